@@ -1,0 +1,33 @@
+"""servotwin: the digital twin of an RC servo, from a pulse in microseconds to the torque at the horn.
+
+Importing the package loads numpy alone; every other part is loaded when its name is first used.
+"""
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+# public name -> module that defines it
+_LAZY = {
+    **dict.fromkeys(("Servo", "catalog_names", "load_dataset", "load_servo", "servo_from_values"), "parameters"),
+    **dict.fromkeys(
+        ("AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor"), "models"),
+    **dict.fromkeys(("Result", "Simulator", "State", "Status", "simulate"), "simulation"),
+}
+_MODULES = ("bench", "errors", "linear", "loads", "models", "parameters", "physics", "plotting", "signals",
+            "simulation", "units")
+
+__all__ = ["__version__", *_LAZY, *_MODULES]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f"servotwin.{name}")
+    if name in _LAZY:
+        return getattr(import_module(f"servotwin.{_LAZY[name]}"), name)
+    raise AttributeError(f"module 'servotwin' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

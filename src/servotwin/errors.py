@@ -1,0 +1,157 @@
+"""Every exception that servotwin raises: one tree, and each carries what was wrong as data.
+
+A message is one line made of three parts: what was looked at, what was got, and what is allowed.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+class ServotwinError(Exception):
+    """Root of all exceptions of this package."""
+
+
+class InputError(ServotwinError, ValueError):
+    """Something that the caller gave is not usable.
+
+    Parameters
+    ----------
+    what : str
+        The thing looked at, for example ``"motor.armature_resistance"``.
+    got : object, optional
+        The value that was given.
+    allowed : str, optional
+        What would have been accepted.
+
+    Examples
+    --------
+    >>> str(InputError("duration", got=0.0, allowed="a positive number of seconds"))
+    'duration: got 0.0, allowed: a positive number of seconds'
+    """
+
+    def __init__(self, what: str, got: object = None, allowed: str | None = None) -> None:
+        self.what = what
+        self.got = got
+        self.allowed = allowed
+        super().__init__(self._message())
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by state: subclasses have other constructors."""
+        return (_rebuild, (type(self), self.args, self.__dict__))
+
+    def _message(self) -> str:
+        text = self.what
+        if self.got is not None:
+            text += f": got {_shown(self.got)}"
+        if self.allowed is not None:
+            text += f"{',' if self.got is not None else ':'} allowed: {self.allowed}"
+        return text
+
+
+class UnitError(InputError):
+    """A unit that does not exist or does not fit the quantity."""
+
+
+class ParameterError(InputError):
+    """A servo parameter is unknown, out of its physical range, or not finite."""
+
+
+class MissingParameterError(ParameterError):
+    """A model requires a parameter that the servo does not have."""
+
+    def __init__(self, model: str, servo: str, names: Iterable[str]) -> None:
+        self.model = model
+        self.servo = servo
+        self.names = tuple(names)
+        super().__init__(f"{model} needs {', '.join(self.names)}, which servo {servo!r} does not give")
+
+
+class ServoFileError(InputError):
+    """A servo file cannot be read or holds something wrong; names the file, the table and the key."""
+
+    def __init__(self, file: str, problem: str, table: str | None = None, key: str | None = None,
+                 got: object = None, allowed: str | None = None) -> None:
+        self.file = file
+        self.table = table
+        self.key = key
+        where = file + (f" [{table}]" if table else "") + (f" {key}" if key else "")
+        super().__init__(f"{where}: {problem}", got=got, allowed=allowed)
+
+
+class UnknownNameError(InputError, KeyError):
+    """A name that is not in a known set; suggests the nearest one."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        self.name = name
+        self.known = tuple(known)
+        near = get_close_matches(name, self.known, n=1, cutoff=0.4)
+        self.suggestion = near[0] if near else None
+        hint = f"; did you mean {self.suggestion!r}?" if near else ""
+        super().__init__(f"unknown {kind} {name!r}{hint}", allowed=", ".join(self.known) or "none")
+
+    def __str__(self) -> str:
+        return InputError._message(self)  # KeyError would print the repr
+
+
+class CommandError(InputError):
+    """A command signal that is malformed, or that the model cannot take."""
+
+
+class LoadError(InputError):
+    """A load that is malformed, or that the model cannot carry."""
+
+
+class OutputExistsError(InputError):
+    """An output file is there already and overwriting was not asked for."""
+
+    def __init__(self, path: object) -> None:
+        self.path = path
+        super().__init__(f"{path} exists already; use --force (overwrite=True) to replace it")
+
+
+class OutputError(InputError):
+    """An output cannot be written."""
+
+
+class MissingExtraError(ServotwinError, ImportError):
+    """An optional package is needed and not installed."""
+
+    def __init__(self, package: str, extra: str) -> None:
+        self.package = package
+        self.extra = extra
+        super().__init__(f"{package} is needed for this: pip install 'servotwin[{extra}]'")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by the constructor's own arguments."""
+        return (type(self), (self.package, self.extra))
+
+
+class SimulationError(ServotwinError, RuntimeError):
+    """A simulation ended before its time; raised only on request (``raise_if_failed``)."""
+
+    def __init__(self, status: str, time: float, cause: str) -> None:
+        self.status = status
+        self.time = time
+        self.cause = cause
+        super().__init__(f"simulation ended at t = {time:.6g} s: {cause}")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by the constructor's own arguments."""
+        return (type(self), (self.status, self.time, self.cause))
+
+
+def _rebuild(kind: type[InputError], args: tuple[object, ...], state: dict[str, object]) -> InputError:
+    error = kind.__new__(kind)
+    error.args = args
+    error.__dict__.update(state)
+    return error
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 120 else text[:117] + "..."

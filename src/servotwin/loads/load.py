@@ -1,0 +1,174 @@
+"""The sum of all that hangs on the shaft, in one normal form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin.errors import LoadError
+from servotwin.loads.parts import Free, Part, Pendulum, Recorded, Spring
+from servotwin.physics.pieces import Piece, Pieces, constant_pieces
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load:
+    """All parts of a load, added up; `a + b` and `b + a` are equal.
+
+    The torque against the motion that does not depend on acceleration is
+
+        τ_ext + B_L q̇ + τ_C sgn(q̇),   τ_ext = τ + k (q − q_r) + Σ m g l sin(q − q_h) + τ_recorded(t)
+
+    Parameters
+    ----------
+    inertia : float
+        Moment of inertia J_L without that of the pendulums [kg m²].
+    viscous_friction : float
+        B_L [N m s/rad].
+    torque : float
+        Constant external torque; positive pushes towards −q [N m].
+    coulomb_torque : float
+        Dry friction of the load itself; holds the shaft at rest and opposes motion both ways [N m].
+    spring : Spring
+        One spring, equivalent to all that were added.
+    pendulums : tuple of Pendulum
+    recorded : tuple of Recorded
+
+    Examples
+    --------
+    >>> from servotwin.loads import Inertia, Pendulum
+    >>> load = Inertia(1e-3) + Inertia(2e-3) + Pendulum(mass=0.1, length=0.12)
+    >>> load.inertia, load.pendulum.mass
+    (0.003, 0.1)
+    """
+
+    inertia: float = 0.0
+    viscous_friction: float = 0.0
+    torque: float = 0.0
+    coulomb_torque: float = 0.0
+    spring: Spring = field(default_factory=lambda: Spring(0.0))
+    pendulums: tuple[Pendulum, ...] = ()
+    recorded: tuple[Recorded, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("inertia", "viscous_friction", "coulomb_torque"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise LoadError(f"load.{name}", got=value, allowed="a finite number of at least 0")
+        if not math.isfinite(self.torque):
+            raise LoadError("load.torque", got=self.torque, allowed="a finite number [N m]")
+
+    def __add__(self, other: Part | Load) -> Load:
+        more = as_load(other)
+        return Load(
+            inertia=self.inertia + more.inertia,
+            viscous_friction=self.viscous_friction + more.viscous_friction,
+            torque=self.torque + more.torque,
+            coulomb_torque=self.coulomb_torque + more.coulomb_torque,
+            spring=_joined(self.spring, more.spring),
+            pendulums=tuple(sorted(self.pendulums + more.pendulums, key=repr)),
+            recorded=tuple(sorted(self.recorded + more.recorded, key=repr)),
+        )
+
+    @property
+    def pendulum(self) -> Pendulum:
+        """The pendulum, where the load has exactly one."""
+        if len(self.pendulums) != 1:
+            raise LoadError("load.pendulum", got=f"{len(self.pendulums)} pendulums", allowed="exactly one")
+        return self.pendulums[0]
+
+    @cached_property
+    def total_inertia(self) -> float:
+        """Moment of inertia of all parts, pendulums included [kg m²]."""
+        return self.inertia + sum(p.moment_of_inertia for p in self.pendulums)
+
+    @cached_property
+    def gravity(self) -> tuple[float, float]:
+        """Amplitude [N m] and hanging angle [rad] of the one sine of q that all pendulums add up to."""
+        if len(self.pendulums) == 1:
+            return self.pendulums[0].gravity_torque, self.pendulums[0].hanging_angle
+        c = sum(p.gravity_torque * math.cos(p.hanging_angle) for p in self.pendulums)
+        s = sum(p.gravity_torque * math.sin(p.hanging_angle) for p in self.pendulums)
+        return math.hypot(c, s), math.atan2(s, c)
+
+    @cached_property
+    def torque_pieces(self) -> Pieces:
+        """The part of τ_ext that depends on time alone [N m]."""
+        if not self.recorded:
+            return constant_pieces(self.torque)
+        times = sorted({t for r in self.recorded for t in r.time})
+        first = max(r.time[0] for r in self.recorded)
+        last = min(r.time[-1] for r in self.recorded)
+        times = [t for t in times if first <= t <= last]
+        if len(times) < 2:
+            raise LoadError("recorded torques", got="recordings that do not overlap", allowed="a common time span")
+        values = [self.torque + sum(float(np.interp(t, r.time, r.torque)) for r in self.recorded) for t in times]
+        rows = [Piece(t0, y0, (y1 - y0) / (t1 - t0))
+                for t0, t1, y0, y1 in zip(times, times[1:], values, values[1:], strict=False)]
+        return Pieces(tuple(rows))
+
+    @property
+    def time_span(self) -> tuple[float, float]:
+        """First and last time for which the load is known [s]; recordings bound it."""
+        return (max((r.time[0] for r in self.recorded), default=-math.inf),
+                min((r.time[-1] for r in self.recorded), default=math.inf))
+
+    def external_torque(self, time: ArrayLike, angle: ArrayLike) -> NDArray[np.float64]:
+        """Return τ_ext(t, q) [N m] at `time` [s] and `angle` [rad], arrays of one shape.
+
+        Raises
+        ------
+        LoadError
+            Outside the span of a recorded torque.
+        """
+        t, q = np.asarray(time, dtype=np.float64), np.asarray(angle, dtype=np.float64)
+        self.check_span(float(np.min(t, initial=math.inf)), float(np.max(t, initial=-math.inf)))
+        amplitude, hanging = self.gravity
+        return np.asarray(self.torque_pieces(t) + self.spring.stiffness * (q - self.spring.rest_angle)
+                          + amplitude * np.sin(q - hanging))
+
+    def check_span(self, start: float, end: float) -> None:
+        """Raise LoadError unless the load is known from `start` to `end` [s]."""
+        first, last = self.time_span
+        if start < first or end > last:
+            raise LoadError("recorded torque", got=f"a run from {start:g} to {end:g} s",
+                            allowed=f"times from {first:g} to {last:g} s, which the record covers")
+
+
+def as_load(load: Part | Load | None) -> Load:
+    """Return any load, part or None (a free shaft) in normal form.
+
+    Raises
+    ------
+    LoadError
+        If it is not a load.
+    """
+    if load is None:
+        return Load()
+    if isinstance(load, Load):
+        return load
+    name = type(load).__name__
+    if isinstance(load, Free):
+        return Load()
+    if isinstance(load, Spring):
+        return Load(spring=load)
+    if isinstance(load, Pendulum):
+        return Load(pendulums=(load,))
+    if isinstance(load, Recorded):
+        return Load(recorded=(load,))
+    if isinstance(load, Part):
+        return Load(**load.terms())
+    raise LoadError("load", got=name, allowed="a load of servotwin.loads, or a sum of them")
+
+
+def _joined(a: Spring, b: Spring) -> Spring:
+    if a.stiffness == 0.0 or b.stiffness == 0.0:
+        return b if a.stiffness == 0.0 else a
+    stiffness = a.stiffness + b.stiffness
+    return Spring(stiffness, (a.stiffness * a.rest_angle + b.stiffness * b.rest_angle) / stiffness)

@@ -1,0 +1,224 @@
+"""The parts of a load: each one mechanical thing, checked once, addable to others."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from servotwin.errors import LoadError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from servotwin.loads.load import Load
+
+STANDARD_GRAVITY = 9.80665  # m/s², 3rd CGPM (1901)
+
+
+class Part:
+    """Base of all parts: addition, and a check that every number is finite."""
+
+    def __post_init__(self) -> None:
+        for name, value in self.terms().items():
+            if isinstance(value, bool) or not isinstance(value, int | float | np.floating) or not math.isfinite(value):
+                raise LoadError(f"{type(self).__name__}({name})", got=value, allowed="a finite number")
+
+    def terms(self) -> dict[str, Any]:
+        """Return the numbers of this part by name (SI)."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
+
+    def __add__(self, other: Part | Load) -> Load:
+        from servotwin.loads.load import as_load  # the sum knows its parts; the parts learn of it only here
+
+        return as_load(self) + other
+
+
+def _check(part: Part, name: str, good: bool, allowed: str) -> None:
+    if not good:
+        raise LoadError(f"{type(part).__name__}({name})", got=getattr(part, name), allowed=allowed)
+
+
+@dataclass(frozen=True)
+class Free(Part):
+    """Nothing: the shaft turns freely.
+
+    Examples
+    --------
+    >>> (Free() + Inertia(1e-3)).inertia
+    0.001
+    """
+
+
+@dataclass(frozen=True)
+class Inertia(Part):
+    """A disc: moment of inertia J_L about the shaft, at least 0 [kg m²] (paper, eq. 16).
+
+    Examples
+    --------
+    >>> Inertia(1e-3).inertia
+    0.001
+    """
+
+    inertia: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check(self, "inertia", self.inertia >= 0.0, "a number of at least 0 [kg m²]")
+
+
+@dataclass(frozen=True)
+class Viscous(Part):
+    """A damper: torque B_L q̇ against the motion, B_L at least 0 [N m s/rad] (paper, eq. 16).
+
+    Examples
+    --------
+    >>> Viscous(1e-4).viscous_friction
+    0.0001
+    """
+
+    viscous_friction: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check(self, "viscous_friction", self.viscous_friction >= 0.0, "a number of at least 0 [N m s/rad]")
+
+
+@dataclass(frozen=True)
+class Constant(Part):
+    """A constant torque, a weight on a drum; positive pushes the shaft towards −q [N m].
+
+    Examples
+    --------
+    >>> (Constant(0.1) + Constant(0.2)).torque
+    0.3
+    """
+
+    torque: float
+
+
+@dataclass(frozen=True)
+class Coulomb(Part):
+    """Dry friction of the load: opposes motion either way and holds at rest, at least 0 [N m].
+
+    Examples
+    --------
+    >>> Coulomb(0.05).coulomb_torque
+    0.05
+    """
+
+    coulomb_torque: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check(self, "coulomb_torque", self.coulomb_torque >= 0.0, "a number of at least 0 [N m]")
+
+
+@dataclass(frozen=True)
+class Spring(Part):
+    """A torsion spring: torque k (q − q_r) against the motion away from its rest angle.
+
+    Parameters
+    ----------
+    stiffness : float
+        k, at least 0 [N m/rad].
+    rest_angle : float
+        q_r [rad].
+
+    Examples
+    --------
+    >>> (Spring(1.0, 0.0) + Spring(1.0, 1.0)).spring
+    Spring(stiffness=2.0, rest_angle=0.5)
+    """
+
+    stiffness: float
+    rest_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _check(self, "stiffness", self.stiffness >= 0.0, "a number of at least 0 [N m/rad]")
+
+
+@dataclass(frozen=True)
+class Pendulum(Part):
+    """A weight on an arm: torque m g l sin(q − q_h) against the motion away from hanging.
+
+    Parameters
+    ----------
+    mass : float
+        m, at least 0 [kg].
+    length : float
+        Distance l of the centre of mass from the shaft, at least 0 [m].
+    inertia : float, optional
+        Moment of inertia about the shaft [kg m²]; m l² unless given.
+    hanging_angle : float
+        Output angle q_h at which it hangs straight down [rad].
+    gravity : float
+        g [m/s²].
+
+    Examples
+    --------
+    >>> round(Pendulum(mass=0.1, length=0.12).gravity_torque, 6)
+    0.11768
+    """
+
+    mass: float
+    length: float
+    inertia: float | None = None
+    hanging_angle: float = 0.0
+    gravity: float = STANDARD_GRAVITY
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("mass", "length", "gravity"):
+            _check(self, name, getattr(self, name) >= 0.0, "a number of at least 0")
+        _check(self, "inertia", self.inertia is None or self.inertia >= 0.0, "a number of at least 0 [kg m²]")
+
+    def terms(self) -> dict[str, Any]:
+        """Return the given numbers by name (SI)."""
+        return {name: value for name, value in super().terms().items() if name != "inertia" or value is not None}
+
+    @property
+    def moment_of_inertia(self) -> float:
+        """About the shaft [kg m²]."""
+        return self.mass * self.length**2 if self.inertia is None else self.inertia
+
+    @property
+    def gravity_torque(self) -> float:
+        """Amplitude m g l [N m]."""
+        return self.mass * self.gravity * self.length
+
+
+@dataclass(frozen=True)
+class Recorded(Part):
+    """A torque measured over time, linear between samples; a run outside the record is an error.
+
+    Parameters
+    ----------
+    time : sequence of float, shape (n,)
+        Increasing, n ≥ 2 [s].
+    torque : sequence of float, shape (n,)
+        Positive pushes the shaft towards −q [N m].
+
+    Examples
+    --------
+    >>> Recorded([0.0, 1.0], [0.0, 0.2]).torque
+    (0.0, 0.2)
+    """
+
+    time: Sequence[float]
+    torque: Sequence[float]
+
+    def __post_init__(self) -> None:
+        time, torque = np.asarray(self.time, dtype=np.float64), np.asarray(self.torque, dtype=np.float64)
+        if time.ndim != 1 or time.shape != torque.shape or time.size < 2:
+            raise LoadError("Recorded(time, torque)", got=f"shapes {time.shape} and {torque.shape}",
+                            allowed="two arrays of one length of at least 2")
+        if not (np.isfinite(time).all() and np.isfinite(torque).all()):
+            raise LoadError("Recorded(time, torque)", got="values that are not finite", allowed="finite numbers")
+        if not (np.diff(time) > 0.0).all():
+            raise LoadError("Recorded(time)", got="times that do not increase", allowed="increasing times [s]")
+        object.__setattr__(self, "time", tuple(time.tolist()))
+        object.__setattr__(self, "torque", tuple(torque.tolist()))

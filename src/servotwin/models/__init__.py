@@ -1,0 +1,16 @@
+"""One final class per fidelity; each joins a servo's parameters to the laws that it uses."""
+
+from servotwin.models.averaged import AveragedServo, AveragedServoInductive
+from servotwin.models.base import Model
+from servotwin.models.bounded import BoundedServo
+from servotwin.models.motors import DCMotor, GearedMotor
+
+MODELS: dict[str, type[Model]] = {
+    "dc-motor": DCMotor,
+    "geared-motor": GearedMotor,
+    "averaged": AveragedServo,
+    "averaged-inductive": AveragedServoInductive,
+    "bounded": BoundedServo,
+}
+
+__all__ = ["MODELS", "AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "Model"]

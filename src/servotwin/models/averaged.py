@@ -1,0 +1,123 @@
+"""The paper's servo: mean armature voltage proportional to the error, Coulomb friction smoothed by tanh."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from servotwin.models.base import Model, check_travel
+from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.plant import make_plant
+from servotwin.physics import electronics, potentiometer
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from servotwin.loads import Load
+    from servotwin.physics.pieces import Pieces
+    from servotwin.signals import Signal
+
+_REQUIRES = (
+    "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
+    "motor.motor_viscous_friction", "gear.gear_reduction",
+    "friction.coulomb_torque_forward", "friction.coulomb_torque_backward", "friction.zero_crossing_slope",
+    "electronics.bridge_gain", "electronics.comparator_gain", "electronics.voltage_to_pulse_gain",
+    "electronics.pulse_to_voltage_gain", "electronics.command_offset",
+    "potentiometer.feedback_gain", "potentiometer.feedback_offset",
+)
+_SIGNALS = (
+    "command_voltage", "command_angle", "pulse_width", "armature_voltage", "armature_current", "motor_angle",
+    "motor_speed", "motor_torque", "output_angle", "output_speed", "load_torque", "feedback_voltage",
+)
+
+
+class _Averaged(Model):
+    """What the two averaged servos share: (38) with offsets, (41), and the command chain."""
+
+    optional = ("electronics.command_pulse_offset",)
+    signals = _SIGNALS
+
+    def _plant(self, load: Load, inductance: float) -> Plant:
+        return make_plant(
+            self, load, reduction=self.value("gear.gear_reduction"), inductance=inductance,
+            friction=(self.value("friction.coulomb_torque_forward"), self.value("friction.coulomb_torque_backward")),
+            slope=self.value("friction.zero_crossing_slope"),
+            gain=self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain"),
+            p=self.value("potentiometer.feedback_gain"), b_o=self.value("potentiometer.feedback_offset"))
+
+    def _gains(self) -> tuple[float, float, float, float]:
+        """k_p1, k_p2, b_i, t_0."""
+        return (self.value("electronics.voltage_to_pulse_gain"), self.value("electronics.pulse_to_voltage_gain"),
+                self.value("electronics.command_offset"), self.value_or("electronics.command_pulse_offset", 0.0))
+
+    def command(self, signal: Signal) -> Pieces:
+        """Return v_c [V]: k_p v_i + b_i of a voltage, k_p2 (t_a − t_0) + b_i of a pulse, p q* + b_o of an angle."""
+        k_p1, k_p2, b_i, t_0 = self._gains()
+        if signal.kind == "voltage":
+            return signal.pieces.scaled(k_p1 * k_p2, b_i)
+        if signal.kind == "pulse_width":
+            return signal.pieces.scaled(k_p2, b_i - k_p2 * t_0)
+        check_travel(signal, self.servo)
+        return signal.pieces.scaled(self.value("potentiometer.feedback_gain"),
+                                    self.value("potentiometer.feedback_offset"))
+
+    def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
+        k_p1, k_p2, b_i, t_0 = self._gains()
+        v_i = (drive - b_i) / (k_p1 * k_p2)
+        if name == "command_voltage":
+            return v_i
+        if name == "pulse_width":
+            return np.asarray(electronics.pulse_width_from_voltage(v_i, k_p1, t_0))
+        return np.asarray(potentiometer.angle_from_voltage(
+            drive, self.value("potentiometer.feedback_gain"), self.value("potentiometer.feedback_offset")))
+
+    def start_angle(self, drive: float) -> float:
+        """Return the angle without error, (v_c − b_o)/p [rad]."""
+        return (drive - self.value("potentiometer.feedback_offset")) / self.value("potentiometer.feedback_gain")
+
+
+@final
+class AveragedServo(_Averaged):
+    """The paper's model, eq. (35)-(41) with the offsets of the measured servo; armature inductance neglected.
+
+    As printed it knows no supply: the armature voltage grows with the error without bound. It has no deadband and
+    no static friction, so a loaded shaft creeps.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = AveragedServo(st.load_servo("hitec-hs-755hb"))
+    >>> "supply.open_circuit_voltage" in model.ignored
+    True
+    """
+
+    requires = _REQUIRES
+    layout = ("output_angle", "output_speed")
+
+    def pack(self, load: Load) -> Plant:
+        """Return the plant at the output shaft."""
+        return self._plant(load, 0.0)
+
+
+@final
+class AveragedServoInductive(_Averaged):
+    """The averaged servo with armature inductance, eq. (27)-(33) and (41), the current as a state.
+
+    The paper's (34) gives the rate of the torque from the third derivative of the angle and cannot be run forward;
+    this is the same physics.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> AveragedServoInductive(st.load_servo("hitec-hs-755hb")).layout
+    ('output_angle', 'output_speed', 'armature_current')
+    """
+
+    requires = (*_REQUIRES, "motor.armature_inductance")
+    layout = ("output_angle", "output_speed", "armature_current")
+
+    def pack(self, load: Load) -> Plant:
+        """Return the plant at the output shaft."""
+        return self._plant(load, self.value("motor.armature_inductance"))

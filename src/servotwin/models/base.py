@@ -1,0 +1,141 @@
+"""What every model is: parameters joined to laws, a command conversion, and named output signals."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, ClassVar, final
+
+from servotwin.errors import CommandError, MissingParameterError, UnknownNameError
+from servotwin.models import outputs
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from servotwin.loads import Load
+    from servotwin.models.kernels.hybrid import Plant
+    from servotwin.models.samples import Samples
+    from servotwin.parameters import Servo
+    from servotwin.physics.pieces import Pieces
+    from servotwin.signals import Signal
+
+
+class Model(ABC):
+    """A fidelity: immutable once built, without state of its own.
+
+    Parameters
+    ----------
+    servo : Servo
+        Must give every parameter of `requires`.
+
+    Raises
+    ------
+    MissingParameterError
+        If the servo lacks a required parameter; all that are missing are named.
+    """
+
+    requires: ClassVar[tuple[str, ...]]
+    """Dotted names without which the model cannot be built."""
+    optional: ClassVar[tuple[str, ...]] = ()
+    """Dotted names that are used where given."""
+    layout: ClassVar[tuple[str, ...]]
+    """Signal names of the state: angle, speed and, with inductance, current."""
+    signals: ClassVar[tuple[str, ...]]
+    """Names of the output signals, `time` apart."""
+
+    def __init__(self, servo: Servo) -> None:
+        missing = [name for name in self.requires if servo.get(name) is None]
+        if missing:
+            raise MissingParameterError(type(self).__name__, servo.name, missing)
+        self._servo = servo
+        self._prepare()
+
+    def _prepare(self) -> None:  # noqa: B027 - a hook that most models do not need
+        """Check what depends on several parameters, once."""
+
+    @property
+    def servo(self) -> Servo:
+        """The servo whose parameters are used."""
+        return self._servo
+
+    @property
+    def ignored(self) -> tuple[str, ...]:
+        """Dotted names that the servo gives and this model does not read."""
+        read = set(self.requires) | set(self.optional)
+        return tuple(name for name in self._servo.names() if name not in read)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._servo.name!r})"
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and self._servo == other._servo
+
+    def __hash__(self) -> int:
+        return hash((type(self), self._servo.name))
+
+    @final
+    def value(self, name: str) -> float:
+        """Return a required parameter (SI)."""
+        number = self._servo.get(name)
+        if not isinstance(number, int | float):
+            raise MissingParameterError(type(self).__name__, self._servo.name, [name])
+        return float(number)
+
+    @final
+    def value_or(self, name: str, default: float) -> float:
+        """Return an optional parameter (SI), or its default where the servo does not give it."""
+        number = self._servo.get(name)
+        return float(number) if isinstance(number, int | float) else default
+
+    @abstractmethod
+    def pack(self, load: Load) -> Plant:
+        """Return everything that the engine reads, as plain floats."""
+
+    @abstractmethod
+    def command(self, signal: Signal) -> Pieces:
+        """Return the signal as what the model follows: armature voltage (motors) or control voltage (servos) [V].
+
+        Raises
+        ------
+        CommandError
+            If the model cannot take this kind of command, or it asks for an angle outside the travel.
+        """
+
+    @abstractmethod
+    def start_angle(self, drive: float) -> float:
+        """Return the angle [rad] at which the model rests under a command `drive` [V] that never changed."""
+
+    @final
+    def output(self, name: str, samples: Samples, drive: Pieces, load: Load) -> NDArray[np.float64]:
+        """Return an output signal (SI), shape (n,).
+
+        Raises
+        ------
+        UnknownNameError
+            If the model does not have it; the message lists those that it has.
+        """
+        if name == "time":
+            return samples.time
+        if name not in self.signals:
+            raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.signals))
+        return outputs.SIGNALS[name].compute(self, samples, drive, load)
+
+    def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
+        raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.signals))
+
+
+def check_travel(signal: Signal, servo: Servo) -> None:
+    """Raise CommandError if an angle command leaves the travel that the servo gives."""
+    lowest, highest = signal.pieces.bounds(signal.pieces.table[-1].start)
+    lower = servo.get("stops.lower_angle")
+    upper = servo.get("stops.upper_angle")
+    low = lower if isinstance(lower, int | float) else -math.inf
+    high = upper if isinstance(upper, int | float) else math.inf
+    slack = 1e-9
+    if lowest < low - slack or highest > high + slack:
+        angle = lowest if lowest < low - slack else highest
+        raise CommandError(
+            "angle command", got=f"{math.degrees(angle):.6g} deg",
+            allowed=f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg, the travel of {servo.name}")

@@ -1,0 +1,132 @@
+"""The averaged servo with what a real one cannot do without: supply limit, deadband, sticking, end stops."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from typing import TYPE_CHECKING, final
+
+import numpy as np
+
+from servotwin.errors import MissingParameterError
+from servotwin.models.base import Model, check_travel
+from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.plant import make_plant
+from servotwin.physics import potentiometer
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from servotwin.loads import Load
+    from servotwin.physics.pieces import Pieces
+    from servotwin.signals import Signal
+
+
+@final
+class BoundedServo(Model):
+    """Mean armature voltage, limited by the supply, with deadband, true sticking and end stops.
+
+    Its command chain needs a calibration: `electronics.one_shot_slope` with `one_shot_offset`, or
+    `pulse_to_voltage_gain` with `command_offset`. Where both are given each serves its own kind of command.
+
+    Warns
+    -----
+    UserWarning
+        If the two calibrations differ by more than 1 % of the supply voltage.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> BoundedServo(st.load_servo("hitec-hs-755hb")).layout
+    ('output_angle', 'output_speed')
+    """
+
+    requires = (
+        "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
+        "motor.motor_viscous_friction", "gear.gear_reduction",
+        "friction.coulomb_torque_forward", "friction.coulomb_torque_backward",
+        "electronics.bridge_gain", "electronics.comparator_gain",
+        "potentiometer.feedback_gain", "potentiometer.feedback_offset", "supply.open_circuit_voltage",
+    )
+    optional = (
+        "electronics.voltage_deadband", "supply.bridge_drop_voltage", "friction.breakaway_ratio",
+        "stops.lower_angle", "stops.upper_angle", "stops.restitution",
+        "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset", "electronics.command_offset",
+        "electronics.pulse_to_voltage_gain", "electronics.one_shot_slope", "electronics.one_shot_offset",
+    )
+    layout = ("output_angle", "output_speed")
+    signals = (
+        "command_voltage", "command_angle", "pulse_width", "armature_voltage", "armature_current", "motor_angle",
+        "motor_speed", "motor_torque", "output_angle", "output_speed", "load_torque", "feedback_voltage",
+    )
+
+    def _prepare(self) -> None:
+        given = self.servo.get
+        slope, k_p2 = given("electronics.one_shot_slope"), given("electronics.pulse_to_voltage_gain")
+        if slope is None and k_p2 is None:
+            raise MissingParameterError(type(self).__name__, self.servo.name, [
+                "electronics.one_shot_slope (or electronics.pulse_to_voltage_gain)"])
+        if given("electronics.one_shot_offset") is None and given("electronics.command_offset") is None:
+            raise MissingParameterError(type(self).__name__, self.servo.name, [
+                "electronics.one_shot_offset (or electronics.command_offset)"])
+        self._slope = self.value_or("electronics.one_shot_slope", 1.0 / float(k_p2) if k_p2 else math.nan)
+        self._k_p2 = self.value_or("electronics.pulse_to_voltage_gain", 1.0 / self._slope)
+        self._t_0 = self.value_or("electronics.command_pulse_offset", 0.0)
+        offset = self.value_or("electronics.command_offset", math.nan)
+        self._T_0 = self.value_or("electronics.one_shot_offset", self._slope * (self._k_p2 * self._t_0 - offset))
+        self._b_i = offset if offset == offset else self._k_p2 * self._t_0 - self._T_0 / self._slope
+        self._compare_calibrations()
+
+    def _compare_calibrations(self) -> None:
+        width = 1.5e-3  # s, the middle of the RC standard
+        of_pulse = (width - self._T_0) / self._slope
+        of_voltage = self._k_p2 * (width - self._t_0) + self._b_i
+        if abs(of_pulse - of_voltage) > 0.01 * self.value("supply.open_circuit_voltage"):
+            warnings.warn(
+                f"{self.servo.name}: at 1500 us electronics.one_shot_slope/one_shot_offset give {of_pulse:.4g} V and "
+                f"electronics.pulse_to_voltage_gain/command_offset {of_voltage:.4g} V; each is used for its own kind "
+                "of command", stacklevel=4)
+
+    @property
+    def voltage_limit(self) -> float:
+        """V_max = V_oc − V_ce0 [V]."""
+        return self.value("supply.open_circuit_voltage") - self.value_or("supply.bridge_drop_voltage", 0.0)
+
+    def pack(self, load: Load) -> Plant:
+        """Return the plant at the output shaft."""
+        return make_plant(
+            self, load, reduction=self.value("gear.gear_reduction"),
+            friction=(self.value("friction.coulomb_torque_forward"), self.value("friction.coulomb_torque_backward")),
+            breakaway=self.value_or("friction.breakaway_ratio", 1.0),
+            gain=self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain"),
+            p=self.value("potentiometer.feedback_gain"), b_o=self.value("potentiometer.feedback_offset"),
+            deadband=self.value_or("electronics.voltage_deadband", 0.0), voltage_limit=self.voltage_limit,
+            stops=(self.value_or("stops.lower_angle", -math.inf), self.value_or("stops.upper_angle", math.inf)),
+            restitution=self.value_or("stops.restitution", 0.0))
+
+    def command(self, signal: Signal) -> Pieces:
+        """Return v_c [V]: k_p v_i + b_i of a voltage, (t_a − T_0)/one_shot_slope of a pulse, p q* + b_o of an angle."""
+        if signal.kind == "voltage":
+            return signal.pieces.scaled(self.value("electronics.voltage_to_pulse_gain") * self._k_p2, self._b_i)
+        if signal.kind == "pulse_width":
+            return signal.pieces.scaled(1.0 / self._slope, -self._T_0 / self._slope)
+        check_travel(signal, self.servo)
+        return signal.pieces.scaled(self.value("potentiometer.feedback_gain"),
+                                    self.value("potentiometer.feedback_offset"))
+
+    def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
+        if name == "pulse_width":
+            return self._T_0 + self._slope * drive
+        if name == "command_voltage":
+            return (drive - self._b_i) / (self.value("electronics.voltage_to_pulse_gain") * self._k_p2)
+        return np.asarray(potentiometer.angle_from_voltage(
+            drive, self.value("potentiometer.feedback_gain"), self.value("potentiometer.feedback_offset")))
+
+    def start_angle(self, drive: float) -> float:
+        """Return the angle without error, (v_c − b_o)/p, within the stops [rad]."""
+        q = (drive - self.value("potentiometer.feedback_offset")) / self.value("potentiometer.feedback_gain")
+        return min(max(q, self.value_or("stops.lower_angle", -math.inf)),
+                   self.value_or("stops.upper_angle", math.inf))
+
+

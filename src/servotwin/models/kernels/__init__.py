@@ -1,0 +1,1 @@
+"""The models' modes as plain functions over floats; they know `math` and nothing else."""

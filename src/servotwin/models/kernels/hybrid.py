@@ -1,0 +1,352 @@
+"""The servo as a hybrid automaton: its modes, what holds in each, and what ends each.
+
+One automaton serves the motors and the servos without pulses. What a model lacks has a neutral value (no supply
+limit: infinite; no deadband, stop or friction: absent), so every law stands here once. A mode is a pair:
+
+zone     how the armature voltage follows the error v_e = u − p q − b_o: saturated (±2), linear (±1), deadband (0)
+contact  how the shaft moves: without friction, sliding forward or backward, in the core of a smoothed friction,
+         stuck, or resting on the lower or upper stop
+
+All quantities are at the output shaft (a bare motor has N = 1).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class Plant(NamedTuple):
+    """Everything that the automaton reads, as plain floats in SI."""
+
+    J: float  # N² J_m + J_L
+    b: float  # N² B_m + B_L
+    K: float  # N k_a
+    K_b: float  # N k_b
+    R: float
+    L: float  # 0: the current follows at once
+    F_forward: float  # N F_ec1
+    F_backward: float  # N F_ec2
+    breakaway: float  # F_s / F_c
+    kappa: float  # N k, slope of tanh (41); 0: true sticking
+    coulomb: float  # dry friction of the load
+    stiffness: float
+    rest_angle: float
+    gravity: float  # m g l
+    hanging_angle: float
+    gain: float  # A k_s
+    p: float
+    b_o: float
+    half_deadband: float
+    V_max: float
+    lower: float
+    upper: float
+    restitution: float
+
+
+class Mode(NamedTuple):
+    """Zone of the voltage law and contact of the shaft."""
+
+    zone: int
+    contact: int
+
+
+SATURATED_BACKWARD, LINEAR_BACKWARD, DEAD, LINEAR, SATURATED = -2, -1, 0, 1, 2
+FREE, FORWARD, BACKWARD, CORE, STUCK, ON_LOWER, ON_UPPER = range(7)
+CONTACT_NAMES = ("free", "forward", "backward", "core", "stuck", "on lower stop", "on upper stop")
+
+# What can end a mode. A guard is at least zero as long as the mode lasts.
+SPEED, CORE_FORWARD, CORE_BACKWARD, ZONE_UP, ZONE_DOWN, UPPER, LOWER, RELEASE_FORWARD, RELEASE_BACKWARD = range(9)
+EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper stop", "lower stop",
+               "release forward", "release backward")
+
+_SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
+_REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
+_TIE = 1e-13  # V
+
+
+def at_rest(contact: int) -> bool:
+    """Tell whether the shaft stands still in this contact."""
+    return contact >= STUCK
+
+
+def core_speed(plant: Plant) -> float:
+    """Return the output speed [rad/s] beyond which the smoothed friction (41) is constant; 0 for true sticking."""
+    return _SATURATED_TANH / plant.kappa if plant.kappa > 0.0 else 0.0
+
+
+def zone_limits(plant: Plant, zone: int) -> tuple[float, float]:
+    """Return the errors v_e [V] between which a zone lies."""
+    e1 = plant.half_deadband
+    e2 = e1 + plant.V_max / plant.gain
+    if zone == SATURATED:
+        return e2, math.inf
+    if zone == SATURATED_BACKWARD:
+        return -math.inf, -e2
+    if zone == DEAD:
+        return -e1, e1
+    if e1 == 0.0:  # one linear zone: without a deadband nothing happens at v_e = 0
+        return -e2, e2
+    return (e1, e2) if zone == LINEAR else (-e2, -e1)
+
+
+def zone_of(plant: Plant, error: float, error_rate: float) -> int:
+    """Return the zone in which the error lies; on a boundary, the one that it moves into."""
+    tie = _TIE * (1.0 + abs(error))
+    e = error + (math.copysign(2.0 * tie, error_rate) if error_rate != 0.0 else 0.0)
+    size = abs(e)
+    if size > plant.half_deadband + plant.V_max / plant.gain:
+        return SATURATED if e > 0.0 else SATURATED_BACKWARD
+    if plant.half_deadband == 0.0:
+        return LINEAR
+    if size <= plant.half_deadband:
+        return DEAD
+    return LINEAR if e > 0.0 else LINEAR_BACKWARD
+
+
+def voltage(plant: Plant, zone: int, error: float) -> float:
+    """Return the armature voltage [V] of a zone at the error v_e [V]."""
+    if zone == DEAD:
+        return 0.0
+    if zone == SATURATED or zone == SATURATED_BACKWARD:
+        return math.copysign(plant.V_max, zone)
+    return plant.gain * (error - zone * plant.half_deadband)
+
+
+def in_linear_zone(zone: int) -> bool:
+    """Tell whether the armature voltage follows the error in this zone."""
+    return zone == LINEAR or zone == LINEAR_BACKWARD
+
+
+def external_torque(plant: Plant, tau: float, q: float) -> float:
+    """Return τ_ext [N m] against +q, given its part `tau` that depends on time alone."""
+    torque = tau + plant.stiffness * (q - plant.rest_angle)
+    if plant.gravity != 0.0:
+        torque += plant.gravity * math.sin(q - plant.hanging_angle)
+    return torque
+
+
+def holding_bounds(plant: Plant) -> tuple[float, float]:
+    """Return the torques [N m] that friction holds at rest, against a start backward and forward."""
+    return (plant.breakaway * plant.F_backward + plant.coulomb, plant.breakaway * plant.F_forward + plant.coulomb)
+
+
+def driving_torque(plant: Plant, zone: int, u: float, tau: float, q: float, i: float) -> float:
+    """Return N k_a i − τ_ext [N m] at rest: what friction has to hold."""
+    if plant.L == 0.0:
+        i = voltage(plant, zone, u - plant.p * q - plant.b_o) / plant.R
+    return plant.K * i - external_torque(plant, tau, q)
+
+
+def has_friction(plant: Plant) -> bool:
+    """Tell whether there is any friction other than viscous."""
+    return plant.F_forward > 0.0 or plant.F_backward > 0.0 or plant.coulomb > 0.0
+
+
+def contact_of(plant: Plant, zone: int, u: float, tau: float, q: float, w: float, i: float, smooth: bool) -> int:
+    """Return the contact of a shaft at q with speed w; `smooth` keeps a smoothed friction in one piece."""
+    if plant.kappa > 0.0:
+        if not has_friction(plant):
+            return FREE
+        if smooth or abs(w) <= core_speed(plant):
+            return CORE
+        return FORWARD if w > 0.0 else BACKWARD
+    if w == 0.0:
+        return _contact_from_rest(plant, driving_torque(plant, zone, u, tau, q, i), q)
+    if not has_friction(plant):
+        return FREE
+    return FORWARD if w > 0.0 else BACKWARD
+
+
+def _contact_from_rest(plant: Plant, torque: float, q: float) -> int:
+    backward, forward = holding_bounds(plant)
+    free = not has_friction(plant)
+    if torque > forward or (free and torque == 0.0):
+        if q >= plant.upper and not (free and torque == 0.0):
+            return ON_UPPER
+        return FREE if free else FORWARD
+    if torque < -backward:
+        if q <= plant.lower:
+            return ON_LOWER
+        return FREE if free else BACKWARD
+    return STUCK
+
+
+def friction_torque(plant: Plant, contact: int, w: float) -> float:
+    """Return the friction [N m] against +q of a moving shaft, the load's own included."""
+    if contact == FORWARD:
+        return plant.F_forward + plant.coulomb
+    if contact == BACKWARD:
+        return -plant.F_backward - plant.coulomb
+    if contact == CORE:
+        x = math.tanh(plant.kappa * w)
+        return ((plant.F_forward if w >= 0.0 else plant.F_backward) + plant.coulomb) * x
+    return 0.0
+
+
+def rates(plant: Plant, mode: Mode, u: float, tau: float, q: float, w: float, i: float) -> tuple[float, float]:
+    """Return ẇ [rad/s²] and di/dt [A/s] (0 without inductance)."""
+    v = voltage(plant, mode.zone, u - plant.p * q - plant.b_o)
+    di = 0.0
+    if plant.L > 0.0:
+        di = (v - plant.R * i - plant.K_b * w) / plant.L
+    else:
+        i = (v - plant.K_b * w) / plant.R
+    if at_rest(mode.contact):
+        return 0.0, di
+    torque = plant.K * i - plant.b * w - friction_torque(plant, mode.contact, w) - external_torque(plant, tau, q)
+    return torque / plant.J, di
+
+
+def jacobian(plant: Plant, mode: Mode, q: float, w: float) -> tuple[float, ...]:
+    """Return ∂ẇ/∂(q, w, i), ∂(di/dt)/∂(q, w, i), and the gains of u and τ: ∂ẇ/∂u, ∂ẇ/∂τ, ∂(di/dt)/∂u."""
+    gain = plant.gain if in_linear_zone(mode.zone) else 0.0
+    Eq = Ew = Ei = Eu = 0.0
+    Fq = -plant.stiffness
+    if plant.gravity != 0.0:
+        Fq -= plant.gravity * math.cos(q - plant.hanging_angle)
+    Fw = -plant.b
+    Fi = Fu = 0.0
+    if mode.contact == CORE:
+        x = math.tanh(plant.kappa * w)
+        F = (plant.F_forward if w >= 0.0 else plant.F_backward) + plant.coulomb
+        Fw -= F * plant.kappa * (1.0 - x * x)
+    if plant.L > 0.0:
+        Eq, Ew, Ei, Eu = -gain * plant.p / plant.L, -plant.K_b / plant.L, -plant.R / plant.L, gain / plant.L
+        Fi = plant.K
+    else:
+        per_volt = plant.K / plant.R
+        Fq -= per_volt * gain * plant.p
+        Fw -= per_volt * plant.K_b
+        Fu = per_volt * gain
+    J = plant.J
+    if at_rest(mode.contact):
+        return 0.0, 0.0, 0.0, 0.0, 0.0, Ei, 0.0, 0.0, Eu
+    return Fq / J, Fw / J, Fi / J, Eq, Ew, Ei, Fu / J, -1.0 / J, Eu
+
+
+def guards(plant: Plant, mode: Mode, smooth: bool) -> tuple[int, ...]:
+    """Return what can end this mode."""
+    zone, contact = mode
+    kinds: list[int] = []
+    if contact == CORE:
+        if not smooth:
+            kinds += (CORE_FORWARD, CORE_BACKWARD)
+    elif contact == STUCK:
+        kinds += (RELEASE_FORWARD, RELEASE_BACKWARD)
+    elif contact == ON_UPPER:
+        kinds.append(RELEASE_BACKWARD)
+    elif contact == ON_LOWER:
+        kinds.append(RELEASE_FORWARD)
+    elif contact != FREE:
+        kinds.append(SPEED)
+    low, high = zone_limits(plant, zone)
+    if high < math.inf:
+        kinds.append(ZONE_UP)
+    if low > -math.inf:
+        kinds.append(ZONE_DOWN)
+    if plant.upper < math.inf and contact in (FREE, FORWARD, CORE):
+        kinds.append(UPPER)
+    if plant.lower > -math.inf and contact in (FREE, BACKWARD, CORE):
+        kinds.append(LOWER)
+    return tuple(kinds)
+
+
+def guard(plant: Plant, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float,
+          q: float, w: float, i: float, dw: float, di: float) -> tuple[float, float]:
+    """Return a guard and its time derivative; the mode ends when it falls below zero."""
+    zone, contact = mode
+    if kind == SPEED:
+        sign = 1.0 if contact == FORWARD else -1.0
+        return sign * w - core_speed(plant), sign * dw
+    if kind == CORE_FORWARD:
+        return core_speed(plant) - w, -dw
+    if kind == CORE_BACKWARD:
+        return core_speed(plant) + w, dw
+    if kind == UPPER:
+        return plant.upper - q, -w
+    if kind == LOWER:
+        return q - plant.lower, w
+    error = u - plant.p * q - plant.b_o
+    error_rate = du - plant.p * w
+    low, high = zone_limits(plant, zone)
+    if kind == ZONE_UP:
+        return high - error, -error_rate
+    if kind == ZONE_DOWN:
+        return error - low, error_rate
+    torque = driving_torque(plant, zone, u, tau, q, i)
+    if plant.L == 0.0:
+        di = plant.gain * error_rate / plant.R if in_linear_zone(zone) else 0.0
+    rate = plant.K * di - dtau
+    backward, forward = holding_bounds(plant)
+    if kind == RELEASE_FORWARD:
+        return forward - torque, -rate
+    return torque + backward, rate
+
+
+def cross(plant: Plant, mode: Mode, kind: int, u: float, tau: float,
+          q: float, w: float, i: float) -> tuple[Mode, float, float]:
+    """Return the mode, angle and speed just after the guard `kind` of `mode` has reached zero."""
+    zone, contact = mode
+    if kind == ZONE_UP or kind == ZONE_DOWN:
+        return Mode(_neighbour(plant, zone, kind), contact), q, w
+    if kind == SPEED and plant.kappa > 0.0:
+        return Mode(zone, CORE), q, w
+    if kind == SPEED:
+        return Mode(zone, _contact_from_rest(plant, driving_torque(plant, zone, u, tau, q, i), q)), q, 0.0
+    if kind == CORE_FORWARD:
+        return Mode(zone, FORWARD), q, w
+    if kind == CORE_BACKWARD:
+        return Mode(zone, BACKWARD), q, w
+    if kind == UPPER or kind == LOWER:
+        return _rebound(plant, zone, kind, u, tau, w, i)
+    free = not has_friction(plant)
+    if kind == RELEASE_FORWARD:
+        return Mode(zone, FREE if free else FORWARD), q, 0.0
+    return Mode(zone, FREE if free else BACKWARD), q, 0.0
+
+
+def _rebound(plant: Plant, zone: int, kind: int, u: float, tau: float, w: float,
+             i: float) -> tuple[Mode, float, float]:
+    q = plant.upper if kind == UPPER else plant.lower
+    w = -plant.restitution * w
+    if abs(w) < _REST_SPEED:
+        torque = driving_torque(plant, zone, u, tau, q, i)
+        return Mode(zone, _contact_from_rest(plant, torque, q)), q, 0.0
+    if not has_friction(plant):
+        return Mode(zone, FREE), q, w
+    return Mode(zone, FORWARD if w > 0.0 else BACKWARD), q, w
+
+
+def _neighbour(plant: Plant, zone: int, kind: int) -> int:
+    step = 1 if kind == ZONE_UP else -1
+    if plant.half_deadband > 0.0:
+        return zone + step
+    if zone == LINEAR:
+        return 2 * step
+    return LINEAR
+
+
+def linear_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], tau: tuple[float, ...],
+                        q: float, w: float) -> tuple[float, ...]:
+    """Return (a, c, f0, f1, fs, Ω, φ, q0, w0) of the motion of a linear sliding mode without inductance.
+
+    `u` is (value, slope, amplitude, frequency, phase) of the command at the start of the motion, `tau` (value,
+    slope) of the external torque; see `second_order`.
+    """
+    per_volt = plant.K / plant.R
+    damping = plant.b + per_volt * plant.K_b
+    stiffness = plant.stiffness
+    torque = plant.stiffness * plant.rest_angle - friction_torque(plant, mode.contact, w) - tau[0]
+    rate = -tau[1]
+    sinusoid = 0.0
+    if in_linear_zone(mode.zone):
+        gain = per_volt * plant.gain
+        stiffness += gain * plant.p
+        torque += gain * (u[0] - plant.b_o - mode.zone * plant.half_deadband)
+        rate += gain * u[1]
+        sinusoid = gain * u[2]
+    else:
+        torque += per_volt * voltage(plant, mode.zone, 0.0)
+    J = plant.J
+    return (0.5 * damping / J, stiffness / J, torque / J, rate / J, sinusoid / J, u[3], u[4], q, w)

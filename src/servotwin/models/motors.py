@@ -1,0 +1,83 @@
+"""The paper's first two plants: a DC motor alone, and with a geared load. Their command is the armature voltage."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, final
+
+from servotwin.errors import CommandError
+from servotwin.models.base import Model
+from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.plant import make_plant
+
+if TYPE_CHECKING:
+    from servotwin.loads import Load
+    from servotwin.physics.pieces import Pieces
+    from servotwin.signals import Signal
+
+_MOTOR = ("motor.armature_resistance", "motor.armature_inductance", "motor.torque_constant",
+          "motor.back_emf_constant", "motor.rotor_inertia", "motor.motor_viscous_friction")
+
+
+def _armature_voltage(model: Model, signal: Signal) -> Pieces:
+    if signal.kind != "voltage":
+        raise CommandError(f"command of {type(model).__name__}", got=f"unit {signal.unit}",
+                           allowed="V, mV: a motor follows its armature voltage")
+    return signal.pieces
+
+
+@final
+class DCMotor(Model):
+    """A DC motor with armature inductance, eq. (7)-(15); a load, if any, sits on its own shaft.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> DCMotor(st.load_servo("hitec-hs-755hb")).layout
+    ('motor_angle', 'motor_speed', 'armature_current')
+    """
+
+    requires = _MOTOR
+    layout = ("motor_angle", "motor_speed", "armature_current")
+    signals = ("armature_voltage", "armature_current", "motor_angle", "motor_speed", "motor_torque")
+
+    def pack(self, load: Load) -> Plant:
+        """Return the plant at the motor's own shaft."""
+        return make_plant(self, load, reduction=1.0, inductance=self.value("motor.armature_inductance"))
+
+    def command(self, signal: Signal) -> Pieces:
+        """Return the armature voltage [V]; other units are refused."""
+        return _armature_voltage(self, signal)
+
+    def start_angle(self, drive: float) -> float:
+        """Return 0: a motor starts at angle 0."""
+        return 0.0
+
+
+@final
+class GearedMotor(Model):
+    """A DC motor with a load behind a gear, eq. (16)-(22).
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> GearedMotor(st.load_servo("hitec-hs-755hb")).layout
+    ('output_angle', 'output_speed', 'armature_current')
+    """
+
+    requires = (*_MOTOR, "gear.gear_reduction")
+    layout = ("output_angle", "output_speed", "armature_current")
+    signals = ("armature_voltage", "armature_current", "motor_angle", "motor_speed", "motor_torque",
+               "output_angle", "output_speed", "load_torque")
+
+    def pack(self, load: Load) -> Plant:
+        """Return the plant at the output shaft."""
+        return make_plant(self, load, reduction=self.value("gear.gear_reduction"),
+                          inductance=self.value("motor.armature_inductance"))
+
+    def command(self, signal: Signal) -> Pieces:
+        """Return the armature voltage [V]; other units are refused."""
+        return _armature_voltage(self, signal)
+
+    def start_angle(self, drive: float) -> float:
+        """Return 0: a motor starts at angle 0."""
+        return 0.0

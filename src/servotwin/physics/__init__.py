@@ -1,0 +1,73 @@
+"""Physics: every law one pure, broadcasting function without state.
+
+Equation numbers are those of Urrea and Kern, "A New Model for Analog Servo Motors", Canadian Journal on Automation,
+Control and Intelligent Systems 2(2), 2011; `docs/theory` lists them all. Everything is SI: rad, s, V, A, N m, kg m².
+A mechanical quantity names its shaft, `motor_` or `output_`, unless it can belong to one alone.
+"""
+
+from servotwin.physics.analog_servo import driven_spindle_torque, forward_acceleration, loop_voltage, spindle_torque
+from servotwin.physics.electronics import (
+    averaged_bridge_gain,
+    bounded_armature_voltage,
+    comparator_voltage,
+    control_voltage_from_pulse,
+    control_voltage_from_voltage,
+    feedback_error,
+    pulse_width_from_voltage,
+    unbounded_armature_voltage,
+)
+from servotwin.physics.friction import (
+    coulomb_torque,
+    creep_speed,
+    smoothed_coulomb_torque,
+    sticks,
+    undamped_creep_speed,
+)
+from servotwin.physics.gear import (
+    motor_from_output,
+    output_inertia,
+    output_viscous_friction,
+    reflected_inertia,
+    reflected_viscous_friction,
+)
+from servotwin.physics.motor import (
+    armature_current_rate,
+    back_emf,
+    electromagnetic_torque,
+    required_motor_torque,
+    steady_armature_current,
+)
+from servotwin.physics.potentiometer import angle_from_voltage, feedback_voltage, quantised
+
+__all__ = [
+    "angle_from_voltage",
+    "armature_current_rate",
+    "averaged_bridge_gain",
+    "back_emf",
+    "bounded_armature_voltage",
+    "comparator_voltage",
+    "control_voltage_from_pulse",
+    "control_voltage_from_voltage",
+    "coulomb_torque",
+    "creep_speed",
+    "driven_spindle_torque",
+    "electromagnetic_torque",
+    "feedback_error",
+    "feedback_voltage",
+    "forward_acceleration",
+    "loop_voltage",
+    "motor_from_output",
+    "output_inertia",
+    "output_viscous_friction",
+    "pulse_width_from_voltage",
+    "quantised",
+    "reflected_inertia",
+    "reflected_viscous_friction",
+    "required_motor_torque",
+    "smoothed_coulomb_torque",
+    "spindle_torque",
+    "steady_armature_current",
+    "sticks",
+    "unbounded_armature_voltage",
+    "undamped_creep_speed",
+]

@@ -1,0 +1,179 @@
+"""The permanent-magnet DC motor: torque, back-EMF and armature circuit.
+
+Equation numbers are those of Urrea and Kern, "A New Model for Analog Servo Motors", Canadian Journal on Automation,
+Control and Intelligent Systems 2(2), 2011. Every law broadcasts: numbers give a number, arrays an array.
+"""
+
+from __future__ import annotations
+
+from servotwin.physics._typing import Real
+
+
+def electromagnetic_torque(armature_current: Real, torque_constant: Real) -> Real:
+    """Return the torque that the current makes in the armature.
+
+    Parameters
+    ----------
+    armature_current : float or array
+        i_a [A].
+    torque_constant : float or array
+        k_a, positive [N m/A].
+
+    Returns
+    -------
+    float or array
+        k_a i_a, in +q for a positive current [N m].
+
+    Notes
+    -----
+    Eq. 4, which calls it τ_m, and eq. 26, which calls it τ_o. It is the signal `motor_torque`.
+
+    Examples
+    --------
+    >>> electromagnetic_torque(2.0, 0.005)
+    0.01
+    """
+    i_a, k_a = armature_current, torque_constant
+    return k_a * i_a
+
+
+def back_emf(motor_speed: Real, back_emf_constant: Real) -> Real:
+    """Return the voltage that the turning armature induces in itself.
+
+    Parameters
+    ----------
+    motor_speed : float or array
+        Speed of the motor shaft [rad/s].
+    back_emf_constant : float or array
+        k_b, positive [V s/rad].
+
+    Returns
+    -------
+    float or array
+        v_b = k_b q̇_m [V].
+
+    Notes
+    -----
+    Eq. 24. Eq. 6 should say the same; it is printed as a copy of eq. 5, with k ψ in the place of k_b.
+
+    Examples
+    --------
+    >>> back_emf(400.0, 0.005)
+    2.0
+    """
+    qd_m, k_b = motor_speed, back_emf_constant
+    return k_b * qd_m
+
+
+def armature_current_rate(
+    armature_voltage: Real,
+    armature_current: Real,
+    motor_speed: Real,
+    armature_resistance: Real,
+    armature_inductance: Real,
+    back_emf_constant: Real,
+) -> Real:
+    """Return the rate of change of the armature current.
+
+    Parameters
+    ----------
+    armature_voltage : float or array
+        v_a at the motor's terminals [V].
+    armature_current : float or array
+        i_a [A].
+    motor_speed : float or array
+        Speed of the motor shaft [rad/s].
+    armature_resistance : float or array
+        R_a, positive [Ω].
+    armature_inductance : float or array
+        L_a, positive [H].
+    back_emf_constant : float or array
+        k_b, positive [V s/rad].
+
+    Returns
+    -------
+    float or array
+        di_a/dt [A/s].
+
+    Notes
+    -----
+    Eq. 7 and 27, solved for the derivative.
+
+    Examples
+    --------
+    >>> armature_current_rate(6.0, 1.0, 200.0, 3.0, 0.001, 0.005)
+    2000.0
+    """
+    v_a, i_a = armature_voltage, armature_current
+    R_a, L_a = armature_resistance, armature_inductance
+    return (v_a - R_a * i_a - back_emf(motor_speed, back_emf_constant)) / L_a
+
+
+def steady_armature_current(
+    armature_voltage: Real, motor_speed: Real, armature_resistance: Real, back_emf_constant: Real
+) -> Real:
+    """Return the current that flows where the armature inductance is neglected.
+
+    Parameters
+    ----------
+    armature_voltage : float or array
+        v_a at the motor's terminals [V].
+    motor_speed : float or array
+        Speed of the motor shaft [rad/s].
+    armature_resistance : float or array
+        R_a, positive [Ω].
+    back_emf_constant : float or array
+        k_b, positive [V s/rad].
+
+    Returns
+    -------
+    float or array
+        i_a = (v_a − k_b q̇_m)/R_a [A].
+
+    Notes
+    -----
+    Eq. 7 with L_a = 0, the step from eq. 31 to eq. 35.
+
+    Examples
+    --------
+    >>> steady_armature_current(6.0, 600.0, 3.0, 0.005)
+    1.0
+    """
+    v_a, R_a = armature_voltage, armature_resistance
+    return (v_a - back_emf(motor_speed, back_emf_constant)) / R_a
+
+
+def required_motor_torque(
+    motor_acceleration: Real, motor_speed: Real, rotor_inertia: Real, motor_viscous_friction: Real
+) -> Real:
+    """Return the torque that moves the bare rotor as stated.
+
+    Parameters
+    ----------
+    motor_acceleration : float or array
+        Acceleration of the motor shaft [rad/s²].
+    motor_speed : float or array
+        Speed of the motor shaft [rad/s].
+    rotor_inertia : float or array
+        J_m, positive [kg m²].
+    motor_viscous_friction : float or array
+        B_m, at least 0 [N m s/rad].
+
+    Returns
+    -------
+    float or array
+        J_m q̈_m + B_m q̇_m [N m].
+
+    Notes
+    -----
+    Eq. 10 and 25, where it is called τ_m. It equals `electromagnetic_torque` only for a motor without load and without
+    Coulomb friction (eq. 11).
+
+    Examples
+    --------
+    >>> round(required_motor_torque(1000.0, 100.0, 1e-6, 1e-6), 9)
+    0.0011
+    """
+    qdd_m, qd_m = motor_acceleration, motor_speed
+    J_m, B_m = rotor_inertia, motor_viscous_friction
+    return J_m * qdd_m + B_m * qd_m

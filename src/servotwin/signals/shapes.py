@@ -1,0 +1,227 @@
+"""The shapes that a command can have; each returns a `Signal`."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin import units
+from servotwin.errors import CommandError
+from servotwin.physics.pieces import Piece, Pieces, constant_pieces
+from servotwin.signals.signal import KINDS, Signal, in_si, kind_of
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+_TURN = 2.0 * math.pi
+
+
+def constant(value: float, *, unit: str, frame_period: float | None = None) -> Signal:
+    """Return a command that never changes.
+
+    Examples
+    --------
+    >>> constant(1500.0, unit="us").initial
+    0.0015
+    """
+    y = in_si(value, unit, "constant(value)")
+    return Signal(pieces=constant_pieces(y), unit=unit, initial=y, frame_period=frame_period)
+
+
+def step(before: float, after: float, *, at: float = 0.0, unit: str, frame_period: float | None = None) -> Signal:
+    """Return a step from `before` to `after` at the time `at` [s].
+
+    Examples
+    --------
+    >>> step(1500.0, 2000.0, at=0.1, unit="us").pieces.table[1].value
+    0.002
+    """
+    y0, y1 = in_si(before, unit, "step(before)"), in_si(after, unit, "step(after)")
+    at = _time(at, "step(at)")
+    rows = (Piece(at - 1.0, y0), Piece(at, y1))
+    return Signal(pieces=Pieces(rows), unit=unit, initial=y1 if at < 0.0 else y0, frame_period=frame_period)
+
+
+def ramp(before: float, after: float, *, at: float = 0.0, over: float, unit: str,
+         frame_period: float | None = None) -> Signal:
+    """Return a ramp that starts at the time `at` [s] and takes `over` seconds.
+
+    Examples
+    --------
+    >>> round(float(ramp(0.0, 1.0, at=1.0, over=2.0, unit="rad")(2.0)), 12)
+    0.5
+    """
+    y0, y1 = in_si(before, unit, "ramp(before)"), in_si(after, unit, "ramp(after)")
+    at, over = _time(at, "ramp(at)"), _positive(over, "ramp(over)")
+    rows = (Piece(at - 1.0, y0), Piece(at, y0, (y1 - y0) / over), Piece(at + over, y1))
+    pieces = Pieces(rows)
+    initial = y0 if at >= 0.0 else float(pieces(0.0))
+    return Signal(pieces=pieces, unit=unit, initial=initial, frame_period=frame_period)
+
+
+def sine(*, mean: float, amplitude: float, frequency: float, phase: float = 0.0, unit: str,
+         frame_period: float | None = None) -> Signal:
+    """Return mean + amplitude sin(2π frequency t + phase), frequency in hertz, phase in radians.
+
+    Examples
+    --------
+    >>> float(sine(mean=1.2, amplitude=0.3, frequency=2.0, unit="V")(0.125))
+    1.5
+    """
+    row = Piece(0.0, in_si(mean, unit, "sine(mean)"), 0.0, in_si(amplitude, unit, "sine(amplitude)"),
+                _TURN * _positive(frequency, "sine(frequency)"), _time(phase, "sine(phase)"))
+    return _smooth((row,), unit, frame_period)
+
+
+def chirp(*, mean: float, amplitude: float, start_frequency: float, end_frequency: float, duration: float,
+          unit: str, frame_period: float | None = None) -> Signal:
+    """Return a sine whose frequency [Hz] goes linearly from start to end in `duration` [s], then stays.
+
+    Examples
+    --------
+    >>> s = chirp(mean=1.2, amplitude=0.3, start_frequency=0.1, end_frequency=5.0, duration=10.0, unit="V")
+    >>> round(float(s(0.0)), 9)
+    1.2
+    """
+    y, a = in_si(mean, unit, "chirp(mean)"), in_si(amplitude, unit, "chirp(amplitude)")
+    T = _positive(duration, "chirp(duration)")
+    w0 = _TURN * _positive(start_frequency, "chirp(start_frequency)")
+    w1 = _TURN * _positive(end_frequency, "chirp(end_frequency)")
+    rows = (Piece(0.0, y, 0.0, a, w0, 0.0, (w1 - w0) / T), Piece(T, y, 0.0, a, w1, 0.5 * (w0 + w1) * T % _TURN))
+    return _smooth(rows, unit, frame_period)
+
+
+def prbs(low: float, high: float, *, bit_time: float, duration: float, order: int = 9, seed: int = 0, unit: str,
+         frame_period: float | None = None) -> Signal:
+    """Return a pseudo-random binary sequence of maximal length 2^order − 1, repeated for `duration` [s].
+
+    Parameters
+    ----------
+    low, high : float
+        The two values, in `unit`.
+    bit_time, duration : float
+        [s]
+    order : int
+        Length of the shift register, 2 to 20.
+    seed : int
+        Where in its cycle the register starts.
+
+    Examples
+    --------
+    >>> s = prbs(1400.0, 1600.0, bit_time=0.05, duration=1.0, unit="us")
+    >>> sorted({round(1e6 * float(v)) for v in s(np.arange(0.0, 1.0, 0.05))})
+    [1400, 1600]
+    """
+    if not (isinstance(order, int) and 2 <= order <= 20):
+        raise CommandError("prbs(order)", got=order, allowed="an integer from 2 to 20")
+    from scipy.signal import max_len_seq
+
+    length = 2**order - 1
+    bits = max_len_seq(order, state=[(1 + seed % length) >> k & 1 for k in range(order)])[0]
+    T = _positive(bit_time, "prbs(bit_time)")
+    count = max(1, math.ceil(_positive(duration, "prbs(duration)") / T - 1e-9))
+    if count > 10_000_000:
+        raise CommandError("prbs(duration / bit_time)", got=count, allowed="at most 10 000 000 bits")
+    levels = in_si(low, unit, "prbs(low)"), in_si(high, unit, "prbs(high)")
+    time = np.asarray(np.arange(count) * T, dtype=np.float64)
+    return _held(time, np.asarray([levels[bits[k % length]] for k in range(count)]), unit, frame_period)
+
+
+def samples(time: ArrayLike, value: ArrayLike, *, unit: str, hold: str = "previous",
+            frame_period: float | None = None) -> Signal:
+    """Return a sampled command: held ("previous") or interpolated ("linear"), with the last value kept.
+
+    Parameters
+    ----------
+    time : array_like, shape (n,)
+        Increasing [s].
+    value : array_like, shape (n,)
+        In `unit`.
+    hold : {"previous", "linear"}
+
+    Raises
+    ------
+    CommandError
+        If the arrays are empty, of unequal length, unsorted or not finite.
+
+    Examples
+    --------
+    >>> float(samples([0.0, 1.0], [0.0, 1.0], unit="rad", hold="linear")(0.25))
+    0.25
+    """
+    t, y = _arrays(time, value, unit, "samples")
+    if hold == "previous":
+        return _held(t, y, unit, frame_period)
+    if hold != "linear":
+        raise CommandError("samples(hold)", got=hold, allowed="previous, linear")
+    slope = np.append(np.diff(y) / np.diff(t), 0.0)
+    rows = [Piece(*row) for row in zip(t.tolist(), y.tolist(), slope.tolist(), strict=True)]
+    if t[0] > 0.0:
+        rows.insert(0, Piece(0.0, float(y[0])))
+    return _smooth(tuple(rows), unit, frame_period)
+
+
+def pulse_train(edges: ArrayLike, widths: ArrayLike, *, unit: str = "us") -> Signal:
+    """Return pulses given one by one: rising edges [s] and widths (in `unit`), each width held until the next edge.
+
+    Examples
+    --------
+    >>> pulse_train([0.0, 0.02], [1500.0, 1600.0]).edges
+    (0.0, 0.02)
+    """
+    if kind_of(unit) != "pulse_width":
+        raise CommandError("unit of a pulse width", got=unit, allowed="us, ms, s")
+    t, y = _arrays(edges, widths, unit, "pulse_train")
+    late = np.flatnonzero(y[:-1] >= np.diff(t))
+    if late.size:
+        raise CommandError(f"pulse {late[0]}", got=f"width {y[late[0]]:g} s",
+                           allowed="a pulse that ends before the next")
+    held = _held(t, y, unit, None)
+    return Signal(pieces=held.pieces, unit=unit, initial=held.initial, edges=tuple(t.tolist()))
+
+
+def _held(t: NDArray[np.float64], y: NDArray[np.float64], unit: str, frame_period: float | None) -> Signal:
+    keep = np.append(True, np.diff(y) != 0.0)  # equal neighbours are one piece
+    rows = tuple(Piece(a, b) for a, b in zip(t[keep].tolist(), y[keep].tolist(), strict=True))
+    return Signal(pieces=Pieces(rows), unit=unit, initial=float(y[0]), frame_period=frame_period)
+
+
+def _smooth(rows: tuple[Piece, ...], unit: str, frame_period: float | None) -> Signal:
+    pieces = Pieces(rows)
+    return Signal(pieces=pieces, unit=unit, initial=float(pieces(0.0)), frame_period=frame_period)
+
+
+def _arrays(time: ArrayLike, value: ArrayLike, unit: str,
+            what: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    kind_of(unit)
+    try:
+        t, y = np.asarray(time, dtype=np.float64), np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise CommandError(what, got="values that are no numbers", allowed="arrays of numbers") from None
+    if t.ndim != 1 or t.shape != y.shape:
+        raise CommandError(what, got=f"shapes {t.shape} and {y.shape}", allowed="two arrays of one length")
+    if t.size == 0:
+        raise CommandError(what, got="no samples", allowed="at least one")
+    for name, a in (("time", t), ("value", y)):
+        bad = np.flatnonzero(~np.isfinite(a))
+        if bad.size:
+            raise CommandError(f"{what}: {name} of sample {bad[0]}", got=float(a[bad[0]]), allowed="a finite number")
+    bad = np.flatnonzero(np.diff(t) <= 0.0)
+    if bad.size:
+        raise CommandError(f"{what}: time of sample {bad[0] + 1}", got=float(t[bad[0] + 1]),
+                           allowed=f"more than {t[bad[0]]:g} s, the one before")
+    return t, np.asarray(units.to_si(y, unit, KINDS[unit][1]))
+
+
+def _time(value: float, what: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value):
+        raise CommandError(what, got=value, allowed="a finite number")
+    return float(value)
+
+
+def _positive(value: float, what: str) -> float:
+    if _time(value, what) <= 0.0:
+        raise CommandError(what, got=value, allowed="a positive number")
+    return float(value)

@@ -1,0 +1,94 @@
+"""Where the energy went: an integral of every power over the continuous solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin.models.kernels import hybrid
+from servotwin.models.outputs import current_of, torques_of, voltage_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from servotwin.loads import Load
+    from servotwin.models import Model
+    from servotwin.models.samples import Samples
+    from servotwin.physics.pieces import Pieces
+    from servotwin.simulation.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energy balance of a run [J]; supply = winding + bridge + brush + friction + stops + load + stored + residual.
+
+    Parameters
+    ----------
+    supply : float
+        Delivered to the motor's terminals, ∫ v_a i_a dt; negative when the motor brakes into the supply.
+    winding : float
+        Heat in the armature resistance.
+    bridge, brush : float
+        Heat in the bridge and at the brushes; zero for models with a mean armature voltage.
+    conversion : float
+        Mechanical power that k_a ≠ k_b makes of electrical power; zero for an ideal motor.
+    friction : float
+        Heat in motor and gear, viscous and dry.
+    stops : float
+        Lost in impacts on the end stops.
+    load : float
+        Given to the load: its damping, dry friction and external torque (its inertia counts as stored).
+    stored : float
+        Increase of kinetic and magnetic energy.
+    residual : float
+        What does not balance; rounding and quadrature.
+    """
+
+    supply: float
+    winding: float
+    bridge: float
+    brush: float
+    conversion: float
+    friction: float
+    stops: float
+    load: float
+    stored: float
+    residual: float
+
+
+def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -> Energy:
+    """Return the energy balance of a whole run."""
+    plant = model.pack(load)
+
+    def powers(samples: Samples) -> NDArray[np.float64]:
+        u = drive(samples.time)
+        v, i, w = voltage_of(plant, samples, u), current_of(plant, samples, u), samples.speed
+        torques = torques_of(model, samples, drive, load)
+        own_viscous = (plant.b - load.viscous_friction) * w
+        to_load = (load.viscous_friction * w + torques.load_friction + torques.external) * w
+        return np.array([v * i, plant.R * i * i, (plant.K_b - plant.K) * i * w,
+                         (own_viscous + torques.servo_friction) * w, to_load])
+
+    supply, winding, conversion, friction, to_load = trajectory.integral(powers).tolist()
+    stored, stops = _kinetic(plant, trajectory)
+    return Energy(supply, winding, 0.0, 0.0, conversion, friction, stops, to_load, stored,
+                  supply - winding - conversion - friction - stops - to_load - stored)
+
+
+def _kinetic(plant: hybrid.Plant, trajectory: Trajectory) -> tuple[float, float]:
+    """Return the energy stored over the run, and what impacts took."""
+    lost = 0.0
+    segments = trajectory.segments
+    if not segments:
+        return 0.0, 0.0
+
+    def stored(k: int, at: float) -> float:
+        _, w, i = segments[k].motion.state(at - segments[k].anchor)
+        return 0.5 * plant.J * w * w + 0.5 * plant.L * i * i
+
+    for k in range(1, len(segments)):
+        if segments[k].anchor == segments[k].start:
+            lost += stored(k - 1, segments[k - 1].end) - stored(k, segments[k].start)
+    return stored(len(segments) - 1, segments[-1].end) - stored(0, segments[0].start), lost

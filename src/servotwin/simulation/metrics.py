@@ -1,0 +1,168 @@
+"""Metrics of a step response, read from the continuous solution and not from samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from servotwin.models.samples import Samples
+    from servotwin.simulation.result import Result
+    from servotwin.simulation.trajectory import Trajectory
+
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+@dataclass(frozen=True)
+class StepMetrics:
+    """Metrics of a step response; times count from the step.
+
+    Parameters
+    ----------
+    initial, final, target : float
+        Angle at the step, at the end of the run, and commanded [rad]; the target is nan for motors.
+    rise_time : float
+        From 10 % to 90 % of the way from initial to final [s].
+    settling_time : float
+        Until the angle stays within 2 % of the way around the final angle [s].
+    overshoot : float
+        Beyond the final angle, as a fraction of the way.
+    steady_error : float
+        Target − final [rad].
+    slew_rate : float
+        Highest speed [rad/s].
+    peak_current : float
+        Highest magnitude of the armature current [A].
+    """
+
+    initial: float
+    final: float
+    target: float
+    rise_time: float
+    settling_time: float
+    overshoot: float
+    steady_error: float
+    slew_rate: float
+    peak_current: float
+
+
+def step_metrics(result: Result) -> StepMetrics:
+    """Return the metrics of a result whose command steps once."""
+    result.raise_if_failed()
+    table = result.command.pieces.table
+    changes = [p for p in table[1:] if p.start >= 0.0]
+    if len(changes) != 1 or any(p.slope or p.amplitude for p in table):
+        raise InputError("step metrics", got="a command that is not a single step", allowed="one made by signals.step")
+    start = changes[0].start
+    if start >= result.ended:
+        raise InputError("step metrics", got=f"a step at {start:g} s in a run of {result.ended:g} s",
+                         allowed="a step within the run")
+    angle_name = result.model.layout[0]
+    q0, q1 = result.at(angle_name, [start, result.ended]).tolist()
+    way = q1 - q0
+    has_target = "command_angle" in result.model.signals
+    target = float(result.at("command_angle", [result.ended])[0]) if has_target else math.nan
+
+    def progress(samples: Samples) -> NDArray[np.float64]:
+        return np.asarray((samples.angle - q0) / way)
+
+    nan = math.nan
+    rise = settling = overshoot = nan
+    if abs(way) > 1e-12:
+        t10, t90 = (_first_reach(result.trajectory, progress, start, level) for level in (0.1, 0.9))
+        rise = t90 - t10
+        settling = _last_outside(result.trajectory, progress, start, 0.02) - start
+        overshoot = max(0.0, _highest(result.trajectory, progress, start)[1] - 1.0)
+        overshoot = 0.0 if overshoot < 1e-12 else overshoot
+    return StepMetrics(
+        initial=q0, final=q1, target=target, rise_time=rise, settling_time=settling, overshoot=overshoot,
+        steady_error=target - q1, slew_rate=result.peak(result.model.layout[1]),
+        peak_current=result.peak("armature_current"))
+
+
+def peak(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]]) -> float:
+    """Return the largest magnitude of a signal over a whole run."""
+    return _highest(trajectory, lambda samples: np.abs(signal(samples)), -math.inf)[1]
+
+
+def _values(trajectory: Trajectory, index: int, signal: Callable[[Samples], NDArray[np.float64]],
+            start: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    times = trajectory.dense_times(index)
+    times = times[times >= start]
+    return times, signal(trajectory.inside(index, times))
+
+
+def _highest(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]],
+             start: float) -> tuple[float, float]:
+    """Return time and value of the highest point from `start` on."""
+    best, when, where = -math.inf, math.nan, -1
+    bracket = (0.0, 0.0)
+    for k in range(len(trajectory.segments)):
+        times, values = _values(trajectory, k, signal, start)
+        if values.size and values.max() > best:
+            n = int(values.argmax())
+            best, when, where = float(values[n]), float(times[n]), k
+            bracket = (float(times[max(n - 1, 0)]), float(times[min(n + 1, times.size - 1)]))
+    if where < 0:
+        return when, best
+
+    def at(t: float) -> float:
+        return float(signal(trajectory.inside(where, np.array([t])))[0])
+
+    a, b = bracket
+    for _ in range(60):  # golden section: the highest point between the neighbours of the highest sample
+        x, y = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
+        a, b = (a, y) if at(x) > at(y) else (x, b)
+        if b - a <= 1e-9 * max(abs(b), 1e-6):
+            break
+    middle = at(0.5 * (a + b))
+    return (0.5 * (a + b), middle) if middle > best else (when, best)
+
+
+def _first_reach(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]], start: float,
+                 level: float) -> float:
+    for k in range(len(trajectory.segments)):
+        times, values = _values(trajectory, k, signal, start)
+        reached = np.flatnonzero(values >= level)
+        if reached.size:
+            n = int(reached[0])
+            return float(times[n]) if n == 0 else _bisected(
+                trajectory, k, lambda s: signal(s) - level, float(times[n - 1]), float(times[n]))
+    return math.nan
+
+
+def _last_outside(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]], start: float,
+                  band: float) -> float:
+    def outside(samples: Samples) -> NDArray[np.float64]:
+        return np.abs(signal(samples) - 1.0) - band
+
+    for k in reversed(range(len(trajectory.segments))):
+        times, values = _values(trajectory, k, outside, start)
+        late = np.flatnonzero(values > 0.0)
+        if late.size:
+            n = int(late[-1])
+            return float(times[n]) if n == times.size - 1 else _bisected(
+                trajectory, k, outside, float(times[n]), float(times[n + 1]))
+    return start
+
+
+def _bisected(trajectory: Trajectory, index: int, signal: Callable[[Samples], NDArray[np.float64]], a: float,
+              b: float) -> float:
+    def at(t: float) -> float:
+        return float(signal(trajectory.inside(index, np.array([t])))[0])
+
+    rising = at(b) > 0.0
+    for _ in range(80):
+        middle = 0.5 * (a + b)
+        if b - a <= 1e-15 * max(abs(b), 1.0):
+            break
+        a, b = (a, middle) if (at(middle) > 0.0) == rising else (middle, b)
+    return 0.5 * (a + b)

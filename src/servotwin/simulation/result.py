@@ -1,0 +1,179 @@
+"""What a simulation gives back: named signals, events, metrics and energy, and the ways out to files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin.errors import MissingExtraError, SimulationError
+from servotwin.models.outputs import SIGNALS
+from servotwin.models.samples import Samples
+from servotwin.simulation import files
+from servotwin.simulation.energy import Energy, energy_of
+from servotwin.simulation.metrics import StepMetrics, peak, step_metrics
+from servotwin.simulation.status import Status
+from servotwin.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+    import xarray as xr
+    from numpy.typing import ArrayLike, NDArray
+
+    from servotwin.loads import Load
+    from servotwin.models import Model
+    from servotwin.physics.pieces import Pieces
+    from servotwin.signals import Signal
+    from servotwin.simulation.engine import Event
+
+
+@dataclass(frozen=True)
+class Stats:
+    """How the solution was found: method, number of motions and of events."""
+
+    method: str
+    motions: int
+    events: int
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """The outcome of a simulation; signals are computed when they are asked for.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Output times [s].
+    events : tuple of Event
+        (time [s], kind, output angle [rad]) in order.
+    status : Status
+        How it ended; `cause` says it in words, `ended` when [s].
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = st.BoundedServo(st.load_servo("hitec-hs-755hb"))
+    >>> result = st.simulate(model, st.signals.step(0.0, 90.0, unit="deg"), duration=1.0, output_step=0.1)
+    >>> result["output_angle"].shape, result.units["output_angle"], result.status.ok
+    ((11,), 'rad', True)
+    """
+
+    model: Model
+    command: Signal
+    load: Load
+    drive: Pieces = field(repr=False)
+    time: NDArray[np.float64] = field(repr=False)
+    trajectory: Trajectory = field(repr=False)
+    events: tuple[Event, ...] = field(repr=False)
+    status: Status
+    ended: float
+    cause: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all signals, `time` first."""
+        return ("time", *self.model.signals)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """SI unit of each signal."""
+        return {"time": "s", **{name: SIGNALS[name].unit for name in self.model.signals}}
+
+    @cached_property
+    def _samples(self) -> Samples:
+        return self.trajectory.at(self.time)
+
+    @cached_property
+    def _computed(self) -> dict[str, NDArray[np.float64]]:
+        return {}
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Return a signal (SI), shape (n,); KeyError with the names that there are, if it is none of them."""
+        if name not in self._computed:
+            values = self._signal(name, self._samples)
+            values.setflags(write=False)
+            self._computed[name] = values
+        return self._computed[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def _signal(self, name: str, samples: Samples) -> NDArray[np.float64]:
+        values = np.array(self.model.output(name, samples, self.drive, self.load), dtype=np.float64)
+        return np.where(samples.time > self.ended, np.nan, values) if not self.status.ok else values
+
+    def at(self, name: str, time: ArrayLike) -> NDArray[np.float64]:
+        """Return a signal (SI) of the continuous solution at any `time` [s], shape (m,)."""
+        t = np.atleast_1d(np.asarray(time, dtype=np.float64))
+        return self._signal(name, self.trajectory.at(t))
+
+    def raise_if_failed(self) -> Result:
+        """Return the result itself, or raise SimulationError if the run ended before its time."""
+        if not self.status.ok:
+            raise SimulationError(self.status.name, self.ended, self.cause)
+        return self
+
+    @cached_property
+    def stats(self) -> Stats:
+        """How the solution was found."""
+        closed = [segment.motion.closed for segment in self.trajectory.segments]
+        method = "closed form" if all(closed) else "integrated" if not any(closed) else "closed form and integrated"
+        return Stats(method, len(closed), len(self.events))
+
+    @cached_property
+    def energy(self) -> Energy:
+        """Energy balance over the whole run [J], from the continuous solution."""
+        return energy_of(self.model, self.trajectory, self.drive, self.load)
+
+    def peak(self, name: str) -> float:
+        """Return the largest magnitude of a signal (SI) over the whole continuous solution."""
+        return peak(self.trajectory, lambda samples: self.model.output(name, samples, self.drive, self.load))
+
+    def step_metrics(self) -> StepMetrics:
+        """Return rise time, settling time, overshoot, steady error, slew rate and peak current of a step.
+
+        Raises
+        ------
+        InputError
+            If the command is no step, or the run did not reach its end.
+        """
+        return step_metrics(self)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return all signals (SI) as a pandas DataFrame, indexed by time [s]."""
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingExtraError("pandas", "data") from None
+        frame = pd.DataFrame({name: self[name] for name in self.model.signals}, index=pd.Index(self.time, name="time"))
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return all signals (SI) as an xarray Dataset over the dimension `time`, with units."""
+        try:
+            import xarray as xr
+        except ImportError:
+            raise MissingExtraError("xarray", "data") from None
+        data = {name: ("time", self[name], {"units": self.units[name], "long_name": SIGNALS[name].meaning})
+                for name in self.model.signals}
+        return xr.Dataset(data, coords={"time": ("time", self.time, {"units": "s"})},
+                          attrs={"model": type(self.model).__name__, "servo": self.model.servo.name})
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write all signals to a CSV file, the unit of each in its column name.
+
+        Raises
+        ------
+        OutputExistsError, OutputError
+            If the file exists and `overwrite` is false, or it cannot be written.
+        """
+        files.save_csv(path, {name: self[name] for name in self.names}, self.units, overwrite=overwrite)

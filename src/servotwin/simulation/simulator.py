@@ -1,0 +1,206 @@
+"""`Simulator`, which goes from state to state, and `simulate`, a run of it from start to end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
+from servotwin.loads import as_load
+from servotwin.physics.pieces import Pieces
+from servotwin.signals import Signal
+from servotwin.simulation import engine
+from servotwin.simulation.engine import Record, State
+from servotwin.simulation.result import Result
+from servotwin.simulation.status import Status
+from servotwin.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from servotwin.loads import Load, Part
+    from servotwin.models import Model
+
+_MOST_SAMPLES = 20_000_000
+
+
+class Simulator:
+    """A model with its load, ready to be advanced; it holds no state itself.
+
+    Parameters
+    ----------
+    model : Model
+    load : Load, optional
+        What hangs on the shaft; nothing unless given.
+    seed : int
+        Seed of all noise (the models without pulses have none).
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> sim = st.Simulator(st.BoundedServo(st.load_servo("hitec-hs-755hb")))
+    >>> command = st.signals.step(0.0, 90.0, unit="deg")
+    >>> state = sim.initial(command)
+    >>> state = sim.advance(state, 1.0, command)
+    >>> 80 < 57.29578 * state["output_angle"] < 100
+    True
+    """
+
+    def __init__(self, model: Model, load: Load | Part | None = None, seed: int = 0) -> None:
+        self.model = model
+        self.load = as_load(load)
+        self.seed = seed
+        self._plant = model.pack(self.load)
+        self._torque = self.load.torque_pieces
+        self._last: tuple[Signal, Pieces] | None = None
+
+    def drive(self, command: Signal) -> Pieces:
+        """Return the command as what the model follows [V]."""
+        if not isinstance(command, Signal):
+            raise CommandError("command", got=type(command).__name__, allowed="a signal of servotwin.signals")
+        if self._last is None or self._last[0] is not command:
+            self._last = (command, self.model.command(command))
+        return self._last[1]
+
+    def initial(self, command: Signal, initial: Mapping[str, float] | None = None) -> State:
+        """Return the state at t = 0: at rest where the command of just before asks for.
+
+        Parameters
+        ----------
+        command : Signal
+        initial : mapping, optional
+            Values (SI) by signal name that replace this, such as ``{"output_angle": 0.1, "output_speed": 0.0}``.
+
+        Raises
+        ------
+        UnknownNameError, InputError
+            If a name is no state of the model, or a value is not finite or beyond a stop.
+        """
+        drive = self.drive(command)
+        before = drive.table[0]._replace(value=command.initial, slope=0.0, amplitude=0.0)
+        start = self.model.command(Signal(pieces=Pieces((before,)), unit=command.unit, initial=command.initial))
+        values = [self.model.start_angle(start.table[0].value), 0.0, 0.0]
+        for name, value in (initial or {}).items():
+            if name not in self.model.layout:
+                raise UnknownNameError(f"state of {type(self.model).__name__}", name, self.model.layout)
+            if not math.isfinite(value):
+                raise InputError(f"initial {name}", got=value, allowed="a finite number (SI)")
+            values[self.model.layout.index(name)] = float(value)
+        if not self._plant.lower <= values[0] <= self._plant.upper:
+            raise InputError(f"initial {self.model.layout[0]}", got=values[0],
+                             allowed=f"{self._plant.lower:.6g} to {self._plant.upper:.6g} rad, between the stops")
+        y = (values[0], values[1], values[2])
+        return State(time=0.0, names=self.model.layout, values=y, anchor=y)
+
+    def advance(self, state: State, until: float, command: Signal, *, external_torque: float = 0.0) -> State:
+        """Return the state at `until` [s] under a command.
+
+        Splitting an interval into several calls changes nothing beyond rounding. A command that differs takes
+        effect at the time of `state`.
+
+        Parameters
+        ----------
+        state : State
+        until : float
+            Not before the state's time [s].
+        command : Signal
+            Its time is that of the state.
+        external_torque : float
+            Constant torque during this call beside the load; positive pushes towards −q [N m].
+
+        Raises
+        ------
+        SimulationError
+            If the run cannot go on.
+        """
+        return self._run(state, until, command, external_torque, None)
+
+    def _run(self, state: State, until: float, command: Signal, external_torque: float,
+             record: Record | None) -> State:
+        if not (math.isfinite(until) and until >= state.time):
+            raise InputError("advance(until)", got=until, allowed=f"a finite time from {state.time:g} s on")
+        if not math.isfinite(external_torque):
+            raise InputError("external_torque", got=external_torque, allowed="a finite number [N m]")
+        self.load.check_span(state.time, until)
+        torque = self._torque.scaled(1.0, external_torque) if external_torque else self._torque
+        return engine.run(self._plant, self.drive(command), torque, state, until, record)
+
+
+def simulate(model: Model, command: Signal, *, duration: float, load: Load | Part | None = None,
+             output_step: float | None = None, output_times: ArrayLike | None = None,
+             initial: Mapping[str, float] | None = None, seed: int = 0) -> Result:
+    """Simulate from t = 0 to `duration` and return the result.
+
+    Parameters
+    ----------
+    model : Model
+    command : Signal
+    duration : float
+        Positive [s].
+    load : Load, optional
+        Nothing unless given.
+    output_step : float, optional
+        Distance of the output times [s], 1 ms unless given; outputs at 0, output_step, …, duration. It changes
+        nothing but where the solution is shown.
+    output_times : array_like, shape (n,), optional
+        Output times instead [s], from 0 to `duration`, not decreasing.
+    initial : mapping, optional
+        Initial values by state name (SI), see `Simulator.initial`.
+    seed : int
+        Seed of all noise.
+
+    Raises
+    ------
+    InputError
+        On bad input only; a run that ends early says so in `Result.status`.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = st.BoundedServo(st.load_servo("hitec-hs-755hb"))
+    >>> result = st.simulate(model, st.signals.step(0.0, 90.0, at=0.1, unit="deg"), duration=1.0)
+    >>> result["output_angle"].shape
+    (1001,)
+    """
+    if isinstance(duration, bool) or not (math.isfinite(duration) and duration > 0.0):
+        raise InputError("duration", got=duration, allowed="a positive number of seconds")
+    times = _times(duration, output_step, output_times)
+    simulator = Simulator(model, load, seed)
+    record = Record([], [])
+    status, ended, cause = Status.COMPLETED, duration, Status.COMPLETED.message
+    try:
+        simulator._run(simulator.initial(command, initial), duration, command, 0.0, record)
+    except SimulationError as error:
+        status, ended, cause = Status[error.status], error.time, error.cause
+    return Result(model=model, command=command, load=simulator.load, drive=simulator.drive(command), time=times,
+                  trajectory=Trajectory(tuple(record.segments)), events=tuple(record.events),
+                  status=status, ended=ended, cause=cause)
+
+
+def _times(duration: float, output_step: float | None, output_times: ArrayLike | None) -> NDArray[np.float64]:
+    if output_times is not None:
+        if output_step is not None:
+            raise InputError("output_step and output_times", allowed="one of them")
+        times = np.asarray(output_times, dtype=np.float64)
+        inside = times.ndim == 1 and times.size > 0 and bool(np.isfinite(times).all())
+        if not inside or times.min() < 0.0 or times.max() > duration or (np.diff(times) < 0.0).any():
+            raise InputError("output_times", got=output_times,
+                             allowed=f"finite times that do not decrease, from 0 to {duration:g} s")
+        return times
+    step = 1e-3 if output_step is None else output_step
+    if not (math.isfinite(step) and step > 0.0):
+        raise InputError("output_step", got=step, allowed="a positive number of seconds")
+    if duration / step > _MOST_SAMPLES:
+        raise InputError("duration / output_step", got=f"{duration / step:.3g} outputs",
+                         allowed=f"at most {_MOST_SAMPLES}: take a larger output_step")
+    count = math.floor(duration / step * (1.0 + 1e-12))
+    times = np.asarray(np.arange(count + 1) * step, dtype=np.float64)
+    times[-1] = min(times[-1], duration)
+    if duration - times[-1] > 1e-9 * step:
+        times = np.append(times, duration)
+    else:
+        times[-1] = duration
+    return times

@@ -1,0 +1,29 @@
+"""How a simulation ended."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Status(Enum):
+    """How a simulation ended; each member carries its message.
+
+    Examples
+    --------
+    >>> Status.COMPLETED.ok, Status.DIVERGED.message
+    (True, 'the state is no longer finite')
+    """
+
+    COMPLETED = 0, "reached the end"
+    DIVERGED = 1, "the state is no longer finite"
+    STEP_TOO_SMALL = 2, "no step is short enough for the tolerance"
+    CHATTER = 3, "events follow each other without time going on"
+
+    def __init__(self, code: int, message: str) -> None:
+        self.code = code
+        self.message = message
+
+    @property
+    def ok(self) -> bool:
+        """Whether the whole time was simulated."""
+        return self is Status.COMPLETED

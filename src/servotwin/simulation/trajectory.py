@@ -1,0 +1,95 @@
+"""The continuous solution of a run: its segments, evaluated at any time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.models.kernels import hybrid
+from servotwin.models.samples import Samples
+from servotwin.simulation.engine import Segment
+from servotwin.simulation.motion import Exponential
+
+Array = NDArray[np.float64]
+_NODES = 12  # Gauss-Legendre nodes per interval
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Segments without gaps, in order; after the last one the state is not known (nan)."""
+
+    segments: tuple[Segment, ...]
+
+    @cached_property
+    def _starts(self) -> Array:
+        return np.array([segment.start for segment in self.segments])
+
+    def at(self, time: Array) -> Samples:
+        """Return the state at `time` [s], any order; at an event, just after it."""
+        t = np.asarray(time, dtype=np.float64)
+        if not self.segments:
+            nothing = np.full(t.size, math.nan)
+            return Samples.make(t, np.tile(nothing, (3, 1)), np.zeros(t.size), np.zeros(t.size))
+        index = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
+        return self._states(t, index)
+
+    def inside(self, index: int, time: Array) -> Samples:
+        """Return the state at `time` [s] by the motion of one segment, its end included."""
+        return self._states(time, np.full(time.size, index))
+
+    def _states(self, t: Array, index: NDArray[np.intp]) -> Samples:
+        y = np.full((3, t.size), math.nan)
+        zone, contact = np.zeros(t.size), np.zeros(t.size)
+        for k in np.unique(index):
+            segment = self.segments[k]
+            where = np.flatnonzero((index == k) & (t <= segment.end) & (t >= segment.start))
+            if where.size == 0:
+                continue
+            s = t[where] - segment.anchor
+            motion = segment.motion
+            if isinstance(motion, Exponential):
+                y[:, where] = motion.states(s)
+            else:
+                y[:, where] = np.array([motion.state(x) for x in s.tolist()]).T
+            zone[where], contact[where] = segment.mode
+        return Samples.make(t, y, zone, contact)
+
+    def intervals(self, index: int) -> Array:
+        """Return the ends of short intervals of one segment, in each of which all signals are smooth and gentle."""
+        segment = self.segments[index]
+        start, end = segment.start, segment.end
+        width = segment.inputs.period(start, end) / 4.0
+        fine, settled = segment.motion.scales()
+        edges = [start]
+        while edges[-1] < end:
+            age = edges[-1] - segment.anchor
+            edges.append(min(end, edges[-1] + min(width, fine if age < settled else max(age, fine))))
+        return np.array(edges)
+
+    def integral(self, integrand: Callable[[Samples], Array]) -> Array:
+        """Return the integral over the whole run of a vector of signals; `integrand` returns shape (m, n)."""
+        x, weight = np.polynomial.legendre.leggauss(_NODES)
+        total: Array | float = 0.0
+        for k in range(len(self.segments)):
+            edges = self.intervals(k)
+            half = 0.5 * np.diff(edges)
+            nodes = (edges[:-1] + half)[:, None] + half[:, None] * x
+            values = integrand(self.inside(k, nodes.ravel()))
+            total = total + (values * (half[:, None] * weight).ravel()).sum(axis=1)
+        return np.asarray(total)
+
+    def dense_times(self, index: int, per_interval: int = 8) -> Array:
+        """Return times that resolve one segment, both its ends included."""
+        edges = self.intervals(index)
+        fractions = np.linspace(0.0, 1.0, per_interval, endpoint=False)
+        inner = (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel()
+        return np.append(inner, edges[-1])
+
+    def is_still(self, index: int) -> bool:
+        """Whether the shaft stands still during a segment."""
+        return hybrid.at_rest(self.segments[index].mode.contact)

@@ -1,0 +1,133 @@
+"""Units at the edge: everything inside is SI, and this is the one place that converts.
+
+A unit belongs to a dimension; a value is converted with one factor (temperatures are given in kelvin only).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from servotwin.errors import UnitError
+
+_DEG = math.pi / 180.0
+_GRAVITY = 9.80665  # standard gravity, m/s^2 (CGPM 1901), for kgf
+
+# dimension -> {unit: factor to SI}; the first unit of each is the SI one.
+DIMENSIONS: dict[str, dict[str, float]] = {
+    "number": {"1": 1.0, "%": 0.01},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
+    "angle": {"rad": 1.0, "deg": _DEG},
+    "speed": {"rad/s": 1.0, "deg/s": _DEG, "rpm": math.pi / 30.0},
+    "inverse speed": {"s/rad": 1.0, "s/deg": 1.0 / _DEG},
+    "voltage": {"V": 1.0, "mV": 1e-3},
+    "current": {"A": 1.0, "mA": 1e-3},
+    "resistance": {"ohm": 1.0, "mohm": 1e-3},
+    "inductance": {"H": 1.0, "mH": 1e-3, "uH": 1e-6},
+    "torque": {"N m": 1.0, "mN m": 1e-3, "kgf cm": _GRAVITY * 1e-2, "ozf in": 0.45359237 / 16 * _GRAVITY * 0.0254},
+    "torque per current": {"N m/A": 1.0, "mN m/A": 1e-3},
+    "voltage per speed": {"V s/rad": 1.0, "mV s/rad": 1e-3, "V/krpm": 0.03 / math.pi},
+    "inertia": {"kg m2": 1.0, "g cm2": 1e-7, "kg cm2": 1e-4},
+    "torque per speed": {"N m s/rad": 1.0, "mN m s/rad": 1e-3},
+    "torque per angle": {"N m/rad": 1.0, "N m/deg": 1.0 / _DEG},
+    "inverse torque": {"1/(N m)": 1.0},
+    "voltage gain": {"V/V": 1.0},
+    "time per voltage": {"s/V": 1.0, "ms/V": 1e-3, "us/V": 1e-6},
+    "voltage per time": {"V/s": 1.0, "V/ms": 1e3, "mV/us": 1e3},
+    "voltage per angle": {"V/rad": 1.0, "mV/deg": 1e-3 / _DEG, "V/deg": 1.0 / _DEG},
+    "voltage per count": {"V": 1.0, "mV": 1e-3},
+    "mass": {"kg": 1.0, "g": 1e-3},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    "acceleration": {"m/s2": 1.0},
+    "heat capacity": {"J/K": 1.0},
+    "thermal resistance": {"K/W": 1.0},
+    "temperature": {"K": 1.0},
+    "inverse temperature": {"1/K": 1.0, "%/K": 0.01},
+    "energy": {"J": 1.0},
+    "frequency": {"Hz": 1.0},
+}
+
+
+def si_unit(dimension: str) -> str:
+    """Return the SI unit of a dimension, for example ``"ohm"`` for ``"resistance"``.
+
+    Raises
+    ------
+    UnitError
+        If the dimension is not known.
+
+    Examples
+    --------
+    >>> si_unit("angle")
+    'rad'
+    """
+    return next(iter(_units_of(dimension)))
+
+
+def factor(unit: str, dimension: str) -> float:
+    """Return what a value in `unit` is multiplied by to be in SI.
+
+    Raises
+    ------
+    UnitError
+        If the unit does not measure this dimension.
+
+    Examples
+    --------
+    >>> factor("us", "time")
+    1e-06
+    """
+    units = _units_of(dimension)
+    if unit not in units:
+        raise UnitError(f"unit of a {dimension}", got=unit, allowed=", ".join(units))
+    return units[unit]
+
+
+@overload
+def to_si(value: float, unit: str, dimension: str) -> float: ...
+@overload
+def to_si(value: ArrayLike, unit: str, dimension: str) -> float | NDArray[np.float64]: ...
+def to_si(value: ArrayLike, unit: str, dimension: str) -> float | NDArray[np.float64]:
+    """Convert a number or array from `unit` to SI (same shape).
+
+    Examples
+    --------
+    >>> to_si(1500.0, "us", "time")
+    0.0015
+    """
+    return _scaled(value, factor(unit, dimension), divide=False)
+
+
+@overload
+def from_si(value: float, unit: str, dimension: str) -> float: ...
+@overload
+def from_si(value: ArrayLike, unit: str, dimension: str) -> float | NDArray[np.float64]: ...
+def from_si(value: ArrayLike, unit: str, dimension: str) -> float | NDArray[np.float64]:
+    """Convert a number or array from SI to `unit` (same shape).
+
+    Examples
+    --------
+    >>> round(from_si(3.141592653589793, "deg", "angle"), 9)
+    180.0
+    """
+    return _scaled(value, factor(unit, dimension), divide=True)
+
+
+def _scaled(value: ArrayLike, by: float, *, divide: bool) -> float | NDArray[np.float64]:
+    if isinstance(value, int | float):
+        # Dividing by a whole number keeps decimals exact: 1500 us is 0.0015 s to the last bit.
+        inverse = 1.0 / by
+        if not divide and by < 1.0 and abs(inverse - round(inverse)) < 1e-9 * inverse:
+            return float(value) / round(inverse)
+        return float(value) / by if divide else float(value) * by
+    array = np.asarray(value, dtype=np.float64)
+    return array / by if divide else array * by
+
+
+def _units_of(dimension: str) -> dict[str, float]:
+    if dimension not in DIMENSIONS:
+        raise UnitError("dimension", got=dimension, allowed=", ".join(DIMENSIONS))
+    return DIMENSIONS[dimension]
