@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,13 +98,7 @@ def zero_error_angle(plant: Plant, v_c: Signal) -> float:
 def segments(t_end: float, breaks: Sequence[float]) -> list[tuple[float, float]]:
     """The intervals between 0, the breaks inside (0, t_end), and t_end."""
     cuts = [0.0, *sorted({float(b) for b in breaks if 0.0 < b < t_end}), t_end]
-    return list(zip(cuts[:-1], cuts[1:], strict=True))
-
-
-def left_continuous(signal: Signal, ends: Sequence[float]) -> Callable[[float, float], float]:
-    """Value at t seen from the segment that ends at `end`: its last instant gives the left limit."""
-    del ends
-    return lambda t, end: signal(min(t, math.nextafter(end, -math.inf)))
+    return list(pairwise(cuts))
 
 
 def _smoothed_friction(plant: Plant, w: Array, side: int) -> tuple[Array, Array]:
@@ -176,16 +171,10 @@ def solve_geared_motor(
 
         return f
 
-    linear = _without_friction(plant)
+    linear = replace(plant, F1=0.0, F2=0.0)
     w_scale = 1.0 if N > 1.0 else 100.0
     y = _solve_smooth(make, linear, v_a, t_end, times, y0, (w_scale, w_scale, 0.1), breaks, tol)
     return Trajectory(q=y[:, 0], w=y[:, 1], i=y[:, 2])
-
-
-def _without_friction(plant: Plant) -> Plant:
-    from dataclasses import replace
-
-    return replace(plant, F1=0.0, F2=0.0)
 
 
 def solve_averaged(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin import units
-from servotwin.errors import OutputError, OutputExistsError
+from servotwin.parameters import write_file
 
 # SI unit -> (suffix of the column, unit in the file, dimension)
 _COLUMNS = {
@@ -37,24 +35,6 @@ def save_csv(path: str | Path, signals: Mapping[str, NDArray[np.float64]], si_un
         suffix, unit, dimension = _OWN.get(name) or _COLUMNS[si_units[name]]
         names.append(f"{name}_{suffix}")
         columns.append(np.asarray(units.from_si(values, unit, dimension)))
-    target = Path(path)
-    if target.exists() and not overwrite:
-        raise OutputExistsError(target)
-    try:
-        handle, partial = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".partial")
-    except OSError as error:
-        raise OutputError(f"{target} cannot be written ({error.strerror})") from None
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            np.savetxt(file, np.column_stack(columns), fmt="%.12g", delimiter=",", header=",".join(names), comments="")
-        os.replace(partial, target)
-        target.chmod(0o666 & ~_umask())
-    except OSError as error:
-        Path(partial).unlink(missing_ok=True)
-        raise OutputError(f"{target} cannot be written ({error.strerror})") from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    table = np.column_stack(columns)
+    write_file(path, lambda file: np.savetxt(file, table, fmt="%.12g", delimiter=",", header=",".join(names),
+                                             comments="", encoding="utf-8"), overwrite=overwrite)

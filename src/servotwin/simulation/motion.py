@@ -11,9 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from servotwin.models.kernels import hybrid, rodas, second_order
 from servotwin.models.kernels.hybrid import Mode, Plant
 from servotwin.models.kernels.rodas import Vector
@@ -121,93 +118,80 @@ class SecondOrder:
 
     def scales(self) -> tuple[float, float]:
         """From the two roots: real ones need fine intervals only while they are fast beside the time passed."""
-        a, c = self.coefficients[:2]
-        rate = 2.0 * a + math.sqrt(abs(c))
-        if rate == 0.0:
-            return math.inf, 0.0
-        if a * a >= c:
-            return 1.0 / rate, 40.0 / rate
-        return 1.0 / rate, 45.0 / a if a > 0.0 else math.inf
+        return _scales(*self.coefficients[:2])
 
     def intervals(self, s0: float, s1: float) -> Iterator[float]:
         """Between the zeros of the acceleration, which are known; under a sinusoid on a fine grid."""
-        a, c, f0, f1, fs, _, _, q0, w0 = self.coefficients
-        if fs != 0.0 or self.inputs.periodic:
-            yield from self._fine(s0, s1)
-            return
-        dw = f0 - c * q0 - 2.0 * a * w0
-        zero, spacing = second_order.first_acceleration_zero(a, c, dw, f1 - c * w0 - 2.0 * a * dw)
-        settled = 45.0 / a if a > 0.0 else math.inf  # the free motion is below rounding from here on
-        while zero < min(s1, settled):
-            if zero > s0:
-                yield zero
-            zero += spacing
-        yield s1
+        return _intervals(self.coefficients, self.inputs, self.t0, s0, s1)
 
-    def _fine(self, s0: float, s1: float) -> Iterator[float]:
-        width = self.inputs.period(self.t0 + s0, self.t0 + s1) / 12.0
-        fine, settled = self.scales()
+
+def _scales(a: float, c: float) -> tuple[float, float]:
+    rate = 2.0 * a + math.sqrt(abs(c))
+    if rate == 0.0:
+        return math.inf, 0.0
+    if a * a >= c:
+        return 1.0 / rate, 40.0 / rate
+    return 1.0 / rate, 45.0 / a if a > 0.0 else math.inf
+
+
+def _intervals(coefficients: tuple[float, ...], inputs: Inputs, t0: float, s0: float, s1: float) -> Iterator[float]:
+    a, c, f0, f1, fs, _, _, q0, w0 = coefficients
+    if fs != 0.0 or inputs.periodic:
+        width = inputs.period(t0 + s0, t0 + s1) / 12.0
+        fine, settled = _scales(a, c)
         if s0 < settled:
             middle = min(s1, settled)
             yield from grid(s0, middle, min(width, 0.5 * fine))
             s0 = middle
         if s0 < s1:
             yield from grid(s0, s1, width)
+        return
+    dw = f0 - c * q0 - 2.0 * a * w0
+    zero, spacing = second_order.first_zero(a, c, dw, f1 - c * w0 - 2.0 * a * dw)
+    settled = 45.0 / a if a > 0.0 else math.inf  # the free motion is below rounding from here on
+    while zero < min(s1, settled):
+        if zero > s0:
+            yield zero
+        zero += spacing
+    yield s1
 
 
-class Exponential:
-    """A linear motion with current, without friction: the matrix exponential of state and inputs together."""
+@dataclass(frozen=True)
+class WithCurrent:
+    """A sliding motion with inductance, without feedback or spring: the speed moves in second order.
 
-    closed = True
+    `coefficients` are those of the speed; the angle is its integral, and the current what accelerates the shaft.
+    """
 
-    def __init__(self, plant: Plant, mode: Mode, y: Vector, inputs: Inputs, t0: float) -> None:
-        self.length = math.inf
-        Fq, Fw, Fi, Eq, Ew, Ei, Fu, Ft, Eu = hybrid.jacobian(plant, mode, 0.0, 0.0)
-        F0, E0 = hybrid.rates(plant, mode, 0.0, 0.0, 0.0, 0.0, 0.0)
-        # states: q, w, i, then 1 and s, then sine and cosine of the command
-        M = np.zeros((7, 7))
-        M[0, 1] = 1.0
-        M[1, :3], M[2, :3] = (Fq, Fw, Fi), (Eq, Ew, Ei)
-        u, du = _polynomial(inputs.u, t0)
-        tau, dtau = _polynomial(inputs.tau, t0)
-        M[1, 3:5] = F0 + Fu * u + Ft * tau, Fu * du + Ft * dtau
-        M[2, 3:5] = E0 + Eu * u, Eu * du
-        M[1:3, 5] = Fu * inputs.u.amplitude, Eu * inputs.u.amplitude
-        M[4, 3] = 1.0
-        M[5, 6], M[6, 5] = inputs.u.frequency, -inputs.u.frequency
-        phase = inputs.u.phase + inputs.u.frequency * (t0 - inputs.u.start)
-        self._matrix = M
-        self._start = np.array([*y, 1.0, 0.0, math.sin(phase), math.cos(phase)])
-
-    def states(self, s: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return (q, w, i) at times s, shape (3, n)."""
-        from scipy.linalg import expm
-
-        return np.asarray((expm(self._matrix * s[:, None, None]) @ self._start)[:, :3].T)
+    coefficients: tuple[float, ...]
+    plant: Plant
+    angle: float
+    torque: tuple[float, float]
+    inputs: Inputs
+    t0: float
+    length: float = math.inf
+    closed: bool = True
 
     def state(self, s: float) -> Vector:
         """Return (q, w, i)."""
-        q, w, i = self.states(np.array([s]))[:, 0].tolist()
-        return q, w, i
+        w, dw, way = second_order.propagate_with_integral(self.coefficients, s)
+        plant = self.plant
+        tau = self.torque[0] + self.torque[1] * s
+        return self.angle + way, w, (plant.J * dw + plant.b * w + tau) / plant.K
 
     def acceleration(self, s: float, y: Vector) -> tuple[float, float]:
         """Return ẇ and di/dt."""
-        from scipy.linalg import expm
-
-        rates = self._matrix @ (expm(self._matrix * s) @ self._start)
-        return float(rates[1]), float(rates[2])
+        w, dw = second_order.propagate(self.coefficients, s)
+        ddw = second_order.acceleration(self.coefficients, s, w, dw)
+        return dw, (self.plant.J * ddw + self.plant.b * dw + self.torque[1]) / self.plant.K
 
     def scales(self) -> tuple[float, float]:
-        """From the eigenvalues; a real one needs fine intervals only while it is fast beside the time passed."""
-        eigenvalues = np.linalg.eigvals(self._matrix[:3, :3])
-        rate = float(np.abs(eigenvalues).max())
-        oscillating = -eigenvalues.real[np.abs(eigenvalues.imag) > 1e-9 * rate]
-        slowest = float(oscillating.min()) if oscillating.size else rate
-        return (1.0 / rate if rate > 0.0 else math.inf), (45.0 / slowest if slowest > 0.0 else math.inf)
+        """As for a motion of second order."""
+        return _scales(*self.coefficients[:2])
 
     def intervals(self, s0: float, s1: float) -> Iterator[float]:
-        """One interval: this motion has no guards."""
-        yield s1
+        """Between the zeros of the second derivative of the speed."""
+        return _intervals(self.coefficients, self.inputs, self.t0, s0, s1)
 
 
 @dataclass(frozen=True)
@@ -254,13 +238,17 @@ def closed_motion(plant: Plant, mode: Mode, y: Vector, inputs: Inputs, t0: float
     follows = hybrid.in_linear_zone(mode.zone)
     if plant.gravity != 0.0 or mode.contact == hybrid.CORE or (follows and inputs.u.sweep != 0.0):
         return None
-    if plant.L > 0.0:
-        return Exponential(plant, mode, y, inputs, t0) if mode.contact == hybrid.FREE else None
+    if plant.L > 0.0 and (plant.p != 0.0 or plant.stiffness != 0.0):
+        return None  # of third order
     u, du = _polynomial(inputs.u, t0)
     phase = inputs.u.phase + inputs.u.frequency * (t0 - inputs.u.start)
     wave = (u, du, inputs.u.amplitude, inputs.u.frequency, phase) if follows else (u, du, 0.0, 0.0, 0.0)
-    return SecondOrder(
-        hybrid.linear_coefficients(plant, mode, wave, _polynomial(inputs.tau, t0), y[0], y[1]), inputs, t0)
+    tau = _polynomial(inputs.tau, t0)
+    if plant.L > 0.0:
+        against = (tau[0] + hybrid.friction_torque(plant, mode.contact, y[1]), tau[1])
+        return WithCurrent(hybrid.speed_coefficients(plant, mode, wave, against, y[1], y[2]), plant, y[0], against,
+                           inputs, t0)
+    return SecondOrder(hybrid.linear_coefficients(plant, mode, wave, tau, y[0], y[1]), inputs, t0)
 
 
 def integrated_step(plant: Plant, mode: Mode, y: Vector, inputs: Inputs, t0: float, step: float,

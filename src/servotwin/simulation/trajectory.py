@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from servotwin.models.kernels import hybrid
 from servotwin.models.samples import Samples
 from servotwin.simulation.engine import Segment
-from servotwin.simulation.motion import Exponential
 
 Array = NDArray[np.float64]
 _NODES = 12  # Gauss-Legendre nodes per interval
@@ -51,11 +50,7 @@ class Trajectory:
             if where.size == 0:
                 continue
             s = t[where] - segment.anchor
-            motion = segment.motion
-            if isinstance(motion, Exponential):
-                y[:, where] = motion.states(s)
-            else:
-                y[:, where] = np.array([motion.state(x) for x in s.tolist()]).T
+            y[:, where] = np.array([segment.motion.state(x) for x in s.tolist()]).T
             zone[where], contact[where] = segment.mode
         return Samples.make(t, y, zone, contact)
 

@@ -350,3 +350,21 @@ def linear_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], tau: tup
         torque += per_volt * voltage(plant, mode.zone, 0.0)
     J = plant.J
     return (0.5 * damping / J, stiffness / J, torque / J, rate / J, sinusoid / J, u[3], u[4], q, w)
+
+
+def speed_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], against: tuple[float, ...],
+                       w: float, i: float) -> tuple[float, ...]:
+    """Return the coefficients of the speed of a motor with inductance, without feedback or spring.
+
+    From L di/dt = v − R i − K_b w and J ẇ = K i − b w − τ, where `against` is (value, slope) of all constant and
+    external torque τ, and `u` as in `linear_coefficients`.
+    """
+    J, b, K, R, L = plant.J, plant.b, plant.K, plant.R, plant.L
+    per_volt = K / (L * J)
+    follows = in_linear_zone(mode.zone)
+    v = voltage(plant, mode.zone, u[0] - plant.b_o)
+    dv, wave = (plant.gain * u[1], plant.gain * u[2]) if follows else (0.0, 0.0)
+    f0 = per_volt * v - R / (L * J) * against[0] - against[1] / J
+    f1 = per_volt * dv - R / (L * J) * against[1]
+    return (0.5 * (R / L + b / J), (R * b + K * plant.K_b) / (L * J), f0, f1, per_volt * wave, u[3], u[4], w,
+            (K * i - b * w - against[0]) / J)

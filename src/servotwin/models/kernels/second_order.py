@@ -6,7 +6,8 @@ With g the impulse response, G1 and G2 its first and second integrals,
 
     q(s) = q0 + w0 g + (f0 − c q0) G1 + f1 G2 + sinusoid,    q̇(s) = w0 ġ + (f0 − c q0) g + f1 G1 + sinusoid
 
-which loses no digits for a or c near zero, near critical damping, or for short and long times.
+which loses no digits for a or c near zero, near critical damping, or for short and long times. Where q stands for
+the speed of a motor with inductance, its integral, with G3 the integral of G2, is the angle.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from __future__ import annotations
 import math
 
 
-def response(a: float, c: float, s: float) -> tuple[float, float, float, float]:
-    """Return ġ, g, G1, G2 at s ≥ 0 for g̈ + 2 a ġ + c g = 0, g(0) = 0, ġ(0) = 1, with a ≥ 0."""
+def response(a: float, c: float, s: float) -> tuple[float, float, float, float, float]:
+    """Return ġ, g, G1, G2, G3 at s ≥ 0 for g̈ + 2 a ġ + c g = 0, g(0) = 0, ġ(0) = 1, with a ≥ 0."""
     x = a * s
     y = c * s * s
     if x < 0.25 and -0.25 < y < 0.25:
@@ -26,13 +27,14 @@ def response(a: float, c: float, s: float) -> tuple[float, float, float, float]:
     return _close(a, c, d, s)
 
 
-def _series(x: float, y: float, s: float) -> tuple[float, float, float, float]:
+def _series(x: float, y: float, s: float) -> tuple[float, float, float, float, float]:
     # Taylor coefficients of g, scaled by s: p[n+2] = -(2x (n+1) p[n+1] + y p[n]) / ((n+2)(n+1))
     before = 0.0
     p = 1.0
     dg = g = 1.0
     G1 = 0.5
     G2 = 1.0 / 6.0
+    G3 = 1.0 / 24.0
     n = 1
     while n < 24:
         nxt = -(2.0 * x * n * p + y * before) / (n * (n + 1.0))
@@ -43,12 +45,13 @@ def _series(x: float, y: float, s: float) -> tuple[float, float, float, float]:
         g += p
         G1 += p / (n + 1.0)
         G2 += p / ((n + 1.0) * (n + 2.0))
+        G3 += p / ((n + 1.0) * (n + 2.0) * (n + 3.0))
         if abs(p) * n < 1e-18 and abs(before) < 1e-17:
             break
-    return dg, g * s, G1 * s * s, G2 * s * s * s
+    return dg, g * s, G1 * s * s, G2 * s * s * s, G3 * s * s * s * s
 
 
-def _distinct(a: float, c: float, beta: float, s: float) -> tuple[float, float, float, float]:
+def _distinct(a: float, c: float, beta: float, s: float) -> tuple[float, float, float, float, float]:
     # Two real roots well apart; the slow one without cancellation.
     l2 = -(a + beta)
     l1 = c / l2
@@ -59,23 +62,28 @@ def _distinct(a: float, c: float, beta: float, s: float) -> tuple[float, float, 
     m2 = math.expm1(x2)
     dg = (l1 * (m1 + 1.0) - l2 * (m2 + 1.0)) * k
     g = (m1 - m2) * k
-    # integrals of exp(l s): s phi1(l s), s² phi2(l s)
+    # integrals of exp(l s): s phi1(l s), s² phi2(l s), s³ phi3(l s)
     u1 = m1 / x1 if x1 != 0.0 else 1.0
     u2 = m2 / x2
     G1 = (u1 - u2) * s * k
-    G2 = (_phi2(x1, u1) - _phi2(x2, u2)) * s * s * k
-    return dg, g, G1, G2
+    v1, t1 = _phi2_phi3(x1, u1)
+    v2, t2 = _phi2_phi3(x2, u2)
+    G2 = (v1 - v2) * s * s * k
+    G3 = (t1 - t2) * s * s * s * k
+    return dg, g, G1, G2, G3
 
 
-def _phi2(x: float, phi1: float) -> float:
-    # (e^x - 1 - x) / x²
-    if -0.3 < x < 0.3:
-        return 0.5 + x * (1 / 6 + x * (1 / 24 + x * (1 / 120 + x * (1 / 720 + x * (1 / 5040 + x * (
-            1 / 40320 + x * (1 / 362880 + x * (1 / 3628800 + x * (1 / 39916800 + x / 479001600)))))))))
-    return (phi1 - 1.0) / x
+def _phi2_phi3(x: float, phi1: float) -> tuple[float, float]:
+    # (e^x - 1 - x) / x², (e^x - 1 - x - x²/2) / x³
+    if -0.5 < x < 0.5:
+        phi3 = 1 / 6 + x * (1 / 24 + x * (1 / 120 + x * (1 / 720 + x * (1 / 5040 + x * (1 / 40320 + x * (
+            1 / 362880 + x * (1 / 3628800 + x * (1 / 39916800 + x * (1 / 479001600 + x / 6227020800)))))))))
+        return 0.5 + x * phi3, phi3
+    phi2 = (phi1 - 1.0) / x
+    return phi2, (phi2 - 0.5) / x
 
 
-def _close(a: float, c: float, d: float, s: float) -> tuple[float, float, float, float]:
+def _close(a: float, c: float, d: float, s: float) -> tuple[float, float, float, float, float]:
     # Complex roots, or real ones close together; here c s² is not small.
     z = d * s * s
     decay = math.exp(-a * s)
@@ -96,16 +104,24 @@ def _close(a: float, c: float, d: float, s: float) -> tuple[float, float, float,
     dg = ch - a * sh
     G1 = (1.0 - dg - 2.0 * a * g) / c
     G2 = (s - g - 2.0 * a * G1) / c
-    return dg, g, G1, G2
+    G3 = (0.5 * s * s - G1 - 2.0 * a * G2) / c
+    return dg, g, G1, G2, G3
 
 
 def propagate(coefficients: tuple[float, ...], s: float) -> tuple[float, float]:
     """Return q and q̇ at s ≥ 0 after the start, for coefficients (a, c, f0, f1, fs, Ω, φ, q0, w0)."""
+    q, w, _ = propagate_with_integral(coefficients, s)
+    return q, w
+
+
+def propagate_with_integral(coefficients: tuple[float, ...], s: float) -> tuple[float, float, float]:
+    """Return q, q̇ and the integral of q from 0 to s."""
     a, c, f0, f1, fs, omega, phase, q0, w0 = coefficients
-    dg, g, G1, G2 = response(a, c, s)
+    dg, g, G1, G2, G3 = response(a, c, s)
     r = f0 - c * q0
     q = q0 + w0 * g + r * G1 + f1 * G2
     w = w0 * dg + r * g + f1 * G1
+    integral = q0 * s + w0 * G1 + r * G2 + f1 * G3
     if fs != 0.0:
         # The steady sinusoid, less the free motion that starts as it does.
         re = c - omega * omega
@@ -117,7 +133,8 @@ def propagate(coefficients: tuple[float, ...], s: float) -> tuple[float, float]:
         wp = scale * omega * (re * cp + im * sp)
         q += scale * (re * st - im * ct) - qp * (1.0 - c * G1) - wp * g
         w += scale * omega * (re * ct + im * st) - wp * dg + c * qp * g
-    return q, w
+        integral += (scale / omega * (re * (cp - ct) - im * (st - sp)) - qp * (s - c * G2) - wp * G1)
+    return q, w, integral
 
 
 def acceleration(coefficients: tuple[float, ...], s: float, q: float, w: float) -> float:
@@ -129,11 +146,11 @@ def acceleration(coefficients: tuple[float, ...], s: float, q: float, w: float) 
     return qdd
 
 
-def first_acceleration_zero(a: float, c: float, h0: float, h1: float) -> tuple[float, float]:
+def first_zero(a: float, c: float, h0: float, h1: float) -> tuple[float, float]:
     """Return the first s > 0 at which a solution of ḧ + 2 a ḣ + c h = 0 is zero, and the spacing of later zeros.
 
-    h(0) = h0, ḣ(0) = h1. Without a zero, or without a later one, inf is returned. Between the zeros of the
-    acceleration (which solves this equation under polynomial forcing) the speed is monotone.
+    h(0) = h0, ḣ(0) = h1. Without a zero, or without a later one, inf is returned. The acceleration q̈ solves this
+    equation under polynomial forcing, so that q̇ is monotone between its zeros.
     """
     d = a * a - c
     slope = h1 + a * h0

@@ -1,0 +1,102 @@
+#!/usr/bin/env python3
+"""Everything that a developer does, from a fresh clone on: `python3 dev.py TASK`.
+
+It needs nothing but Python 3.11 or newer: it makes a virtual environment in .venv, installs the package with pinned
+versions, and runs the task in it.
+"""
+
+import hashlib
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+ENVIRONMENT = ROOT / ".venv"
+BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
+STAMP = ENVIRONMENT / "installed"
+
+TASKS = {
+    "setup": "make .venv and install servotwin with all tools",
+    "paper": "set up, then write the report of the paper to paper-report/ (main job)",
+    "test": "set up, then run all tests",
+    "check": "set up, then lint, types, import rules",
+    "examples": "set up, then run every script of examples/",
+    "docs": "set up, then build the documentation to docs/_build/",
+    "bench": "set up, then print the benchmark tables",
+}
+
+
+def run(*command: str) -> None:
+    """Run a program of the environment in the repository's root; stop here if it fails."""
+    program, *arguments = command
+    done = subprocess.run([str(BIN / program), *arguments], cwd=ROOT, check=False)
+    if done.returncode != 0:
+        sys.exit(done.returncode)
+
+
+def setup() -> None:
+    """Make the environment and install, unless that was done for these very requirements."""
+    wanted = hashlib.sha256(b"".join((ROOT / name).read_bytes() for name in ("pyproject.toml", "constraints.txt")))
+    wanted.update(f"{sys.version_info[:2]} {ROOT}".encode())
+    if STAMP.exists() and STAMP.read_text() == wanted.hexdigest():
+        return
+    print("Setting up .venv (about a minute, once) ...", flush=True)
+    if not (BIN / ("python.exe" if os.name == "nt" else "python")).exists():
+        try:
+            venv.create(ENVIRONMENT, with_pip=True)
+        except (subprocess.CalledProcessError, OSError, ImportError):
+            sys.exit("dev.py: this Python cannot make virtual environments (on Debian: apt install python3-venv)")
+    run("python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
+        "--constraint", "constraints.txt", "--editable", ".[dev]")
+    STAMP.write_text(wanted.hexdigest())
+
+
+def test(arguments: list[str]) -> None:
+    """Run the tests on two processes."""
+    run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", *arguments)
+
+
+def check(arguments: list[str]) -> None:
+    """Lint, types and import rules."""
+    run("ruff", "check", ".")
+    run("mypy")
+    run("lint-imports")
+
+
+def examples(arguments: list[str]) -> None:
+    """Run every example, pictures and files into a folder of their own."""
+    out = ROOT / "examples" / "out"
+    out.mkdir(exist_ok=True)
+    for script in sorted((ROOT / "examples").glob("*.py")):
+        print(f"-- {script.name}", flush=True)
+        done = subprocess.run([str(BIN / "python"), str(script)], cwd=out, check=False)
+        if done.returncode != 0:
+            sys.exit(done.returncode)
+
+
+def main(arguments: list[str]) -> None:
+    """Set up, then do one task."""
+    if sys.version_info < (3, 11):
+        sys.exit(f"dev.py: servotwin needs Python 3.11 or newer, this is {sys.version.split()[0]}")
+    task = arguments[0] if arguments else ""
+    if task not in TASKS:
+        print("usage: python3 dev.py TASK\n\n" + "\n".join(f"  {name:9} {what}" for name, what in TASKS.items()))
+        sys.exit(0 if task in ("-h", "--help") else 2)
+    setup()
+    rest = arguments[1:]
+    if task == "paper":
+        run("servotwin", "paper", *(rest or ["--out", "paper-report", "--force"]))
+    elif task == "docs":
+        run("python", "-m", "sphinx", "-W", "-q", "-b", "html", "docs", "docs/_build/html", *rest)
+        print("docs/_build/html/index.html")
+    elif task == "bench":
+        for script in sorted((ROOT / "benchmarks").glob("*/run.py")):
+            run("python", str(script), *rest)
+    elif task != "setup":
+        {"test": test, "check": check, "examples": examples}[task](rest)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

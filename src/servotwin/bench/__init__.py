@@ -1,0 +1,47 @@
+"""The bench of the paper as a program: from a command voltage to the seven readings of its display.
+
+V_i → 10-bit converter → pulse generator (16 µs steps, a frame of 16.384 ms) → servo → potentiometer → 10-bit
+converter → V_i, ADC_i, V_o, ADC_o, f, q, t_a.
+"""
+
+from servotwin.bench.bench import Bench, BenchRun, bench_servo
+from servotwin.bench.calibration import Interval, command_voltage_interval, zero_offset_interval
+from servotwin.bench.converter import FEEDBACK_CONVERTER, INPUT_CONVERTER, Converter
+from servotwin.bench.fits import CurvatureTest, LineFit, TableFit, curvature_test, fit_line, table_fits
+from servotwin.bench.generator import PulseGenerator
+from servotwin.bench.reading import Reading, TableRow
+from servotwin.bench.residuals import (
+    Comparison,
+    ModelShares,
+    Shares,
+    compare,
+    measured_shares,
+    model_shares,
+)
+
+__all__ = [
+    "FEEDBACK_CONVERTER",
+    "INPUT_CONVERTER",
+    "Bench",
+    "BenchRun",
+    "Comparison",
+    "Converter",
+    "CurvatureTest",
+    "Interval",
+    "LineFit",
+    "ModelShares",
+    "PulseGenerator",
+    "Reading",
+    "Shares",
+    "TableFit",
+    "TableRow",
+    "bench_servo",
+    "command_voltage_interval",
+    "compare",
+    "curvature_test",
+    "fit_line",
+    "measured_shares",
+    "model_shares",
+    "table_fits",
+    "zero_offset_interval",
+]

@@ -1,0 +1,201 @@
+"""Simulated against measured: the differences row by row, and what each is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from servotwin.bench.fits import TableFit
+from servotwin.bench.reading import TableRow
+from servotwin.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Simulated less measured, one row of the table.
+
+    Parameters
+    ----------
+    output_angle : float
+        [rad]
+    feedback_voltage : float
+        [V]
+    pulse_width : float
+        [s]
+    command_count, feedback_count : int
+        [counts]
+    """
+
+    output_angle: float
+    feedback_voltage: float
+    pulse_width: float
+    command_count: int
+    feedback_count: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shares:
+    """Why a measured angle lies off the straight line q(V_i); the shares add up to `total` [rad].
+
+    Parameters
+    ----------
+    total : float
+        Measured angle less the line q(V_i).
+    quantum : float
+        The generator's 16 µs steps: what t_a less the line t_a(V_i) turns.
+    curvature : float
+        Measured angle less the line q(t_a).
+    rest : float
+        The line q(t_a) of the line t_a(V_i) is not quite the line q(V_i).
+    """
+
+    total: float
+    quantum: float
+    curvature: float
+    rest: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelShares:
+    """Why a simulated value differs from the measured one; the shares add up to `total` [rad] or [V].
+
+    Parameters
+    ----------
+    total : float
+        Simulated less measured.
+    generator : float
+        A pulse width other than the measured one.
+    curvature : float
+        The straight line over t_a less the measured value: a linear servo cannot bend.
+    standing : float
+        Mean of both approaches less the value without error: an unequal stop from either side.
+    rest : float
+        Calibration of the servo less the straight line over t_a.
+    """
+
+    total: float
+    generator: float
+    curvature: float
+    standing: float
+    rest: float
+
+
+def compare(rows: Sequence[TableRow], columns: Mapping[str, ArrayLike]) -> tuple[Comparison, ...]:
+    """Return simulated less measured.
+
+    Parameters
+    ----------
+    rows : sequence of TableRow, length n
+    columns : mapping
+        The measured table: q_deg, V_o_V, t_a_us, ADC_i, ADC_o, each of length n.
+
+    Raises
+    ------
+    InputError
+        If the lengths differ.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.bench import Bench, bench_servo
+    >>> table = st.load_dataset("urrea-kern-table-2").columns
+    >>> bench = Bench(st.BoundedServo(bench_servo(st.load_servo("hitec-hs-755hb"))))
+    >>> max(abs(row.pulse_width) for row in compare(bench.measure(table["V_i_V"]), table)) < 1e-6
+    True
+    """
+    q, v_o, t_a, n_i, n_o = (_column(columns, name, len(rows)) for name in
+                             ("q_deg", "V_o_V", "t_a_us", "ADC_i", "ADC_o"))
+    return tuple(
+        Comparison(
+            output_angle=row.reading.output_angle - math.radians(q[k]),
+            feedback_voltage=row.reading.feedback_voltage - v_o[k],
+            pulse_width=row.reading.pulse_width - 1e-6 * t_a[k],
+            command_count=row.reading.command_count - round(n_i[k]),
+            feedback_count=row.reading.feedback_count - round(n_o[k]))
+        for k, row in enumerate(rows))
+
+
+def measured_shares(fits: Mapping[str, TableFit]) -> tuple[Shares, ...]:
+    """Return, row by row, why the measured angles lie off the straight line q(V_i) [rad].
+
+    Parameters
+    ----------
+    fits : mapping
+        Of `table_fits`.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.bench import table_fits
+    >>> shares = measured_shares(table_fits(st.load_dataset("urrea-kern-table-2").columns))
+    >>> all(abs(s.total - s.quantum - s.curvature - s.rest) < 1e-12 for s in shares)
+    True
+    """
+    by_voltage, by_width, widths = fits["q(V_i)"], fits["q(t_a)"], fits["t_a(V_i)"]
+    shares = []
+    for k, volt in enumerate(widths.x):
+        quantum = by_width.line.slope * widths.line.residuals[k]
+        curvature = by_width.line.residuals[k]
+        total = by_voltage.line.residuals[k]
+        rest = by_width.line(widths.line(volt)) - by_voltage.line(volt)
+        shares.append(Shares(total=math.radians(total), quantum=math.radians(quantum),
+                             curvature=math.radians(curvature), rest=math.radians(rest)))
+    return tuple(shares)
+
+
+def model_shares(rows: Sequence[TableRow], fits: Mapping[str, TableFit], *,
+                 quantity: str = "output_angle") -> tuple[ModelShares, ...]:
+    """Return, row by row, why a simulated value differs from the measured one.
+
+    Parameters
+    ----------
+    rows : sequence of TableRow
+        For the voltages of the table, in its order.
+    fits : mapping
+        Of `table_fits`.
+    quantity : {"output_angle", "feedback_voltage"}
+        [rad] or [V]
+
+    Raises
+    ------
+    InputError
+        If the quantity is another, or the rows are not those of the table.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.bench import Bench, bench_servo, table_fits
+    >>> table = st.load_dataset("urrea-kern-table-2").columns
+    >>> bench = Bench(st.BoundedServo(bench_servo(st.load_servo("hitec-hs-755hb"))))
+    >>> shares = model_shares(bench.measure(table["V_i_V"]), table_fits(table))
+    >>> all(abs(s.total - s.generator - s.curvature - s.standing - s.rest) < 1e-12 for s in shares)
+    True
+    """
+    names = {"output_angle": "q(t_a)", "feedback_voltage": "V_o(t_a)"}
+    if quantity not in names:
+        raise InputError("quantity", got=quantity, allowed=", ".join(names))
+    fit = fits[names[quantity]]
+    if len(rows) != len(fit.x):
+        raise InputError("rows of the simulated table", got=len(rows), allowed=f"{len(fit.x)}, as measured")
+    unit = math.pi / 180.0 if quantity == "output_angle" else 1.0
+    shares = []
+    for k, row in enumerate(rows):
+        simulated = getattr(row.reading, quantity)
+        target = row.target_angle if quantity == "output_angle" else row.target_voltage
+        width = 1e6 * row.reading.pulse_width
+        shares.append(ModelShares(
+            total=simulated - unit * fit.y[k], generator=unit * fit.line.slope * (width - fit.x[k]),
+            curvature=-unit * fit.line.residuals[k], standing=simulated - target,
+            rest=target - unit * fit.line(width)))
+    return tuple(shares)
+
+
+def _column(columns: Mapping[str, ArrayLike], name: str, length: int) -> list[float]:
+    values = np.atleast_1d(np.asarray(columns[name], dtype=np.float64)) if name in columns else np.empty(0)
+    if values.size != length:
+        raise InputError(f"column {name} of the measured table", got=f"{values.size} values", allowed=f"{length}")
+    return [float(v) for v in values]

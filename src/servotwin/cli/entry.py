@@ -1,0 +1,116 @@
+"""The entry point: run a command, and turn whatever goes wrong into one line and an exit code."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import warnings
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+TRACEBACK = "SERVOTWIN_TRACEBACK"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Words after `servotwin`; those of the process unless given.
+
+    Returns
+    -------
+    int
+        0: done; 2: bad input or an output that cannot be written; 130: interrupted; 1: a mistake of servotwin.
+
+    Examples
+    --------
+    >>> main(["--version"])
+    servotwin 0.1.0
+    0
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        for stream in (sys.stdout, sys.stderr):
+            if hasattr(stream, "reconfigure"):
+                stream.reconfigure(errors="backslashreplace")  # a name may hold what the terminal cannot show
+        with _one_line_warnings():
+            code = _run(words)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return code
+    except KeyboardInterrupt as error:
+        return _failed(error, words)
+    except Exception as error:
+        if os.environ.get(TRACEBACK):
+            raise
+        return _failed(error, words)
+
+
+def _run(words: Sequence[str]) -> int:
+    import typer
+    from typer.main import get_command
+
+    from servotwin.cli.app import app
+
+    command = get_command(app)
+    try:
+        # Not command(...): that would print errors in its own way, and treat a broken pipe as one of ours.
+        with command.make_context("servotwin", list(words)) as context:
+            command.invoke(context)
+    except typer.Exit as ended:
+        return int(ended.exit_code)
+    return 0
+
+
+def _failed(error: BaseException, words: Sequence[str]) -> int:
+    from servotwin.cli.failure import describe
+
+    failure = describe(error)
+    if isinstance(error, BrokenPipeError) or not _flushed():
+        _discard_stdout()
+    elif "--json" in words:
+        _try_write(sys.stdout, failure.to_json())
+    _try_write(sys.stderr, f"servotwin: error: {failure.message}")
+    return failure.code
+
+
+def _try_write(stream: object, line: str) -> None:
+    with contextlib.suppress(OSError, ValueError):
+        if stream is not None:
+            stream.write(line + "\n")  # type: ignore[attr-defined]
+            stream.flush()  # type: ignore[attr-defined]
+
+
+def _flushed() -> bool:
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except (OSError, ValueError):
+        return False
+    return True
+
+
+def _discard_stdout() -> None:
+    """Send what is still buffered nowhere, or the interpreter would complain about it on its way out."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, sys.stdout.fileno())
+        os.close(null)
+
+
+@contextlib.contextmanager
+def _one_line_warnings() -> Iterator[None]:
+    from servotwin.cli.failure import one_line
+
+    def show(message: Warning | str, *_: object) -> None:
+        _try_write(sys.stderr, f"servotwin: warning: {one_line(str(message))}")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = show
+        yield

@@ -1,0 +1,105 @@
+"""Numbers and columns out of words and files."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+
+from servotwin.errors import InputError
+
+
+def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | None = None) -> list[float]:
+    """Return the numbers of a text such as ``"0:180"``.
+
+    Parameters
+    ----------
+    what : str
+        What to call it in an error.
+    text : str
+        Numbers, with colons between them.
+    names : tuple of str
+        What each number is.
+    required : int, optional
+        How many must be there; all unless given.
+
+    Raises
+    ------
+    InputError
+        If there are too few or too many, or one is no number.
+
+    Examples
+    --------
+    >>> numbers("--step", "0:180", ("BEFORE", "AFTER"))
+    [0.0, 180.0]
+    """
+    least = len(names) if required is None else required
+    form = ":".join(names[:least]) + "".join(f"[:{name}]" for name in names[least:])
+    words = text.split(":")
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        values = []
+    if not least <= len(values) <= len(names):
+        raise InputError(what, got=text, allowed=f"{form}, with numbers" if len(names) > 1 else "a number")
+    return values
+
+
+def read_columns(path: Path, *wanted: Mapping[str, float]) -> list[list[float]]:
+    r"""Return columns of a CSV file with a header, in SI.
+
+    Parameters
+    ----------
+    path : Path
+    *wanted : mapping of str to float
+        For each column, the names that it may have, and the factor to SI of each.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is empty, lacks a column, or has a value that is no number.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> file = Path(tempfile.mkdtemp()) / "torque.csv"
+    >>> _ = file.write_text("time_s,torque_mNm\n0,0\n1,200\n")
+    >>> read_columns(file, {"time_s": 1.0}, {"torque_Nm": 1.0, "torque_mNm": 1e-3})
+    [[0.0, 1.0], [0.0, 0.2]]
+    """
+    header, rows = _table(path)
+    columns = []
+    for names in wanted:
+        name = next((name for name in names if name in header), None)
+        if name is None:
+            raise InputError(f"{path}: columns", got=", ".join(header), allowed="one of " + ", ".join(names))
+        k = header.index(name)
+        columns.append([names[name] * _number(path, row, k, line, name) for line, row in rows])
+    return columns
+
+
+def _number(path: Path, row: list[str], k: int, line: int, name: str) -> float:
+    try:
+        return float(row[k])
+    except (IndexError, ValueError):
+        got = row[k] if k < len(row) else "nothing"
+        raise InputError(f"{path}: line {line}, {name}", got=got, allowed="a number") from None
+
+
+def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file)
+            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not readable as CSV (not a UTF-8 text)") from None
+    except OSError as error:
+        raise InputError(f"{path}: not readable as CSV ({error.strerror})") from None
+    except (csv.Error, ValueError) as error:
+        raise InputError(f"{path}: not readable as CSV ({error})") from None
+    if len(rows) < 2:
+        raise InputError(str(path), got="a header without rows" if rows else "an empty file",
+                         allowed="a header and at least one row")
+    return [cell.strip() for cell in rows[0][1]], rows[1:]

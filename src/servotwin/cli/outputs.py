@@ -1,0 +1,152 @@
+"""Output files: checked before anything is computed, written beside their place, then moved into it together."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from servotwin.errors import OutputError, OutputExistsError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Target:
+    """A file to be written.
+
+    Parameters
+    ----------
+    option : str
+        The option that names it, such as ``"--out"``.
+    path : Path
+        As the user gave it.
+    endings : tuple of str
+        What its name may end in, such as ``(".csv",)``.
+    """
+
+    option: str
+    path: Path
+    endings: tuple[str, ...]
+
+    @property
+    def place(self) -> Path:
+        """Where it really goes: links are followed, so that they stay links."""
+        try:
+            return self.path.resolve()
+        except (OSError, RuntimeError, ValueError) as error:
+            raise OutputError(f"{self.option} {self.path} cannot be written ({_reason(error)})") from None
+
+
+def check_targets(targets: Sequence[Target], *, force: bool, inputs: Mapping[str, Path] | None = None) -> None:
+    """Raise unless every file can be written, no two are the same, and none is an input.
+
+    Parameters
+    ----------
+    targets : sequence of Target
+    force : bool
+        Whether files that exist may be replaced.
+    inputs : mapping of str to Path, optional
+        Files that are read, by what names them.
+
+    Raises
+    ------
+    OutputExistsError
+        If a file exists and `force` is false.
+    OutputError
+        In all other cases.
+
+    Examples
+    --------
+    >>> check_targets([Target(option="--out", path=Path("run.txt"), endings=(".csv",))], force=False)
+    Traceback (most recent call last):
+    ...
+    servotwin.errors.OutputError: --out: got 'run.txt', allowed: a name that ends in .csv
+    """
+    taken = {_identity(path): f"{what} {path}" for what, path in (inputs or {}).items()}
+    for target in targets:
+        if target.path.suffix.lower() not in target.endings:
+            raise OutputError(target.option, got=str(target.path),
+                              allowed="a name that ends in " + ", ".join(target.endings))
+        _check_place(target, force=force)
+        other = taken.setdefault(_identity(target.place), f"{target.option} {target.path}")
+        if other != f"{target.option} {target.path}":
+            raise OutputError(f"{target.option} {target.path} is the same file as {other}")
+
+
+@contextlib.contextmanager
+def staged(targets: Sequence[Target], *, force: bool) -> Iterator[list[Path]]:
+    """Give a path to write to for each target; at the end all move into place, or, after an error, none does.
+
+    Examples
+    --------
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> target = Target(option="--out", path=folder / "a.csv", endings=(".csv",))
+    >>> with staged([target], force=False) as paths:
+    ...     _ = paths[0].write_text("time_s")
+    >>> [path.name for path in folder.iterdir()]
+    ['a.csv']
+    """
+    with contextlib.ExitStack() as stack:
+        places = [target.place for target in targets]
+        drafts = []
+        for target, place in zip(targets, places, strict=True):
+            with _naming(target):
+                folder = tempfile.mkdtemp(dir=place.parent, prefix=".servotwin-")
+            stack.callback(shutil.rmtree, folder, ignore_errors=True)
+            drafts.append(Path(folder) / place.name)
+        yield drafts
+        for target, place in zip(targets, places, strict=True):
+            if place.exists() and not force:  # it came into being meanwhile
+                raise OutputExistsError(target.path)
+        for target, draft, place in zip(targets, drafts, places, strict=True):
+            with _naming(target):
+                draft.replace(place)
+
+
+def _check_place(target: Target, *, force: bool) -> None:
+    place = target.place
+    with _naming(target):
+        if place.is_dir():
+            raise OutputError(f"{target.option} {target.path} is a folder")
+        if os.path.lexists(place) and not place.is_file():
+            raise OutputError(f"{target.option} {target.path} is no regular file")
+        if place.exists() and not force:
+            raise OutputExistsError(target.path)
+        if not place.parent.exists():
+            raise OutputError(f"{target.option} {target.path}: the folder {target.path.parent} does not exist")
+        if not place.parent.is_dir():
+            raise OutputError(f"{target.option} {target.path}: {target.path.parent} is no folder")
+        # Permissions do not tell (root, read-only file systems): try.
+        handle, probe = tempfile.mkstemp(dir=place.parent, prefix=f".{place.name}.", suffix=".partial")
+        os.close(handle)
+        Path(probe).unlink()
+
+
+@contextlib.contextmanager
+def _naming(target: Target) -> Iterator[None]:
+    try:
+        yield
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(f"{target.option} {target.path} cannot be written ({_reason(error)})") from None
+    except ValueError as error:
+        if isinstance(error, OutputExistsError):
+            raise
+        raise OutputError(f"{target.option} {str(target.path)!r} cannot be written ({error})") from None
+
+
+def _reason(error: BaseException) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _identity(path: Path) -> tuple[object, ...]:
+    """What two names of one file have in common."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return (path.absolute() if not path.parent.exists() else path.resolve(),)
+    return (found.st_dev, found.st_ino)

@@ -1,0 +1,159 @@
+"""Everything that the report of the paper computes, before any picture is drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from servotwin import bench, signals
+from servotwin.loads import Inertia
+from servotwin.models import AveragedServo, BoundedServo
+from servotwin.parameters import load_dataset, load_servo
+from servotwin.simulation import simulate
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from servotwin.bench import Bench, Comparison, Interval, ModelShares, Shares, TableFit, TableRow
+    from servotwin.models import Model
+    from servotwin.parameters import Servo
+    from servotwin.simulation import Result, StepMetrics
+
+Progress = Callable[[str, float], None]
+
+SERVO = "hitec-hs-755hb"
+LOAD_INERTIA = 1e-3  # kg m²; assumed, the paper does not say what its simulated servo carried
+STEP_AT, STEP_DURATION = 0.1, 1.5  # s
+MODELS: Mapping[str, type[Model]] = {"averaged": AveragedServo, "bounded": BoundedServo}
+LABELS = {"averaged": "averaged servo (the paper's model)", "bounded": "bounded servo"}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BenchStudy:
+    """One model on the bench: its table, and how that differs from the measured one."""
+
+    bench: Bench
+    rows: tuple[TableRow, ...]
+    differences: tuple[Comparison, ...]
+    angle_shares: tuple[ModelShares, ...]
+    voltage_shares: tuple[ModelShares, ...]
+
+    def worst(self, name: str) -> float:
+        """Return the largest magnitude of one difference over all rows (SI, counts)."""
+        return max(abs(getattr(row, name)) for row in self.differences)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Study:
+    """All results of the report.
+
+    Parameters
+    ----------
+    servo : Servo
+        Of the catalog.
+    table : mapping
+        The measured Table II, in its own units.
+    ranges : mapping
+        Table I.
+    steps : mapping
+        By model, the response to 0→180°.
+    metrics : mapping
+        By model.
+    peak_voltage : mapping
+        By model, the largest magnitude of the armature voltage [V].
+    fits : mapping
+        The straight lines through Table II.
+    measured_shares : tuple of Shares
+        Why the measured angles lie off a straight line.
+    on_bench : mapping
+        By model.
+    offsets : Interval
+        Zero offsets of the converter that give all five pulse widths [counts].
+    """
+
+    servo: Servo
+    table: Mapping[str, NDArray[np.float64]]
+    ranges: Mapping[str, NDArray[np.float64]]
+    steps: Mapping[str, Result]
+    metrics: Mapping[str, StepMetrics]
+    peak_voltage: Mapping[str, float]
+    fits: Mapping[str, TableFit]
+    measured_shares: tuple[Shares, ...]
+    on_bench: Mapping[str, BenchStudy]
+    offsets: Interval
+
+    @property
+    def supply(self) -> float:
+        """Open-circuit voltage of the supply [V]."""
+        return _value(self.servo, "supply.open_circuit_voltage")
+
+    @property
+    def voltage_limit(self) -> float:
+        """What the supply leaves for the motor, V_oc − V_ce0 [V]."""
+        drop = self.servo.get("supply.bridge_drop_voltage")
+        return self.supply - (float(drop) if isinstance(drop, int | float) else 0.0)
+
+    def value(self, name: str) -> float:
+        """Return a parameter of the servo (SI)."""
+        return _value(self.servo, name)
+
+
+def run_study(progress: Progress) -> Study:
+    """Compute everything; `progress` is told words and a fraction of the whole report."""
+    progress("reading the servo and the tables", 0.02)
+    servo = load_servo(SERVO)
+    table = load_dataset("urrea-kern-table-2").columns
+    ranges = load_dataset("urrea-kern-table-1").columns
+    progress("simulating the step from 0 to 180°", 0.05)
+    steps = {name: _step(model(servo)) for name, model in MODELS.items()}
+    progress("fitting straight lines to Table II", 0.10)
+    fits = bench.table_fits(table)
+    progress("measuring on the simulated bench", 0.15)
+    at_bench = bench.bench_servo(servo)
+    return Study(
+        servo=servo, table=table, ranges=ranges, steps=steps,
+        metrics={name: step.step_metrics() for name, step in steps.items()},
+        peak_voltage={name: step.peak("armature_voltage") for name, step in steps.items()},
+        fits=fits, measured_shares=bench.measured_shares(fits),
+        on_bench={name: _bench(model(at_bench), table, fits) for name, model in MODELS.items()},
+        offsets=bench.zero_offset_interval(table["V_i_V"].tolist(), [1e-6 * t for t in table["t_a_us"].tolist()]))
+
+
+def _step(model: Model) -> Result:
+    command = signals.step(0.0, 180.0, at=STEP_AT, unit="deg")
+    return simulate(model, command, duration=STEP_DURATION, load=Inertia(LOAD_INERTIA)).raise_if_failed()
+
+
+def _bench(model: Model, table: Mapping[str, NDArray[np.float64]], fits: Mapping[str, TableFit]) -> BenchStudy:
+    apparatus = bench.Bench(model)
+    rows = apparatus.measure(table["V_i_V"])
+    return BenchStudy(
+        bench=apparatus, rows=rows, differences=bench.compare(rows, table),
+        angle_shares=bench.model_shares(rows, fits),
+        voltage_shares=bench.model_shares(rows, fits, quantity="feedback_voltage"))
+
+
+def headline_numbers(study: Study) -> dict[str, float]:
+    """Return the numbers of the summary, the unit in each name."""
+    numbers: dict[str, float] = {}
+    for name, one in study.on_bench.items():
+        numbers[f"{name}_worst_angle_deg"] = math.degrees(one.worst("output_angle"))
+        numbers[f"{name}_worst_feedback_voltage_mV"] = 1e3 * one.worst("feedback_voltage")
+        numbers[f"{name}_worst_pulse_width_us"] = 1e6 * one.worst("pulse_width")
+        numbers[f"{name}_worst_feedback_count"] = float(one.worst("feedback_count"))
+    for name, metrics in study.metrics.items():
+        numbers[f"{name}_rise_time_s"] = metrics.rise_time
+        numbers[f"{name}_top_speed_deg_per_s"] = math.degrees(metrics.slew_rate)
+        numbers[f"{name}_peak_armature_voltage_V"] = study.peak_voltage[name]
+    numbers["averaged_peak_voltage_over_supply"] = study.peak_voltage["averaged"] / study.supply
+    numbers["bench_pulse_rate_Hz"] = study.on_bench["bounded"].rows[0].reading.pulse_rate
+    numbers["converter_offset_lower_counts"], numbers["converter_offset_upper_counts"] = study.offsets
+    return numbers
+
+
+def _value(servo: Servo, name: str) -> float:
+    number = servo.get(name)
+    return float(number) if isinstance(number, int | float) else math.nan

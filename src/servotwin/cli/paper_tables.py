@@ -1,0 +1,202 @@
+"""The tables of the report."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+from servotwin import units
+from servotwin.cli.paper_format import escape, fixed, number, table, with_error
+from servotwin.cli.paper_study import LABELS, MODELS, Study
+from servotwin.parameters import GROUPS
+
+if TYPE_CHECKING:
+    from servotwin.bench import ModelShares
+    from servotwin.cli.paper_findings import Finding
+    from servotwin.parameters import Quantity
+
+# dimension -> (unit in which a reader expects it, as printed)
+_READABLE = {
+    "time": ("us", "µs"), "angle": ("deg", "°"), "inertia": ("g cm2", "g cm²"), "inductance": ("mH", "mH"),
+    "torque per current": ("mN m/A", "mN m/A"), "voltage per speed": ("mV s/rad", "mV s/rad"),
+    "time per voltage": ("us/V", "µs/V"), "resistance": ("ohm", "Ω"),
+}
+_SHORT = {"averaged": "averaged", "bounded": "bounded"}
+
+
+def step_table(study: Study) -> str:
+    """Return the metrics of the step for both models."""
+    rows: list[list[str]] = []
+    one = study.metrics
+    for words, unit, values in (
+        ("rise time, 10 to 90 %", "s", [fixed(m.rise_time, 3) for m in one.values()]),
+        ("settling time, 2 %", "s", [fixed(m.settling_time, 3) for m in one.values()]),
+        ("overshoot", "%", [fixed(100.0 * m.overshoot, 2) for m in one.values()]),
+        ("final angle", "°", [fixed(math.degrees(m.final), 2) for m in one.values()]),
+        ("command less final angle", "°", [fixed(math.degrees(m.steady_error), 2) for m in one.values()]),
+        ("top speed", "°/s", [fixed(math.degrees(m.slew_rate), 0) for m in one.values()]),
+        ("peak armature current", "A", [fixed(m.peak_current, 2) for m in one.values()]),
+        ("peak armature voltage", "V", [fixed(v, 2) for v in study.peak_voltage.values()]),
+        ("of that, times the supply", "1", [fixed(v / study.supply, 2) for v in study.peak_voltage.values()]),
+    ):
+        rows.append([words, *values, unit])
+    return table(["quantity", *(escape(LABELS[name]) for name in one), "unit"], rows,
+                 caption="Step from 0 to 180°, load inertia 1×10<sup>−3</sup> kg m² (assumed)")
+
+
+def ranges_table(study: Study) -> str:
+    """Return Table I of the paper."""
+    rows = [[f"{q:.0f}", f"{t:.0f}", f"{v:.1f}"] for q, t, v in
+            zip(*(study.ranges[name].tolist() for name in ("q_deg", "t_a_us", "V_o_V")), strict=True)]
+    return table(["q (°)", "t<sub>a</sub> (µs)", "v<sub>o</sub> (V)"], rows,
+                 caption="Table I of the paper: the range of operation of analog servos", text_columns=0)
+
+
+def comparison_table(study: Study) -> str:
+    """Return Table II, measured beside simulated."""
+    t = {name: column.tolist() for name, column in study.table.items()}
+    head = ["", "V<sub>i</sub> (V)", "ADC<sub>i</sub>", "t<sub>a</sub> (µs)", "f (Hz)", "q (°)", "V<sub>o</sub> (V)",
+            "ADC<sub>o</sub>", "band (°)"]
+    rows = []
+    for k in range(len(t["q_deg"])):
+        volt = f"{t['V_i_V'][k]:.3f}"
+        rows.append(["<strong>measured</strong>", volt, f"{t['ADC_i'][k]:.0f}", f"{t['t_a_us'][k]:.0f}",
+                     f"{t['f_Hz'][k]:.0f}", f"{t['q_deg'][k]:.0f}", f"{t['V_o_V'][k]:.3f}", f"{t['ADC_o'][k]:.0f}",
+                     ""])
+        for name, one in study.on_bench.items():
+            row = one.rows[k]
+            r = row.reading
+            rows.append([_SHORT[name], volt, f"{r.command_count}", f"{1e6 * r.pulse_width:.0f}",
+                         f"{r.pulse_rate:.3f}", fixed(math.degrees(r.output_angle), 2), f"{r.feedback_voltage:.4f}",
+                         f"{r.feedback_count}", f"± {fixed(math.degrees(row.standing_band), 2)}"])
+    return table(head, rows, caption="Table II of the paper, measured and simulated. The simulated rows are the mean of "
+                 "an approach from below and one from above; the band is half their difference.")
+
+
+def difference_table(study: Study) -> str:
+    """Return simulated less measured."""
+    rows = []
+    for name, one in study.on_bench.items():
+        for k, (d, row) in enumerate(zip(one.differences, one.rows, strict=True)):
+            rows.append([_SHORT[name], f"{study.table['q_deg'][k]:.0f}", fixed(math.degrees(d.output_angle), 2),
+                         fixed(1e3 * d.feedback_voltage, 1), fixed(1e6 * d.pulse_width, 1), f"{d.command_count:+d}",
+                         f"{d.feedback_count:+d}", fixed(math.degrees(row.deadband_band), 2),
+                         fixed(math.degrees(row.friction_band), 2)])
+        rows.append([f"<strong>{_SHORT[name]}, largest</strong>", "", *(
+            f"<strong>{text}</strong>" for text in (
+                fixed(math.degrees(one.worst("output_angle")), 2), fixed(1e3 * one.worst("feedback_voltage"), 1),
+                fixed(1e6 * one.worst("pulse_width"), 1), f"{one.worst('command_count'):.0f}",
+                f"{one.worst('feedback_count'):.0f}")), "", ""])
+    head = ["model", "row (°)", "Δq (°)", "ΔV<sub>o</sub> (mV)", "Δt<sub>a</sub> (µs)", "ΔADC<sub>i</sub>",
+            "ΔADC<sub>o</sub>", "deadband (°)", "friction (°)"]
+    return table(head, [[cell.replace("-", "−") if k > 1 else cell for k, cell in enumerate(r)] for r in rows],
+                 caption="Simulated less measured, and what the standing band is made of")
+
+
+def measured_shares_table(study: Study) -> str:
+    """Return why the measured angles lie off a straight line over the command voltage."""
+    rows = [[f"{q:.0f}", *(fixed(math.degrees(v), 2) for v in (s.total, s.quantum, s.curvature, s.rest))]
+            for q, s in zip(study.table["q_deg"], study.measured_shares, strict=True)]
+    return table(["row (°)", "measured less line q(V<sub>i</sub>)", "= 16 µs steps", "+ curvature of q(t<sub>a</sub>)",
+                  "+ rest"], rows, text_columns=0,
+                 caption="Why the measured angles (°) scatter about a straight line over V<sub>i</sub>")
+
+
+def model_shares_table(study: Study, name: str) -> str:
+    """Return why one model differs from the measured table."""
+    one = study.on_bench[name]
+
+    def cells(s: ModelShares, scale: float, places: int) -> list[str]:
+        return [fixed(scale * v, places) for v in (s.total, s.generator, s.curvature, s.standing, s.rest)]
+
+    angle = [[f"{q:.0f}", "q (°)", *cells(s, math.degrees(1.0), 2)]
+             for q, s in zip(study.table["q_deg"], one.angle_shares, strict=True)]
+    volt = [[f"{q:.0f}", "V<sub>o</sub> (mV)", *cells(s, 1e3, 1)]
+            for q, s in zip(study.table["q_deg"], one.voltage_shares, strict=True)]
+    return table(["row (°)", "quantity", "simulated less measured", "= other pulse width", "+ curvature",
+                  "+ unequal standing", "+ calibration"], angle + volt, text_columns=2,
+                 caption=f"What the difference is made of: {escape(LABELS[name])}")
+
+
+def fits_table(study: Study) -> str:
+    """Return the straight lines with standard errors, and the test for curvature."""
+    rows = []
+    for fit in study.fits.values():
+        scale, slope_unit, unit = _scaled(fit.name, fit.slope_unit, fit.unit)
+        line, test = fit.line, fit.curvature
+        offset = 1.0 if unit == fit.unit else 1e3
+        rows.append([
+            _pretty(fit.name), with_error(scale * line.slope, scale * line.slope_error, slope_unit),
+            with_error(line.intercept, line.intercept_error, fit.unit),
+            f"{fixed(offset * line.max_residual, 2 if offset == 1.0 else 1)} {unit}", fixed(test.f_value, 2),
+            fixed(test.p_value, 3), f"{fixed(offset * test.sagitta, 2 if offset == 1.0 else 1)} {unit}"])
+    return table(["fit", "slope ± s.e.", "offset ± s.e.", "largest residual", "F (parabola)", "p",
+                  "bend"], rows, caption="Straight lines through Table II, one standard error; F-test of a quadratic "
+                 "term (1 and 2 degrees of freedom), and how far the parabola lies off its chord")
+
+
+def _scaled(name: str, slope_unit: str, unit: str) -> tuple[float, str, str]:
+    if name == "V_o(q)":
+        return 1e3, "mV/°", "mV"
+    if name == "V_o(t_a)":
+        return 1e6, "V/s", "mV"
+    return 1.0, slope_unit, "mV" if unit == "V" else unit
+
+
+def _pretty(name: str) -> str:
+    for plain_name, pretty in (("ADC_i", "ADC<sub>i</sub>"), ("ADC_o", "ADC<sub>o</sub>"), ("V_i", "V<sub>i</sub>"),
+                               ("V_o", "V<sub>o</sub>"), ("t_a", "t<sub>a</sub>")):
+        name = name.replace(plain_name, pretty)
+    return name
+
+
+def findings_table(findings: Sequence[Finding], caption: str) -> str:
+    """Return corrections or disagreements, numbered."""
+    rows = [[f"{k}. {_pretty(f.place)}", _pretty(f.remark), _pretty(f.shown_by)]
+            for k, f in enumerate(findings, start=1)]
+    return table(["place", "what is done about it", "the number that shows it"], rows, caption=caption, text_columns=3)
+
+
+def origins(study: Study) -> dict[str, int]:
+    """Return how many parameters there are of each origin."""
+    return dict(Counter(study.servo.source(name).origin for name in study.servo.names()))
+
+
+def parameter_table(study: Study) -> str:
+    """Return every parameter with value, range, origin and source."""
+    rows = []
+    for name in study.servo.names():
+        quantity = study.servo.source(name)
+        group, field_name = name.split(".")
+        metadata = next(f.metadata for f in fields(GROUPS[group]) if f.name == field_name)
+        value, spread = _shown(quantity, str(metadata["dimension"]))
+        read = [_SHORT[key] for key, model in MODELS.items() if name in (*model.requires, *model.optional)]
+        rows.append([f"<code>{escape(name)}</code>", escape(str(metadata["symbol"])), value, spread,
+                     f'<span class="{quantity.origin}">{quantity.origin}</span>',
+                     escape(quantity.source or "no source: a prior to be identified"),
+                     ", ".join(read) or "–"])
+    return table(["parameter", "symbol", "value", "range or ± s.e.", "origin", "source", "read by"], rows,
+                 caption=f"The servo file <code>{escape(study.servo.name)}</code>", text_columns=7)
+
+
+def _shown(quantity: Quantity, dimension: str) -> tuple[str, str]:
+    """Return value and spread with the unit in which a reader expects them."""
+    if not isinstance(quantity.value, float):
+        return escape(str(quantity.value)), ""
+    unit, printed = _READABLE.get(dimension, (quantity.unit, quantity.unit))
+    printed = "" if printed == "1" else printed
+
+    def text(value: float) -> str:
+        return number(float(units.from_si(value, unit, dimension)))
+
+    spread = ""
+    if quantity.std is not None:
+        spread = f"± {text(quantity.std)}"
+    elif quantity.lower is not None or quantity.upper is not None:
+        low = text(quantity.lower) if quantity.lower is not None else "…"
+        high = text(quantity.upper) if quantity.upper is not None else "…"
+        spread = f"{low} to {high}"
+    return f"{text(quantity.value)} {printed}".rstrip(), spread

@@ -1,0 +1,118 @@
+"""What goes to standard output: text, tables and JSON, each written at once."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import math
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rich.console import RenderableType
+
+_PIPE_WIDTH = 120  # characters of a line where no terminal says how wide it is
+
+
+def emit(text: str) -> None:
+    """Write a text and a line end to standard output.
+
+    Raises
+    ------
+    OSError
+        If that fails; it names standard output.
+
+    Examples
+    --------
+    >>> emit("hello")
+    hello
+    """
+    if sys.stdout is None:
+        return
+    try:
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, "standard output") from None
+
+
+def emit_json(data: Any) -> None:
+    """Write one JSON document; a number that is not finite becomes null.
+
+    Examples
+    --------
+    >>> emit_json({"a": float("nan")})
+    {
+      "a": null
+    }
+    """
+    emit(json.dumps(_finite(data), indent=2, allow_nan=False))
+
+
+def show(*parts: RenderableType) -> None:
+    """Write tables and texts as `rich` draws them, as wide as the terminal.
+
+    Examples
+    --------
+    >>> show("one", "two")
+    one
+    two
+    """
+    from rich.console import Console
+
+    page = io.StringIO()
+    terminal = sys.stdout is not None and sys.stdout.isatty()
+    width = None if terminal or os.environ.get("COLUMNS", "").isdigit() else _PIPE_WIDTH
+    console = Console(file=page, force_terminal=terminal, width=width, markup=False, highlight=False, emoji=False)
+    for part in parts:
+        console.print(part)
+    emit("\n".join(line.rstrip() for line in page.getvalue().rstrip("\n").split("\n")))
+
+
+@contextlib.contextmanager
+def patience(what: str) -> Iterator[None]:
+    """Show on a terminal that something lasts, once it has lasted for a second.
+
+    Examples
+    --------
+    >>> with patience("adding"):
+    ...     1 + 1
+    2
+    """
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield
+        return
+    import threading
+
+    status: list[Any] = []
+
+    def begin() -> None:
+        from rich.console import Console
+
+        status.append(Console(stderr=True, markup=False).status(f"{what} ..."))
+        status[0].start()
+
+    timer = threading.Timer(1.0, begin)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
+        for shown in status:
+            shown.stop()
+
+
+def _finite(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {str(key): _finite(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_finite(value) for value in data]
+    if isinstance(data, float) and not math.isfinite(data):
+        return None
+    return data

@@ -1,0 +1,25 @@
+"""What a servo is made of: parameters with units, origin and spread, the catalog, and published data."""
+
+from servotwin.parameters.catalog import catalog_names, load_servo
+from servotwin.parameters.datasets import Dataset, dataset_names, load_dataset
+from servotwin.parameters.groups import (
+    GROUPS,
+    Electronics,
+    Friction,
+    Gear,
+    Group,
+    Motor,
+    Potentiometer,
+    Stops,
+    Supply,
+    Thermal,
+)
+from servotwin.parameters.output_file import write_file
+from servotwin.parameters.quantity import ORIGINS, Quantity
+from servotwin.parameters.servo import Servo, servo_from_values, unit_of
+
+__all__ = [
+    "GROUPS", "ORIGINS", "Dataset", "Electronics", "Friction", "Gear", "Group", "Motor", "Potentiometer", "Quantity",
+    "Servo", "Stops", "Supply", "Thermal", "catalog_names", "dataset_names", "load_dataset", "load_servo",
+    "servo_from_values", "unit_of", "write_file",
+]

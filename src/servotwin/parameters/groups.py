@@ -1,0 +1,247 @@
+"""The parameter groups: frozen dataclasses whose fields say unit, range, meaning and symbol, and check themselves.
+
+Names, letters and ranges are those of Urrea & Kern (2011) where the paper has them; the theory pages list both.
+A field that is None is absent: the effect is off, or not known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from itertools import pairwise
+from typing import Any, ClassVar
+
+from servotwin.errors import ParameterError
+from servotwin.units import si_unit
+
+POSITIVE = "a positive number"
+NOT_NEGATIVE = "a number of at least 0"
+ANY = "a finite number"
+AT_LEAST_ONE = "a number of at least 1"
+FRACTION = "a number from 0 to 1"
+
+_RULES: dict[str, Callable[[float], bool]] = {
+    POSITIVE: lambda x: x > 0.0,
+    NOT_NEGATIVE: lambda x: x >= 0.0,
+    ANY: lambda x: True,
+    AT_LEAST_ONE: lambda x: x >= 1.0,
+    FRACTION: lambda x: 0.0 <= x <= 1.0,
+}
+
+
+def parameter(symbol: str, dimension: str, rule: str, meaning: str) -> Any:
+    """Declare a number that may be absent."""
+    return field(default=None, metadata={"symbol": symbol, "dimension": dimension, "rule": rule, "meaning": meaning})
+
+
+def table(symbol: str, dimension: str, meaning: str) -> Any:
+    """Declare a table of numbers that may be absent."""
+    return field(default=None, metadata={"symbol": symbol, "dimension": dimension, "rule": "table",
+                                         "meaning": meaning})
+
+
+def choice(options: tuple[str, ...], meaning: str) -> Any:
+    """Declare a word out of a few that may be absent."""
+    return field(default=None, metadata={"symbol": "", "dimension": "word", "rule": options, "meaning": meaning})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group:
+    """Base of all groups: checks every field once, and the relations between fields."""
+
+    title: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if value is not None:
+                object.__setattr__(self, f.name, self._checked(f.name, value, f.metadata))
+        self._check_relations()
+
+    def _checked(self, name: str, value: Any, metadata: Any) -> Any:
+        rule = metadata["rule"]
+        what = f"{self.title}.{name}"
+        if isinstance(rule, tuple):
+            if value not in rule:
+                raise ParameterError(what, got=value, allowed=" or ".join(rule))
+            return value
+        unit = si_unit(metadata["dimension"])
+        if rule == "table":
+            if not isinstance(value, list | tuple) or not all(_is_number(x) for x in value) or not value:
+                raise ParameterError(what, got=value, allowed=f"a list of finite numbers [{unit}]")
+            return tuple(float(x) for x in value)
+        if not _is_number(value) or not _RULES[rule](value):
+            raise ParameterError(what, got=value, allowed=f"{rule} [{unit}]")
+        return float(value)
+
+    def _check_relations(self) -> None:
+        """Check what depends on several fields."""
+
+    def _ordered(self, low: str, high: str) -> None:
+        a, b = getattr(self, low), getattr(self, high)
+        if a is not None and b is not None and not a < b:
+            raise ParameterError(f"{self.title}.{low}", got=a, allowed=f"less than {self.title}.{high} = {b!r}")
+
+
+def _is_number(value: Any) -> bool:
+    return not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motor(Group):
+    """The DC motor, at its own shaft (paper, eq. 4-15)."""
+
+    title = "motor"
+    armature_resistance: float | None = parameter("R_a", "resistance", POSITIVE, "armature resistance (7)")
+    armature_inductance: float | None = parameter("L_a", "inductance", POSITIVE, "armature inductance (7)")
+    torque_constant: float | None = parameter("k_a", "torque per current", POSITIVE, "torque per current (4, 26)")
+    back_emf_constant: float | None = parameter("k_b", "voltage per speed", POSITIVE, "back-EMF per speed (6, 24)")
+    rotor_inertia: float | None = parameter("J_m", "inertia", POSITIVE, "inertia of rotor and first gear (10)")
+    motor_viscous_friction: float | None = parameter("B_m", "torque per speed", NOT_NEGATIVE, "viscous friction (10)")
+    brush_drop_voltage: float | None = parameter("V_br", "voltage", NOT_NEGATIVE, "voltage lost at the brushes")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gear(Group):
+    """The gear train (paper, eq. 16-22); the paper's n is 1/gear_reduction."""
+
+    title = "gear"
+    gear_reduction: float | None = parameter("N = 1/n", "number", AT_LEAST_ONE, "motor turns per output turn (18)")
+    backlash: float | None = parameter("", "angle", NOT_NEGATIVE, "total play between motor and output, at the output")
+    output_inertia: float | None = parameter("", "inertia", NOT_NEGATIVE, "inertia of gear wheel and horn")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Friction(Group):
+    """Dry friction of motor and gear (paper, eq. 37-41), at the motor shaft; both Coulomb torques are magnitudes."""
+
+    title = "friction"
+    coulomb_torque_forward: float | None = parameter("F_ec1", "torque", NOT_NEGATIVE, "Coulomb torque forward (41)")
+    coulomb_torque_backward: float | None = parameter("F_ec2", "torque", NOT_NEGATIVE, "Coulomb torque backward (41)")
+    zero_crossing_slope: float | None = parameter("k", "inverse speed", POSITIVE, "slope of tanh at speed zero (41)")
+    breakaway_ratio: float | None = parameter("r", "number", AT_LEAST_ONE, "static over Coulomb friction")
+    stribeck_speed: float | None = parameter("v_s", "speed", POSITIVE, "motor speed at which static friction fades")
+    stribeck_exponent: float | None = parameter("alpha", "number", POSITIVE, "how sharply it fades")
+    load_friction: float | None = parameter("K_l", "number", NOT_NEGATIVE, "gear friction per torque through the gear")
+    load_friction_stribeck: float | None = parameter("K_ls", "number", NOT_NEGATIVE, "its static part")
+    load_friction_motor: float | None = parameter("K_m", "number", NOT_NEGATIVE, "gear friction per motor torque")
+    load_friction_external: float | None = parameter("K_e", "number", NOT_NEGATIVE, "gear friction per load torque")
+    load_friction_motor_stribeck: float | None = parameter("K_ms", "number", NOT_NEGATIVE, "static part of K_m")
+    load_friction_external_stribeck: float | None = parameter("K_es", "number", NOT_NEGATIVE, "static part of K_e")
+    load_friction_motor_quad: float | None = parameter(
+        "K_mq", "inverse torque", NOT_NEGATIVE, "quadratic in motor torque")
+    load_friction_external_quad: float | None = parameter(
+        "K_eq", "inverse torque", NOT_NEGATIVE, "quadratic in load torque")
+
+    def _check_relations(self) -> None:
+        if self.stribeck_exponent is not None and self.stribeck_speed is None:
+            raise ParameterError("friction.stribeck_exponent", got=self.stribeck_exponent,
+                                 allowed="only together with friction.stribeck_speed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Potentiometer(Group):
+    """The position sensor (paper, eq. 38; Table II)."""
+
+    title = "potentiometer"
+    feedback_gain: float | None = parameter("p", "voltage per angle", POSITIVE, "voltage per output angle (38)")
+    feedback_offset: float | None = parameter("b_o", "voltage", ANY, "voltage at output angle 0")
+    backlash: float | None = parameter("", "angle", NOT_NEGATIVE, "total play between output and potentiometer")
+    noise: float | None = parameter("", "voltage", NOT_NEGATIVE, "noise, rms")
+    linearity_angle: tuple[float, ...] | None = table("", "angle", "angles of the linearity table")
+    linearity_error: tuple[float, ...] | None = table("", "voltage", "voltage added at these angles")
+    quantisation: float | None = parameter("", "voltage per count", POSITIVE, "voltage per count")
+
+    def _check_relations(self) -> None:
+        angles, errors = self.linearity_angle, self.linearity_error
+        if (angles is None) != (errors is None) or (angles and errors and len(angles) != len(errors)):
+            raise ParameterError("potentiometer.linearity_error", got=errors,
+                                 allowed="as many values as potentiometer.linearity_angle")
+        if angles and any(b <= a for a, b in pairwise(angles)):
+            raise ParameterError("potentiometer.linearity_angle", got=angles, allowed="increasing angles")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Electronics(Group):
+    """Pulse-to-voltage converter, comparator and bridge (paper, eq. 38), and the chip at pulse level."""
+
+    title = "electronics"
+    bridge_gain: float | None = parameter("A", "voltage gain", POSITIVE, "gain of the bridge (38)")
+    comparator_gain: float | None = parameter("k_s", "voltage gain", POSITIVE, "gain of the comparator (38)")
+    voltage_to_pulse_gain: float | None = parameter(
+        "k_p1", "time per voltage", POSITIVE, "pulse per command voltage (38)")
+    pulse_to_voltage_gain: float | None = parameter(
+        "k_p2", "voltage per time", POSITIVE, "voltage per pulse width (38)")
+    command_offset: float | None = parameter("b_i", "voltage", ANY, "control voltage at command voltage 0")
+    command_pulse_offset: float | None = parameter("t_0", "time", ANY, "pulse width at command voltage 0")
+    voltage_deadband: float | None = parameter(
+        "w_v", "voltage", NOT_NEGATIVE, "full width of the deadband, averaged models")
+    frame_period: float | None = parameter("T_f", "time", POSITIVE, "period of the pulses")
+    deadband: float | None = parameter("w", "time", NOT_NEGATIVE, "full width of the comparator's deadband")
+    stretcher_gain: float | None = parameter("K", "number", POSITIVE, "drive time per pulse error")
+    minimum_drive_time: float | None = parameter("t_min", "time", NOT_NEGATIVE, "shortest drive")
+    stretcher_time_constant: float | None = parameter("tau_s", "time", POSITIVE, "of an RC stretcher; absent: linear")
+    off_state: str | None = choice(("brake", "coast"), "what the bridge does between drives")
+    one_shot_offset: float | None = parameter("T_0", "time", ANY, "width of the one-shot at feedback voltage 0")
+    one_shot_slope: float | None = parameter(
+        "1/s_r", "time per voltage", POSITIVE, "one-shot width per feedback voltage")
+    back_emf_injection: float | None = parameter("beta", "number", ANY, "share of the motor's voltage in the feedback")
+    supply_coupling: float | None = parameter("c_s", "number", ANY, "share of a supply sag in the feedback")
+    pulse_timeout: float | None = parameter("", "time", POSITIVE, "drive ends so long after the last pulse")
+    pulse_width_min: float | None = parameter("", "time", POSITIVE, "shortest pulse accepted")
+    pulse_width_max: float | None = parameter("", "time", POSITIVE, "longest pulse accepted")
+
+    def _check_relations(self) -> None:
+        self._ordered("pulse_width_min", "pulse_width_max")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Supply(Group):
+    """Battery or regulator, and what the bridge takes of it."""
+
+    title = "supply"
+    open_circuit_voltage: float | None = parameter("V_oc", "voltage", POSITIVE, "voltage without load")
+    internal_resistance: float | None = parameter("R_b", "resistance", NOT_NEGATIVE, "resistance of the source")
+    bridge_drop_voltage: float | None = parameter(
+        "V_ce0", "voltage", NOT_NEGATIVE, "constant drop of a conducting pair")
+    bridge_drop_resistance: float | None = parameter(
+        "r_c", "resistance", NOT_NEGATIVE, "resistance of a conducting pair")
+    current_limit: float | None = parameter("", "current", POSITIVE, "most that the source gives")
+
+    def _check_relations(self) -> None:
+        V_oc, V_ce0 = self.open_circuit_voltage, self.bridge_drop_voltage
+        if V_oc is not None and V_ce0 is not None and V_ce0 >= V_oc:
+            raise ParameterError("supply.bridge_drop_voltage", got=V_ce0,
+                                 allowed=f"less than supply.open_circuit_voltage = {V_oc!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stops(Group):
+    """End stops of the output shaft."""
+
+    title = "stops"
+    lower_angle: float | None = parameter("", "angle", ANY, "lowest output angle")
+    upper_angle: float | None = parameter("", "angle", ANY, "highest output angle")
+    restitution: float | None = parameter("", "number", FRACTION, "speed after over speed before an impact")
+
+    def _check_relations(self) -> None:
+        self._ordered("lower_angle", "upper_angle")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thermal(Group):
+    """Two thermal masses, winding and housing."""
+
+    title = "thermal"
+    winding_capacity: float | None = parameter("", "heat capacity", POSITIVE, "of the winding")
+    housing_capacity: float | None = parameter("", "heat capacity", POSITIVE, "of the housing")
+    winding_to_housing: float | None = parameter("", "thermal resistance", POSITIVE, "from winding to housing")
+    housing_to_ambient: float | None = parameter("", "thermal resistance", POSITIVE, "from housing to the air")
+    ambient: float | None = parameter("", "temperature", POSITIVE, "temperature of the air")
+    magnet_coefficient: float | None = parameter("", "inverse temperature", ANY, "of k_a and k_b")
+
+
+GROUPS: dict[str, type[Group]] = {
+    group.title: group for group in (Motor, Gear, Friction, Electronics, Potentiometer, Supply, Stops, Thermal)
+}

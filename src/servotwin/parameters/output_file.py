@@ -1,0 +1,54 @@
+"""Writing a file whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from servotwin.errors import OutputError, OutputExistsError
+
+
+def write_file(path: str | Path, write: Callable[[Path], object], *, overwrite: bool = False) -> None:
+    """Let `write` fill a temporary file beside `path`, then move it into place; on failure nothing has changed.
+
+    Raises
+    ------
+    OutputExistsError
+        If `path` exists and `overwrite` is false.
+    OutputError
+        If it cannot be written.
+
+    Examples
+    --------
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> write_file(folder / "a.txt", lambda path: path.write_text("text"))
+    >>> (folder / "a.txt").read_text()
+    'text'
+    """
+    target = Path(path)
+    try:
+        if target.exists() and not overwrite:
+            raise OutputExistsError(target)
+        if target.is_dir():
+            raise OutputError(f"{target} is a folder")
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
+    except OSError as error:
+        raise OutputError(f"{target} cannot be written ({error.strerror})") from None
+    partial = Path(name)
+    try:
+        os.close(handle)
+        write(partial)
+        partial.chmod(0o666 & ~_umask())
+        os.replace(partial, target)
+    except OSError as error:
+        raise OutputError(f"{target} cannot be written ({error.strerror})") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

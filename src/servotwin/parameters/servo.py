@@ -1,0 +1,217 @@
+"""A servo: its parameter groups, and for every number where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from servotwin.errors import ParameterError, UnknownNameError
+from servotwin.parameters.groups import (
+    GROUPS,
+    Electronics,
+    Friction,
+    Gear,
+    Group,
+    Motor,
+    Potentiometer,
+    Stops,
+    Supply,
+    Thermal,
+)
+from servotwin.parameters.quantity import Quantity
+from servotwin.units import si_unit
+
+Value = float | tuple[float, ...] | str
+_NAMES = tuple(f"{group}.{f.name}" for group, kind in GROUPS.items() for f in fields(kind))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Servo:
+    """All that is known of one servo; made by `load_servo` or `servo_from_values`.
+
+    Parameters
+    ----------
+    name : str
+        Short id, such as ``"hitec-hs-755hb"``.
+    title : str
+        For people.
+    motor, gear, friction, electronics, potentiometer, supply, stops, thermal : Group
+        Always there; a field that is None is absent. Plain numbers in SI.
+    quantities : mapping of str to Quantity
+        Every given value by its dotted name, with unit, origin, source and spread.
+    notes : str
+    sheet, fit : mapping
+        Facts of the data sheet, and the record of a fit, as the servo file holds them.
+
+    Examples
+    --------
+    >>> servo = servo_from_values("mine", {"motor": {"armature_resistance": 3.0}})
+    >>> servo.motor.armature_resistance, servo.motor.torque_constant
+    (3.0, None)
+    >>> servo.replace({"motor.armature_resistance": 3.1}).motor.armature_resistance
+    3.1
+    """
+
+    name: str
+    title: str = ""
+    motor: Motor = field(default_factory=Motor)
+    gear: Gear = field(default_factory=Gear)
+    friction: Friction = field(default_factory=Friction)
+    electronics: Electronics = field(default_factory=Electronics)
+    potentiometer: Potentiometer = field(default_factory=Potentiometer)
+    supply: Supply = field(default_factory=Supply)
+    stops: Stops = field(default_factory=Stops)
+    thermal: Thermal = field(default_factory=Thermal)
+    quantities: Mapping[str, Quantity] = field(default_factory=dict, repr=False)
+    notes: str = field(default="", repr=False)
+    sheet: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    fit: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("quantities", "sheet", "fit"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by plain mappings."""
+        state = {f.name: getattr(self, f.name) for f in fields(self)}
+        return _rebuild, ({k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()},)
+
+    def __hash__(self) -> int:
+        return hash((self.name, tuple(getattr(self, group) for group in GROUPS)))
+
+    def names(self) -> tuple[str, ...]:
+        """Return the dotted names of all values that are given, in the order of the groups."""
+        return tuple(name for name in _NAMES if self.get(name) is not None)
+
+    def get(self, name: str) -> Value | None:
+        """Return a value (SI) by its dotted name, None where it is absent.
+
+        Raises
+        ------
+        UnknownNameError
+            If no parameter has this name; the nearest one is suggested.
+        """
+        group, key = check_name(name)
+        value: Value | None = getattr(getattr(self, group), key)
+        return value
+
+    def source(self, name: str) -> Quantity:
+        """Return a given value with unit, origin, source and spread.
+
+        Raises
+        ------
+        UnknownNameError
+            If no parameter has this name.
+        ParameterError
+            If this servo does not give it.
+        """
+        if self.get(name) is None:
+            raise ParameterError(f"{name} is not given by servo {self.name!r}")
+        return self.quantities[name]
+
+    def replace(self, values: Mapping[str, Value]) -> Servo:
+        """Return a servo with some values replaced (dotted name to SI number); their origin becomes assumed.
+
+        Raises
+        ------
+        ParameterError, UnknownNameError
+            If a value is not physical, or a name unknown.
+        """
+        changed: dict[str, dict[str, Value]] = {}
+        for name, value in values.items():
+            group, key = check_name(name)
+            changed.setdefault(group, {})[key] = value
+        groups = {group: replace(getattr(self, group), **new) for group, new in changed.items()}
+        quantities = dict(self.quantities)
+        for name in values:
+            group, key = check_name(name)
+            quantities[name] = Quantity(value=getattr(groups[group], key), unit=unit_of(name), origin="assumed",
+                                        source="replaced")
+        return replace(self, quantities=quantities, **groups)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write a servo file that `load_servo` reads back as an equal servo.
+
+        Raises
+        ------
+        OutputExistsError, OutputError
+            If the file exists and `overwrite` is false, or it cannot be written.
+        """
+        from servotwin.parameters.servo_file import write_servo_file
+
+        write_servo_file(self, Path(path), overwrite=overwrite)
+
+
+def servo_from_values(name: str, values: Mapping[str, Mapping[str, Value]], *, title: str = "") -> Servo:
+    """Return a servo from plain SI numbers by group; every value counts as assumed.
+
+    Parameters
+    ----------
+    name : str
+    values : mapping
+        Such as ``{"motor": {"armature_resistance": 3.0}}``; groups may be partial or absent.
+
+    Raises
+    ------
+    ParameterError, UnknownNameError
+        If a value is not physical, or a name unknown.
+
+    Examples
+    --------
+    >>> servo_from_values("mine", {"gear": {"gear_reduction": 280.0}}).source("gear.gear_reduction").origin
+    'assumed'
+    """
+    quantities: dict[str, Quantity] = {}
+    groups: dict[str, Group] = {}
+    for group, entries in values.items():
+        for key in entries:
+            check_name(f"{group}.{key}")
+        if group not in GROUPS:
+            raise UnknownNameError("parameter group", group, GROUPS)
+        groups[group] = GROUPS[group](**entries)
+        for key in entries:
+            value = getattr(groups[group], key)
+            if value is not None:
+                quantities[f"{group}.{key}"] = Quantity(value=value, unit=unit_of(f"{group}.{key}"), origin="assumed")
+    return Servo(name=name, title=title, quantities=quantities, **groups)  # type: ignore[arg-type]
+
+
+def check_name(name: str) -> tuple[str, str]:
+    """Return group and field of a dotted name.
+
+    Raises
+    ------
+    UnknownNameError
+        If no parameter has this name; the nearest one is suggested.
+
+    Examples
+    --------
+    >>> check_name("motor.rotor_inertia")
+    ('motor', 'rotor_inertia')
+    """
+    if name not in _NAMES:
+        group = name.partition(".")[0]
+        near = [n for n in _NAMES if n.startswith(f"{group}.")] or list(_NAMES)
+        raise UnknownNameError("parameter", name, near)
+    group, _, key = name.partition(".")
+    return group, key
+
+
+def unit_of(name: str) -> str:
+    """Return the SI unit of a parameter; empty for words.
+
+    Examples
+    --------
+    >>> unit_of("motor.rotor_inertia")
+    'kg m2'
+    """
+    group, key = check_name(name)
+    dimension = GROUPS[group].__dataclass_fields__[key].metadata["dimension"]
+    return "" if dimension == "word" else si_unit(dimension)
+
+
+def _rebuild(state: dict[str, Any]) -> Servo:
+    return Servo(**state)

@@ -1,0 +1,35 @@
+"""Pictures: results over time, straight lines through data, pulses, and the paper's block diagrams.
+
+Everything is drawn with matplotlib's objects and without its global state; matplotlib is loaded when a picture is
+asked for. Angles are in degrees and pulses in microseconds.
+"""
+
+from servotwin.plotting.block_diagrams import PAPER_DIAGRAMS, block_diagram
+from servotwin.plotting.curves import Curve, Limit, curves, pulses
+from servotwin.plotting.diagram import Diagram
+from servotwin.plotting.files import save, to_bytes
+from servotwin.plotting.formula import Formula, formula_svg
+from servotwin.plotting.style import COLOURS, LINES, axes_grid, finished
+from servotwin.plotting.time_response import SHOWN, Shown, shown, time_response
+
+__all__ = [
+    "COLOURS",
+    "LINES",
+    "PAPER_DIAGRAMS",
+    "SHOWN",
+    "Curve",
+    "Diagram",
+    "Formula",
+    "Limit",
+    "Shown",
+    "axes_grid",
+    "block_diagram",
+    "curves",
+    "finished",
+    "formula_svg",
+    "pulses",
+    "save",
+    "shown",
+    "time_response",
+    "to_bytes",
+]

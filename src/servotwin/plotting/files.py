@@ -1,0 +1,97 @@
+"""From figures to files: PNG, SVG or PDF; the same figure gives the same bytes."""
+
+from __future__ import annotations
+
+import io
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from servotwin.errors import OutputError, OutputExistsError
+from servotwin.plotting.style import context
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS = ("png", "svg", "pdf")
+# No date and no program version in a file: two runs are comparable byte by byte.
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None}, "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+_DPI = 160
+
+
+def to_bytes(figure: Figure, file_format: str) -> bytes:
+    """Return a figure as the contents of a file.
+
+    Parameters
+    ----------
+    figure : Figure
+    file_format : {"png", "svg", "pdf"}
+
+    Raises
+    ------
+    OutputError
+        If the format is none of these.
+
+    Examples
+    --------
+    >>> from servotwin.plotting import axes_grid
+    >>> to_bytes(axes_grid()[0], "png")[1:4]
+    b'PNG'
+    """
+    if file_format not in FORMATS:
+        raise OutputError("format of a picture", got=file_format, allowed=", ".join(FORMATS))
+    with context(), io.BytesIO() as stream:
+        figure.savefig(stream, format=file_format, dpi=_DPI, metadata=_METADATA[file_format])
+        return stream.getvalue()
+
+
+def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> None:
+    """Write a figure to a file whose ending says the format: .png, .svg or .pdf.
+
+    A failure leaves what was there untouched.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : str or Path
+    overwrite : bool
+        Whether a file that is there already may be replaced.
+
+    Raises
+    ------
+    OutputExistsError
+        If the file exists and `overwrite` is false.
+    OutputError
+        If the ending is another, or the file cannot be written.
+    """
+    target = Path(path)
+    file_format = target.suffix.lower().removeprefix(".")
+    if file_format not in FORMATS:
+        raise OutputError("ending of a picture's name", got=target.name,
+                          allowed=", ".join(f".{name}" for name in FORMATS))
+    if target.exists() and not overwrite:
+        raise OutputExistsError(target)
+    data = to_bytes(figure, file_format)
+    try:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".partial")
+    except OSError as error:
+        raise OutputError(f"{target} cannot be written ({error.strerror})") from None
+    partial = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        partial.chmod(0o666 & ~_umask())
+        partial.replace(target)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise OutputError(f"{target} cannot be written ({error.strerror})") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,88 @@
+"""One look for all pictures: readable at column width, for the colour-blind and in grey print."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLOURS: Mapping[str, str] = MappingProxyType({
+    "black": "#000000", "orange": "#E69F00", "sky": "#56B4E9", "green": "#009E73", "yellow": "#F0E442",
+    "blue": "#0072B2", "vermilion": "#D55E00", "purple": "#CC79A7", "grey": "#666666",
+})
+"""The palette of Okabe and Ito (2008), told apart with any colour vision, and a grey."""
+
+LINES: tuple[tuple[str, Any], ...] = (
+    (COLOURS["blue"], "-"), (COLOURS["vermilion"], (0, (5, 2))), (COLOURS["green"], (0, (1, 1.4))),
+    (COLOURS["purple"], (0, (6, 2, 1.2, 2))), (COLOURS["black"], (0, (3, 1.5, 1, 1.5, 1, 1.5))),
+)
+"""Colour and dash of the first, second, … curve: the dash alone tells them apart in grey print."""
+
+_RC = {
+    "font.size": 9.0, "axes.titlesize": 9.0, "axes.labelsize": 9.0, "legend.fontsize": 8.0, "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0, "font.family": "DejaVu Sans", "mathtext.fontset": "dejavusans", "lines.linewidth": 1.6,
+    "axes.linewidth": 0.8, "axes.grid": True, "grid.color": "#D9D9D9", "grid.linewidth": 0.6,
+    "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False,
+    "figure.facecolor": "white", "savefig.facecolor": "white", "figure.dpi": 100.0, "path.simplify": True,
+    "svg.hashsalt": "servotwin", "svg.fonttype": "path", "pdf.fonttype": 42, "axes.unicode_minus": True,
+}
+
+WIDTH = 5.2  # inch: a column of text, or the width of a phone held upright
+
+
+def context() -> AbstractContextManager[None]:
+    """Return a context in which matplotlib draws in the style of this package."""
+    import matplotlib as mpl
+
+    return mpl.rc_context(_RC)
+
+
+def axes_grid(rows: int = 1, *, width: float = WIDTH, height: float = 3.0,
+              share: bool = True, ratios: tuple[float, ...] | None = None) -> tuple[Figure, list[Axes]]:
+    """Return a figure with `rows` panels below each other.
+
+    Parameters
+    ----------
+    rows : int
+        Number of panels, at least 1.
+    width, height : float
+        Of the whole figure [inch].
+    share : bool
+        Whether all panels show the same stretch of the horizontal axis.
+    ratios : tuple of float, length `rows`, optional
+        Heights of the panels to each other; equal unless given.
+
+    Examples
+    --------
+    >>> figure, axes = axes_grid(2)
+    >>> len(axes)
+    2
+    """
+    with context():
+        figure = new_figure(width, height)
+        grid = figure.subplots(rows, 1, sharex=share, squeeze=False, height_ratios=ratios)
+        return figure, [grid[k, 0] for k in range(rows)]
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure [inch] that is drawn without any window."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def finished(figure: Figure) -> Figure:
+    """Return the figure with its layout found once and then kept, so that all files of it look the same."""
+    with context():
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+    return figure
