@@ -24,8 +24,3 @@ def data_folder():
 @pytest.fixture(params=list(MODELS), scope="session")
 def model(request, servo):
     return MODELS[request.param](servo)
-
-
-def command_for(model, before=0.4, after=1.6, at=0.05):
-    """A step that every model can follow, in its own unit."""
-    return st.signals.step(before, after, at=at, unit="V")

@@ -168,10 +168,10 @@ def test_an_external_torque_of_a_call_equals_a_constant_load(model):
     np.testing.assert_allclose(pushed.values, loaded.advance(loaded.initial(command), 0.4, command).values, atol=1e-13)
 
 
-def test_power_at_the_spindle_is_what_the_load_gets(model):
+@pytest.mark.parametrize("name", [name for name, kind in MODELS.items() if "load_torque" in kind.signals])
+def test_power_at_the_spindle_is_what_the_load_gets(servo, name):
     """Work of load_torque = kinetic energy of the load + its losses."""
-    if "load_torque" not in model.signals:
-        pytest.skip("no output shaft")
+    model = MODELS[name](servo)
     load = loads.Inertia(3e-3) + loads.Viscous(1e-2)
     result = st.simulate(model, COMMANDS["step"], duration=0.5, load=load, output_step=1e-4)
     work = np.trapezoid(result["load_torque"] * result["output_speed"], result.time)

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from .reference import Load, Plant, Signal, no_torque
+from .plant import Load, Plant, Signal, no_torque
 
 Groups = dict[str, dict[str, float]]
 Spec = dict[str, Any]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.optimize import brentq, minimize_scalar
 
-from .reference import Plant, Signal, Trajectory, segments, zero_error_angle
+from .plant import Plant, Signal, Trajectory, segments, zero_error_angle
 
 Array = NDArray[np.float64]
 Guard = tuple[str, Callable[[float, Array], float]]

@@ -11,8 +11,16 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from .cases import COMMANDS, DURATION, LOADS, command_signal, random_case
-from .hybrid import armature_voltage, solve_bounded
-from .reference import Load, Plant, solve_averaged, solve_averaged_inductive, solve_dc_motor, solve_geared_motor
+from .hybrid import armature_voltage
+from .reference import (
+    Load,
+    Plant,
+    solve_averaged,
+    solve_averaged_inductive,
+    solve_bounded,
+    solve_dc_motor,
+    solve_geared_motor,
+)
 
 N = 250.0
 SERVO = Plant(

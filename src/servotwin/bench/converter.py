@@ -47,12 +47,12 @@ class Converter:
     @property
     def highest(self) -> int:
         """The highest count, 2^bits − 1 [1]."""
-        return 2**self.bits - 1
+        return int(2**self.bits) - 1
 
     @property
     def gain(self) -> float:
         """Counts per volt [1/V]."""
-        return 2**self.bits / self.reference
+        return float(2**self.bits / self.reference)
 
     def count(self, voltage: float) -> int:
         """Return the count of a voltage [V].

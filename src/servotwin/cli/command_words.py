@@ -87,9 +87,9 @@ class CommandWords:
         return shapes[0]
 
     @property
-    def inputs(self) -> dict[str, Path]:
-        """Files that are read, by option."""
-        return {f"--{name}": path for name in ("pulses", "command") if (path := getattr(self, name)) is not None}
+    def inputs(self) -> list[Path]:
+        """Files that are read."""
+        return [path for path in (self.pulses, self.command) if path is not None]
 
     def described(self, duration: float) -> str:
         """Return the command in words; `duration` [s] is that of the run."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from typing import TextIO
 
 TRACEBACK = "SERVOTWIN_TRACEBACK"
 
@@ -45,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
     except KeyboardInterrupt as error:
         return _failed(error, words)
+    except SystemExit:  # how rich, which draws the help, reacts to a broken pipe
+        return _failed(BrokenPipeError(), words)
     except Exception as error:
         if os.environ.get(TRACEBACK):
             raise
@@ -79,11 +82,11 @@ def _failed(error: BaseException, words: Sequence[str]) -> int:
     return failure.code
 
 
-def _try_write(stream: object, line: str) -> None:
+def _try_write(stream: TextIO | None, line: str) -> None:
     with contextlib.suppress(OSError, ValueError):
         if stream is not None:
-            stream.write(line + "\n")  # type: ignore[attr-defined]
-            stream.flush()  # type: ignore[attr-defined]
+            stream.write(line + "\n")
+            stream.flush()
 
 
 def _flushed() -> bool:
@@ -107,7 +110,8 @@ def _discard_stdout() -> None:
 def _one_line_warnings() -> Iterator[None]:
     from servotwin.cli.failure import one_line
 
-    def show(message: Warning | str, *_: object) -> None:
+    def show(message: Warning | str, category: type[Warning], filename: str, lineno: int,
+             file: TextIO | None = None, line: str | None = None) -> None:
         _try_write(sys.stderr, f"servotwin: warning: {one_line(str(message))}")
 
     with warnings.catch_warnings():

@@ -6,7 +6,7 @@ import contextlib
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,7 +40,7 @@ class Target:
             raise OutputError(f"{self.option} {self.path} cannot be written ({_reason(error)})") from None
 
 
-def check_targets(targets: Sequence[Target], *, force: bool, inputs: Mapping[str, Path] | None = None) -> None:
+def check_targets(targets: Sequence[Target], *, force: bool, inputs: Sequence[Path] = ()) -> None:
     """Raise unless every file can be written, no two are the same, and none is an input.
 
     Parameters
@@ -48,8 +48,8 @@ def check_targets(targets: Sequence[Target], *, force: bool, inputs: Mapping[str
     targets : sequence of Target
     force : bool
         Whether files that exist may be replaced.
-    inputs : mapping of str to Path, optional
-        Files that are read, by what names them.
+    inputs : sequence of Path
+        Files that are read.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def check_targets(targets: Sequence[Target], *, force: bool, inputs: Mapping[str
     ...
     servotwin.errors.OutputError: --out: got 'run.txt', allowed: a name that ends in .csv
     """
-    taken = {_identity(path): f"{what} {path}" for what, path in (inputs or {}).items()}
+    taken = {_identity(path): f"the input {path}" for path in inputs}
     for target in targets:
         if target.path.suffix.lower() not in target.endings:
             raise OutputError(target.option, got=str(target.path),
@@ -144,7 +144,7 @@ def _reason(error: BaseException) -> str:
 
 
 def _identity(path: Path) -> tuple[object, ...]:
-    """What two names of one file have in common."""
+    """Return what two names of one file have in common."""
     try:
         found = path.stat()
     except (OSError, ValueError):

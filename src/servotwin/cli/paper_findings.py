@@ -9,6 +9,7 @@ import numpy as np
 
 from servotwin import bench
 from servotwin.cli.paper_format import fixed, number, with_error
+from servotwin.cli.paper_study import LOAD_INERTIA
 from servotwin.physics.friction import creep_speed
 
 if TYPE_CHECKING:
@@ -62,8 +63,8 @@ def corrections(study: Study) -> tuple[Finding, ...]:
                 f"{number(N * F)} N m"),
         Finding("(34)", "Gives τ̇<sub>L</sub> from the third derivative of q and cannot be run forward. The same "
                 "physics is simulated with the current as a state.", "no number: a change of form"),
-        Finding("(40)", "An inverse statement: motion in, torque out. Forward it needs a load, which the paper does not "
-                "name.", f"here J<sub>L</sub> = {number(1e-3)} kg m² (assumed)"),
+        Finding("(40)", "An inverse statement: motion in, torque out. Forward it needs a load, which the paper does "
+                "not name.", f"here J<sub>L</sub> = {number(LOAD_INERTIA)} kg m² (assumed)"),
     )
 
 
@@ -75,7 +76,7 @@ def disagreements(study: Study) -> tuple[Finding, ...]:
 def _tables(study: Study) -> tuple[Finding, ...]:
     one, fits = study.ranges, study.fits
     rate = float(np.ptp(one["q_deg"]) / np.ptp(one["t_a_us"]))
-    gain = float(np.ptp(one["V_o_V"]) / np.radians(np.ptp(one["q_deg"])))
+    gain = float(np.ptp(one["v_o_V"]) / np.radians(np.ptp(one["q_deg"])))
     pulse, pot = fits["q(t_a)"].line, fits["V_o(q)"].line
     p = math.degrees(1.0) * pot.slope
     curve = fits["q(t_a)"]
@@ -99,10 +100,11 @@ def _bench_data(study: Study) -> tuple[Finding, ...]:
     generator = study.on_bench["bounded"].bench.generator
     volts, counts = study.table["V_i_V"].tolist(), study.table["ADC_i"].tolist()
     gain = bench.INPUT_CONVERTER.gain
-    zero = bench.Interval(max(n - gain * v for n, v in zip(counts, volts, strict=True)),
-                          min(n + 1.0 - gain * v for n, v in zip(counts, volts, strict=True)))
+    zero = _count_offsets(volts, counts, gain)
+    others = _count_offsets(volts[:2] + volts[3:], counts[:2] + counts[3:], gain)
     span = bench.command_voltage_interval(582)
     ideal = bench.Converter(bits=10, reference=2.5).count(volts[2])
+    usual = bench.Converter(bits=10, reference=2.5, offset=others.middle).count(volts[2])
     moved = study.table["t_a_us"].copy()
     moved[2] = _MOVED
     straight = bench.fit_line(moved, study.table["V_o_V"])
@@ -120,20 +122,28 @@ def _bench_data(study: Study) -> tuple[Finding, ...]:
                 f"one step is {fixed(1e6 * generator.step, 0)} µs or {fixed(step, 1)}°, twice the deadband of "
                 f"{fixed(2.0 * math.degrees(half_band), 1)}°; f = {fixed(generator.pulse_rate, 3)} Hz, printed 61"),
         Finding("V_i and ADC_i", f"No zero offset of a converter with {fixed(gain, 1)} counts/V gives all five ADC_i: "
-                "the 90° row does not fit the other four.",
-                f"the rows ask for at least {fixed(zero.lower, 2)} and less than {fixed(zero.upper, 2)} counts; "
+                f"the other four agree on {fixed(others.lower, 2)} to {fixed(others.upper, 2)} counts, the 90° row "
+                "does not.",
+                f"all five ask for at least {fixed(zero.lower, 2)} and less than {fixed(zero.upper, 2)} counts; "
                 f"582 counts are {span.lower:.4f} to {span.upper:.4f} V, printed {volts[2]:.3f} V"),
         Finding("V_i and t_a", "The five pulse widths can be had from the five V_i, but only with a zero offset that "
                 f"has no other reason. The bench uses the middle, {fixed(study.offsets.middle, 2)} counts, identified "
                 "from Table II.",
                 f"offset from {fixed(low, 2)} to below {fixed(high, 2)} counts; with 0 the 90° row reads {ideal} "
-                f"counts and gives {1e6 * generator.width(ideal):.0f} µs, printed 1526"),
+                f"counts and gives {1e6 * generator.width(ideal):.0f} µs, with {fixed(others.middle, 2)} it reads "
+                f"{usual} and gives {1e6 * generator.width(usual):.0f} µs; printed 1526"),
         Finding("The 90° row", "Its pulse width and its counts may be of another frame than its voltages. The table is "
                 "used as printed.",
                 f"with {_MOVED:.0f} µs the largest residual of V_o(t_a) falls from "
                 f"{fixed(1e3 * study.fits['V_o(t_a)'].line.max_residual, 1)} to "
                 f"{fixed(1e3 * straight.max_residual, 1)} mV"),
     )
+
+
+def _count_offsets(volts: list[float], counts: list[float], gain: float) -> bench.Interval:
+    """Return the zero offsets of a converter for which each voltage gives its count."""
+    return bench.Interval(max(n - gain * v for n, v in zip(counts, volts, strict=True)),
+                          min(n + 1.0 - gain * v for n, v in zip(counts, volts, strict=True)))
 
 
 def _printed(study: Study) -> tuple[Finding, ...]:
@@ -143,8 +153,8 @@ def _printed(study: Study) -> tuple[Finding, ...]:
         Finding("Fig. 12: the supply", "The circuit labels the output of an LM2940-CT5 “+6 V”; by its name this is the "
                 "5 V version. The voltage at the motor is stated nowhere else.",
                 f"{number(study.supply)} V is used (the label)"),
-        Finding("Conclusion: vibration", "The servo vibrated until motor and electronics had separate supplies. (38) has "
-                "no path from supply to feedback, so no model of this report can show it.",
+        Finding("Conclusion: vibration", "The servo vibrated until motor and electronics had separate supplies. (38) "
+                "has no path from supply to feedback, so no model of this report can show it.",
                 f"scale: 1 mV at the potentiometer is {fixed(per_millivolt, 2)} µs or {fixed(angle, 3)}°"),
         Finding("A word", "ADC_i and ADC_o are called values of a “digital-analog” converter. They are counts of "
                 "analog-digital converters.", "no number: a slip"),

@@ -23,7 +23,8 @@ _LOOP = r"n\,k_a\,A\,k_s"
 FORMULAS: dict[int, tuple[tuple[str, str], ...]] = {
     2: (("(15)", rf"$\dfrac{{\Theta_m}}{{V_a}} = \dfrac{{k_a}}{{s\,[{_MOTOR}]}}$"),),
     4: (("(22) with (19), (20)",
-         r"$\dfrac{\Theta_L}{V_a} = \dfrac{n\,k_a}{s\,[(L_a s + R_a)((J_m + n^2 J_L)\,s + B_m + n^2 B_L) + k_a k_b]}$"),),
+         r"$\dfrac{\Theta_L}{V_a} = "
+         r"\dfrac{n\,k_a}{s\,[(L_a s + R_a)((J_m + n^2 J_L)\,s + B_m + n^2 B_L) + k_a k_b]}$"),),
     5: (("(16)", r"$\dfrac{\Theta_L}{T_o} = \dfrac{n\,/\,[(J_m s + B_m)\,s]}"
                  r"{1 + n\,/\,[(J_m s + B_m)\,s]\;\cdot\;n\,s\,(J_L s + B_L)}$"),
         ("(17)", r"$\dfrac{\Theta_L}{T_o} = \dfrac{n}{[(J_m + n^2 J_L)\,s + (B_m + n^2 B_L)]\,s}$")),

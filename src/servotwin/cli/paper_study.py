@@ -43,7 +43,7 @@ class BenchStudy:
 
     def worst(self, name: str) -> float:
         """Return the largest magnitude of one difference over all rows (SI, counts)."""
-        return max(abs(getattr(row, name)) for row in self.differences)
+        return float(max(abs(getattr(row, name)) for row in self.differences))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -96,6 +96,13 @@ class Study:
         drop = self.servo.get("supply.bridge_drop_voltage")
         return self.supply - (float(drop) if isinstance(drop, int | float) else 0.0)
 
+    @property
+    def sheet_seconds_per_60deg(self) -> float | None:
+        """Time for 60° in the maker's sheet [s], where the servo file has it."""
+        fact = self.servo.sheet.get("speed_per_60deg")
+        value = getattr(fact, "value", None) if not isinstance(fact, Mapping) else fact.get("value")
+        return float(value) if isinstance(value, int | float) else None
+
     def value(self, name: str) -> float:
         """Return a parameter of the servo (SI)."""
         return _value(self.servo, name)
@@ -143,7 +150,7 @@ def headline_numbers(study: Study) -> dict[str, float]:
         numbers[f"{name}_worst_angle_deg"] = math.degrees(one.worst("output_angle"))
         numbers[f"{name}_worst_feedback_voltage_mV"] = 1e3 * one.worst("feedback_voltage")
         numbers[f"{name}_worst_pulse_width_us"] = 1e6 * one.worst("pulse_width")
-        numbers[f"{name}_worst_feedback_count"] = float(one.worst("feedback_count"))
+        numbers[f"{name}_worst_feedback_count"] = one.worst("feedback_count")
     for name, metrics in study.metrics.items():
         numbers[f"{name}_rise_time_s"] = metrics.rise_time
         numbers[f"{name}_top_speed_deg_per_s"] = math.degrees(metrics.slew_rate)
@@ -151,7 +158,7 @@ def headline_numbers(study: Study) -> dict[str, float]:
     numbers["averaged_peak_voltage_over_supply"] = study.peak_voltage["averaged"] / study.supply
     numbers["bench_pulse_rate_Hz"] = study.on_bench["bounded"].rows[0].reading.pulse_rate
     numbers["converter_offset_lower_counts"], numbers["converter_offset_upper_counts"] = study.offsets
-    return numbers
+    return {name: round(value, 9) for name, value in numbers.items()}  # 4e-13 µs is rounding and no difference
 
 
 def _value(servo: Servo, name: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import fields
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from servotwin import units
 from servotwin.cli.paper_format import escape, fixed, number, table, with_error
-from servotwin.cli.paper_study import LABELS, MODELS, Study
+from servotwin.cli.paper_study import LABELS, LOAD_INERTIA, MODELS, Study
 from servotwin.parameters import GROUPS
 
 if TYPE_CHECKING:
@@ -18,11 +19,13 @@ if TYPE_CHECKING:
     from servotwin.cli.paper_findings import Finding
     from servotwin.parameters import Quantity
 
-# dimension -> (unit in which a reader expects it, as printed)
-_READABLE = {
-    "time": ("us", "µs"), "angle": ("deg", "°"), "inertia": ("g cm2", "g cm²"), "inductance": ("mH", "mH"),
-    "torque per current": ("mN m/A", "mN m/A"), "voltage per speed": ("mV s/rad", "mV s/rad"),
-    "time per voltage": ("us/V", "µs/V"), "resistance": ("ohm", "Ω"),
+# dimension -> units in which a reader expects it: (smallest value in SI, unit, as printed), largest first
+_READABLE: dict[str, tuple[tuple[float, str, str], ...]] = {
+    "time": ((3e-3, "ms", "ms"), (0.0, "us", "µs")), "angle": ((0.0, "deg", "°"),),
+    "inertia": ((0.0, "g cm2", "g cm²"),), "inductance": ((0.0, "mH", "mH"),),
+    "torque": ((1e-2, "N m", "N m"), (0.0, "mN m", "mN m")), "voltage": ((0.1, "V", "V"), (0.0, "mV", "mV")),
+    "torque per current": ((0.0, "mN m/A", "mN m/A"),), "voltage per speed": ((0.0, "mV s/rad", "mV s/rad"),),
+    "time per voltage": ((0.0, "us/V", "µs/V"),), "resistance": ((0.0, "ohm", "Ω"),), "number": ((0.0, "1", ""),),
 }
 _SHORT = {"averaged": "averaged", "bounded": "bounded"}
 
@@ -44,13 +47,13 @@ def step_table(study: Study) -> str:
     ):
         rows.append([words, *values, unit])
     return table(["quantity", *(escape(LABELS[name]) for name in one), "unit"], rows,
-                 caption="Step from 0 to 180°, load inertia 1×10<sup>−3</sup> kg m² (assumed)")
+                 caption=f"Step from 0 to 180°, load inertia {number(LOAD_INERTIA)} kg m² (assumed)")
 
 
 def ranges_table(study: Study) -> str:
     """Return Table I of the paper."""
     rows = [[f"{q:.0f}", f"{t:.0f}", f"{v:.1f}"] for q, t, v in
-            zip(*(study.ranges[name].tolist() for name in ("q_deg", "t_a_us", "V_o_V")), strict=True)]
+            zip(*(study.ranges[name].tolist() for name in ("q_deg", "t_a_us", "v_o_V")), strict=True)]
     return table(["q (°)", "t<sub>a</sub> (µs)", "v<sub>o</sub> (V)"], rows,
                  caption="Table I of the paper: the range of operation of analog servos", text_columns=0)
 
@@ -72,8 +75,8 @@ def comparison_table(study: Study) -> str:
             rows.append([_SHORT[name], volt, f"{r.command_count}", f"{1e6 * r.pulse_width:.0f}",
                          f"{r.pulse_rate:.3f}", fixed(math.degrees(r.output_angle), 2), f"{r.feedback_voltage:.4f}",
                          f"{r.feedback_count}", f"± {fixed(math.degrees(row.standing_band), 2)}"])
-    return table(head, rows, caption="Table II of the paper, measured and simulated. The simulated rows are the mean of "
-                 "an approach from below and one from above; the band is half their difference.")
+    return table(head, rows, caption="Table II of the paper, measured and simulated. The simulated rows are the mean "
+                 "of an approach from below and one from above; the band is half their difference.")
 
 
 def difference_table(study: Study) -> str:
@@ -129,7 +132,7 @@ def fits_table(study: Study) -> str:
         line, test = fit.line, fit.curvature
         offset = 1.0 if unit == fit.unit else 1e3
         rows.append([
-            _pretty(fit.name), with_error(scale * line.slope, scale * line.slope_error, slope_unit),
+            pretty(fit.name), with_error(scale * line.slope, scale * line.slope_error, slope_unit),
             with_error(line.intercept, line.intercept_error, fit.unit),
             f"{fixed(offset * line.max_residual, 2 if offset == 1.0 else 1)} {unit}", fixed(test.f_value, 2),
             fixed(test.p_value, 3), f"{fixed(offset * test.sagitta, 2 if offset == 1.0 else 1)} {unit}"])
@@ -146,7 +149,8 @@ def _scaled(name: str, slope_unit: str, unit: str) -> tuple[float, str, str]:
     return 1.0, slope_unit, "mV" if unit == "V" else unit
 
 
-def _pretty(name: str) -> str:
+def pretty(name: str) -> str:
+    """Return the name of a fit with its indices below."""
     for plain_name, pretty in (("ADC_i", "ADC<sub>i</sub>"), ("ADC_o", "ADC<sub>o</sub>"), ("V_i", "V<sub>i</sub>"),
                                ("V_o", "V<sub>o</sub>"), ("t_a", "t<sub>a</sub>")):
         name = name.replace(plain_name, pretty)
@@ -155,7 +159,7 @@ def _pretty(name: str) -> str:
 
 def findings_table(findings: Sequence[Finding], caption: str) -> str:
     """Return corrections or disagreements, numbered."""
-    rows = [[f"{k}. {_pretty(f.place)}", _pretty(f.remark), _pretty(f.shown_by)]
+    rows = [[f"{k}. {pretty(f.place)}", pretty(f.remark), pretty(f.shown_by)]
             for k, f in enumerate(findings, start=1)]
     return table(["place", "what is done about it", "the number that shows it"], rows, caption=caption, text_columns=3)
 
@@ -174,7 +178,7 @@ def parameter_table(study: Study) -> str:
         metadata = next(f.metadata for f in fields(GROUPS[group]) if f.name == field_name)
         value, spread = _shown(quantity, str(metadata["dimension"]))
         read = [_SHORT[key] for key, model in MODELS.items() if name in (*model.requires, *model.optional)]
-        rows.append([f"<code>{escape(name)}</code>", escape(str(metadata["symbol"])), value, spread,
+        rows.append([f"<code>{escape(name)}</code>", _symbol(str(metadata["symbol"])), value, spread,
                      f'<span class="{quantity.origin}">{quantity.origin}</span>',
                      escape(quantity.source or "no source: a prior to be identified"),
                      ", ".join(read) or "–"])
@@ -184,19 +188,25 @@ def parameter_table(study: Study) -> str:
 
 def _shown(quantity: Quantity, dimension: str) -> tuple[str, str]:
     """Return value and spread with the unit in which a reader expects them."""
-    if not isinstance(quantity.value, float):
-        return escape(str(quantity.value)), ""
-    unit, printed = _READABLE.get(dimension, (quantity.unit, quantity.unit))
-    printed = "" if printed == "1" else printed
+    value = quantity.value
+    if not isinstance(value, float):
+        return escape(str(value)), ""
+    unit, printed = next(((unit, printed) for least, unit, printed in _READABLE.get(dimension, ())
+                          if abs(value) >= least), (quantity.unit, quantity.unit))
 
-    def text(value: float) -> str:
-        return number(float(units.from_si(value, unit, dimension)))
+    def shown(si: float) -> float:
+        return float(units.from_si(si, unit, dimension))
 
+    if quantity.std:
+        best, error = with_error(shown(value), shown(quantity.std)).split(" ± ")
+        return f"{best} {printed}".rstrip(), f"± {error}"
     spread = ""
-    if quantity.std is not None:
-        spread = f"± {text(quantity.std)}"
-    elif quantity.lower is not None or quantity.upper is not None:
-        low = text(quantity.lower) if quantity.lower is not None else "…"
-        high = text(quantity.upper) if quantity.upper is not None else "…"
+    if quantity.lower is not None or quantity.upper is not None:
+        low, high = ("…" if bound is None else number(shown(bound)) for bound in (quantity.lower, quantity.upper))
         spread = f"{low} to {high}"
-    return f"{text(quantity.value)} {printed}".rstrip(), spread
+    return f"{number(shown(value))} {printed}".rstrip(), spread
+
+
+def _symbol(symbol: str) -> str:
+    """Return a symbol such as F_ec1 with its index below."""
+    return re.sub(r"_([A-Za-z0-9]+)", r"<sub>\1</sub>", escape(symbol))

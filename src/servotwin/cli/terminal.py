@@ -11,8 +11,9 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
+    import typer
     from rich.console import RenderableType
 
 _PIPE_WIDTH = 120  # characters of a line where no terminal says how wide it is
@@ -38,6 +39,13 @@ def emit(text: str) -> None:
         sys.stdout.flush()
     except OSError as error:
         raise OSError(error.errno, error.strerror, "standard output") from None
+
+
+def emit_help(context: typer.Context) -> None:
+    """Write the help of a command."""
+    text = context.get_help()  # empty where typer has written it already
+    if text:
+        emit(text)
 
 
 def emit_json(data: Any) -> None:
@@ -116,3 +124,41 @@ def _finite(data: Any) -> Any:
     if isinstance(data, float) and not math.isfinite(data):
         return None
     return data
+
+
+def pairs(rows: Sequence[tuple[str, str]]) -> RenderableType:
+    """Return labels and texts side by side.
+
+    Examples
+    --------
+    >>> show(pairs([("final angle", "180.00 deg"), ("energy", "1 J")]))
+      final angle  180.00 deg
+      energy       1 J
+    """
+    from rich.table import Table
+
+    drawn = Table.grid(padding=(0, 2))
+    drawn.add_column(no_wrap=True, style="bold")
+    drawn.add_column(overflow="fold")
+    for label, text in rows:
+        drawn.add_row("  " + label, text)
+    return drawn
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]], *, wraps: str = "") -> RenderableType:
+    """Return a table without frame; only the column `wraps` may break its lines.
+
+    Examples
+    --------
+    >>> show(table(("id", "torque"), [("a", "1 N m")]))
+    id  torque
+    a   1 N m
+    """
+    from rich.table import Table
+
+    drawn = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
+    for name in header:
+        drawn.add_column(name, no_wrap=name != wraps, overflow="fold")
+    for row in rows:
+        drawn.add_row(*row)
+    return drawn

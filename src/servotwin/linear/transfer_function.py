@@ -62,7 +62,7 @@ def transfer_function(model: Model, *, input: str | None = None, output: str | N
     >>> servo = st.servo_from_values("ideal", {"motor": {
     ...     "armature_resistance": 2.0, "armature_inductance": 0.5, "torque_constant": 0.1, "back_emf_constant": 0.1,
     ...     "rotor_inertia": 0.02, "motor_viscous_friction": 0.2}})
-    >>> transfer_function(st.DCMotor(servo)).dcgain()
+    >>> float(transfer_function(st.DCMotor(servo)).dcgain())
     inf
     """
     import control

@@ -35,7 +35,7 @@ _SIGNALS = (
 class _Averaged(Model):
     """What the two averaged servos share: (38) with offsets, (41), and the command chain."""
 
-    optional = ("electronics.command_pulse_offset",)
+    optional = ("electronics.command_pulse_offset", "gear.output_inertia")
     signals = _SIGNALS
 
     def _plant(self, load: Load, inductance: float) -> Plant:

@@ -88,6 +88,12 @@ class Model(ABC):
         number = self._servo.get(name)
         return float(number) if isinstance(number, int | float) else default
 
+    @final
+    def load_inertia(self, load: Load) -> float:
+        """Return J_L [kg m²]: the load's, and that of gear wheel and horn where the servo gives it."""
+        own = self.value_or("gear.output_inertia", 0.0) if "gear.output_inertia" in self.optional else 0.0
+        return load.total_inertia + own
+
     @abstractmethod
     def pack(self, load: Load) -> Plant:
         """Return everything that the engine reads, as plain floats."""

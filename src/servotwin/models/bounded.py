@@ -49,7 +49,7 @@ class BoundedServo(Model):
         "potentiometer.feedback_gain", "potentiometer.feedback_offset", "supply.open_circuit_voltage",
     )
     optional = (
-        "electronics.voltage_deadband", "supply.bridge_drop_voltage", "friction.breakaway_ratio",
+        "gear.output_inertia", "electronics.voltage_deadband", "supply.bridge_drop_voltage", "friction.breakaway_ratio",
         "stops.lower_angle", "stops.upper_angle", "stops.restitution",
         "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset", "electronics.command_offset",
         "electronics.pulse_to_voltage_gain", "electronics.one_shot_slope", "electronics.one_shot_offset",
@@ -69,8 +69,12 @@ class BoundedServo(Model):
         if given("electronics.one_shot_offset") is None and given("electronics.command_offset") is None:
             raise MissingParameterError(type(self).__name__, self.servo.name, [
                 "electronics.one_shot_offset (or electronics.command_offset)"])
-        self._slope = self.value_or("electronics.one_shot_slope", 1.0 / float(k_p2) if k_p2 else math.nan)
-        self._k_p2 = self.value_or("electronics.pulse_to_voltage_gain", 1.0 / self._slope)
+        if slope is None:
+            self._k_p2 = self.value("electronics.pulse_to_voltage_gain")
+            self._slope = 1.0 / self._k_p2
+        else:
+            self._slope = self.value("electronics.one_shot_slope")
+            self._k_p2 = self.value_or("electronics.pulse_to_voltage_gain", 1.0 / self._slope)
         self._t_0 = self.value_or("electronics.command_pulse_offset", 0.0)
         offset = self.value_or("electronics.command_offset", math.nan)
         self._T_0 = self.value_or("electronics.one_shot_offset", self._slope * (self._k_p2 * self._t_0 - offset))

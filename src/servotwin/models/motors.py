@@ -65,6 +65,7 @@ class GearedMotor(Model):
     """
 
     requires = (*_MOTOR, "gear.gear_reduction")
+    optional = ("gear.output_inertia",)
     layout = ("output_angle", "output_speed", "armature_current")
     signals = ("armature_voltage", "armature_current", "motor_angle", "motor_speed", "motor_torque",
                "output_angle", "output_speed", "load_torque")

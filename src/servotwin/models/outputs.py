@@ -95,7 +95,7 @@ def torques_of(model: Model, samples: Samples, drive: Pieces, load: Load) -> Tor
 def load_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
     """Return τ_L [N m], delivered to the load: J_L q̈ + B_L q̇ + its friction + τ_ext (physics, eq. 16 and 23)."""
     torques = torques_of(model, samples, drive, load)
-    return (load.total_inertia * torques.acceleration + load.viscous_friction * samples.speed
+    return (model.load_inertia(load) * torques.acceleration + load.viscous_friction * samples.speed
             + torques.load_friction + torques.external)
 
 

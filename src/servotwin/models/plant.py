@@ -22,7 +22,7 @@ def make_plant(model: Model, load: Load, *, reduction: float, inductance: float 
     stiffness, rest_angle = load.spring.stiffness, load.spring.rest_angle
     gravity, hanging = load.gravity
     return Plant(
-        J=N * N * model.value("motor.rotor_inertia") + load.total_inertia,
+        J=N * N * model.value("motor.rotor_inertia") + model.load_inertia(load),
         b=N * N * model.value("motor.motor_viscous_friction") + load.viscous_friction,
         K=N * model.value("motor.torque_constant"),
         K_b=N * model.value("motor.back_emf_constant"),

@@ -5,12 +5,12 @@ asked for. Angles are in degrees and pulses in microseconds.
 """
 
 from servotwin.plotting.block_diagrams import PAPER_DIAGRAMS, block_diagram
-from servotwin.plotting.curves import Curve, Limit, curves, pulses
 from servotwin.plotting.diagram import Diagram
 from servotwin.plotting.files import save, to_bytes
 from servotwin.plotting.formula import Formula, formula_svg
+from servotwin.plotting.panels import Curve, Limit, curves, pulses
+from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
 from servotwin.plotting.style import COLOURS, LINES, axes_grid, finished
-from servotwin.plotting.time_response import SHOWN, Shown, shown, time_response
 
 __all__ = [
     "COLOURS",

@@ -28,12 +28,12 @@ class Formula:
 
 @cache
 def formula_svg(source: str, size: float = 10.0) -> Formula:
-    """Return a formula in matplotlib's math text as an SVG picture.
+    r"""Return a formula in matplotlib's math text as an SVG picture.
 
     Parameters
     ----------
     source : str
-        Such as ``r"$v_o = p\\,q + b_o$"``.
+        Such as ``r"$v_o = p\,q + b_o$"``.
     size : float
         Of the letters [pt].
 
@@ -53,7 +53,7 @@ def formula_svg(source: str, size: float = 10.0) -> Formula:
     from matplotlib.mathtext import MathTextParser
 
     with context():
-        prop = FontProperties(size=size)  # type: ignore[arg-type]
+        prop = FontProperties(size=size)
         width, height, depth, *_ = MathTextParser("path").parse(source, dpi=72, prop=prop)
         margin = 0.15 * size
         width, height = width + 2 * margin, height + 2 * margin

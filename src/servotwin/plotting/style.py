@@ -40,7 +40,8 @@ def context() -> AbstractContextManager[None]:
     """Return a context in which matplotlib draws in the style of this package."""
     import matplotlib as mpl
 
-    return mpl.rc_context(_RC)
+    settings: Any = _RC
+    return mpl.rc_context(settings)
 
 
 def axes_grid(rows: int = 1, *, width: float = WIDTH, height: float = 3.0,

@@ -1,0 +1,44 @@
+"""The commands: what `servotwin --help` lists."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from servotwin import __version__
+from servotwin.cli.catalog import catalog
+from servotwin.cli.report import paper
+from servotwin.cli.simulate import simulate
+from servotwin.cli.terminal import emit, emit_help
+
+app = typer.Typer(
+    name="servotwin", add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Example: servotwin simulate hitec-hs-755hb --step 0:180 --plot run.png",
+    help="The digital twin of an RC servo: from a pulse in microseconds to the torque at the horn.")
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        emit(f"servotwin {__version__}")
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def servotwin(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option(
+        "--version", is_eager=True, callback=_version, help="Print the version and end.")] = False,
+) -> None:
+    """Show the help where no command is given."""
+    if context.invoked_subcommand is None:
+        emit_help(context)
+
+
+app.command("paper", help="Reproduce the paper's figures and tables in a report.",
+            epilog="Example: servotwin paper --out paper-report --force")(paper)
+app.command("simulate", help="Simulate one servo under one command and one load.",
+            epilog="Example: servotwin simulate hitec-hs-755hb --step 0:180 --plot run.png\n\n"
+                   "Example: servotwin simulate my-servo.toml --sine 1500:200:2 --unit us --out run.csv")(simulate)
+app.add_typer(catalog, name="catalog")

@@ -1,0 +1,254 @@
+"""The report as one HTML page that needs nothing but itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from servotwin import __version__
+from servotwin.cli import paper_linear, paper_tables
+from servotwin.cli.paper_findings import corrections, disagreements
+from servotwin.cli.paper_format import escape, fixed, number, picture, plain
+from servotwin.cli.paper_study import LABELS, LOAD_INERTIA, SERVO, Study
+
+if TYPE_CHECKING:
+    from servotwin.cli.paper_figures import Picture
+
+_STYLE = """
+:root{color-scheme:light;--ink:#1b1f24;--soft:#57606a;--line:#d0d7de;--wash:#f6f8fa;--blue:#0072b2}
+*{box-sizing:border-box}
+body{margin:0 auto;max-width:64rem;padding:1rem 1.2rem 4rem;background:#fff;color:var(--ink);
+font:16px/1.55 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",Arial,sans-serif}
+h1{font-size:1.7rem;line-height:1.25;margin:1rem 0 .3rem}h2{font-size:1.3rem;margin:2.6rem 0 .6rem;padding-top:.4rem;
+border-top:2px solid var(--line)}h3{font-size:1.05rem;margin:1.6rem 0 .4rem}
+p{margin:.5rem 0}a{color:var(--blue)}code{font-size:.9em;overflow-wrap:anywhere}.lead{color:var(--soft)}
+.note{border-left:4px solid #d55e00;background:#fff6ef;padding:.5rem .9rem;margin:1rem 0}
+.numbers{display:grid;grid-template-columns:repeat(auto-fit,minmax(13rem,1fr));gap:.8rem;padding:0;margin:1rem 0;
+list-style:none}
+.numbers li{border:1px solid var(--line);border-radius:8px;padding:.6rem .8rem;background:var(--wash);font-size:.9rem}
+.numbers b{display:block;font-size:1.35rem;color:var(--blue);font-variant-numeric:tabular-nums}
+nav ol{columns:2;column-gap:2rem;margin:.4rem 0}
+.figures{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,26rem),1fr));gap:1rem;align-items:start}
+figure{margin:.8rem 0;padding:.6rem;border:1px solid var(--line);border-radius:8px;break-inside:avoid;min-width:0}
+figure>div{overflow-x:auto}figure img{display:block;max-width:100%;height:auto;margin:0 auto}
+figure.wide img.drawing{width:var(--w);max-width:max(100%,40rem)}
+figcaption{font-size:.9rem;color:var(--soft);margin-top:.4rem}figcaption b{color:var(--ink)}
+img.formula{vertical-align:middle;max-width:none;height:auto}.formulas{overflow-x:auto;padding:.3rem 0}
+.formulas p{white-space:nowrap;margin:.5rem 0}.formulas span{color:var(--soft);font-size:.85rem;padding-left:.8rem}
+.scroll{overflow-x:auto;margin:.8rem 0}table{border-collapse:collapse;font-size:.86rem;width:100%}
+caption{text-align:left;color:var(--soft);padding:.3rem 0;font-size:.9rem}
+th,td{padding:.3rem .55rem;border-bottom:1px solid var(--line);text-align:left;vertical-align:top}
+th{background:var(--wash);font-weight:600}td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;
+white-space:nowrap}th.n{white-space:normal}
+.measured,.identified{color:#00664a;font-weight:600}.datasheet,.literature{color:#005a8d;font-weight:600}
+.assumed{color:#a34700;font-weight:600}footer{margin-top:3rem;color:var(--soft);font-size:.85rem}
+@media(max-width:40rem){body{font-size:15px;padding:.6rem .8rem 3rem}nav ol{columns:1}}
+@media print{body{max-width:none;font-size:9.5pt;padding:0}h2{break-after:avoid}.scroll,figure>div,.formulas{overflow:
+visible}.figures{grid-template-columns:1fr 1fr}tr{break-inside:avoid}table{font-size:7.5pt}
+figure.wide img.drawing{max-width:100%}a{color:inherit;text-decoration:none}}
+"""
+
+_SECTIONS = (
+    ("summary", "Summary"), ("values", "What the paper does not give"), ("step", "The step from 0 to 180°"),
+    ("bench", "The bench"), ("measured", "Measured beside simulated"), ("fits", "Straight lines through Table II"),
+    ("models", "Block diagrams and transfer functions"), ("corrections", "Corrections to the paper"),
+    ("disagreements", "Disagreements and gaps in its data"), ("parameters", "Parameters and where they come from"),
+    ("files", "Files beside this report"),
+)
+
+
+def page(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+    """Return the whole report; `svg` holds the pictures by name."""
+    parts = {
+        "summary": _summary(study), "values": _values(study), "step": _step(study, pictures, svg),
+        "bench": _bench(study, pictures, svg), "measured": _measured(study, pictures, svg),
+        "fits": _fits(study), "models": _models(study, pictures, svg),
+        "corrections": paper_tables.findings_table(corrections(study), "What the equations need"),
+        "disagreements": paper_tables.findings_table(disagreements(study), "What the data say"),
+        "parameters": _parameters(study), "files": _files(pictures),
+    }
+    contents = "".join(f'<li><a href="#{key}">{title}</a></li>' for key, title in _SECTIONS)
+    body = "".join(f'<section id="{key}"><h2>{title}</h2>\n{parts[key]}</section>\n' for key, title in _SECTIONS)
+    return f"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>A New Model for Analog Servo Motors: simulated again</title>
+<style>{_STYLE}</style></head>
+<body>
+<h1>A New Model for Analog Servo Motors: simulated again</h1>
+<p class="lead">The figures, tables and equations of C. Urrea and J. Kern, “A New Model for Analog Servo Motors.
+Simulations and Experimental Results”, <cite>Canadian Journal on Automation, Control and Intelligent Systems</cite>
+2(2), March 2011 (“the paper”), computed with servotwin {escape(__version__)} for the servo
+<code>{escape(SERVO)}</code>. Numbers in round brackets are equations of the paper.</p>
+<nav aria-label="Contents"><ol>{contents}</ol></nav>
+{body}<footer>servotwin {escape(__version__)}. This page loads nothing from the network.</footer>
+</body></html>
+"""
+
+
+def _summary(study: Study) -> str:
+    peak = study.peak_voltage["averaged"]
+    bounded, averaged = study.on_bench["bounded"], study.on_bench["averaged"]
+    cards = []
+    for one, name in ((averaged, "averaged"), (bounded, "bounded")):
+        cards.append((f"{fixed(math.degrees(one.worst('output_angle')), 2)}°, "
+                      f"{fixed(1e3 * one.worst('feedback_voltage'), 1)} mV",
+                      f"largest difference to Table II of the {escape(LABELS[name])}: angle, feedback voltage; pulse "
+                      f"width {fixed(1e6 * one.worst('pulse_width'), 1)} µs, ADC<sub>o</sub> "
+                      f"{one.worst('feedback_count'):.0f} counts"))
+    cards += [
+        (f"{fixed(peak, 1)} V = {fixed(peak / study.supply, 1)} × supply",
+         "what the printed model puts on the motor in a step of 180°: (38) has no bound"),
+        (f"{fixed(study.metrics['averaged'].rise_time, 2)} s against {fixed(study.metrics['bounded'].rise_time, 2)} s",
+         "rise time of that step, printed model against a servo whose supply ends"),
+        (f"{fixed(math.degrees(study.metrics['bounded'].slew_rate), 0)} °/s",
+         f"top speed of the bounded servo{_sheet_speed(study)}"),
+        (f"{study.on_bench['bounded'].rows[0].reading.pulse_rate:.3f} Hz",
+         "pulse rate of the bench, 1024 steps of 16 µs; the paper prints 61"),
+    ]
+    listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
+    share = max(abs(s.rest) + abs(s.standing) for s in bounded.angle_shares)
+    return f"""<ul class="numbers">{listed}</ul>
+<ul><li>All five rows of Table II are met by both models. What is left is the curvature of the measured angle over pulse
+width; everything else together stays below {fixed(math.degrees(share), 2)}° for the bounded servo. The potentiometer
+and the command chain were calibrated with the same table, so this shows that the chain is consistent; it is no
+independent test.</li>
+<li>The static characteristic, which is what the paper measured, cannot tell the two models apart. The step can: the
+printed model is {fixed(study.metrics['bounded'].rise_time / study.metrics['averaged'].rise_time, 1)} times as fast as
+the bounded one, because its armature voltage has no bound.</li>
+<li>{len(corrections(study))} places of the equations need a correction or a remark, and {len(disagreements(study))}
+places of the data disagree with each other or leave something out; each is listed with the number that shows
+it.</li></ul>
+"""
+
+
+def _sheet_speed(study: Study) -> str:
+    seconds = study.sheet_seconds_per_60deg
+    return f" (the maker's sheet: {number(seconds)} s for 60°, {fixed(60.0 / seconds, 0)} °/s)" if seconds else ""
+
+
+def _values(study: Study) -> str:
+    count = paper_tables.origins(study)
+    words = ", ".join(f"{n} {origin}" for origin, n in sorted(count.items(), key=lambda item: -item[1]))
+    return f"""<div class="note"><p><strong>The paper publishes no parameter values.</strong> It gives no number for
+k<sub>a</sub>, k<sub>b</sub>, R<sub>a</sub>, L<sub>a</sub>, J<sub>m</sub>, B<sub>m</sub>, n, A, k<sub>s</sub>,
+k<sub>p</sub>, p, F<sub>ec</sub> or k. Its simulated curves (Figures 13 to 17) therefore cannot be compared with the
+ones here, curve for curve, and nothing here was tuned to look like them. What can be compared is Table II and Figures
+22 to 27, which were measured.</p></div>
+<p>The {sum(count.values())} values used here come from elsewhere: {words}. “Measured” is a least-squares fit to Table
+II. “Datasheet” is the maker's sheet of the HS-755HB, or follows from it. “Assumed” is a prior that no source gives;
+it has a range and has to be identified for a real unit. <a href="#parameters">The list</a> names each.</p>
+"""
+
+
+def _step(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+    names = ("figure-13", "figure-14", "figure-15", "figure-16", "figure-armature-voltage", "figure-17")
+    return f"""<p>The command goes from 0 to 180° at 0.1 s. The load is an inertia of {number(LOAD_INERTIA)} kg m²
+(assumed; the paper does not say what its simulated servo carried). Both models have the same parameters. The averaged
+servo is the paper's model, (35) to (41) with the two offsets that the measured servo needs. The bounded servo has in
+addition a supply that ends, a deadband, friction that holds, and end stops.</p>
+<div class="figures">{_figures(names, pictures, svg)}</div>
+{paper_tables.step_table(study)}"""
+
+
+def _bench(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+    apparatus = study.on_bench["bounded"].bench
+    low, high = study.offsets
+    servo = apparatus.model.servo
+    before, after = study.value("electronics.bridge_gain"), servo.get("electronics.bridge_gain")
+    gain = f"{fixed(before, 1)} to {fixed(float(after), 1)}" if isinstance(after, int | float) else "its value"
+    return f"""<p>The simulated bench repeats the paper's: V<sub>i</sub> → 10-bit converter (2.5 V) → pulses → servo →
+potentiometer → 10-bit converter → the seven readings of the display.</p>
+<ul><li>The converter at the command has {fixed(apparatus.input_converter.gain, 1)} counts/V. Its zero offset is
+<strong>identified from Table II</strong>: only from {fixed(low, 2)} to below {fixed(high, 2)} counts do the printed
+V<sub>i</sub> give all five printed pulse widths; the middle, {fixed(study.offsets.middle, 2)}, is used.</li>
+<li>The generator makes 16 m + 6 µs with m = ⌊(ADC<sub>i</sub> − 1)/6⌋ − 1, once in
+{fixed(1e3 * apparatus.generator.frame_period, 3)} ms (inferred from the five rows).</li>
+<li>The converter at the potentiometer is the fitted line ADC<sub>o</sub> = 432.65 V<sub>o</sub> − 44.1, rounded. It
+is a description and no circuit.</li>
+<li>The servo file is for frames of 20 ms. By the averaging theory A k<sub>s</sub> goes as 1/T<sub>f</sub>, so on the
+bench A goes from {gain} V/V.</li>
+<li>A servo stops short, from either side. Each angle is approached from 30° below and from 30° above (less where the
+travel ends), with a wait until the shaft stands or for 5 s; a row is the mean, and half the difference is its
+standing band. The smoothed friction (41) never quite stands: the averaged servo is read while it still
+creeps.</li></ul>
+<div class="figures">{_figures(("figure-22", "figure-23", "figure-24"), pictures, svg)}</div>
+{paper_tables.ranges_table(study)}"""
+
+
+def _measured(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+    tables = "".join(paper_tables.model_shares_table(study, name) for name in study.on_bench)
+    return f"""<div class="figures">{_figures(("figure-25", "figure-26", "figure-27"), pictures, svg)}</div>
+{paper_tables.comparison_table(study)}
+{paper_tables.difference_table(study)}
+<p>The paper does not say from which side its angles were approached. Its points lie within
+{fixed(study.fits['q(V_i)'].line.max_residual, 1)}° of a line, while the bounded servo may stop anywhere within
+± {fixed(math.degrees(max(row.standing_band for row in study.on_bench['bounded'].rows)), 1)}°. So its band is probably
+too wide: either the loop gain is higher (it is assumed), or single pulses free the shaft where their mean does not. A
+model of the mean voltage cannot show the latter.</p>
+<h3>What the differences are made of</h3>
+<p>The 16 µs steps move the measured and the simulated servo alike, so they are seen against a straight line over
+V<sub>i</sub> and not between the two:</p>
+{paper_tables.measured_shares_table(study)}
+<p>Between simulated and measured there remain: another pulse width than the printed one (none), the curvature that a
+straight servo cannot have, an unequal stop from either side, and the calibration of the servo file (V<sub>o</sub> over
+t<sub>a</sub> and V<sub>o</sub> over q, rounded, against q over t<sub>a</sub>). The shares add up.</p>
+{tables}"""
+
+
+def _fits(study: Study) -> str:
+    curved = [paper_tables.pretty(name) for name, fit in study.fits.items() if fit.curvature.p_value < 0.05]
+    verdict = f"At the 5 % level curved: {', '.join(curved)}." if curved else "None is curved at the 5 % level."
+    return f"""{paper_tables.fits_table(study)}<p>Five points leave three degrees of freedom to a line and two to a
+parabola. p is the probability of such an F or a larger one if the truth were straight. {verdict}</p>
+"""
+
+
+def _models(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+    parts = ["<p>The paper's diagrams, redrawn, with their transfer functions. The numbers are those of the servo "
+             "file; dry friction has no transfer function and is left out.</p>"]
+    for which, formulas in paper_linear.FORMULAS.items():
+        made = next(p for p in pictures if p.name == f"figure-{which:02d}")
+        lines = [f"<p>{paper_linear.formula(text)}<span>{equation}</span></p>" for equation, text in formulas]
+        numeric = paper_linear.numeric(study, which)
+        if numeric is not None:
+            poles = ", ".join(_pole(p) for p in numeric.poles if p.imag >= 0.0)
+            shown = paper_linear.formula(numeric.text)
+            lines.append(f"<p>{shown}<span>{numeric.words}; poles (1/s): {poles}</span></p>")
+        parts.append(_figure(made, svg[made.name], after=f'<div class="formulas">{"".join(lines)}</div>', wide=True))
+    return "\n".join(parts)
+
+
+def _pole(p: complex) -> str:
+    if abs(p.imag) < 1e-9 * max(abs(p), 1.0):
+        return fixed(p.real, 1) if p.real else "0"
+    return f"{fixed(p.real, 1)} ± {fixed(p.imag, 1)} j"
+
+
+def _parameters(study: Study) -> str:
+    return f"""<p>None of these is a value of the paper's authors. A range belongs to an assumed or derived value, ± one
+standard error to a fitted one.</p>
+{paper_tables.parameter_table(study)}"""
+
+
+def _files(pictures: Sequence[Picture]) -> str:
+    return f"""<p>Beside this page lie {len(pictures)} pictures as PNG and SVG in <code>figures/</code>, and the numbers
+behind each plot in <code>data/</code>, with the unit in every column's name: one CSV file per plot,
+<code>table-2.csv</code> (measured and simulated), <code>fits.csv</code> and <code>parameters.csv</code>.</p>
+<p>Made by <code>servotwin paper</code>.</p>
+"""
+
+
+def _figures(names: Sequence[str], pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+    by_name = {p.name: p for p in pictures}
+    return "\n".join(_figure(by_name[name], svg[name]) for name in names)
+
+
+def _figure(made: Picture, svg: bytes, *, after: str = "", wide: bool = False) -> str:
+    width = made.figure.get_size_inches()[0] * 96.0
+    image = picture(svg, f"{made.title}. {plain(made.caption)}", kind="drawing",
+                    style=f"--w:{width:.0f}px" if wide else "")
+    kind = ' class="wide"' if wide else ""
+    return (f'<figure{kind} id="{made.name}"><div>{image}</div>\n{after}<figcaption><b>{made.title}.</b> '
+            f"{made.caption}</figcaption></figure>")

@@ -1,0 +1,56 @@
+"""`servotwin paper`: the report that reproduces the paper."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from servotwin.cli.terminal import emit_json, pairs, show
+
+
+def paper(
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the report goes.")] = Path("paper-report"),
+    force: Annotated[bool, typer.Option("--force", help="Replace a report that exists.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print paths and headline numbers as JSON.")] = False,
+) -> None:
+    """Reproduce the paper's figures and tables in a report."""
+    from servotwin.cli.paper import write_paper_report
+
+    with _progress() as progress:
+        report = write_paper_report(out, force=force, progress=progress)
+    if as_json:
+        emit_json({
+            "folder": str(report.folder), "report": str(report.page),
+            "figures": [str(path) for path in report.figures], "data": [str(path) for path in report.data],
+            "numbers": dict(report.numbers)})
+        return
+    numbers = [(name, f"{value:.5g}") for name, value in report.numbers.items()]
+    show(pairs([("report", str(report.page)),
+                ("figures", f"{len(report.figures)} files in {report.folder / 'figures'}"),
+                ("data", f"{len(report.data)} files in {report.folder / 'data'}")]),
+         "headline numbers", pairs(numbers))
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[str, float], None]]:
+    """Show progress on standard error: a bar on a terminal, else nothing but the words, one line each."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield _say
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeElapsedColumn(),
+               TextColumn("{task.description}", markup=False))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda words, fraction: bar.update(task, description=words, completed=fraction)
+
+
+def _say(words: str, fraction: float) -> None:
+    typer.echo(f"{100.0 * fraction:3.0f} % {words}", err=True)

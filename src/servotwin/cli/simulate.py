@@ -1,0 +1,155 @@
+"""`servotwin simulate`: one servo, one command, one load."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from servotwin.cli.terminal import emit_json, pairs, patience, show
+
+if TYPE_CHECKING:
+    from servotwin.cli.command_words import CommandWords
+    from servotwin.cli.outputs import Target
+    from servotwin.models import Model
+    from servotwin.simulation import Result
+
+_COMMAND, _PLANT, _OUTPUT = "Command (one of)", "Servo and load", "Run and output"
+
+
+def simulate(
+    servo: Annotated[str, typer.Argument(help="Id in the catalog, or path of a servo file (.toml).")],
+    step: Annotated[str | None, typer.Option(
+        metavar="BEFORE:AFTER", help="Step, at --at.", rich_help_panel=_COMMAND)] = None,
+    ramp: Annotated[str | None, typer.Option(
+        metavar="BEFORE:AFTER", help="Ramp from --at on, in --over seconds.", rich_help_panel=_COMMAND)] = None,
+    sine: Annotated[str | None, typer.Option(
+        metavar="MEAN:AMPLITUDE:HZ", help="Sine.", rich_help_panel=_COMMAND)] = None,
+    chirp: Annotated[str | None, typer.Option(
+        metavar="MEAN:AMPLITUDE:HZ:HZ", help="Sine whose frequency goes from one to the other during the run.",
+        rich_help_panel=_COMMAND)] = None,
+    prbs: Annotated[str | None, typer.Option(
+        metavar="LOW:HIGH:SECONDS", help="Pseudo-random sequence of two values, with the time of a bit.",
+        rich_help_panel=_COMMAND)] = None,
+    constant: Annotated[str | None, typer.Option(
+        metavar="VALUE", help="The same all the time.", rich_help_panel=_COMMAND)] = None,
+    pulses: Annotated[Path | None, typer.Option(
+        metavar="FILE.csv", help="Pulses one by one: columns time_s (rising edge), pulse_width_us.",
+        rich_help_panel=_COMMAND)] = None,
+    command: Annotated[Path | None, typer.Option(
+        metavar="FILE.csv", help="Samples: time_s and pulse_width_us, command_angle_deg or command_voltage_V.",
+        rich_help_panel=_COMMAND)] = None,
+    unit: Annotated[str | None, typer.Option(
+        metavar="UNIT", help="Unit of the command: deg (default), rad, us, ms, s, V or mV.",
+        rich_help_panel=_COMMAND)] = None,
+    at: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="When a step or ramp begins (default 0.1).", rich_help_panel=_COMMAND)] = None,
+    over: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="How long a ramp takes.", rich_help_panel=_COMMAND)] = None,
+    hold: Annotated[str | None, typer.Option(
+        metavar="HOW", help="Between samples of --command: previous (default) or linear.",
+        rich_help_panel=_COMMAND)] = None,
+    model: Annotated[str, typer.Option(
+        metavar="MODEL", help="bounded, averaged, averaged-inductive, geared-motor or dc-motor.",
+        rich_help_panel=_PLANT)] = "bounded",
+    load: Annotated[list[str] | None, typer.Option(
+        metavar="PART=VALUE", help="What hangs on the shaft, repeatable or with commas, SI: inertia=, viscous=, "
+        "torque=, coulomb=, pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
+        "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=_PLANT)] = None,
+    change: Annotated[list[str] | None, typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, repeatable, SI.",
+        rich_help_panel=_PLANT)] = None,
+    duration: Annotated[float, typer.Option(
+        metavar="SECONDS", help="Time to simulate.", rich_help_panel=_OUTPUT)] = 1.5,
+    output_step: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="Distance of the outputs in time (default 0.001); it does not change the solution.",
+        rich_help_panel=_OUTPUT)] = None,
+    out: Annotated[Path | None, typer.Option(
+        metavar="FILE.csv", help="Write all signals.", rich_help_panel=_OUTPUT)] = None,
+    plot: Annotated[Path | None, typer.Option(
+        metavar="FILE", help="Draw the response: .png, .svg or .pdf.", rich_help_panel=_OUTPUT)] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.", rich_help_panel=_OUTPUT)] = False,
+    as_json: Annotated[bool, typer.Option(
+        "--json", help="Print the summary as JSON, in SI.", rich_help_panel=_OUTPUT)] = False,
+) -> None:
+    """Simulate one servo under one command and one load."""
+    from servotwin.cli import load_words
+    from servotwin.cli.command_words import CommandWords
+
+    words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
+                         command=command, unit=unit, at=at, over=over, hold=hold)
+    targets = _checked_targets(out, plot, servo, words, load or [], force=force)
+    result = _run(_model(servo, model, change or []), words, load or [], duration, output_step)
+    found = _write(result, targets, force=force)
+    found |= {"command": words.described(duration), "load": load_words.described(load or []),
+              "files": [str(target.path) for target in targets]}
+    _report(found, as_json=as_json)
+
+
+def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: CommandWords, load: list[str], *,
+                     force: bool) -> list[Target]:
+    from servotwin.cli.load_words import recorded_files
+    from servotwin.cli.outputs import Target, check_targets
+
+    targets = []
+    if out is not None:
+        targets.append(Target(option="--out", path=out, endings=(".csv",)))
+    if plot is not None:
+        targets.append(Target(option="--plot", path=plot, endings=(".png", ".svg", ".pdf")))
+    check_targets(targets, force=force, inputs=[Path(servo), *words.inputs, *recorded_files(load)])
+    return targets
+
+
+def _model(servo: str, name: str, change: list[str]) -> Model:
+    from servotwin.cli.settings import settings
+    from servotwin.errors import UnknownNameError
+    from servotwin.models import MODELS
+    from servotwin.parameters import load_servo
+
+    if name not in MODELS:
+        raise UnknownNameError("model", name, MODELS)
+    loaded = load_servo(servo)
+    return MODELS[name](loaded.replace(settings(change)) if change else loaded)
+
+
+def _run(model: Model, words: CommandWords, load: list[str], duration: float, output_step: float | None) -> Result:
+    from servotwin.cli.load_words import load_from
+    from servotwin.errors import InputError
+    from servotwin.simulation import simulate as run
+
+    if not (math.isfinite(duration) and duration > 0.0):
+        raise InputError("--duration", got=duration, allowed="a positive number of seconds")
+    if output_step is not None and not (math.isfinite(output_step) and output_step > 0.0):
+        raise InputError("--output-step", got=output_step, allowed="a positive number of seconds")
+    signal = words.signal(duration)
+    with patience("simulating"):
+        result = run(model, signal, duration=duration, load=load_from(load), output_step=output_step)
+    return result.raise_if_failed()
+
+
+def _write(result: Result, targets: list[Target], *, force: bool) -> dict[str, Any]:
+    from servotwin.cli.outputs import staged
+    from servotwin.cli.summary import facts
+
+    with patience("writing"), staged(targets, force=force) as drafts:
+        for target, draft in zip(targets, drafts, strict=True):
+            if target.option == "--out":
+                result.save(draft)
+            else:
+                from servotwin import plotting
+
+                plotting.save(plotting.time_response(result), draft)
+        return facts(result)
+
+
+def _report(found: dict[str, Any], *, as_json: bool) -> None:
+    from servotwin.cli.summary import lines, origin_lines
+
+    if as_json:
+        emit_json(found)
+        return
+    written = [("written", name) for name in found["files"]]
+    show(f"{found['title']} ({found['servo']}), model {found['model']}",
+         pairs([*lines(found), *origin_lines(found), *written]))

@@ -1,0 +1,134 @@
+"""What a simulation is summed up to: one set of facts (SI), shown as a table or as JSON."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from servotwin import units
+from servotwin.errors import InputError
+from servotwin.models import MODELS
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.simulation import Result
+
+_ENERGY = ("winding", "bridge", "brush", "conversion", "friction", "stops", "load", "stored")
+
+
+def facts(result: Result) -> dict[str, Any]:
+    """Return what is worth knowing of a result, in SI, ready for JSON.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = st.BoundedServo(st.load_servo("hitec-hs-755hb"))
+    >>> found = facts(st.simulate(model, st.signals.step(0.0, 90.0, at=0.1, unit="deg"), duration=1.0))
+    >>> found["model"], found["status"], 1.5 < found["final_angle"] < 1.6
+    ('bounded', 'COMPLETED', True)
+    """
+    metrics = None
+    try:
+        metrics = result.step_metrics()
+    except InputError:
+        pass  # no step
+    angle = result.model.layout[0]
+    return {
+        "servo": result.model.servo.name,
+        "title": result.model.servo.title,
+        "model": model_name(result.model),
+        "status": result.status.name,
+        "duration": float(result.time[-1]),
+        "angle": angle,
+        "final_angle": float(result.at(angle, [result.time[-1]])[0]),
+        "step_metrics": None if metrics is None else dataclasses.asdict(metrics),
+        "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
+        "energy": dataclasses.asdict(result.energy),
+        "solution": dataclasses.asdict(result.stats),
+        "assumed": assumed(result.model),
+        "ignored": list(result.model.ignored),
+    }
+
+
+def model_name(model: Model) -> str:
+    """Return the name that `--model` has for a model."""
+    return next(name for name, kind in MODELS.items() if kind is type(model))
+
+
+def assumed(model: Model) -> list[str]:
+    """Return the dotted names that a model reads and nobody measured."""
+    servo = model.servo
+    read = dict.fromkeys((*model.requires, *model.optional))
+    return [name for name in read if servo.get(name) is not None and servo.source(name).origin == "assumed"]
+
+
+def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the facts as pairs of label and text, in the units of people.
+
+    Examples
+    --------
+    >>> energy = {"supply": 2.0, "winding": 1.5, "friction": 0.5}
+    >>> lines({"final_angle": 3.14159265, "peak_current": 1.8, "energy": energy})[:2]
+    [('final angle', '180.00 deg'), ('peak current', '1.800 A')]
+    """
+    rows = [(label, found[key]) for key, label in (("command", "command"), ("load", "load")) if key in found]
+    rows.append((_angle_label(found), f"{_deg(found['final_angle']):.2f} deg"))
+    rows += _step_rows(found.get("step_metrics"))
+    rows.append(("peak current", f"{found['peak_current']:.3f} A"))
+    energy = found["energy"]
+    parts = [f"{name} {energy[name]:.4g} J" for name in _ENERGY if abs(energy.get(name, 0.0)) > 1e-9]
+    rows.append(("energy", f"{energy['supply']:.4g} J supplied: {', '.join(parts) or 'nothing moved'}"))
+    return rows
+
+
+def origin_lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return how the solution was found, and which of its parameters nobody measured."""
+    solution = found["solution"]
+    return [
+        ("status", f"{found['status'].lower()}, {found['duration']:g} s simulated"),
+        ("solved", f"{solution['method']}, {solution['motions']} motions, {solution['events']} events"),
+        ("assumed", names(found["assumed"])),
+        ("ignored", names(found["ignored"])),
+    ]
+
+
+def names(dotted: Sequence[str]) -> str:
+    """Return dotted names, sorted by group, in words.
+
+    Examples
+    --------
+    >>> names(["motor.rotor_inertia", "gear.gear_reduction", "motor.torque_constant"])
+    '3: motor (rotor_inertia, torque_constant), gear (gear_reduction)'
+    """
+    groups: dict[str, list[str]] = {}
+    for name in dotted:
+        group, _, key = name.partition(".")
+        groups.setdefault(group, []).append(key)
+    words = ", ".join(f"{group} ({', '.join(keys)})" for group, keys in groups.items())
+    return f"{len(dotted)}: {words}" if dotted else "none"
+
+
+def _angle_label(found: Mapping[str, Any]) -> str:
+    return "final motor angle" if found.get("angle") == "motor_angle" else "final angle"
+
+
+def _step_rows(metrics: Mapping[str, float] | None) -> list[tuple[str, str]]:
+    if metrics is None:
+        return []
+    rows = []
+    if not math.isnan(metrics["target"]):
+        rows.append(("steady error", f"{_deg(metrics['steady_error']):.2f} deg"))
+    if not math.isnan(metrics["rise_time"]):
+        rows.append(("rise time", f"{1e3 * metrics['rise_time']:.1f} ms (10 to 90 %)"))
+    if not math.isnan(metrics["settling_time"]):
+        rows.append(("settling time", f"{1e3 * metrics['settling_time']:.1f} ms (2 %)"))
+    if not math.isnan(metrics["overshoot"]):
+        rows.append(("overshoot", f"{100 * metrics['overshoot']:.2f} %"))
+    speed = units.from_si(metrics["slew_rate"], "deg/s", "speed")
+    return [*rows, ("peak speed", f"{speed:.1f} deg/s")]
+
+
+def _deg(angle: float) -> float:
+    return units.from_si(angle, "deg", "angle")

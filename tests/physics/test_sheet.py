@@ -1,0 +1,111 @@
+"""What a data sheet says about the motor: the relations hold both ways, and the HS-755HB's numbers come out."""
+
+import itertools
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from servotwin.errors import ParameterError
+from servotwin.physics.sheet import motor_from_sheet
+
+HS_755HB = {"supply_voltage": 6.0, "stall_torque": 1.2945, "no_load_speed": math.pi / 3 / 0.23,
+            "no_load_current": 0.285}
+HS_311 = {"supply_voltage": 6.0, "stall_torque": 0.3432, "no_load_speed": math.pi / 3 / 0.15,
+          "no_load_current": 0.18, "stall_current": 0.8}
+
+
+def test_hs_755hb_without_stall_current():
+    motor = motor_from_sheet(**HS_755HB)
+    assert motor.resistance == pytest.approx(3.04, abs=0.005)
+    assert motor.output_torque_constant == pytest.approx(1.04, abs=0.005)
+    assert motor.stall_current == pytest.approx(1.84, abs=0.005)
+    assert motor.gear_efficiency == 0.8
+    assert motor.feasible
+
+
+def test_hs_755hb_ranges_over_what_is_assumed():
+    motors = [motor_from_sheet(**HS_755HB, gear_efficiency=eta, drop_voltage=drop)
+              for eta, drop in itertools.product((0.7, 0.8, 0.9), (0.0, 0.2, 0.4))]
+    for name, low, high, within in (("resistance", 2.75, 3.7, 0.03), ("output_torque_constant", 1.02, 1.12, 0.005),
+                                    ("stall_current", 1.6, 2.0, 0.04)):
+        found = [getattr(motor, name) for motor in motors]
+        assert (min(found), max(found)) == pytest.approx((low, high), abs=within), name
+
+
+def test_with_stall_current_the_efficiency_follows():
+    motor = motor_from_sheet(**HS_311)
+    assert motor.resistance == pytest.approx(5.6 / 0.8)
+    assert motor.stall_current == pytest.approx(0.8)
+    assert motor.output_torque_constant == pytest.approx((5.6 - 7.0 * 0.18) / (math.pi / 3 / 0.15))
+    assert motor.gear_efficiency == pytest.approx(0.8893, abs=1e-4)
+    assert motor.feasible
+
+
+@pytest.mark.parametrize(("change", "efficiency"), [
+    # FT-7235 and RDS3115: sheets whose stall torque asks for more than their currents can give
+    ({"supply_voltage": 8.4, "stall_torque": 3.3539, "no_load_speed": math.pi / 3 / 0.098, "no_load_current": 0.34,
+      "stall_current": 3.6, "drop_voltage": 0.4}, 1.5),
+    ({"supply_voltage": 5.0, "stall_torque": 1.3239, "no_load_speed": math.pi / 3 / 0.16, "no_load_current": 0.08,
+      "stall_current": 1.3, "drop_voltage": 0.0}, 1.5),
+])
+def test_impossible_sheets_are_told(change, efficiency):
+    motor = motor_from_sheet(**change)
+    assert motor.gear_efficiency == pytest.approx(efficiency, abs=0.15)
+    assert not motor.feasible
+
+
+sheets = st.fixed_dictionaries({
+    "supply_voltage": st.floats(4.0, 9.0), "stall_torque": st.floats(0.05, 4.0), "no_load_speed": st.floats(2.0, 25.0),
+    "no_load_current": st.floats(0.02, 1.0), "drop_voltage": st.floats(0.0, 0.5), "gear_efficiency": st.floats(0.5, 1.0),
+})
+
+
+@given(sheets)
+def test_the_solution_satisfies_all_three_relations(sheet):
+    motor = motor_from_sheet(**sheet)
+    U, I_0 = sheet["supply_voltage"] - sheet["drop_voltage"], sheet["no_load_current"]
+    R, K_out, I_s = motor.resistance, motor.output_torque_constant, motor.stall_current
+    assert R > 0.0
+    assert K_out > 0.0
+    assert I_s > I_0
+    assert I_s == pytest.approx(U / R)
+    assert sheet["no_load_speed"] == pytest.approx((U - R * I_0) / K_out)
+    assert sheet["stall_torque"] == pytest.approx(motor.gear_efficiency * K_out * (I_s - I_0), rel=1e-6)
+
+
+@given(sheets)
+def test_both_branches_agree(sheet):
+    motor = motor_from_sheet(**sheet)
+    del sheet["gear_efficiency"]
+    again = motor_from_sheet(**sheet, stall_current=motor.stall_current)
+    assert again.resistance == pytest.approx(motor.resistance, rel=1e-9)
+    assert again.output_torque_constant == pytest.approx(motor.output_torque_constant, rel=1e-6)
+    assert again.gear_efficiency == pytest.approx(motor.gear_efficiency, rel=1e-6)
+    assert again.coulomb_torque == pytest.approx(motor.coulomb_torque, rel=1e-6)
+
+
+@given(sheets)
+def test_coulomb_torque_and_gear_loss_share_the_no_load_current(sheet):
+    motor = motor_from_sheet(**sheet)
+    eta = motor.gear_efficiency
+    mu = (1.0 - eta) / (1.0 + eta)
+    assert eta == pytest.approx((1.0 - mu) / (1.0 + mu))
+    assert motor.coulomb_torque == pytest.approx(
+        motor.output_torque_constant * sheet["no_load_current"] * (1.0 - mu))
+
+
+@pytest.mark.parametrize(("change", "named"), [
+    ({"supply_voltage": 0.0}, "supply_voltage"), ({"stall_torque": -1.0}, "stall_torque"),
+    ({"no_load_speed": math.nan}, "no_load_speed"), ({"no_load_current": math.inf}, "no_load_current"),
+    ({"gear_efficiency": 0.0}, "gear_efficiency"), ({"drop_voltage": 6.0}, "drop_voltage"),
+    ({"drop_voltage": -0.1}, "drop_voltage"), ({"stall_current": 0.2}, "stall_current"),
+    ({"stall_current": 0.0}, "stall_current"),
+])
+def test_a_bad_sheet_is_refused_in_one_line(change, named):
+    with pytest.raises(ParameterError) as caught:
+        motor_from_sheet(**(HS_755HB | change))
+    assert named in str(caught.value)
+    assert caught.value.allowed
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,69 @@
+"""The package against the independent reference, on random servos, loads and commands."""
+
+import warnings
+
+import numpy as np
+import pytest
+from reference import reference
+from reference.cases import DURATION, random_case
+from validation.cases_in_words import command_of, load_of, servo_of
+
+import servotwin as st
+
+TIMES = np.linspace(0.0, DURATION, 151)
+
+
+def run(model_class, case):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # random calibrations differ by design
+        model = model_class(servo_of(case))
+    return st.simulate(model, command_of(case.command), duration=DURATION, load=load_of(case.load),
+                       output_times=TIMES).raise_if_failed()
+
+
+@pytest.mark.parametrize("seed", range(80))
+def test_bounded_servo(seed):
+    case = random_case(np.random.default_rng(seed))
+    exact = reference.solve_bounded(case.plant, case.v_c, DURATION, TIMES, breaks=case.breaks)
+    result = run(st.BoundedServo, case)
+    tolerance = 1e-12 if result.stats.method == "closed form" else 1e-9
+    np.testing.assert_allclose(result["output_angle"], exact.q, rtol=0.0, atol=tolerance)
+    np.testing.assert_allclose(result["output_speed"], exact.w, rtol=0.0, atol=100 * tolerance)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_averaged_servo(seed):
+    case = random_case(np.random.default_rng(1000 + seed))
+    exact = reference.solve_averaged(case.plant, case.v_c, DURATION, TIMES, breaks=case.breaks)
+    result = run(st.AveragedServo, case)
+    np.testing.assert_allclose(result["output_angle"], exact.q, rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_averaged_servo_with_inductance(seed):
+    case = random_case(np.random.default_rng(2000 + seed))
+    exact = reference.solve_averaged_inductive(case.plant, case.v_c, DURATION, TIMES, breaks=case.breaks)
+    result = run(st.AveragedServoInductive, case)
+    np.testing.assert_allclose(result["output_angle"], exact.q, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(result["armature_current"], exact.i, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["free", "inertia", "viscous", "constant", "spring", "pendulum", "recorded"])
+def test_geared_motor(kind):
+    case = random_case(np.random.default_rng(3000), load=kind)
+    signal = command_of(case.command)  # here it is the armature voltage
+    exact = reference.solve_geared_motor(case.plant, lambda t: float(signal(max(t, 0.0))), DURATION, TIMES,
+                                         breaks=case.breaks)
+    result = run(st.GearedMotor, case)
+    scale = np.abs(exact.q).max() + 1.0
+    tolerance = (1e-11 if result.stats.method == "closed form" else 1e-8) * scale
+    np.testing.assert_allclose(result["output_angle"], exact.q, rtol=0.0, atol=tolerance)
+
+
+def test_dc_motor():
+    case = random_case(np.random.default_rng(4000), load="free", command="sine")
+    signal = command_of(case.command)
+    exact = reference.solve_dc_motor(case.plant, lambda t: float(signal(max(t, 0.0))), DURATION, TIMES)
+    result = run(st.DCMotor, case)
+    np.testing.assert_allclose(result["motor_angle"], exact.q, rtol=1e-11, atol=1e-10)
+    np.testing.assert_allclose(result["armature_current"], exact.i, rtol=1e-9, atol=1e-10)
