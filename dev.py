@@ -78,7 +78,7 @@ def examples(arguments: list[str]) -> None:
 
 def main(arguments: list[str]) -> None:
     """Set up, then do one task."""
-    if sys.version_info < (3, 11):
+    if tuple(map(int, sys.version.split(".")[:2])) < (3, 11):  # said in one line, not by pip
         sys.exit(f"dev.py: servotwin needs Python 3.11 or newer, this is {sys.version.split()[0]}")
     task = arguments[0] if arguments else ""
     if task not in TASKS:

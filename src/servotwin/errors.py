@@ -50,7 +50,8 @@ class InputError(ServotwinError, ValueError):
             text += f": got {_shown(self.got)}"
         if self.allowed is not None:
             text += f"{',' if self.got is not None else ':'} allowed: {self.allowed}"
-        return text
+        # What a person named may hold a line end or an escape sequence: a file, a servo, a table.
+        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 class UnitError(InputError):
@@ -89,10 +90,10 @@ class UnknownNameError(InputError, KeyError):
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.name = name
         self.known = tuple(known)
-        near = get_close_matches(name, self.known, n=1, cutoff=0.4)
+        near = get_close_matches(str(name), self.known, n=1, cutoff=0.4)
         self.suggestion = near[0] if near else None
         hint = f"; did you mean {self.suggestion!r}?" if near else ""
-        super().__init__(f"unknown {kind} {name!r}{hint}", allowed=", ".join(self.known) or "none")
+        super().__init__(f"unknown {kind} {_shown(name)}{hint}", allowed=", ".join(self.known) or "none")
 
     def __str__(self) -> str:
         return InputError._message(self)  # KeyError would print the repr

@@ -6,7 +6,8 @@ A unit belongs to a dimension; a value is converted with one factor (temperature
 from __future__ import annotations
 
 import math
-from typing import overload
+from numbers import Real
+from typing import TypeGuard, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -116,15 +117,27 @@ def from_si(value: ArrayLike, unit: str, dimension: str) -> float | NDArray[np.f
     return _scaled(value, factor(unit, dimension), divide=True)
 
 
+def is_finite(value: object) -> TypeGuard[float]:
+    """Return whether it is a finite real number, of Python or NumPy; what is true or false is none.
+
+    Examples
+    --------
+    >>> [is_finite(value) for value in (1, np.float32(1.0), True, "1", float("nan"), 10**400)]
+    [True, True, False, False, False, False]
+    """
+    try:
+        return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
+    except OverflowError:  # an integer beyond the range of a float
+        return False
+
+
 def _scaled(value: ArrayLike, by: float, *, divide: bool) -> float | NDArray[np.float64]:
-    if isinstance(value, int | float):
-        # Dividing by a whole number keeps decimals exact: 1500 us is 0.0015 s to the last bit.
-        inverse = 1.0 / by
-        if not divide and by < 1.0 and abs(inverse - round(inverse)) < 1e-9 * inverse:
-            return float(value) / round(inverse)
-        return float(value) / by if divide else float(value) * by
-    array = np.asarray(value, dtype=np.float64)
-    return array / by if divide else array * by
+    x = float(value) if isinstance(value, int | float) else np.asarray(value, dtype=np.float64)
+    # Dividing by a whole number keeps decimals exact: 1500 us is 0.0015 s to the last bit.
+    inverse = 1.0 / by
+    if not divide and by < 1.0 and abs(inverse - round(inverse)) < 1e-9 * inverse:
+        return x / float(round(inverse))
+    return x / by if divide else x * by
 
 
 def _units_of(dimension: str) -> dict[str, float]:

@@ -19,6 +19,7 @@ _BELONGS = {
     "at": ("step", "ramp"),
     "over": ("ramp",),
     "hold": ("command",),
+    "column": ("command",),
 }
 _EDGES = {"time_s": 1.0, "time_ms": 1e-3, "time": 1.0}
 _WIDTHS = {"pulse_width_us": 1e-6, "pulse_width_ms": 1e-3, "pulse_width_s": 1.0, "pulse_width": 1.0}
@@ -40,6 +41,8 @@ class CommandWords:
         When a step or ramp begins, and how long a ramp takes [s].
     hold : str, optional
         Between the samples of a file: "previous" or "linear".
+    column : str, optional
+        Which column of a file of samples, where it has several commands.
 
     Examples
     --------
@@ -59,6 +62,7 @@ class CommandWords:
     at: float | None = None
     over: float | None = None
     hold: str | None = None
+    column: str | None = None
 
     @property
     def shape(self) -> str:
@@ -73,17 +77,16 @@ class CommandWords:
         shapes = [name for name in given if name in _SHAPES]
         everything = ", ".join(f"--{name}" for name in _SHAPES)
         if not shapes:
-            raise CommandError("no command is given", allowed=f"one of {everything}")
+            raise CommandError(f"no command is given; use one of {everything}")
         if len(shapes) > 1:
             raise CommandError("commands contradict", got=", ".join(f"--{name}" for name in shapes),
                                allowed=f"one of {everything}")
         for name, owners in _BELONGS.items():
             if name in given and shapes[0] not in owners:
-                why = "its columns say their units" if name == "unit" else f"--{name} does not belong to it"
-                raise CommandError(f"--{name} with --{shapes[0]} ({why})",
-                                   allowed="with " + ", ".join(f"--{owner}" for owner in owners))
+                fitting = ", ".join(f"--{owner}" for owner in owners)
+                raise CommandError(f"--{name} goes with {fitting}, not with --{shapes[0]}")
         if shapes[0] == "ramp" and self.over is None:
-            raise CommandError("--ramp without --over", allowed="--over SECONDS, how long it takes")
+            raise CommandError("--ramp needs --over SECONDS, how long it takes")
         return shapes[0]
 
     @property
@@ -140,7 +143,7 @@ class CommandWords:
                 return signals.constant(values[0], unit=unit)
             case "pulses":
                 return _pulses(Path(self.pulses or ""))
-        return signals.from_csv(Path(self.command or ""), hold=self.hold or "previous")
+        return signals.from_csv(Path(self.command or ""), column=self.column, hold=self.hold or "previous")
 
     def _values(self) -> list[float]:
         forms = {

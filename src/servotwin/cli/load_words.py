@@ -47,7 +47,8 @@ def load_from(words: Sequence[str]) -> Load:
         try:
             total = total + _MAKERS[name](value)
         except InputError as error:
-            raise LoadError(f"--load {name}: {error.what}", got=error.got, allowed=error.allowed) from None
+            what = error.what if error.what == f"--load {name}" else f"--load {name}: {error.what}"
+            raise LoadError(what, got=error.got, allowed=error.allowed) from None
     return total
 
 
@@ -86,16 +87,16 @@ def _parts(words: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def _single(make: Callable[[float], Part], name: str) -> Callable[[str], Part]:
-    return lambda text: make(numbers("value", text, (FORMS[name],))[0])
+    return lambda text: make(numbers(f"--load {name}", text, (FORMS[name],))[0])
 
 
 def _pendulum(text: str) -> Part:
-    mass, length, *hanging = numbers("value", text, ("KG", "M", "HANGING_DEG"), required=2)
+    mass, length, *hanging = numbers("--load pendulum", text, ("KG", "M", "HANGING_DEG"), required=2)
     return loads.Pendulum(mass=mass, length=length, hanging_angle=math.radians(hanging[0]) if hanging else 0.0)
 
 
 def _spring(text: str) -> Part:
-    stiffness, *rest = numbers("value", text, ("NM_PER_RAD", "REST_DEG"), required=1)
+    stiffness, *rest = numbers("--load spring", text, ("NM_PER_RAD", "REST_DEG"), required=1)
     return loads.Spring(stiffness, math.radians(rest[0]) if rest else 0.0)
 
 

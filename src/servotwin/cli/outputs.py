@@ -67,13 +67,14 @@ def check_targets(targets: Sequence[Target], *, force: bool, inputs: Sequence[Pa
     """
     taken = {_identity(path): f"the input {path}" for path in inputs}
     for target in targets:
+        name = f"{target.option} {target.path}"
+        other = taken.setdefault(_identity(target.place), name)
+        if other != name:
+            raise OutputError(f"{name} is the same file as {other}")
         if target.path.suffix.lower() not in target.endings:
             raise OutputError(target.option, got=str(target.path),
                               allowed="a name that ends in " + ", ".join(target.endings))
         _check_place(target, force=force)
-        other = taken.setdefault(_identity(target.place), f"{target.option} {target.path}")
-        if other != f"{target.option} {target.path}":
-            raise OutputError(f"{target.option} {target.path} is the same file as {other}")
 
 
 @contextlib.contextmanager
@@ -97,7 +98,13 @@ def staged(targets: Sequence[Target], *, force: bool) -> Iterator[list[Path]]:
                 folder = tempfile.mkdtemp(dir=place.parent, prefix=".servotwin-")
             stack.callback(shutil.rmtree, folder, ignore_errors=True)
             drafts.append(Path(folder) / place.name)
-        yield drafts
+        try:
+            yield drafts
+        except OutputError as error:
+            what = error.what
+            for target, draft in zip(targets, drafts, strict=True):
+                what = what.replace(str(draft), f"{target.option} {target.path}")
+            raise OutputError(what, got=error.got, allowed=error.allowed) from None
         for target, place in zip(targets, places, strict=True):
             if place.exists() and not force:  # it came into being meanwhile
                 raise OutputExistsError(target.path)

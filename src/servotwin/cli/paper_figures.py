@@ -100,10 +100,10 @@ def _feedback_over_position(study: Study) -> Picture:
         q, v_o = (plotting.shown(name, step[name]) for name in ("output_angle", "feedback_voltage"))
         columns |= {f"{model}_output_angle_deg": q.tolist(), f"{model}_feedback_voltage_V": v_o.tolist()}
         drawn.append(Curve(f"simulated, {LABELS[model]}", q, v_o))
-    drawn.append(Curve("Table I", study.ranges["q_deg"], study.ranges["v_o_V"]))
+    drawn.append(Curve("Table I", study.ranges["q_deg"], study.ranges["V_o_V"]))
     drawn.append(Curve("measured, Table II", angle, voltage, points=True, style=0))
     columns |= {"measured_q_deg": angle.tolist(), "measured_V_o_V": voltage.tolist(),
-                "table_1_q_deg": study.ranges["q_deg"].tolist(), "table_1_v_o_V": study.ranges["v_o_V"].tolist()}
+                "table_1_q_deg": study.ranges["q_deg"].tolist(), "table_1_V_o_V": study.ranges["V_o_V"].tolist()}
     figure = plotting.curves(drawn, x_label="output angle $q$ (°)", y_label="feedback voltage $v_o$ (V)", height=3.4)
     caption = ("The paper's Figure 17. Both models share one potentiometer, so their lines coincide; it is calibrated "
                "with Table II. The line of Table I, the range that the paper states for analog servos, is steeper.")

@@ -138,7 +138,7 @@ ones here, curve for curve, and nothing here was tuned to look like them. What c
 22 to 27, which were measured.</p></div>
 <p>The {sum(count.values())} values used here come from elsewhere: {words}. “Measured” is a least-squares fit to Table
 II. “Datasheet” is the maker's sheet of the HS-755HB, or follows from it. “Assumed” is a prior that no source gives;
-it has a range and has to be identified for a real unit. <a href="#parameters">The list</a> names each.</p>
+most have a range, and they have to be identified for a real unit. <a href="#parameters">The list</a> names each.</p>
 """
 
 
@@ -227,7 +227,7 @@ def _pole(p: complex) -> str:
 
 
 def _parameters(study: Study) -> str:
-    return f"""<p>None of these is a value of the paper's authors. A range belongs to an assumed or derived value, ± one
+    return f"""<p>No value here is one of the paper's authors. A range belongs to an assumed or derived value, ± one
 standard error to a fitted one.</p>
 {paper_tables.parameter_table(study)}"""
 

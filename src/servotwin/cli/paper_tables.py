@@ -53,7 +53,7 @@ def step_table(study: Study) -> str:
 def ranges_table(study: Study) -> str:
     """Return Table I of the paper."""
     rows = [[f"{q:.0f}", f"{t:.0f}", f"{v:.1f}"] for q, t, v in
-            zip(*(study.ranges[name].tolist() for name in ("q_deg", "t_a_us", "v_o_V")), strict=True)]
+            zip(*(study.ranges[name].tolist() for name in ("q_deg", "t_a_us", "V_o_V")), strict=True)]
     return table(["q (°)", "t<sub>a</sub> (µs)", "v<sub>o</sub> (V)"], rows,
                  caption="Table I of the paper: the range of operation of analog servos", text_columns=0)
 

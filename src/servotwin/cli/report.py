@@ -38,9 +38,9 @@ def paper(
 
 @contextlib.contextmanager
 def _progress() -> Iterator[Callable[[str, float], None]]:
-    """Show progress on standard error: a bar on a terminal, else nothing but the words, one line each."""
+    """Show progress on standard error: a bar on a terminal, else a line for each part."""
     if sys.stderr is None or not sys.stderr.isatty():
-        yield _say
+        yield _lines()
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -52,5 +52,12 @@ def _progress() -> Iterator[Callable[[str, float], None]]:
         yield lambda words, fraction: bar.update(task, description=words, completed=fraction)
 
 
-def _say(words: str, fraction: float) -> None:
-    typer.echo(f"{100.0 * fraction:3.0f} % {words}", err=True)
+def _lines() -> Callable[[str, float], None]:
+    told: set[str] = set()
+
+    def tell(words: str, fraction: float) -> None:
+        if words not in told:
+            told.add(words)
+            typer.echo(f"{100.0 * fraction:3.0f} % {words}", err=True)
+
+    return tell

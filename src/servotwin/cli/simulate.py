@@ -51,6 +51,9 @@ def simulate(
     hold: Annotated[str | None, typer.Option(
         metavar="HOW", help="Between samples of --command: previous (default) or linear.",
         rich_help_panel=_COMMAND)] = None,
+    column: Annotated[str | None, typer.Option(
+        metavar="NAME", help="Which column of --command, where it has several commands.",
+        rich_help_panel=_COMMAND)] = None,
     model: Annotated[str, typer.Option(
         metavar="MODEL", help="bounded, averaged, averaged-inductive, geared-motor or dc-motor.",
         rich_help_panel=_PLANT)] = "bounded",
@@ -79,7 +82,7 @@ def simulate(
     from servotwin.cli.command_words import CommandWords
 
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
-                         command=command, unit=unit, at=at, over=over, hold=hold)
+                         command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     targets = _checked_targets(out, plot, servo, words, load or [], force=force)
     result = _run(_model(servo, model, change or []), words, load or [], duration, output_step)
     found = _write(result, targets, force=force)

@@ -12,6 +12,7 @@ import numpy as np
 from servotwin.errors import LoadError
 from servotwin.loads.parts import Free, Part, Pendulum, Recorded, Spring
 from servotwin.physics.pieces import Piece, Pieces, constant_pieces
+from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -59,9 +60,9 @@ class Load:
     def __post_init__(self) -> None:
         for name in ("inertia", "viscous_friction", "coulomb_torque"):
             value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
+            if not (is_finite(value) and value >= 0.0):
                 raise LoadError(f"load.{name}", got=value, allowed="a finite number of at least 0")
-        if not math.isfinite(self.torque):
+        if not is_finite(self.torque):
             raise LoadError("load.torque", got=self.torque, allowed="a finite number [N m]")
 
     def __add__(self, other: Part | Load) -> Load:
@@ -102,16 +103,18 @@ class Load:
         """The part of τ_ext that depends on time alone [N m]."""
         if not self.recorded:
             return constant_pieces(self.torque)
-        times = sorted({t for r in self.recorded for t in r.time})
-        first = max(r.time[0] for r in self.recorded)
-        last = min(r.time[-1] for r in self.recorded)
-        times = [t for t in times if first <= t <= last]
-        if len(times) < 2:
+        t = np.unique(np.concatenate([r.time for r in self.recorded]))
+        first, last = self.time_span
+        t = t[(t >= first) & (t <= last)]
+        if t.size < 2:
             raise LoadError("recorded torques", got="recordings that do not overlap", allowed="a common time span")
-        values = [self.torque + sum(float(np.interp(t, r.time, r.torque)) for r in self.recorded) for t in times]
-        rows = [Piece(t0, y0, (y1 - y0) / (t1 - t0))
-                for t0, t1, y0, y1 in zip(times, times[1:], values, values[1:], strict=False)]
-        return Pieces(tuple(rows))
+        y = self.torque + sum(np.interp(t, r.time, r.torque) for r in self.recorded)
+        with np.errstate(over="ignore"):
+            slope = np.diff(y) / np.diff(t)
+        if not np.isfinite(slope).all():
+            raise LoadError("recorded torques", got="a slope beyond all numbers", allowed="finite slopes [N m/s]")
+        rows = zip(t[:-1].tolist(), y[:-1].tolist(), slope.tolist(), strict=True)
+        return Pieces(tuple(Piece(*row) for row in rows))
 
     @property
     def time_span(self) -> tuple[float, float]:
@@ -168,6 +171,8 @@ def as_load(load: Part | Load | None) -> Load:
 
 
 def _joined(a: Spring, b: Spring) -> Spring:
+    if a.stiffness == b.stiffness == 0.0:
+        return Spring(0.0)
     if a.stiffness == 0.0 or b.stiffness == 0.0:
         return b if a.stiffness == 0.0 else a
     stiffness = a.stiffness + b.stiffness

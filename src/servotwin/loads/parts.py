@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from servotwin.errors import LoadError
+from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,12 +19,13 @@ STANDARD_GRAVITY = 9.80665  # m/s², 3rd CGPM (1901)
 
 
 class Part:
-    """Base of all parts: addition, and a check that every number is finite."""
+    """Base of all parts: addition, and a check that every number is finite; all are kept as floats."""
 
     def __post_init__(self) -> None:
         for name, value in self.terms().items():
-            if isinstance(value, bool) or not isinstance(value, int | float | np.floating) or not math.isfinite(value):
+            if not is_finite(value):
                 raise LoadError(f"{type(self).__name__}({name})", got=value, allowed="a finite number")
+            object.__setattr__(self, name, float(value))  # a float32 would lower the precision of all that it meets
 
     def terms(self) -> dict[str, Any]:
         """Return the numbers of this part by name (SI)."""
@@ -212,7 +213,10 @@ class Recorded(Part):
     torque: Sequence[float]
 
     def __post_init__(self) -> None:
-        time, torque = np.asarray(self.time, dtype=np.float64), np.asarray(self.torque, dtype=np.float64)
+        try:
+            time, torque = np.asarray(self.time, dtype=np.float64), np.asarray(self.torque, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise LoadError("Recorded(time, torque)", got="values that are no numbers", allowed="numbers") from None
         if time.ndim != 1 or time.shape != torque.shape or time.size < 2:
             raise LoadError("Recorded(time, torque)", got=f"shapes {time.shape} and {torque.shape}",
                             allowed="two arrays of one length of at least 2")

@@ -32,8 +32,8 @@ def load_servo(name: str | Path) -> Servo:
     Parameters
     ----------
     name : str or Path
-        An id such as ``"hitec-hs-755hb"``, or the path of a servo file: anything that ends in ``.toml`` or holds a
-        path separator.
+        An id such as ``"hitec-hs-755hb"``, or the path of a servo file: what ends in ``.toml``, holds a path
+        separator, or is no id but a file that exists.
 
     Raises
     ------
@@ -51,5 +51,7 @@ def load_servo(name: str | Path) -> Servo:
     if isinstance(name, Path) or text.endswith(".toml") or os.sep in text or "/" in text:
         return read_servo_file(Path(name))
     if text not in catalog_names():
+        if os.path.isfile(text):
+            return read_servo_file(Path(text))
         raise UnknownNameError("servo", text, catalog_names())
     return read_servo_file(_folder() / f"{text}.toml", name=f"catalog/{text}.toml")

@@ -10,7 +10,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
+from numbers import Real
 from typing import Any, ClassVar
+
+import numpy as np
 
 from servotwin.errors import ParameterError
 from servotwin.units import si_unit
@@ -68,6 +71,8 @@ class Group:
             return value
         unit = si_unit(metadata["dimension"])
         if rule == "table":
+            if isinstance(value, np.ndarray) and value.ndim == 1:
+                value = value.tolist()
             if not isinstance(value, list | tuple) or not all(_is_number(x) for x in value) or not value:
                 raise ParameterError(what, got=value, allowed=f"a list of finite numbers [{unit}]")
             return tuple(float(x) for x in value)
@@ -85,7 +90,11 @@ class Group:
 
 
 def _is_number(value: Any) -> bool:
-    return not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    """Whether it is a finite real number; what is true or false is none."""
+    try:
+        return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
+    except OverflowError:  # an integer beyond the range of a float
+        return False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +119,11 @@ class Gear(Group):
     gear_reduction: float | None = parameter("N = 1/n", "number", AT_LEAST_ONE, "motor turns per output turn (18)")
     backlash: float | None = parameter("", "angle", NOT_NEGATIVE, "total play between motor and output, at the output")
     output_inertia: float | None = parameter("", "inertia", NOT_NEGATIVE, "inertia of gear wheel and horn")
+
+
+_ONE_SHARE = ("load_friction", "load_friction_stribeck")
+_TWO_SHARES = ("load_friction_motor", "load_friction_external", "load_friction_motor_stribeck",
+               "load_friction_external_stribeck", "load_friction_motor_quad", "load_friction_external_quad")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,6 +152,12 @@ class Friction(Group):
         if self.stribeck_exponent is not None and self.stribeck_speed is None:
             raise ParameterError("friction.stribeck_exponent", got=self.stribeck_exponent,
                                  allowed="only together with friction.stribeck_speed")
+        # Models M3 and M4 know one share for all torque through the gear, M5 and M6 one for each side of it.
+        one = [name for name in _ONE_SHARE if getattr(self, name) is not None]
+        two = [name for name in _TWO_SHARES if getattr(self, name) is not None]
+        if one and two:
+            raise ParameterError(f"friction.{two[0]}", got=getattr(self, two[0]),
+                                 allowed=f"not beside friction.{one[0]}, which belongs to another friction law")
 
 
 @dataclass(frozen=True, kw_only=True)

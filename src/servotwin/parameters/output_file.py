@@ -28,6 +28,8 @@ def write_file(path: str | Path, write: Callable[[Path], object], *, overwrite: 
     'text'
     """
     target = Path(path)
+    if "\0" in str(target):
+        raise OutputError(f"{str(target)!r} cannot be written (a path holds no NUL)")
     try:
         if target.exists() and not overwrite:
             raise OutputExistsError(target)

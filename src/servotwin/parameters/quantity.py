@@ -50,7 +50,7 @@ class Quantity:
     def __post_init__(self) -> None:
         if self.origin not in ORIGINS:
             raise ParameterError("origin", got=self.origin, allowed=", ".join(ORIGINS))
-        if self.source is None and self.origin != "assumed":
+        if not self.source and self.origin != "assumed":
             raise ParameterError(f"source of a value that is {self.origin}", got="none",
                                  allowed="a source; only what is assumed may lack it")
         for name in ("std", "lower", "upper"):

@@ -35,16 +35,21 @@ class Servo:
     Parameters
     ----------
     name : str
-        Short id, such as ``"hitec-hs-755hb"``.
+        Short id, such as ``"hitec-hs-755hb"``; not empty.
     title : str
         For people.
     motor, gear, friction, electronics, potentiometer, supply, stops, thermal : Group
         Always there; a field that is None is absent. Plain numbers in SI.
     quantities : mapping of str to Quantity
-        Every given value by its dotted name, with unit, origin, source and spread.
+        Every given value by its dotted name, with unit, origin, source and spread; a value without one is assumed.
     notes : str
     sheet, fit : mapping
         Facts of the data sheet, and the record of a fit, as the servo file holds them.
+
+    Raises
+    ------
+    ParameterError
+        If the name is empty or no text.
 
     Examples
     --------
@@ -71,8 +76,18 @@ class Servo:
     fit: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise ParameterError("name of a servo", got=self.name, allowed='a short id, such as "my-servo"')
+        object.__setattr__(self, "quantities", {name: self._quantity(name) for name in self.names()})
         for name in ("quantities", "sheet", "fit"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def _quantity(self, name: str) -> Quantity:
+        value = getattr(getattr(self, name.partition(".")[0]), name.partition(".")[2])
+        known = self.quantities.get(name)
+        if known is not None and known.value == value:
+            return known
+        return Quantity(value=value, unit=unit_of(name), origin="assumed")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle by plain mappings."""
@@ -112,15 +127,17 @@ class Servo:
             raise ParameterError(f"{name} is not given by servo {self.name!r}")
         return self.quantities[name]
 
-    def replace(self, values: Mapping[str, Value]) -> Servo:
+    def replace(self, values: Mapping[str, Value | None]) -> Servo:
         """Return a servo with some values replaced (dotted name to SI number); their origin becomes assumed.
+
+        None takes a value away.
 
         Raises
         ------
         ParameterError, UnknownNameError
             If a value is not physical, or a name unknown.
         """
-        changed: dict[str, dict[str, Value]] = {}
+        changed: dict[str, dict[str, Value | None]] = {}
         for name, value in values.items():
             group, key = check_name(name)
             changed.setdefault(group, {})[key] = value
@@ -128,8 +145,9 @@ class Servo:
         quantities = dict(self.quantities)
         for name in values:
             group, key = check_name(name)
-            quantities[name] = Quantity(value=getattr(groups[group], key), unit=unit_of(name), origin="assumed",
-                                        source="replaced")
+            value = getattr(groups[group], key)
+            if value is not None:
+                quantities[name] = Quantity(value=value, unit=unit_of(name), origin="assumed", source="replaced")
         return replace(self, quantities=quantities, **groups)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
@@ -164,19 +182,16 @@ def servo_from_values(name: str, values: Mapping[str, Mapping[str, Value]], *, t
     >>> servo_from_values("mine", {"gear": {"gear_reduction": 280.0}}).source("gear.gear_reduction").origin
     'assumed'
     """
-    quantities: dict[str, Quantity] = {}
     groups: dict[str, Group] = {}
     for group, entries in values.items():
+        if group not in GROUPS:
+            raise UnknownNameError("parameter group", str(group), GROUPS)
+        if not isinstance(entries, Mapping):
+            raise ParameterError(group, got=entries, allowed="a mapping of names to values")
         for key in entries:
             check_name(f"{group}.{key}")
-        if group not in GROUPS:
-            raise UnknownNameError("parameter group", group, GROUPS)
         groups[group] = GROUPS[group](**entries)
-        for key in entries:
-            value = getattr(groups[group], key)
-            if value is not None:
-                quantities[f"{group}.{key}"] = Quantity(value=value, unit=unit_of(f"{group}.{key}"), origin="assumed")
-    return Servo(name=name, title=title, quantities=quantities, **groups)  # type: ignore[arg-type]
+    return Servo(name=name, title=title, **groups)  # type: ignore[arg-type]
 
 
 def check_name(name: str) -> tuple[str, str]:

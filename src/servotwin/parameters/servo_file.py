@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin import units
-from servotwin.errors import ParameterError, ServoFileError, UnitError, UnknownNameError
+from servotwin.errors import OutputError, ParameterError, ServoFileError, UnitError, UnknownNameError
 from servotwin.parameters.groups import GROUPS, Group
 from servotwin.parameters.output_file import write_file
 from servotwin.parameters.quantity import ORIGINS, Quantity
@@ -35,7 +37,7 @@ def read_servo_file(path: Path, name: str | None = None) -> Servo:
     ServoFileError
         If the file cannot be read or holds something wrong: names file, table, key, got and allowed.
     """
-    label = name or str(path)
+    label = name or (str(path) if "\0" not in str(path) else repr(str(path)))
     content = _read_toml(path, label)
     for key in content:
         if key not in _TOP_KEYS:
@@ -59,7 +61,7 @@ def read_servo_file(path: Path, name: str | None = None) -> Servo:
 
 def _read_toml(path: Path, label: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # editors on Windows may put a mark in front
     except FileNotFoundError:
         raise ServoFileError(label, "no such file") from None
     except IsADirectoryError:
@@ -68,8 +70,10 @@ def _read_toml(path: Path, label: str) -> dict[str, Any]:
         raise ServoFileError(label, "is not UTF-8 text") from None
     except OSError as error:
         raise ServoFileError(label, f"cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ServoFileError(label, f"is not valid TOML: {str(error) or 'nested too deeply'}") from None
+    except RecursionError:
+        raise ServoFileError(label, "is not valid TOML: nested too deeply") from None
+    except ValueError as error:  # TOMLDecodeError, an integer of thousands of digits, a path with a NUL
+        raise ServoFileError(label, f"is not valid TOML: {error}") from None
 
 
 def _table(label: str, content: Mapping[str, Any], key: str) -> dict[str, Any]:
@@ -82,15 +86,17 @@ def _table(label: str, content: Mapping[str, Any], key: str) -> dict[str, Any]:
 def _read_group(label: str, table: str, kind: type[Group], content: Any) -> tuple[Group, dict[str, Quantity]]:
     if not isinstance(content, dict):
         raise ServoFileError(label, "not a table", table=table, got=content, allowed=f"a table [{table}]")
+    dimensions = {f.name: f.metadata["dimension"] for f in fields(kind)}
     quantities: dict[str, Quantity] = {}
     for key, entry in content.items():
-        if key not in kind.__dataclass_fields__:
-            raise ServoFileError(label, str(UnknownNameError("parameter", key, kind.__dataclass_fields__)), table=table)
-        quantities[key] = _read_entry(label, table, key, kind.__dataclass_fields__[key].metadata["dimension"], entry)
+        if key not in dimensions:
+            raise ServoFileError(label, str(UnknownNameError("parameter", key, dimensions)), table=table)
+        quantities[key] = _read_entry(label, table, key, dimensions[key], entry)
     try:
         group = kind(**{key: q.value for key, q in quantities.items()})
     except ParameterError as error:
-        raise ServoFileError(label, error.what, table=table, got=error.got, allowed=error.allowed) from None
+        raise ServoFileError(label, "not possible", table=table, key=error.what.partition(".")[2], got=error.got,
+                             allowed=error.allowed) from None
     return group, {f"{table}.{key}": quantity for key, quantity in quantities.items()}
 
 
@@ -128,7 +134,7 @@ def _read_entry(label: str, table: str, key: str, dimension: str, entry: Any) ->
             if isinstance(number, bool) or not isinstance(number, int | float):
                 raise wrong(f"{name} is not a number", number, "a number")
         converted = _converted(value, unit, dimension)
-        numbers = {name: units.to_si(float(number), unit, dimension) for name, number in numbers.items()}
+        numbers = {name: _converted(number, unit, dimension) for name, number in numbers.items()}
     try:
         return Quantity(value=converted, unit="" if dimension == "word" else units.si_unit(dimension),
                         origin=entry["origin"], source=entry.get("source"), **numbers)
@@ -142,13 +148,19 @@ def _converted(value: Any, unit: str, dimension: str) -> Any:
         return tuple(_converted(x, unit, dimension) for x in value)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return value
-    return units.to_si(float(value), unit, dimension)
+    try:
+        return units.to_si(float(value), unit, dimension)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
 
 
 def write_servo_file(servo: Servo, path: Path, *, overwrite: bool = False) -> None:
     """Write a servo file in SI; a failure leaves what was there untouched."""
-    text = _document(servo).as_string()
-    write_file(path, lambda file: file.write_text(text, encoding="utf-8"), overwrite=overwrite)
+    try:
+        content = _document(servo).as_string().encode()
+    except UnicodeEncodeError:
+        raise OutputError(f"{path} cannot be written (a text of the servo is not valid Unicode)") from None
+    write_file(path, lambda file: file.write_bytes(content), overwrite=overwrite)
 
 
 def _document(servo: Servo) -> tomlkit.TOMLDocument:

@@ -97,6 +97,10 @@ class Pieces:
     def _starts(self) -> tuple[float, ...]:
         return tuple(piece.start for piece in self.table)
 
+    @cached_property
+    def _columns(self) -> NDArray[np.float64]:
+        return np.array(self.table, dtype=np.float64)
+
     def __getstate__(self) -> dict[str, object]:
         """Leave caches out, so that equal tables pickle to equal bytes."""
         return {"table": self.table}
@@ -116,9 +120,8 @@ class Pieces:
     def __call__(self, time: ArrayLike) -> NDArray[np.float64]:
         """Return the values at `time` [s], any shape."""
         t = np.asarray(time, dtype=np.float64)
-        k = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
-        start, value, slope, amplitude, frequency, phase, sweep = np.asarray(self.table)[k].transpose(
-            (-1, *range(t.ndim)))
+        k = np.maximum(np.searchsorted(self._columns[:, 0], t, side="right") - 1, 0)
+        start, value, slope, amplitude, frequency, phase, sweep = self._columns[k].transpose((-1, *range(t.ndim)))
         s = t - start
         return np.asarray(value + slope * s + amplitude * np.sin(phase + (frequency + 0.5 * sweep * s) * s))
 
@@ -135,8 +138,9 @@ class Pieces:
 
     def bounds(self, end: float = math.inf) -> tuple[float, float]:
         """Return the lowest and highest value until `end` [s] (a sinusoid counts with its whole amplitude)."""
-        ends = (*self._starts[1:], max(end, self._starts[-1]))
-        ranges = [piece_range(p, e) for p, e in zip(self.table, ends, strict=True)]
+        ends = (*self._starts[1:], math.inf)
+        begun = max(bisect_right(self._starts, end), 1)
+        ranges = [piece_range(p, max(min(e, end), p.start)) for p, e in zip(self.table[:begun], ends, strict=False)]
         return min(r[0] for r in ranges), max(r[1] for r in ranges)
 
 

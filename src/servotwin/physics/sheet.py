@@ -96,8 +96,9 @@ def motor_from_sheet(*, supply_voltage: float, stall_torque: float, no_load_spee
                                  allowed=f"more than the no-load current {no_load_current:g} A")
         R, eta = U / stall_current, math.nan
     else:
-        half = U + 0.5 * stall_torque * no_load_speed / (gear_efficiency * no_load_current)
-        R, eta = (U * U / (half + math.sqrt(half * half - U * U))) / no_load_current, gear_efficiency
+        gap = 0.5 * stall_torque * no_load_speed / (gear_efficiency * no_load_current)
+        x = U * U / (U + gap + math.sqrt(gap) * math.sqrt(gap + 2.0 * U))  # one over the larger root, times U²
+        R, eta = x / no_load_current, gear_efficiency
     K_out = (U - R * no_load_current) / no_load_speed
     if stall_current is not None:
         eta = stall_torque / (K_out * (stall_current - no_load_current))

@@ -163,7 +163,7 @@ def block_diagram(number: int) -> Figure:
 
     Examples
     --------
-    >>> block_diagram(2).get_size_inches()[0] > 4.0
+    >>> bool(block_diagram(2).get_size_inches()[0] > 4.0)
     True
     """
     if number not in PAPER_DIAGRAMS:

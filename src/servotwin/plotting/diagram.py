@@ -55,8 +55,8 @@ class Diagram:
     >>> diagram = Diagram(4.0, 1.5)
     >>> block = diagram.block(2.0, 0.75, r"$k_a$")
     >>> diagram.line((0.2, 0.75), block.left, arrow=True)
-    >>> diagram.figure.get_size_inches()[0] > 2.0
-    True
+    >>> len(diagram.figure.axes)
+    1
     """
 
     def __init__(self, width: float, height: float) -> None:

@@ -89,7 +89,7 @@ def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequen
                         textcoords="offset points", ha="right", va="bottom", fontsize=7.5, color=COLOURS["grey"])
         _panel(ax, drawn, y_label)
         if len(drawn) > 1:
-            ax.legend(loc="best", handlelength=3.2)
+            ax.legend(loc="upper left" if below else "best", handlelength=3.2)
         if below:
             axes[1].axhline(0.0, color=COLOURS["grey"], linewidth=1.0)
             _panel(axes[1], below, below_label)

@@ -37,7 +37,7 @@ def from_csv(path: str | Path, *, column: str | None = None, hold: str = "previo
     Raises
     ------
     CommandError
-        If the file cannot be read, is empty, lacks a column, or has a value that is no number.
+        If the file cannot be read, is empty, lacks a column or has it twice, or has a value that is no number.
 
     Examples
     --------
@@ -48,6 +48,9 @@ def from_csv(path: str | Path, *, column: str | None = None, hold: str = "previo
     1600
     """
     header, rows = _read(Path(path))
+    twice = [name for name in (*_TIMES, *_COLUMNS) if header.count(name) > 1]
+    if twice:
+        raise CommandError(f"{path}: column", got=f"{twice[0]} {header.count(twice[0])} times", allowed="once")
     time_name = next((name for name in _TIMES if name in header), None)
     if time_name is None:
         raise CommandError(f"{path}: columns", got=", ".join(header), allowed="a time column: " + ", ".join(_TIMES))
@@ -66,28 +69,37 @@ def from_csv(path: str | Path, *, column: str | None = None, hold: str = "previo
         raise CommandError(f"{path}: {error.what}", got=error.got, allowed=error.allowed) from None
 
 
-def _read(path: Path) -> tuple[list[str], list[list[str]]]:
+def _read(path: Path) -> tuple[list[str], dict[int, list[str]]]:
+    """Return the header, and the rows that are not empty by their line number."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
+            reader = csv.reader(file)
+            filled = ((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
+            rows = dict(filled)
     except FileNotFoundError:
         raise CommandError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except OSError as error:
+        raise CommandError(f"{path}: cannot be read ({error.strerror})") from None
+    except (ValueError, csv.Error) as error:  # not UTF-8, a NUL in the path, an endless cell
         raise CommandError(f"{path}: not readable as CSV ({error})") from None
     if not rows:
         raise CommandError(f"{path}", got="an empty file", allowed="a header and at least one row")
     if len(rows) == 1:
         raise CommandError(f"{path}", got="a header without rows", allowed="at least one row")
-    return [cell.strip() for cell in rows[0]], rows[1:]
+    header = [cell.strip() for cell in rows.pop(min(rows))]
+    for line, row in rows.items():
+        if any(cell.strip() for cell in row[len(header):]):  # decimal commas would be read as other columns
+            raise CommandError(f"{path}: line {line}", got=f"{len(row)} cells", allowed=f"{len(header)}, as the header")
+    return header, rows
 
 
-def _numbers(path: str | Path, header: list[str], rows: list[list[str]], name: str) -> list[float]:
+def _numbers(path: str | Path, header: list[str], rows: dict[int, list[str]], name: str) -> list[float]:
     k = header.index(name)
     values = []
-    for number, row in enumerate(rows, start=2):
+    for line, row in rows.items():
         try:
             values.append(float(row[k]))
         except (IndexError, ValueError):
             got = row[k] if k < len(row) else "nothing"
-            raise CommandError(f"{path}: row {number}, {name}", got=got, allowed="a number") from None
+            raise CommandError(f"{path}: line {line}, {name}", got=got, allowed="a number") from None
     return values

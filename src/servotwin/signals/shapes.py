@@ -40,7 +40,7 @@ def step(before: float, after: float, *, at: float = 0.0, unit: str, frame_perio
     """
     y0, y1 = in_si(before, unit, "step(before)"), in_si(after, unit, "step(after)")
     at = _time(at, "step(at)")
-    rows = (Piece(at - 1.0, y0), Piece(at, y1))
+    rows = (Piece(_before(at), y0), Piece(at, y1))
     return Signal(pieces=Pieces(rows), unit=unit, initial=y1 if at < 0.0 else y0, frame_period=frame_period)
 
 
@@ -55,7 +55,9 @@ def ramp(before: float, after: float, *, at: float = 0.0, over: float, unit: str
     """
     y0, y1 = in_si(before, unit, "ramp(before)"), in_si(after, unit, "ramp(after)")
     at, over = _time(at, "ramp(at)"), _positive(over, "ramp(over)")
-    rows = (Piece(at - 1.0, y0), Piece(at, y0, (y1 - y0) / over), Piece(at + over, y1))
+    if at + over == at:
+        raise CommandError("ramp(over)", got=over, allowed=f"a time that shows beside at = {at:g} s")
+    rows = (Piece(_before(at), y0), Piece(at, y0, (y1 - y0) / over), Piece(at + over, y1))
     pieces = Pieces(rows)
     initial = y0 if at >= 0.0 else float(pieces(0.0))
     return Signal(pieces=pieces, unit=unit, initial=initial, frame_period=frame_period)
@@ -108,6 +110,11 @@ def prbs(low: float, high: float, *, bit_time: float, duration: float, order: in
     seed : int
         Where in its cycle the register starts.
 
+    Raises
+    ------
+    CommandError
+        If a number is not finite, `order` or `seed` no integer, or there are more than ten million bits.
+
     Examples
     --------
     >>> s = prbs(1400.0, 1600.0, bit_time=0.05, duration=1.0, unit="us")
@@ -116,6 +123,8 @@ def prbs(low: float, high: float, *, bit_time: float, duration: float, order: in
     """
     if not (isinstance(order, int) and 2 <= order <= 20):
         raise CommandError("prbs(order)", got=order, allowed="an integer from 2 to 20")
+    if isinstance(seed, bool) or not isinstance(seed, int):
+        raise CommandError("prbs(seed)", got=seed, allowed="an integer")
     from scipy.signal import max_len_seq
 
     length = 2**order - 1
@@ -124,9 +133,9 @@ def prbs(low: float, high: float, *, bit_time: float, duration: float, order: in
     count = max(1, math.ceil(_positive(duration, "prbs(duration)") / T - 1e-9))
     if count > 10_000_000:
         raise CommandError("prbs(duration / bit_time)", got=count, allowed="at most 10 000 000 bits")
-    levels = in_si(low, unit, "prbs(low)"), in_si(high, unit, "prbs(high)")
+    y0, y1 = in_si(low, unit, "prbs(low)"), in_si(high, unit, "prbs(high)")
     time = np.asarray(np.arange(count) * T, dtype=np.float64)
-    return _held(time, np.asarray([levels[bits[k % length]] for k in range(count)]), unit, frame_period)
+    return _held(time, np.where(np.resize(bits, count) == 1, y1, y0), unit, frame_period)
 
 
 def samples(time: ArrayLike, value: ArrayLike, *, unit: str, hold: str = "previous",
@@ -144,7 +153,7 @@ def samples(time: ArrayLike, value: ArrayLike, *, unit: str, hold: str = "previo
     Raises
     ------
     CommandError
-        If the arrays are empty, of unequal length, unsorted or not finite.
+        If the arrays are empty, of unequal length, unsorted or not finite, or a linear slope is beyond all numbers.
 
     Examples
     --------
@@ -156,7 +165,12 @@ def samples(time: ArrayLike, value: ArrayLike, *, unit: str, hold: str = "previo
         return _held(t, y, unit, frame_period)
     if hold != "linear":
         raise CommandError("samples(hold)", got=hold, allowed="previous, linear")
-    slope = np.append(np.diff(y) / np.diff(t), 0.0)
+    with np.errstate(over="ignore"):
+        slope = np.append(np.diff(y) / np.diff(t), 0.0)
+    steep = np.flatnonzero(~np.isfinite(slope))
+    if steep.size:
+        raise CommandError(f"samples: slope after sample {steep[0]}", got=float(slope[steep[0]]),
+                           allowed="a finite number")
     rows = [Piece(*row) for row in zip(t.tolist(), y.tolist(), slope.tolist(), strict=True)]
     if t[0] > 0.0:
         rows.insert(0, Piece(0.0, float(y[0])))
@@ -185,7 +199,8 @@ def pulse_train(edges: ArrayLike, widths: ArrayLike, *, unit: str = "us") -> Sig
 def _held(t: NDArray[np.float64], y: NDArray[np.float64], unit: str, frame_period: float | None) -> Signal:
     keep = np.append(True, np.diff(y) != 0.0)  # equal neighbours are one piece
     rows = tuple(Piece(a, b) for a, b in zip(t[keep].tolist(), y[keep].tolist(), strict=True))
-    return Signal(pieces=Pieces(rows), unit=unit, initial=float(y[0]), frame_period=frame_period)
+    before = max(int(np.searchsorted(t, 0.0)) - 1, 0)  # the sample in force just before t = 0, else the first
+    return Signal(pieces=Pieces(rows), unit=unit, initial=float(y[before]), frame_period=frame_period)
 
 
 def _smooth(rows: tuple[Piece, ...], unit: str, frame_period: float | None) -> Signal:
@@ -198,7 +213,7 @@ def _arrays(time: ArrayLike, value: ArrayLike, unit: str,
     kind_of(unit)
     try:
         t, y = np.asarray(time, dtype=np.float64), np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise CommandError(what, got="values that are no numbers", allowed="arrays of numbers") from None
     if t.ndim != 1 or t.shape != y.shape:
         raise CommandError(what, got=f"shapes {t.shape} and {y.shape}", allowed="two arrays of one length")
@@ -216,9 +231,14 @@ def _arrays(time: ArrayLike, value: ArrayLike, unit: str,
 
 
 def _time(value: float, what: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number) or not math.isfinite(value):
+    if not units.is_finite(value):
         raise CommandError(what, got=value, allowed="a finite number")
     return float(value)
+
+
+def _before(at: float) -> float:
+    """Return a time before `at` [s] that is another number also where `at` is large."""
+    return at - max(1.0, abs(at))
 
 
 def _positive(value: float, what: str) -> float:

@@ -62,7 +62,7 @@ class Signal:
             if self.kind != "pulse_width":
                 raise CommandError("frame_period", got=self.frame_period,
                                    allowed="none: only a pulse signal (unit us, ms or s) has frames")
-            if not (math.isfinite(self.frame_period) and self.frame_period > 0.0):
+            if not (units.is_finite(self.frame_period) and self.frame_period > 0.0):
                 raise CommandError("frame_period", got=self.frame_period, allowed="a positive number [s]")
         if self.kind == "pulse_width" and self.pieces.bounds(self.pieces.table[-1].start)[0] <= 0.0:
             raise CommandError("pulse width", got=self.pieces.bounds(self.pieces.table[-1].start)[0],
@@ -86,7 +86,7 @@ def kind_of(unit: str) -> str:
     CommandError
         If no command is given in this unit.
     """
-    if unit not in KINDS:
+    if not isinstance(unit, str) or unit not in KINDS:
         raise CommandError("unit of a command", got=unit, allowed=", ".join(KINDS))
     return KINDS[unit][0]
 
@@ -100,10 +100,6 @@ def in_si(value: float, unit: str, what: str) -> float:
         If it is not a finite number, or the unit is no command's.
     """
     kind_of(unit)
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise CommandError(what, got=value, allowed=f"a number [{unit}]") from None
-    if not math.isfinite(number):
+    if not units.is_finite(value):
         raise CommandError(what, got=value, allowed=f"a finite number [{unit}]")
-    return float(units.to_si(number, unit, KINDS[unit][1]))
+    return units.to_si(float(value), unit, KINDS[unit][1])

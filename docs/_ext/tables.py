@@ -1,0 +1,175 @@
+"""Tables that are made from the code when the documentation is built, so that they cannot lie.
+
+    ```{servotwin-table} models
+    ```
+"""
+
+import importlib
+import inspect
+import re
+from collections.abc import Iterable
+from dataclasses import fields
+
+import servotwin as st
+from servotwin.models import MODELS
+from servotwin.models.outputs import SIGNALS
+from servotwin.parameters import GROUPS, catalog_names, load_servo
+from servotwin.units import DIMENSIONS, si_unit
+
+_GREEK = ("alpha", "beta", "tau")
+_UNITS = {"ohm": "Ω", "mohm": "mΩ", "us": "µs", "us/V": "µs/V", "mV/us": "mV/µs", "uH": "µH", "deg": "deg"}
+_RULES = {"a positive number": "> 0", "a number of at least 0": "≥ 0", "a finite number": "any",
+          "a number of at least 1": "≥ 1", "a number from 0 to 1": "0 to 1", "table": "list"}
+
+
+def markdown(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """Return a table in Markdown."""
+    lines = [list(header), ["---"] * len(list(header)), *[list(row) for row in rows]]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def symbol(text: str) -> str:
+    r"""Return a parameter's symbol as a formula: ``tau_s`` becomes ``$\tau_{s}$``."""
+    if not text:
+        return ""
+    latex = re.sub(r"_(\w+)", r"_{\1}", text)
+    for name in _GREEK:
+        latex = re.sub(rf"\b{name}(?![a-z])", rf"\\{name}", latex)
+    return f"${latex}$"
+
+
+def unit(text: str) -> str:
+    """Return a unit as it is printed: "kg m2" becomes "kg m²"."""
+    return _UNITS.get(text, text).replace("m2", "m²").replace("s2", "s²")
+
+
+def names() -> list[str]:
+    """Return the dotted names of all parameters."""
+    return [f"{group}.{f.name}" for group, kind in GROUPS.items() for f in fields(kind)]
+
+
+def parameters() -> str:
+    """All parameters: symbol, unit, range and meaning, a table for each group."""
+    parts = []
+    for group, kind in GROUPS.items():
+        rows = []
+        for f in fields(kind):
+            rule, dimension = f.metadata["rule"], f.metadata["dimension"]
+            allowed = " or ".join(f'`"{word}"`' for word in rule) if isinstance(rule, tuple) else _RULES[rule]
+            rows.append((f"`{f.name}`", symbol(f.metadata["symbol"]),
+                         "" if dimension == "word" else unit(si_unit(dimension)), allowed, f.metadata["meaning"]))
+        summary = (inspect.getdoc(kind) or "").splitlines()[0]
+        parts.append(f"### `{group}`\n\n{summary}\n\n"
+                     + markdown(("parameter", "symbol", "unit", "range", "meaning"), rows))
+    return "\n\n".join(parts)
+
+
+def models() -> str:
+    """Which model requires, uses or ignores which parameter."""
+    kinds = list(MODELS.values())
+    rows = []
+    for name in names():
+        marks = ["**required**" if name in kind.requires else "used" if name in kind.optional else "–"
+                 for kind in kinds]
+        rows.append((f"`{name}`", *marks))
+    return markdown(("parameter", *[f"`{kind.__name__}`" for kind in kinds]), rows)
+
+
+def unread() -> str:
+    """The parameters that no model reads."""
+    read = {name for kind in MODELS.values() for name in (*kind.requires, *kind.optional)}
+    return ", ".join(f"`{name}`" for name in names() if name not in read) + "."
+
+
+def model_list() -> str:
+    """The models, their names on the command line and their states."""
+    rows = [(f"`{kind.__name__}`", f"`{name}`", (inspect.getdoc(kind) or "").splitlines()[0].rstrip("."),
+             ", ".join(f"`{s}`" for s in kind.layout)) for name, kind in MODELS.items()]
+    return markdown(("class", "on the command line", "what it is", "states"), rows)
+
+
+def signals() -> str:
+    """All output signals, and which model has them."""
+    kinds = list(MODELS.values())
+    rows = [("`time`", "s", "time since the start of the run", *["yes"] * len(kinds))]
+    rows += [(f"`{name}`", unit(output.unit), output.meaning,
+              *["yes" if name in kind.signals else "–" for kind in kinds]) for name, output in SIGNALS.items()]
+    return markdown(("signal", "unit", "meaning", *[f"`{kind.__name__}`" for kind in kinds]), rows)
+
+
+def units() -> str:
+    """Every dimension with its units; the first is the SI one."""
+    used = {f.metadata["dimension"] for kind in GROUPS.values() for f in fields(kind)}
+    rows = [(dimension, ", ".join(f"`{name}`" for name in known)) for dimension, known in DIMENSIONS.items()
+            if dimension in used]
+    return markdown(("dimension", "units"), rows)
+
+
+def catalog() -> str:
+    """The servos of the catalog, with the share of what is only assumed."""
+    rows = []
+    for name in catalog_names():
+        servo = load_servo(name)
+        origins = [servo.source(parameter).origin for parameter in servo.names()]
+        assumed = sum(origin == "assumed" for origin in origins)
+        rows.append((f"`{name}`", servo.title, str(len(origins)), str(assumed)))
+    return markdown(("id", "servo", "parameters", "of these assumed"), rows)
+
+
+def top_level() -> str:
+    """What `import servotwin as st` offers, and where it is described."""
+    rows = []
+    for name in st.__all__:
+        if name.startswith("__"):
+            continue
+        item = getattr(st, name)
+        if inspect.ismodule(item):
+            rows.append((f"`st.{name}`", "module", f"{{py:mod}}`{item.__name__}`"))
+            continue
+        module = item.__module__.split(".")[1]
+        kind = "class" if inspect.isclass(item) else "function"
+        rows.append((f"`st.{name}`", kind, f"{{py:obj}}`servotwin.{module}.{name}`"))
+    return markdown(("name", "", "described under"), rows)
+
+
+def api(module: str) -> str:
+    """The public names of a module, with the first line of what each says."""
+    found = importlib.import_module(module)
+    rows = []
+    for name in getattr(found, "__all__", [name for name in vars(found) if _is_own(found, name)]):
+        item = getattr(found, name)
+        described = inspect.isclass(item) or inspect.isroutine(item)
+        summary = (inspect.getdoc(item) or "").splitlines()[0] if described else ""
+        rows.append((f"{{py:obj}}`~{module}.{name}`", summary))
+    return markdown(("name", "what it is"), rows)
+
+
+def _is_own(module, name: str) -> bool:
+    item = getattr(module, name)
+    return not name.startswith("_") and getattr(item, "__module__", None) == module.__name__
+
+
+TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "unread": unread, "signals": signals,
+          "units": units, "catalog": catalog, "top-level": top_level, "api": api}
+
+
+def setup(app):
+    from docutils import nodes
+    from sphinx.util.docutils import SphinxDirective
+
+    class Table(SphinxDirective):
+        required_arguments = 1
+        optional_arguments = 1
+
+        def run(self):
+            which, *about = self.arguments
+            if which not in TABLES:
+                raise self.error(f"unknown table {which!r}, there are: {', '.join(TABLES)}")
+            made = self.parse_text_to_nodes(TABLES[which](*about), allow_section_headings=True)
+            for node in made:
+                for table in node.findall(nodes.table):
+                    table["classes"] += ["wide", *(["marks"] if which in ("models", "signals") else [])]
+            return made
+
+    app.add_directive("servotwin-table", Table)
+    return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,106 @@
+"""`servotwin catalog` tells what the servo files hold."""
+
+import pytest
+
+import servotwin as st
+from servotwin.models import MODELS
+
+SERVO = "hitec-hs-755hb"
+
+
+def test_list_has_every_servo(cli):
+    ended = cli("catalog", "list")
+    assert [line.split()[0] for line in ended.out.splitlines()] == ["id", *st.catalog_names()]
+    found = {servo["id"]: servo for servo in cli("catalog", "list", "--json").data}
+    assert set(found) == set(st.catalog_names())
+    assert found[SERVO]["stall_torque"] == pytest.approx(1.2945, abs=1e-3)
+    assert found[SERVO]["speed"] == pytest.approx(60.0 / 0.23, rel=1e-9)
+
+
+def test_show_has_every_parameter(cli):
+    servo = st.load_servo(SERVO)
+    found = cli("catalog", "show", SERVO, "--json").data["parameters"]
+    assert [row["name"] for row in found] == list(servo.names())
+    for row in found:
+        q = servo.source(row["name"])
+        assert (row["unit"], row["origin"], row["source"], row["spread"]) == (q.unit, q.origin, q.source, q.spread)
+        assert row["value"] == q.value
+    text = cli("catalog", "show", SERVO).out
+    for name in servo.names():
+        assert name.partition(".")[2] in text
+    assert "2.754 to 3.724" in text
+    assert "Table II" in text
+
+
+def test_show_takes_a_file_and_a_table_of_numbers(cli, tmp_path):
+    values = {"potentiometer": {"linearity_angle": (0.0, 1.0), "linearity_error": (0.0, 0.01)}}
+    st.servo_from_values("mine", values).save(tmp_path / "mine.toml")
+    assert "0, 0.01" in cli("catalog", "show", "mine.toml").out
+    assert cli("catalog", "show", "mine.toml", "--json").data["parameters"][1]["value"] == [0.0, 0.01]
+
+
+@pytest.mark.parametrize("name", st.catalog_names())
+def test_check_finds_the_catalog_ready_for_every_model(cli, tmp_path, name):
+    st.load_servo(name).save(tmp_path / "copy.toml")
+    ended = cli("catalog", "check", "copy.toml", "--json")
+    assert ended.code == 0
+    assert {model: found["runs"] for model, found in ended.data["models"].items()} == dict.fromkeys(MODELS, True)
+    assert ended.data["warnings"] == []
+
+
+def test_check_says_what_is_lacking(cli, tmp_path):
+    servo = st.load_servo(SERVO)
+    values = {}
+    for name in servo.names():
+        group, _, key = name.partition(".")
+        if name not in ("motor.armature_inductance", "electronics.one_shot_slope",
+                        "electronics.pulse_to_voltage_gain"):
+            values.setdefault(group, {})[key] = servo.get(name)
+    st.servo_from_values("mine", values).save(tmp_path / "mine.toml")
+    models = cli("catalog", "check", "mine.toml", "--json").data["models"]
+    assert models["dc-motor"]["lacks"] == ["motor.armature_inductance"]
+    assert "electronics.pulse_to_voltage_gain" in models["averaged"]["lacks"]
+    assert "electronics.one_shot_slope" in models["bounded"]["lacks"][0]
+    text = cli("catalog", "check", "mine.toml").out
+    assert "cannot run: lacks motor.armature_inductance" in text
+
+
+def test_check_warns_of_calibrations_that_disagree(cli, tmp_path):
+    servo = st.load_servo(SERVO)
+    slope = servo.get("electronics.one_shot_slope")
+    servo.replace({"electronics.one_shot_slope": 1.2 * slope}).save(tmp_path / "mine.toml")
+    ended = cli("catalog", "check", "mine.toml", "--json")
+    assert len(ended.data["warnings"]) == 1
+    assert "each is used for its own kind of command" in ended.data["warnings"][0]
+    assert "warning: " in cli("catalog", "check", "mine.toml").out
+    run = cli("simulate", "mine.toml", "--step", "0:90")
+    assert run.code == 0
+    assert run.err.startswith("servotwin: warning: ")
+    assert run.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (["show", "hitec-hs-755"], "did you mean 'hitec-hs-755hb'?"),
+    (["check", "none.toml"], "none.toml: no such file"),
+    (["check", "broken.toml"], "broken.toml: is not valid TOML"),
+    (["check", "."], "folder"),
+    (["check", "binary.toml"], "is not UTF-8 text"),
+    (["check", "group.toml"], "engine"),
+])
+def test_bad_files(cli, tmp_path, words, said):
+    (tmp_path / "broken.toml").write_text("name = \n")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    (tmp_path / "group.toml").write_text('name = "x"\n[engine]\n')
+    ended = cli("catalog", *words)
+    assert said in ended.error
+    failed = cli("catalog", *words, "--json")
+    assert failed.data["error"]["message"] == ended.error
+
+
+def test_a_sheet_may_hold_anything(cli, tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        'name = "x"\n[sheet]\nstall_torque = 3\nsupply_voltage = {value = "six", unit = "V"}\n'
+        'speed_per_60deg = {value = 0.2, unit = "parsec"}\n')
+    found = cli("catalog", "show", "mine.toml", "--json").data
+    assert (found["stall_torque"], found["supply_voltage"], found["speed"]) == (None, None, None)
+    assert found["parameters"] == []

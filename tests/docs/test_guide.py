@@ -1,0 +1,55 @@
+"""The code of README and guide runs, and prints what it says that it prints."""
+
+import contextlib
+import io
+import re
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from docs.pages import PAGES, ROOT, blocks, promised, with_code
+
+
+def name_of(page):
+    return page.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("page", with_code("python"), ids=name_of)
+def test_python(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "page"}
+    for block in blocks(page, "python"):
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            exec(compile("\n" * block.line + block.code, str(page), "exec"), names)
+        assert printed.getvalue().splitlines() == promised(block.code), f"{name_of(page)}, line {block.line}"
+
+
+def commands():
+    return list(dict.fromkeys(
+        line[2:] for page in PAGES for block in blocks(page, "console") for line in block.code.splitlines()
+        if line.startswith("$ servotwin ")))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with the servo file that the guide writes."""
+    place = tmp_path_factory.mktemp("guide")
+    page = ROOT / "docs" / "guide" / "servos.md"
+    text = next(block.code for block in blocks(page, "python") if "my-servo.toml" in block.code)
+    (place / "my-servo.toml").write_text(re.search(r'"""\n(.*?)"""', text, re.DOTALL)[1], encoding="utf-8")
+    return place
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", commands())
+def test_command_line(line, folder):
+    words = [sys.executable, "-m", *shlex.split(line), *(["--force"] if "--plot" in line or "--out" in line else [])]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_pages_are_found():
+    assert len(with_code("python")) >= 10
+    assert len(commands()) >= 6

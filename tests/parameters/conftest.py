@@ -1,0 +1,71 @@
+"""Random servos: every one that the groups accept."""
+
+import dataclasses
+
+from hypothesis import strategies as st
+
+from servotwin.parameters import GROUPS, ORIGINS, Quantity, Servo, unit_of
+
+_NUMBERS = {
+    "a positive number": st.floats(1e-12, 1e12), "a number of at least 0": st.floats(0.0, 1e12),
+    "a finite number": st.floats(allow_nan=False, allow_infinity=False),
+    "a number of at least 1": st.floats(1.0, 1e12), "a number from 0 to 1": st.floats(0.0, 1.0),
+}
+# What must not be together, or must be in order, is made so afterwards
+_OTHER_LAW = ("load_friction", "load_friction_stribeck")
+
+
+@st.composite
+def group_values(draw, kind):
+    values = {}
+    for f in dataclasses.fields(kind):
+        rule = f.metadata["rule"]
+        if rule == "table" or not draw(st.booleans()):
+            continue
+        values[f.name] = draw(st.sampled_from(rule)) if isinstance(rule, tuple) else draw(_NUMBERS[rule])
+    for low, high in (("lower_angle", "upper_angle"), ("pulse_width_min", "pulse_width_max"),
+                      ("bridge_drop_voltage", "open_circuit_voltage")):
+        if low in values and high in values:
+            values[low], values[high] = sorted((values[low], values[high]))
+            if values[low] == values[high]:
+                del values[low]
+    if "stribeck_speed" not in values:
+        values.pop("stribeck_exponent", None)
+    if any(name in values for name in _OTHER_LAW):
+        values = {k: v for k, v in values.items() if not k.startswith("load_friction") or k in _OTHER_LAW}
+    if kind is GROUPS["potentiometer"] and draw(st.booleans()):
+        angles = sorted(draw(st.sets(st.floats(-4.0, 4.0), min_size=1, max_size=6)))
+        values["linearity_angle"] = tuple(angles)
+        values["linearity_error"] = tuple(draw(st.floats(-1.0, 1.0)) for _ in angles)
+    return values
+
+
+plain_values = st.fixed_dictionaries({}, optional={name: group_values(kind) for name, kind in GROUPS.items()})
+texts = st.text(st.characters(codec="utf-8"), max_size=40)
+toml_values = st.recursive(
+    st.booleans() | st.integers(-2**60, 2**60) | st.floats(allow_nan=False, allow_infinity=False) | texts,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(texts, inner, max_size=3), max_leaves=6)
+tables = st.dictionaries(texts, toml_values, max_size=4)
+
+
+@st.composite
+def servos(draw):
+    groups = {name: GROUPS[name](**values) for name, values in draw(plain_values).items()}
+    quantities = {}
+    for name, group in groups.items():
+        for f in dataclasses.fields(group):
+            value = getattr(group, f.name)
+            if value is None:
+                continue
+            origin = draw(st.sampled_from(ORIGINS))
+            spread = {}
+            if isinstance(value, float):
+                spread = draw(st.sampled_from([
+                    {}, {"std": abs(value) / 7}, {"lower": value - abs(value) / 3}, {"upper": value + abs(value) / 3},
+                    {"lower": value, "upper": value}]))
+                spread = {k: v for k, v in spread.items() if abs(v) < 1e308}
+            source = draw(texts.filter(bool)) if origin != "assumed" else draw(st.none() | texts)
+            quantities[f"{name}.{f.name}"] = Quantity(
+                value=value, unit=unit_of(f"{name}.{f.name}"), origin=origin, source=source, **spread)
+    return Servo(name=draw(texts.filter(bool)), title=draw(texts), notes=draw(texts), quantities=quantities,
+                 sheet=draw(tables), fit=draw(tables), **groups)
