@@ -49,3 +49,9 @@ html_theme_options = {
     "show_prev_next": True,
 }
 html_sidebars = {"index": [], "getting-started": [], "validation": [], "glossary": [], "changelog": []}
+
+
+def setup(app):
+    """Leave out the fields of named tuples, of which Python says nothing but their number."""
+    app.connect("autodoc-skip-member", lambda app, what, name, item, skip, options:
+                True if (getattr(item, "__doc__", None) or "").startswith("Alias for field number") else None)

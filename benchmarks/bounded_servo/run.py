@@ -13,7 +13,8 @@ import servotwin as st
 from servotwin.loads import Load
 
 
-def stepped(model: st.BoundedServo, v_c: float, method: str, rtol: float, corners: tuple[float, ...] = ()) -> np.ndarray:
+def stepped(model: st.BoundedServo, v_c: float, method: str, rtol: float,
+            corners: tuple[float, ...] = ()) -> np.ndarray:
     """The angle by a SciPy integrator that stops where the servo sticks, and at given errors v_e, its corners."""
     p = model.pack(Load())
     f = bounded_right_side(model, v_c)

@@ -5,20 +5,23 @@ import re
 from latex2mathml.converter import convert
 
 _TAG = re.compile(r"\\tag\{([^}]*)\}")
-_THREE_DOTS = "&#x020DB;"  # a combining character that few fonts place well
+_TEXT = re.compile(r"\\text\{[^}]*\}")
+_BAR = re.compile(r"\\[lr]vert\b ?")
+_THREE_DOTS = "<mo>&#x020DB;</mo>"  # a combining character that few fonts place well
 
 
 def to_mathml(latex: str, *, block: bool) -> str:
     """Return a formula as a <math> element."""
-    markup = convert(latex.strip(), display="block" if block else "inline")
-    return markup.replace(_THREE_DOTS, "&#x002D9;&#x002D9;&#x002D9;")
+    latex = _TEXT.sub(lambda text: text[0].replace(r"\_", "_"), _BAR.sub("|", latex.strip()))
+    markup = convert(latex, display="block" if block else "inline")
+    return markup.replace(_THREE_DOTS, '<mo mathsize="60%">&#x022EF;</mo>')
 
 
 def block_html(latex: str) -> str:
     r"""Return a displayed formula; what its \tag says stands in brackets at the right."""
     tag = _TAG.search(latex)
     number = f'<span class="number">({tag.group(1)})</span>' if tag else ""
-    return f'<div class="math">{to_mathml(_TAG.sub("", latex), block=True)}{number}</div>'
+    return f'<div class="formula">{to_mathml(_TAG.sub("", latex), block=True)}{number}</div>'
 
 
 def _visit_inline(writer, node):

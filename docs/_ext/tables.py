@@ -40,7 +40,7 @@ def symbol(text: str) -> str:
 
 def unit(text: str) -> str:
     """Return a unit as it is printed: "kg m2" becomes "kg m²"."""
-    return _UNITS.get(text, text).replace("m2", "m²").replace("s2", "s²")
+    return _UNITS.get(text, text).replace("m2", "m²").replace("s2", "s²").replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def names() -> list[str]:
@@ -56,8 +56,8 @@ def parameters() -> str:
         for f in fields(kind):
             rule, dimension = f.metadata["rule"], f.metadata["dimension"]
             allowed = " or ".join(f'`"{word}"`' for word in rule) if isinstance(rule, tuple) else _RULES[rule]
-            rows.append((f"`{f.name}`", symbol(f.metadata["symbol"]),
-                         "" if dimension == "word" else unit(si_unit(dimension)), allowed, f.metadata["meaning"]))
+            si = "" if dimension == "word" else unit(si_unit(dimension))
+            rows.append((f"`{f.name}`", symbol(f.metadata["symbol"]), si, allowed, _formulas(f.metadata["meaning"])))
         summary = (inspect.getdoc(kind) or "").splitlines()[0]
         parts.append(f"### `{group}`\n\n{summary}\n\n"
                      + markdown(("parameter", "symbol", "unit", "range", "meaning"), rows))
@@ -69,10 +69,14 @@ def models() -> str:
     kinds = list(MODELS.values())
     rows = []
     for name in names():
-        marks = ["**required**" if name in kind.requires else "used" if name in kind.optional else "–"
-                 for kind in kinds]
+        marks = ["●" if name in kind.requires else "(●)" if name in kind.optional else "–" for kind in kinds]
         rows.append((f"`{name}`", *marks))
-    return markdown(("parameter", *[f"`{kind.__name__}`" for kind in kinds]), rows)
+    return markdown(("parameter", *[_breakable(kind.__name__) for kind in kinds]), rows)
+
+
+def _breakable(name: str) -> str:
+    """Let a long class name go on in the next line."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "\N{ZERO WIDTH SPACE}", name)
 
 
 def unread() -> str:
@@ -89,12 +93,27 @@ def model_list() -> str:
 
 
 def signals() -> str:
-    """All output signals, and which model has them."""
-    kinds = list(MODELS.values())
-    rows = [("`time`", "s", "time since the start of the run", *["yes"] * len(kinds))]
-    rows += [(f"`{name}`", unit(output.unit), output.meaning,
-              *["yes" if name in kind.signals else "–" for kind in kinds]) for name, output in SIGNALS.items()]
-    return markdown(("signal", "unit", "meaning", *[f"`{kind.__name__}`" for kind in kinds]), rows)
+    """All output signals, and which models have them."""
+    rows = [("`time`", "s", "time since the start of the run", "all")]
+    rows += [(f"`{name}`", unit(output.unit), _formulas(output.meaning), _owners(name))
+             for name, output in SIGNALS.items()]
+    return markdown(("signal", "unit", "meaning", "models"), rows)
+
+
+def _owners(signal: str) -> str:
+    having = {kind.__name__ for kind in MODELS.values() if signal in kind.signals}
+    lacking = {kind.__name__ for kind in MODELS.values()} - having
+    if not lacking:
+        return "all"
+    if lacking == {"DCMotor", "GearedMotor"}:
+        return "servos"
+    few = sorted(lacking if len(lacking) < len(having) else having)
+    return ("all but " if len(lacking) < len(having) else "") + ", ".join(f"`{name}`" for name in few)
+
+
+def _formulas(text: str) -> str:
+    """Set symbols with an index, such as v_a, as formulas."""
+    return re.sub(r"(?<![\w`])([a-zA-Zτ])_(\w+)", r"$\1_{\2}$", text)
 
 
 def units() -> str:
@@ -168,7 +187,7 @@ def setup(app):
             made = self.parse_text_to_nodes(TABLES[which](*about), allow_section_headings=True)
             for node in made:
                 for table in node.findall(nodes.table):
-                    table["classes"] += ["wide", *(["marks"] if which in ("models", "signals") else [])]
+                    table["classes"] += ["wide", *(["marks"] if which == "models" else [])]
             return made
 
     app.add_directive("servotwin-table", Table)

@@ -28,7 +28,7 @@ def test_show_has_every_parameter(cli):
     text = cli("catalog", "show", SERVO).out
     for name in servo.names():
         assert name.partition(".")[2] in text
-    assert "2.754 to 3.724" in text
+    assert "2.754" in text
     assert "Table II" in text
 
 

@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from servotwin.cli import paper
+from servotwin.cli.paper import report as paper
 from servotwin.errors import OutputError, OutputExistsError
 
 NUMBERS = (2, 4, 5, 6, 8, 13, 14, 15, 16, 17, 22, 23, 24, 25, 26, 27)

@@ -87,7 +87,13 @@ def test_every_file_is_named_as_it_calls_itself(servo):
 def test_every_servo_runs_in_every_model(servo, kind):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        kind(servo)
+        model = kind(servo)
+    result = st.simulate(model, st.signals.step(1.2, 1.4, at=0.05, unit="V"), duration=0.2)
+    result.raise_if_failed()
+    turned = result[model.layout[0]] - result[model.layout[0]][0]
+    if "command_voltage" in model.signals:  # a servo stands still until it is told otherwise
+        assert np.abs(turned[result.time < 0.05]).max() < 1e-12
+    assert turned[-1] > 0.01
 
 
 def test_every_servo_has_what_the_pulse_level_needs(servo):

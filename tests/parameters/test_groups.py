@@ -100,6 +100,11 @@ def test_ranges(group, name, metadata):
         assert metadata["rule"] in refused(group, name, value)
 
 
+def test_a_number_that_is_lost_as_a_float_is_judged_as_the_float():
+    assert "positive" in refused("motor", "armature_resistance", Fraction(1, 10**400))
+    assert GROUPS["motor"](motor_viscous_friction=Fraction(-1, 10**400)).motor_viscous_friction == 0.0
+
+
 @pytest.mark.parametrize(("name", "rule"), [
     ("motor.armature_resistance", "positive"), ("motor.torque_constant", "positive"),
     ("motor.rotor_inertia", "positive"), ("motor.motor_viscous_friction", "at least 0"),

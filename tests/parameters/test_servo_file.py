@@ -181,6 +181,11 @@ def test_what_is_wrong_in_a_value_is_said_with_table_and_key(write, old, new, ke
     (GOOD.replace('"mine"', "3"), ["name: not a text: got 3"]), ("title = []\n" + GOOD, ["title: not a text"]),
     (GOOD.replace("[motor]", "[moter]"), ["unknown table or key 'moter'; did you mean 'motor'?"]),
     ("motor = 3\n" + GOOD.split("[motor]")[0], ["[motor]: not a table: got 3"]),
+    (GOOD.replace("[motor]", "[[motor]]"), ["[motor]: not a table: got [{", "allowed: a table [motor]"]),
+    ('"a\\nb\\u001b" = 1\n' + GOOD, ["unknown table or key 'a\\nb\\x1b'"]),
+    (GOOD + "[gear]\ngear_reduction = { value = 0.5, unit = '1', origin = 'assumed' }",
+     ["[gear] gear_reduction", "got 0.5", "a number of at least 1"]),
+    (GOOD + "[gear]\ngear_reduction = 280.0", ["[gear] gear_reduction", "not a value with its origin: got 280.0"]),
     ("sheet = 1\n" + GOOD, ["not a table"]),
     ("fit = []\n" + GOOD, ["not a table"]),
     (GOOD + "[stops]\nlower_angle = { value = 1, unit = 'rad', origin = 'assumed' }\n"
@@ -198,7 +203,8 @@ def test_what_is_wrong_in_a_file_is_said(write, text, parts):
 
 
 @pytest.mark.parametrize("text", [
-    GOOD + "[", GOOD + "[motor]\n", "= 3", "\0", "name = 'a", "x = " + "[" * 5000, "name = 1" + "0" * 5000, b"\x7fELF",
+    GOOD + "[", GOOD + "[motor]\n", GOOD + GOOD.split("[motor]")[1], "= 3", "\0", "name = 'a", "x = " + "[" * 5000,
+    "name = 1" + "0" * 5000, b"\x7fELF",
 ])
 def test_broken_toml_is_one_line(write, text):
     assert "is not valid TOML: " in str(refused(write(text)))

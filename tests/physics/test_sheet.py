@@ -1,5 +1,6 @@
 """What a data sheet says about the motor: the relations hold both ways, and the HS-755HB's numbers come out."""
 
+import csv
 import itertools
 import math
 
@@ -95,6 +96,41 @@ def test_coulomb_torque_and_gear_loss_share_the_no_load_current(sheet):
     assert eta == pytest.approx((1.0 - mu) / (1.0 + mu))
     assert motor.coulomb_torque == pytest.approx(
         motor.output_torque_constant * sheet["no_load_current"] * (1.0 - mu))
+
+
+@pytest.mark.parametrize(("model", "low", "high"), [("FT-7235", 1.44, 1.52), ("RDS3115", 1.16, 1.65)])
+def test_sheets_of_the_list_that_contradict_themselves(data_folder, model, low, high):
+    """At no supply voltage and no drop can their currents make their stall torque."""
+    with (data_folder / "servo_specs" / "servo_specs_by_voltage.csv").open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if model in row["model"] and row["stall_current_A"]
+                and row["noload_running_current_A"]]
+    assert rows
+    for row, drop in itertools.product(rows, (0.0, 0.4)):
+        motor = motor_from_sheet(
+            supply_voltage=float(row["V"]), stall_torque=float(row["stall_torque_Nm"]),
+            no_load_speed=math.pi / 3.0 / float(row["speed_s_per_60deg"]), drop_voltage=drop,
+            no_load_current=float(row["noload_running_current_A"]), stall_current=float(row["stall_current_A"]))
+        assert not motor.feasible
+        assert low <= motor.gear_efficiency <= high
+
+
+@pytest.mark.parametrize(("efficiency", "feasible"), [(0.499, False), (0.5, True), (1.0, True), (1.001, False)])
+def test_what_is_feasible(efficiency, feasible):
+    assert motor_from_sheet(**HS_755HB, gear_efficiency=efficiency).feasible is feasible
+
+
+@pytest.mark.parametrize("efficiency", [1.0, 1.3])
+def test_without_loss_in_the_gear_all_of_the_no_load_current_is_coulomb_friction(efficiency):
+    motor = motor_from_sheet(**HS_755HB, gear_efficiency=efficiency)
+    assert motor.coulomb_torque == pytest.approx(motor.output_torque_constant * HS_755HB["no_load_current"])
+
+
+@pytest.mark.parametrize("torque", [1e-200, 1e200])
+def test_the_small_root_is_found_without_overflow(torque):
+    """A torque of next to nothing: R I_0 takes all the voltage. An absurd one: R is U²/(T_s ω_0/η_g)."""
+    motor = motor_from_sheet(**(HS_755HB | {"stall_torque": torque}))
+    power = torque * HS_755HB["no_load_speed"] / 0.8
+    assert motor.resistance == pytest.approx(min(5.6 / 0.285, 5.6**2 / power), rel=1e-6)
 
 
 @pytest.mark.parametrize(("change", "named"), [

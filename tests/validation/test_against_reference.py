@@ -4,11 +4,11 @@ import warnings
 
 import numpy as np
 import pytest
+
+import servotwin as st
 from reference import reference
 from reference.cases import DURATION, random_case
 from validation.cases_in_words import command_of, load_of, servo_of
-
-import servotwin as st
 
 TIMES = np.linspace(0.0, DURATION, 151)
 

@@ -8,7 +8,7 @@ import typer
 
 from servotwin import __version__
 from servotwin.cli.catalog import catalog
-from servotwin.cli.report import paper
+from servotwin.cli.paper_command import paper
 from servotwin.cli.simulate import simulate
 from servotwin.cli.terminal import emit, emit_help
 

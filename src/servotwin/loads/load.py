@@ -1,21 +1,34 @@
-"""The sum of all that hangs on the shaft, in one normal form."""
+"""The sum of all that hangs on the shaft, in one normal form, and what every part of it is."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from servotwin.errors import LoadError
-from servotwin.loads.parts import Free, Part, Pendulum, Recorded, Spring
 from servotwin.physics.pieces import Piece, Pieces, constant_pieces
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from servotwin.loads.parts import Pendulum, Recorded, Spring
+
+
+class Part(ABC):
+    """One thing that hangs on the shaft; parts and loads add up to a load."""
+
+    @abstractmethod
+    def as_load(self) -> Load:
+        """Return this part alone, in normal form."""
+
+    def __add__(self, other: Part | Load) -> Load:
+        return self.as_load() + other
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +37,7 @@ class Load:
 
     The torque against the motion that does not depend on acceleration is
 
-        τ_ext + B_L q̇ + τ_C sgn(q̇),   τ_ext = τ + k (q − q_r) + Σ m g l sin(q − q_h) + τ_recorded(t)
+        τ_ext + B_L q̇ + τ_C sgn(q̇),   τ_ext = τ + Σ k (q − q_r) + Σ m g l sin(q − q_h) + τ_recorded(t)
 
     Parameters
     ----------
@@ -36,8 +49,7 @@ class Load:
         Constant external torque; positive pushes towards −q [N m].
     coulomb_torque : float
         Dry friction of the load itself; holds the shaft at rest and opposes motion both ways [N m].
-    spring : Spring
-        One spring, equivalent to all that were added.
+    springs : tuple of Spring
     pendulums : tuple of Pendulum
     recorded : tuple of Recorded
 
@@ -53,7 +65,7 @@ class Load:
     viscous_friction: float = 0.0
     torque: float = 0.0
     coulomb_torque: float = 0.0
-    spring: Spring = field(default_factory=lambda: Spring(0.0))
+    springs: tuple[Spring, ...] = ()
     pendulums: tuple[Pendulum, ...] = ()
     recorded: tuple[Recorded, ...] = ()
 
@@ -64,6 +76,9 @@ class Load:
                 raise LoadError(f"load.{name}", got=value, allowed="a finite number of at least 0")
         if not is_finite(self.torque):
             raise LoadError("load.torque", got=self.torque, allowed="a finite number [N m]")
+        first, last = self.time_span
+        if not first < last:
+            raise LoadError("recorded torques", got="recordings that do not overlap", allowed="a common time span")
 
     def __add__(self, other: Part | Load) -> Load:
         more = as_load(other)
@@ -72,10 +87,17 @@ class Load:
             viscous_friction=self.viscous_friction + more.viscous_friction,
             torque=self.torque + more.torque,
             coulomb_torque=self.coulomb_torque + more.coulomb_torque,
-            spring=_joined(self.spring, more.spring),
+            springs=tuple(sorted(self.springs + more.springs, key=repr)),
             pendulums=tuple(sorted(self.pendulums + more.pendulums, key=repr)),
             recorded=tuple(sorted(self.recorded + more.recorded, key=repr)),
         )
+
+    @property
+    def spring(self) -> Spring:
+        """The spring, where the load has exactly one."""
+        if len(self.springs) != 1:
+            raise LoadError("load.spring", got=f"{len(self.springs)} springs", allowed="exactly one")
+        return self.springs[0]
 
     @property
     def pendulum(self) -> Pendulum:
@@ -88,6 +110,14 @@ class Load:
     def total_inertia(self) -> float:
         """Moment of inertia of all parts, pendulums included [kg m²]."""
         return self.inertia + sum(p.moment_of_inertia for p in self.pendulums)
+
+    @cached_property
+    def elasticity(self) -> tuple[float, float]:
+        """Stiffness [N m/rad] and rest angle [rad] of the one spring that all springs add up to."""
+        stiffness = sum(s.stiffness for s in self.springs)
+        if stiffness == 0.0:
+            return 0.0, 0.0
+        return stiffness, sum(s.stiffness * s.rest_angle for s in self.springs) / stiffness
 
     @cached_property
     def gravity(self) -> tuple[float, float]:
@@ -106,8 +136,6 @@ class Load:
         t = np.unique(np.concatenate([r.time for r in self.recorded]))
         first, last = self.time_span
         t = t[(t >= first) & (t <= last)]
-        if t.size < 2:
-            raise LoadError("recorded torques", got="recordings that do not overlap", allowed="a common time span")
         y = self.torque + sum(np.interp(t, r.time, r.torque) for r in self.recorded)
         with np.errstate(over="ignore"):
             slope = np.diff(y) / np.diff(t)
@@ -133,8 +161,8 @@ class Load:
         t, q = np.asarray(time, dtype=np.float64), np.asarray(angle, dtype=np.float64)
         self.check_span(float(np.min(t, initial=math.inf)), float(np.max(t, initial=-math.inf)))
         amplitude, hanging = self.gravity
-        return np.asarray(self.torque_pieces(t) + self.spring.stiffness * (q - self.spring.rest_angle)
-                          + amplitude * np.sin(q - hanging))
+        stiffness, rest = self.elasticity
+        return np.asarray(self.torque_pieces(t) + stiffness * (q - rest) + amplitude * np.sin(q - hanging))
 
     def check_span(self, start: float, end: float) -> None:
         """Raise LoadError unless the load is known from `start` to `end` [s]."""
@@ -156,24 +184,6 @@ def as_load(load: Part | Load | None) -> Load:
         return Load()
     if isinstance(load, Load):
         return load
-    name = type(load).__name__
-    if isinstance(load, Free):
-        return Load()
-    if isinstance(load, Spring):
-        return Load(spring=load)
-    if isinstance(load, Pendulum):
-        return Load(pendulums=(load,))
-    if isinstance(load, Recorded):
-        return Load(recorded=(load,))
     if isinstance(load, Part):
-        return Load(**load.terms())
-    raise LoadError("load", got=name, allowed="a load of servotwin.loads, or a sum of them")
-
-
-def _joined(a: Spring, b: Spring) -> Spring:
-    if a.stiffness == b.stiffness == 0.0:
-        return Spring(0.0)
-    if a.stiffness == 0.0 or b.stiffness == 0.0:
-        return b if a.stiffness == 0.0 else a
-    stiffness = a.stiffness + b.stiffness
-    return Spring(stiffness, (a.stiffness * a.rest_angle + b.stiffness * b.rest_angle) / stiffness)
+        return load.as_load()
+    raise LoadError("load", got=type(load).__name__, allowed="a load of servotwin.loads, or a sum of them")

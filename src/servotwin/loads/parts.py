@@ -3,38 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from servotwin.errors import LoadError
+from servotwin.loads.load import Load, Part
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from servotwin.loads.load import Load
-
 STANDARD_GRAVITY = 9.80665  # m/s², 3rd CGPM (1901)
 
 
-class Part:
-    """Base of all parts: addition, and a check that every number is finite; all are kept as floats."""
+class _Numbers(Part):
+    """A part that is given by numbers: all finite, kept as floats, and summed by name unless it says otherwise."""
 
     def __post_init__(self) -> None:
-        for name, value in self.terms().items():
+        for f in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, f.name)
+            if value is None and f.default is None:
+                continue
             if not is_finite(value):
-                raise LoadError(f"{type(self).__name__}({name})", got=value, allowed="a finite number")
-            object.__setattr__(self, name, float(value))  # a float32 would lower the precision of all that it meets
+                raise LoadError(f"{type(self).__name__}({f.name})", got=value, allowed="a finite number")
+            object.__setattr__(self, f.name, float(value))  # a float32 would lower the precision of all that it meets
 
-    def terms(self) -> dict[str, Any]:
-        """Return the numbers of this part by name (SI)."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
-
-    def __add__(self, other: Part | Load) -> Load:
-        from servotwin.loads.load import as_load  # the sum knows its parts; the parts learn of it only here
-
-        return as_load(self) + other
+    def as_load(self) -> Load:
+        """Return this part alone, in normal form."""
+        return Load(**vars(self))
 
 
 def _check(part: Part, name: str, good: bool, allowed: str) -> None:
@@ -43,7 +40,7 @@ def _check(part: Part, name: str, good: bool, allowed: str) -> None:
 
 
 @dataclass(frozen=True)
-class Free(Part):
+class Free(_Numbers):
     """Nothing: the shaft turns freely.
 
     Examples
@@ -54,7 +51,7 @@ class Free(Part):
 
 
 @dataclass(frozen=True)
-class Inertia(Part):
+class Inertia(_Numbers):
     """A disc: moment of inertia J_L about the shaft, at least 0 [kg m²] (paper, eq. 16).
 
     Examples
@@ -71,7 +68,7 @@ class Inertia(Part):
 
 
 @dataclass(frozen=True)
-class Viscous(Part):
+class Viscous(_Numbers):
     """A damper: torque B_L q̇ against the motion, B_L at least 0 [N m s/rad] (paper, eq. 16).
 
     Examples
@@ -88,7 +85,7 @@ class Viscous(Part):
 
 
 @dataclass(frozen=True)
-class Constant(Part):
+class Constant(_Numbers):
     """A constant torque, a weight on a drum; positive pushes the shaft towards −q [N m].
 
     Examples
@@ -101,7 +98,7 @@ class Constant(Part):
 
 
 @dataclass(frozen=True)
-class Coulomb(Part):
+class Coulomb(_Numbers):
     """Dry friction of the load: opposes motion either way and holds at rest, at least 0 [N m].
 
     Examples
@@ -118,7 +115,7 @@ class Coulomb(Part):
 
 
 @dataclass(frozen=True)
-class Spring(Part):
+class Spring(_Numbers):
     """A torsion spring: torque k (q − q_r) against the motion away from its rest angle.
 
     Parameters
@@ -130,8 +127,8 @@ class Spring(Part):
 
     Examples
     --------
-    >>> (Spring(1.0, 0.0) + Spring(1.0, 1.0)).spring
-    Spring(stiffness=2.0, rest_angle=0.5)
+    >>> (Spring(1.0, 0.0) + Spring(1.0, 1.0)).elasticity
+    (2.0, 0.5)
     """
 
     stiffness: float
@@ -141,9 +138,13 @@ class Spring(Part):
         super().__post_init__()
         _check(self, "stiffness", self.stiffness >= 0.0, "a number of at least 0 [N m/rad]")
 
+    def as_load(self) -> Load:
+        """Return this part alone, in normal form."""
+        return Load(springs=(self,))
+
 
 @dataclass(frozen=True)
-class Pendulum(Part):
+class Pendulum(_Numbers):
     """A weight on an arm: torque m g l sin(q − q_h) against the motion away from hanging.
 
     Parameters
@@ -177,9 +178,9 @@ class Pendulum(Part):
             _check(self, name, getattr(self, name) >= 0.0, "a number of at least 0")
         _check(self, "inertia", self.inertia is None or self.inertia >= 0.0, "a number of at least 0 [kg m²]")
 
-    def terms(self) -> dict[str, Any]:
-        """Return the given numbers by name (SI)."""
-        return {name: value for name, value in super().terms().items() if name != "inertia" or value is not None}
+    def as_load(self) -> Load:
+        """Return this part alone, in normal form."""
+        return Load(pendulums=(self,))
 
     @property
     def moment_of_inertia(self) -> float:
@@ -226,3 +227,7 @@ class Recorded(Part):
             raise LoadError("Recorded(time)", got="times that do not increase", allowed="increasing times [s]")
         object.__setattr__(self, "time", tuple(time.tolist()))
         object.__setattr__(self, "torque", tuple(torque.tolist()))
+
+    def as_load(self) -> Load:
+        """Return this part alone, in normal form."""
+        return Load(recorded=(self,))

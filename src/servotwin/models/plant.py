@@ -19,7 +19,7 @@ def make_plant(model: Model, load: Load, *, reduction: float, inductance: float 
                restitution: float = 0.0) -> Plant:
     """Return the plant at the output shaft: the motor reflected through the gear, and the load on it."""
     N = reduction
-    stiffness, rest_angle = load.spring.stiffness, load.spring.rest_angle
+    stiffness, rest_angle = load.elasticity
     gravity, hanging = load.gravity
     return Plant(
         J=N * N * model.value("motor.rotor_inertia") + model.load_inertia(load),

@@ -6,17 +6,15 @@ A field that is None is absent: the effect is off, or not known.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
-from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
 
 from servotwin.errors import ParameterError
-from servotwin.units import si_unit
+from servotwin.units import is_finite, si_unit
 
 POSITIVE = "a positive number"
 NOT_NEGATIVE = "a number of at least 0"
@@ -73,10 +71,10 @@ class Group:
         if rule == "table":
             if isinstance(value, np.ndarray) and value.ndim == 1:
                 value = value.tolist()
-            if not isinstance(value, list | tuple) or not all(_is_number(x) for x in value) or not value:
+            if not isinstance(value, list | tuple) or not all(is_finite(x) for x in value) or not value:
                 raise ParameterError(what, got=value, allowed=f"a list of finite numbers [{unit}]")
             return tuple(float(x) for x in value)
-        if not _is_number(value) or not _RULES[rule](value):
+        if not is_finite(value) or not _RULES[rule](float(value)):  # the float is kept, so it is what counts
             raise ParameterError(what, got=value, allowed=f"{rule} [{unit}]")
         return float(value)
 
@@ -87,14 +85,6 @@ class Group:
         a, b = getattr(self, low), getattr(self, high)
         if a is not None and b is not None and not a < b:
             raise ParameterError(f"{self.title}.{low}", got=a, allowed=f"less than {self.title}.{high} = {b!r}")
-
-
-def _is_number(value: Any) -> bool:
-    """Whether it is a finite real number; what is true or false is none."""
-    try:
-        return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
-    except OverflowError:  # an integer beyond the range of a float
-        return False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,7 +35,9 @@ def write_file(path: str | Path, write: Callable[[Path], object], *, overwrite: 
             raise OutputExistsError(target)
         if target.is_dir():
             raise OutputError(f"{target} is a folder")
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=target.suffix)
+        if target.exists() and not target.is_file():
+            raise OutputError(f"{target} is no regular file")  # a device must not be replaced by a file
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=".partial-", suffix=target.suffix)
     except OSError as error:
         raise OutputError(f"{target} cannot be written ({error.strerror})") from None
     partial = Path(name)

@@ -38,8 +38,10 @@ from servotwin.physics.motor import (
     steady_armature_current,
 )
 from servotwin.physics.potentiometer import angle_from_voltage, feedback_voltage, quantised
+from servotwin.physics.sheet import SheetMotor, motor_from_sheet
 
 __all__ = [
+    "SheetMotor",
     "angle_from_voltage",
     "armature_current_rate",
     "averaged_bridge_gain",
@@ -57,6 +59,7 @@ __all__ = [
     "forward_acceleration",
     "loop_voltage",
     "motor_from_output",
+    "motor_from_sheet",
     "output_inertia",
     "output_viscous_friction",
     "pulse_width_from_voltage",

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import io
-import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from servotwin.errors import OutputError, OutputExistsError
+from servotwin.errors import OutputError
+from servotwin.parameters import write_file
 from servotwin.plotting.style import context
 
 if TYPE_CHECKING:
@@ -73,25 +72,4 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> None:
     if file_format not in FORMATS:
         raise OutputError("ending of a picture's name", got=target.name,
                           allowed=", ".join(f".{name}" for name in FORMATS))
-    if target.exists() and not overwrite:
-        raise OutputExistsError(target)
-    data = to_bytes(figure, file_format)
-    try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".partial")
-    except OSError as error:
-        raise OutputError(f"{target} cannot be written ({error.strerror})") from None
-    partial = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        partial.chmod(0o666 & ~_umask())
-        partial.replace(target)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise OutputError(f"{target} cannot be written ({error.strerror})") from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    write_file(target, lambda file: file.write_bytes(to_bytes(figure, file_format)), overwrite=overwrite)

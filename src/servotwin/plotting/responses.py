@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from servotwin import units
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
-from servotwin.plotting.style import LINES, axes_grid, context, finished
+from servotwin.plotting.style import LINES, axes_grid, context
 
 if TYPE_CHECKING:
     import numpy as np
@@ -92,15 +92,17 @@ def time_response(result: Result, signals: Sequence[str] | None = None) -> Figur
     2
     """
     names = _names(result, signals)
-    figure, axes = axes_grid(len(names), height=0.7 + 1.25 * len(names))
+    figure, axes = axes_grid(len(names), height=0.7 + 1.25 * len(names), margins=(0.88, 0.1, 0.45, 0.3, 0.15))
     with context():
         for ax, name in zip(axes, names, strict=True):
             _panel(ax, result, name)
         axes[-1].set_xlabel("time (s)")
         axes[-1].set_xlim(float(result.time[0]), float(result.time[-1]) or 1.0)
-        figure.suptitle(f"{result.model.servo.name}, {type(result.model).__name__}", fontsize=9)
-        figure.align_ylabels(axes)
-    return finished(figure)
+        figure.suptitle(f"{result.model.servo.name}, {type(result.model).__name__}", fontsize=9,
+                        y=1.0 - 0.06 / figure.get_figheight())
+        for ax in axes:
+            ax.yaxis.set_label_coords(-0.11, 0.5)
+    return figure
 
 
 def _names(result: Result, signals: Sequence[str] | None) -> list[str]:
@@ -120,8 +122,7 @@ def _names(result: Result, signals: Sequence[str] | None) -> list[str]:
 
 def _panel(ax: Axes, result: Result, name: str) -> None:
     label = SHOWN[name].label if name in SHOWN else SIGNALS[name].unit
-    words = f"{SHOWN[name].words}\n{SHOWN[name].symbol} ({label})" if name in SHOWN else f"{name}\n({label})"
-    ax.set_ylabel(words)
+    ax.set_ylabel(f"{SHOWN[name].words if name in SHOWN else name}\n({label})")
     companion = _WITH.get(name, "")
     if companion in result.names:
         # As steps only where the command is one of levels: a ramp is a line.
@@ -131,4 +132,4 @@ def _panel(ax: Axes, result: Result, name: str) -> None:
     ax.plot(result.time, shown(name, result[name]), color=LINES[0][0], linestyle=LINES[0][1],
             label=SHOWN[name].words if name in SHOWN else name)
     if companion in result.names:
-        ax.legend(loc="best")
+        ax.legend(loc="lower right")

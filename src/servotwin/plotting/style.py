@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,7 +45,8 @@ def context() -> AbstractContextManager[None]:
 
 
 def axes_grid(rows: int = 1, *, width: float = WIDTH, height: float = 3.0,
-              share: bool = True, ratios: tuple[float, ...] | None = None) -> tuple[Figure, list[Axes]]:
+              share: bool = True, ratios: tuple[float, ...] | None = None,
+              margins: tuple[float, float, float, float, float] | None = None) -> tuple[Figure, list[Axes]]:
     """Return a figure with `rows` panels below each other.
 
     Parameters
@@ -58,6 +59,9 @@ def axes_grid(rows: int = 1, *, width: float = WIDTH, height: float = 3.0,
         Whether all panels show the same stretch of the horizontal axis.
     ratios : tuple of float, length `rows`, optional
         Heights of the panels to each other; equal unless given.
+    margins : tuple of float, optional
+        Left, right, bottom, top and the gap between equal panels [inch]; found from the labels unless given, which
+        takes several times as long as drawing.
 
     Examples
     --------
@@ -66,17 +70,22 @@ def axes_grid(rows: int = 1, *, width: float = WIDTH, height: float = 3.0,
     2
     """
     with context():
-        figure = new_figure(width, height)
+        figure = new_figure(width, height, "constrained" if margins is None else None)
+        if margins is not None:
+            left, right, bottom, top, gap = margins
+            panel = (height - bottom - top - gap * (rows - 1)) / rows
+            figure.subplots_adjust(left=left / width, right=1.0 - right / width, bottom=bottom / height,
+                                   top=1.0 - top / height, hspace=gap / panel)
         grid = figure.subplots(rows, 1, sharex=share, squeeze=False, height_ratios=ratios)
         return figure, [grid[k, 0] for k in range(rows)]
 
 
-def new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """Return an empty figure [inch] that is drawn without any window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 

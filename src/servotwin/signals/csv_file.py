@@ -62,9 +62,9 @@ def from_csv(path: str | Path, *, column: str | None = None, hold: str = "previo
                            allowed=("one of them, chosen by column=" if found else "one of " + ", ".join(_COLUMNS)))
     name = column or found[0]
     time = [_TIMES[time_name] * v for v in _numbers(path, header, rows, time_name)]
+    value = _numbers(path, header, rows, name)
     try:
-        return samples(time, _numbers(path, header, rows, name), unit=_COLUMNS[name], hold=hold,
-                       frame_period=frame_period)
+        return samples(time, value, unit=_COLUMNS[name], hold=hold, frame_period=frame_period)
     except CommandError as error:
         raise CommandError(f"{path}: {error.what}", got=error.got, allowed=error.allowed) from None
 
@@ -75,7 +75,7 @@ def _read(path: Path) -> tuple[list[str], dict[int, list[str]]]:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
             filled = ((reader.line_num, row) for row in reader if any(cell.strip() for cell in row))
-            rows = dict(filled)
+            rows = dict(filled)  # read here, where the file is open
     except FileNotFoundError:
         raise CommandError(f"{path}: no such file") from None
     except OSError as error:

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from servotwin.simulation.result import Result
     from servotwin.simulation.trajectory import Trajectory
 
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-
 
 @dataclass(frozen=True)
 class StepMetrics:
@@ -103,28 +101,41 @@ def _values(trajectory: Trajectory, index: int, signal: Callable[[Samples], NDAr
 def _highest(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]],
              start: float) -> tuple[float, float]:
     """Return time and value of the highest point from `start` on."""
-    best, when, where = -math.inf, math.nan, -1
-    bracket = (0.0, 0.0)
+    when, best = math.nan, -math.inf
+    found = []
     for k in range(len(trajectory.segments)):
         times, values = _values(trajectory, k, signal, start)
-        if values.size and values.max() > best:
-            n = int(values.argmax())
-            best, when, where = float(values[n]), float(times[n]), k
-            bracket = (float(times[max(n - 1, 0)]), float(times[min(n + 1, times.size - 1)]))
-    if where < 0:
-        return when, best
+        if values.size == 0:
+            continue
+        n = int(values.argmax())
+        around = slice(max(n - 1, 0), n + 2)
+        found.append((float(values[n]), k, times[around], values[around]))
+        if values[n] > best:
+            when, best = float(times[n]), float(values[n])
+    # Where two segments meet both have the same highest sample, and the top is in either of them.
+    close = best - 1e-9 * abs(best)
+    for highest, k, times, values in found:
+        if highest >= close and values.min() < highest:
+            time, value = _refined(trajectory, k, signal, float(times[0]), float(times[-1]))
+            if value > best:
+                when, best = time, value
+    return when, best
 
-    def at(t: float) -> float:
-        return float(signal(trajectory.inside(where, np.array([t])))[0])
 
-    a, b = bracket
-    for _ in range(60):  # golden section: the highest point between the neighbours of the highest sample
-        x, y = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
-        a, b = (a, y) if at(x) > at(y) else (x, b)
+def _refined(trajectory: Trajectory, index: int, signal: Callable[[Samples], NDArray[np.float64]], a: float,
+             b: float) -> tuple[float, float]:
+    """Return time and value of the only top between a and b [s], on grids that close in on it."""
+    when, best = a, -math.inf
+    for _ in range(20):
+        times = np.linspace(a, b, 9)
+        values = signal(trajectory.inside(index, times))
+        n = int(values.argmax())
+        if values[n] > best:
+            when, best = float(times[n]), float(values[n])
+        a, b = float(times[max(n - 1, 0)]), float(times[min(n + 1, 8)])
         if b - a <= 1e-9 * max(abs(b), 1e-6):
             break
-    middle = at(0.5 * (a + b))
-    return (0.5 * (a + b), middle) if middle > best else (when, best)
+    return when, best
 
 
 def _first_reach(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]], start: float,

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from servotwin import __version__
-from servotwin.cli import paper_linear, paper_tables
-from servotwin.cli.paper_findings import corrections, disagreements
-from servotwin.cli.paper_format import escape, fixed, number, picture, plain
-from servotwin.cli.paper_study import LABELS, LOAD_INERTIA, SERVO, Study
+from servotwin.cli.paper import linear, tables
+from servotwin.cli.paper.findings import corrections, disagreements
+from servotwin.cli.paper.study import LABELS, LOAD_INERTIA, SERVO, Study
+from servotwin.cli.paper.words import escape, fixed, number, picture, plain
 
 if TYPE_CHECKING:
-    from servotwin.cli.paper_figures import Picture
+    from servotwin.cli.paper.figures import Picture
 
 _STYLE = """
 :root{color-scheme:light;--ink:#1b1f24;--soft:#57606a;--line:#d0d7de;--wash:#f6f8fa;--blue:#0072b2}
@@ -64,8 +64,8 @@ def page(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) ->
         "summary": _summary(study), "values": _values(study), "step": _step(study, pictures, svg),
         "bench": _bench(study, pictures, svg), "measured": _measured(study, pictures, svg),
         "fits": _fits(study), "models": _models(study, pictures, svg),
-        "corrections": paper_tables.findings_table(corrections(study), "What the equations need"),
-        "disagreements": paper_tables.findings_table(disagreements(study), "What the data say"),
+        "corrections": tables.findings_table(corrections(study), "What the equations need"),
+        "disagreements": tables.findings_table(disagreements(study), "What the data say"),
         "parameters": _parameters(study), "files": _files(pictures),
     }
     contents = "".join(f'<li><a href="#{key}">{title}</a></li>' for key, title in _SECTIONS)
@@ -129,7 +129,7 @@ def _sheet_speed(study: Study) -> str:
 
 
 def _values(study: Study) -> str:
-    count = paper_tables.origins(study)
+    count = tables.origins(study)
     words = ", ".join(f"{n} {origin}" for origin, n in sorted(count.items(), key=lambda item: -item[1]))
     return f"""<div class="note"><p><strong>The paper publishes no parameter values.</strong> It gives no number for
 k<sub>a</sub>, k<sub>b</sub>, R<sub>a</sub>, L<sub>a</sub>, J<sub>m</sub>, B<sub>m</sub>, n, A, k<sub>s</sub>,
@@ -149,7 +149,7 @@ def _step(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -
 servo is the paper's model, (35) to (41) with the two offsets that the measured servo needs. The bounded servo has in
 addition a supply that ends, a deadband, friction that holds, and end stops.</p>
 <div class="figures">{_figures(names, pictures, svg)}</div>
-{paper_tables.step_table(study)}"""
+{tables.step_table(study)}"""
 
 
 def _bench(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
@@ -174,14 +174,14 @@ travel ends), with a wait until the shaft stands or for 5 s; a row is the mean, 
 standing band. The smoothed friction (41) never quite stands: the averaged servo is read while it still
 creeps.</li></ul>
 <div class="figures">{_figures(("figure-22", "figure-23", "figure-24"), pictures, svg)}</div>
-{paper_tables.ranges_table(study)}"""
+{tables.ranges_table(study)}"""
 
 
 def _measured(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
-    tables = "".join(paper_tables.model_shares_table(study, name) for name in study.on_bench)
+    shares = "".join(tables.model_shares_table(study, name) for name in study.on_bench)
     return f"""<div class="figures">{_figures(("figure-25", "figure-26", "figure-27"), pictures, svg)}</div>
-{paper_tables.comparison_table(study)}
-{paper_tables.difference_table(study)}
+{tables.comparison_table(study)}
+{tables.difference_table(study)}
 <p>The paper does not say from which side its angles were approached. Its points lie within
 {fixed(study.fits['q(V_i)'].line.max_residual, 1)}° of a line, while the bounded servo may stop anywhere within
 ± {fixed(math.degrees(max(row.standing_band for row in study.on_bench['bounded'].rows)), 1)}°. So its band is probably
@@ -190,17 +190,17 @@ model of the mean voltage cannot show the latter.</p>
 <h3>What the differences are made of</h3>
 <p>The 16 µs steps move the measured and the simulated servo alike, so they are seen against a straight line over
 V<sub>i</sub> and not between the two:</p>
-{paper_tables.measured_shares_table(study)}
+{tables.measured_shares_table(study)}
 <p>Between simulated and measured there remain: another pulse width than the printed one (none), the curvature that a
 straight servo cannot have, an unequal stop from either side, and the calibration of the servo file (V<sub>o</sub> over
 t<sub>a</sub> and V<sub>o</sub> over q, rounded, against q over t<sub>a</sub>). The shares add up.</p>
-{tables}"""
+{shares}"""
 
 
 def _fits(study: Study) -> str:
-    curved = [paper_tables.pretty(name) for name, fit in study.fits.items() if fit.curvature.p_value < 0.05]
+    curved = [tables.pretty(name) for name, fit in study.fits.items() if fit.curvature.p_value < 0.05]
     verdict = f"At the 5 % level curved: {', '.join(curved)}." if curved else "None is curved at the 5 % level."
-    return f"""{paper_tables.fits_table(study)}<p>Five points leave three degrees of freedom to a line and two to a
+    return f"""{tables.fits_table(study)}<p>Five points leave three degrees of freedom to a line and two to a
 parabola. p is the probability of such an F or a larger one if the truth were straight. {verdict}</p>
 """
 
@@ -208,13 +208,13 @@ parabola. p is the probability of such an F or a larger one if the truth were st
 def _models(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
     parts = ["<p>The paper's diagrams, redrawn, with their transfer functions. The numbers are those of the servo "
              "file; dry friction has no transfer function and is left out.</p>"]
-    for which, formulas in paper_linear.FORMULAS.items():
+    for which, formulas in linear.FORMULAS.items():
         made = next(p for p in pictures if p.name == f"figure-{which:02d}")
-        lines = [f"<p>{paper_linear.formula(text)}<span>{equation}</span></p>" for equation, text in formulas]
-        numeric = paper_linear.numeric(study, which)
+        lines = [f"<p>{linear.formula(text)}<span>{equation}</span></p>" for equation, text in formulas]
+        numeric = linear.numeric(study, which)
         if numeric is not None:
             poles = ", ".join(_pole(p) for p in numeric.poles if p.imag >= 0.0)
-            shown = paper_linear.formula(numeric.text)
+            shown = linear.formula(numeric.text)
             lines.append(f"<p>{shown}<span>{numeric.words}; poles (1/s): {poles}</span></p>")
         parts.append(_figure(made, svg[made.name], after=f'<div class="formulas">{"".join(lines)}</div>', wide=True))
     return "\n".join(parts)
@@ -229,7 +229,7 @@ def _pole(p: complex) -> str:
 def _parameters(study: Study) -> str:
     return f"""<p>No value here is one of the paper's authors. A range belongs to an assumed or derived value, ± one
 standard error to a fitted one.</p>
-{paper_tables.parameter_table(study)}"""
+{tables.parameter_table(study)}"""
 
 
 def _files(pictures: Sequence[Picture]) -> str:

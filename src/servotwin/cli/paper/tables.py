@@ -10,13 +10,13 @@ from dataclasses import fields
 from typing import TYPE_CHECKING
 
 from servotwin import units
-from servotwin.cli.paper_format import escape, fixed, number, table, with_error
-from servotwin.cli.paper_study import LABELS, LOAD_INERTIA, MODELS, Study
+from servotwin.cli.paper.study import LABELS, LOAD_INERTIA, MODELS, Study
+from servotwin.cli.paper.words import escape, fixed, number, table, with_error
 from servotwin.parameters import GROUPS
 
 if TYPE_CHECKING:
     from servotwin.bench import ModelShares
-    from servotwin.cli.paper_findings import Finding
+    from servotwin.cli.paper.findings import Finding
     from servotwin.parameters import Quantity
 
 # dimension -> units in which a reader expects it: (smallest value in SI, unit, as printed), largest first

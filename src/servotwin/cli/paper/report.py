@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from servotwin.cli.paper_study import Study, headline_numbers, run_study
+from servotwin.cli.paper.study import Study, headline_numbers, run_study
 from servotwin.errors import OutputError, OutputExistsError
 
 _PAGE = "report.html"
@@ -120,11 +120,11 @@ def _remove_empty(folders: Sequence[Path]) -> None:
 
 def _write_all(folder: Path, tell: Callable[[str, float], None]) -> dict[str, float]:
     from servotwin import plotting
-    from servotwin.cli import paper_figures
-    from servotwin.cli.paper_html import page
+    from servotwin.cli.paper import figures
+    from servotwin.cli.paper.page import page
 
     study = run_study(tell)
-    pictures = paper_figures.pictures(study, lambda done: tell("drawing", 0.25 + 0.3 * done))
+    pictures = figures.pictures(study, lambda done: tell("drawing", 0.25 + 0.3 * done))
     (folder / "figures").mkdir()
     (folder / "data").mkdir()
     svg: dict[str, bytes] = {}

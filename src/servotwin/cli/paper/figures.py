@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin import plotting
-from servotwin.cli.paper_study import LABELS, BenchStudy, Study
+from servotwin.cli.paper.study import LABELS, BenchStudy, Study
 from servotwin.plotting import Curve, Limit
 
 if TYPE_CHECKING:

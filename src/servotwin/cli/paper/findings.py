@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from servotwin import bench
-from servotwin.cli.paper_format import fixed, number, with_error
-from servotwin.cli.paper_study import LOAD_INERTIA
+from servotwin.cli.paper.study import LOAD_INERTIA
+from servotwin.cli.paper.words import fixed, number, with_error
 from servotwin.physics.friction import creep_speed
 
 if TYPE_CHECKING:
-    from servotwin.cli.paper_study import Study
+    from servotwin.cli.paper.study import Study
 
 _MOVED = 1542.0  # µs: the pulse width of the 90° row, one step of the generator longer
 
