@@ -138,7 +138,7 @@ def test_the_small_root_is_found_without_overflow(torque):
     ({"no_load_speed": math.nan}, "no_load_speed"), ({"no_load_current": math.inf}, "no_load_current"),
     ({"gear_efficiency": 0.0}, "gear_efficiency"), ({"drop_voltage": 6.0}, "drop_voltage"),
     ({"drop_voltage": -0.1}, "drop_voltage"), ({"stall_current": 0.2}, "stall_current"),
-    ({"stall_current": 0.0}, "stall_current"),
+    ({"stall_current": 0.0}, "stall_current"), ({"stall_current": 0.285}, "stall_current"),
 ])
 def test_a_bad_sheet_is_refused_in_one_line(change, named):
     with pytest.raises(ParameterError) as caught:
