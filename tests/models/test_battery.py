@@ -177,3 +177,18 @@ def test_power_at_the_spindle_is_what_the_load_gets(servo, name):
     work = np.trapezoid(result["load_torque"] * result["output_speed"], result.time)
     kinetic = 0.5 * 3e-3 * result["output_speed"][-1] ** 2
     assert work == pytest.approx(kinetic + result.energy.load, rel=2e-3, abs=1e-7)
+
+
+def test_a_servo_without_a_voltage_input_has_no_command_voltage(servo, tmp_path):
+    values = {}
+    for name in servo.names():
+        group, key = name.split(".")
+        if key not in ("voltage_to_pulse_gain", "command_pulse_offset", "pulse_to_voltage_gain", "command_offset"):
+            values.setdefault(group, {})[key] = servo.get(name)
+    model = st.BoundedServo(st.servo_from_values("pulses-only", values))
+    result = st.simulate(model, st.signals.step(1500.0, 1800.0, unit="us"), duration=0.2)
+    assert "command_voltage" not in result.names
+    assert result["pulse_width"][-1] == pytest.approx(1.8e-3, rel=1e-12)
+    result.save(tmp_path / "run.csv")
+    with pytest.raises(KeyError, match="pulse_width"):
+        result["command_voltage"]

@@ -42,7 +42,7 @@ class Model(ABC):
     layout: ClassVar[tuple[str, ...]]
     """Signal names of the state: angle, speed and, with inductance, current."""
     signals: ClassVar[tuple[str, ...]]
-    """Names of the output signals, `time` apart."""
+    """Names of all output signals that the class can have, `time` apart."""
 
     def __init__(self, servo: Servo) -> None:
         missing = [name for name in self.requires if servo.get(name) is None]
@@ -94,6 +94,11 @@ class Model(ABC):
         own = self.value_or("gear.output_inertia", 0.0) if "gear.output_inertia" in self.optional else 0.0
         return load.total_inertia + own
 
+    @property
+    def available(self) -> tuple[str, ...]:
+        """Names of the output signals that can be computed for this servo, `time` apart."""
+        return self.signals
+
     @abstractmethod
     def pack(self, load: Load) -> Plant:
         """Return everything that the engine reads, as plain floats."""
@@ -123,13 +128,13 @@ class Model(ABC):
         """
         if name == "time":
             return samples.time
-        if name not in self.signals:
-            raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.signals))
+        if name not in self.available:
+            raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.available))
         return outputs.SIGNALS[name].compute(self, samples, drive, load)
 
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
-        raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.signals))
+        raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.available))
 
 
 def check_travel(signal: Signal, servo: Servo) -> None:

@@ -181,7 +181,7 @@ def _advanced(plant: Plant, state: State, motion: Motion, next_step: float,
 
 
 def _event_name(kind: int, after: Mode) -> str:
-    if kind == hybrid.SPEED and after.contact == hybrid.STUCK:
+    if kind == hybrid.SPEED and hybrid.at_rest(after.contact):
         return "stick"
     if kind == hybrid.SPEED and after.contact != hybrid.CORE:
         return "reversal"

@@ -66,7 +66,7 @@ def step_metrics(result: Result) -> StepMetrics:
     angle_name = result.model.layout[0]
     q0, q1 = result.at(angle_name, [start, result.ended]).tolist()
     way = q1 - q0
-    has_target = "command_angle" in result.model.signals
+    has_target = "command_angle" in result.model.available
     target = float(result.at("command_angle", [result.ended])[0]) if has_target else math.nan
 
     def progress(samples: Samples) -> NDArray[np.float64]:

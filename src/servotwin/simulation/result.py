@@ -77,12 +77,12 @@ class Result:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all signals, `time` first."""
-        return ("time", *self.model.signals)
+        return ("time", *self.model.available)
 
     @property
     def units(self) -> Mapping[str, str]:
         """SI unit of each signal."""
-        return {"time": "s", **{name: SIGNALS[name].unit for name in self.model.signals}}
+        return {"time": "s", **{name: SIGNALS[name].unit for name in self.model.available}}
 
     @cached_property
     def _samples(self) -> Samples:
@@ -153,7 +153,7 @@ class Result:
             import pandas as pd
         except ImportError:
             raise MissingExtraError("pandas", "data") from None
-        frame = pd.DataFrame({name: self[name] for name in self.model.signals}, index=pd.Index(self.time, name="time"))
+        frame = pd.DataFrame({name: self[name] for name in self.model.available}, index=pd.Index(self.time, name="time"))
         frame.attrs["units"] = dict(self.units)
         return frame
 
@@ -164,7 +164,7 @@ class Result:
         except ImportError:
             raise MissingExtraError("xarray", "data") from None
         data = {name: ("time", self[name], {"units": self.units[name], "long_name": SIGNALS[name].meaning})
-                for name in self.model.signals}
+                for name in self.model.available}
         return xr.Dataset(data, coords={"time": ("time", self.time, {"units": "s"})},
                           attrs={"model": type(self.model).__name__, "servo": self.model.servo.name})
 
