@@ -153,23 +153,22 @@ def contact_of(plant: Plant, zone: int, u: float, tau: float, q: float, w: float
         return FORWARD if w > 0.0 else BACKWARD
     if w == 0.0:
         return _contact_from_rest(plant, driving_torque(plant, zone, u, tau, q, i), q)
+    return _sliding(plant, w > 0.0)
+
+
+def _sliding(plant: Plant, forward: bool) -> int:
     if not has_friction(plant):
         return FREE
-    return FORWARD if w > 0.0 else BACKWARD
+    return FORWARD if forward else BACKWARD
 
 
 def _contact_from_rest(plant: Plant, torque: float, q: float) -> int:
     backward, forward = holding_bounds(plant)
-    free = not has_friction(plant)
-    if torque > forward or (free and torque == 0.0):
-        if q >= plant.upper and not (free and torque == 0.0):
-            return ON_UPPER
-        return FREE if free else FORWARD
+    if torque > forward:
+        return ON_UPPER if q >= plant.upper else _sliding(plant, True)
     if torque < -backward:
-        if q <= plant.lower:
-            return ON_LOWER
-        return FREE if free else BACKWARD
-    return STUCK
+        return ON_LOWER if q <= plant.lower else _sliding(plant, False)
+    return STUCK if has_friction(plant) else FREE
 
 
 def friction_torque(plant: Plant, contact: int, w: float) -> float:
@@ -300,10 +299,7 @@ def cross(plant: Plant, mode: Mode, kind: int, u: float, tau: float,
         return Mode(zone, BACKWARD), q, w
     if kind == UPPER or kind == LOWER:
         return _rebound(plant, zone, kind, u, tau, w, i)
-    free = not has_friction(plant)
-    if kind == RELEASE_FORWARD:
-        return Mode(zone, FREE if free else FORWARD), q, 0.0
-    return Mode(zone, FREE if free else BACKWARD), q, 0.0
+    return Mode(zone, _sliding(plant, kind == RELEASE_FORWARD)), q, 0.0
 
 
 def _rebound(plant: Plant, zone: int, kind: int, u: float, tau: float, w: float,
@@ -313,9 +309,7 @@ def _rebound(plant: Plant, zone: int, kind: int, u: float, tau: float, w: float,
     if abs(w) < _REST_SPEED:
         torque = driving_torque(plant, zone, u, tau, q, i)
         return Mode(zone, _contact_from_rest(plant, torque, q)), q, 0.0
-    if not has_friction(plant):
-        return Mode(zone, FREE), q, w
-    return Mode(zone, FORWARD if w > 0.0 else BACKWARD), q, w
+    return Mode(zone, _sliding(plant, w > 0.0)), q, w
 
 
 def _neighbour(plant: Plant, zone: int, kind: int) -> int:
