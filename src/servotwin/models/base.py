@@ -6,8 +6,9 @@ import math
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar, final
 
-from servotwin.errors import CommandError, MissingParameterError, UnknownNameError
+from servotwin.errors import CommandError, InputError, MissingParameterError, UnknownNameError
 from servotwin.models import outputs
+from servotwin.parameters import Servo
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from servotwin.loads import Load
     from servotwin.models.kernels.hybrid import Plant
     from servotwin.models.samples import Samples
-    from servotwin.parameters import Servo
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
@@ -45,6 +45,8 @@ class Model(ABC):
     """Names of all output signals that the class can have, `time` apart."""
 
     def __init__(self, servo: Servo) -> None:
+        if not isinstance(servo, Servo):
+            raise InputError(f"servo of {type(self).__name__}", got=servo, allowed="a servo, such as load_servo(...)")
         missing = [name for name in self.requires if servo.get(name) is None]
         if missing:
             raise MissingParameterError(type(self).__name__, servo.name, missing)

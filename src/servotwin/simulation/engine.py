@@ -22,6 +22,7 @@ from servotwin.simulation.status import Status
 _TOLERANCE = 1e-10  # error of one integrator step, relative to 1 + |state|
 _FIRST_STEP = 1e-4  # s
 _CHATTER = 200  # events without time going on
+_MOST_OSCILLATIONS = 1e7  # within one motion
 
 
 class Event(NamedTuple):
@@ -101,21 +102,28 @@ def run(plant: Plant, command: Pieces, torque: Pieces, state: State, until: floa
     """
     idle = 0
     while state.time < until:
-        state, piece_end = _anchored(plant, command, torque, state)
-        motion, next_step = _motion(plant, state, piece_end)
         before = state.time
-        state, segment, event = _advanced(plant, state, motion, next_step, min(until, piece_end))
+        try:
+            state, piece_end = _anchored(plant, command, torque, state)
+            motion, next_step = _motion(plant, state, piece_end)
+            state, segment, event = _advanced(plant, state, motion, next_step, min(until, piece_end))
+        except ArithmeticError:  # numbers beyond what a float holds
+            raise _failure(Status.DIVERGED, before) from None
         if not all(map(math.isfinite, state.values)):
-            raise SimulationError(Status.DIVERGED.name, before, Status.DIVERGED.message)
+            raise _failure(Status.DIVERGED, before)
         idle = idle + 1 if state.time == before else 0
         if idle > _CHATTER:
-            raise SimulationError(Status.CHATTER.name, before, Status.CHATTER.message)
+            raise _failure(Status.CHATTER, before)
         if record is not None:
             if segment.end > segment.start:
                 record.segments.append(segment)
             if event is not None:
                 record.events.append(event)
     return state
+
+
+def _failure(status: Status, time: float) -> SimulationError:
+    return SimulationError(status.name, time, status.message)
 
 
 def _anchored(plant: Plant, command: Pieces, torque: Pieces, state: State) -> tuple[State, float]:
@@ -141,14 +149,14 @@ def _in_one_piece(plant: Plant, inputs: Inputs) -> bool:
 def _motion(plant: Plant, state: State, piece_end: float) -> tuple[Motion, float]:
     mode, inputs = state.mode, state.inputs
     if mode is None or inputs is None:  # pragma: no cover - _anchored sets both
-        raise SimulationError(Status.DIVERGED.name, state.time, "state without a mode")
+        raise _failure(Status.DIVERGED, state.time)
     motion = closed_motion(plant, mode, state.anchor, inputs, state.anchor_time)
     if motion is not None:
         return motion, state.step
     step, next_step = integrated_step(plant, mode, state.anchor, inputs, state.anchor_time, state.step,
                                       piece_end - state.anchor_time, _TOLERANCE)
     if step is None:
-        raise SimulationError(Status.STEP_TOO_SMALL.name, state.time, Status.STEP_TOO_SMALL.message)
+        raise _failure(Status.STEP_TOO_SMALL, state.time)
     return step, next_step
 
 
@@ -157,11 +165,14 @@ def _advanced(plant: Plant, state: State, motion: Motion, next_step: float,
     """Follow a motion to its first event, its end or the horizon [s], whichever comes first."""
     mode, inputs, t0 = state.mode, state.inputs, state.anchor_time
     if mode is None or inputs is None:  # pragma: no cover - _anchored sets both
-        raise SimulationError(Status.DIVERGED.name, state.time, "state without a mode")
+        raise _failure(Status.DIVERGED, state.time)
     step_end = t0 + motion.length
     if abs(step_end - horizon) <= 4e-16 * abs(horizon):
         step_end = horizon
     end = min(horizon, step_end)
+    fine, settled = motion.scales()
+    if min(end - t0, settled) > _MOST_OSCILLATIONS * fine:
+        raise _failure(Status.TOO_FAST, state.time)
     kinds = hybrid.guards(plant, mode, _in_one_piece(plant, inputs))
     s, kind = first_event(plant, mode, motion, inputs, kinds, t0, state.time - t0, end - t0)
     if kind < 0:

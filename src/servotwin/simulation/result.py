@@ -153,7 +153,8 @@ class Result:
             import pandas as pd
         except ImportError:
             raise MissingExtraError("pandas", "data") from None
-        frame = pd.DataFrame({name: self[name] for name in self.model.available}, index=pd.Index(self.time, name="time"))
+        frame = pd.DataFrame({name: self[name] for name in self.model.available},
+                             index=pd.Index(self.time, name="time"))
         frame.attrs["units"] = dict(self.units)
         return frame
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
 from servotwin.loads import as_load
+from servotwin.models import Model
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
@@ -17,12 +18,12 @@ from servotwin.simulation.engine import Record, State
 from servotwin.simulation.result import Result
 from servotwin.simulation.status import Status
 from servotwin.simulation.trajectory import Trajectory
+from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from servotwin.loads import Load, Part
-    from servotwin.models import Model
 
 _MOST_SAMPLES = 20_000_000
 
@@ -50,9 +51,9 @@ class Simulator:
     """
 
     def __init__(self, model: Model, load: Load | Part | None = None, seed: int = 0) -> None:
-        self.model = model
+        self.model = _model(model)
         self.load = as_load(load)
-        self.seed = seed
+        self.seed = _seed(seed)
         self._plant = model.pack(self.load)
         self._torque = self.load.torque_pieces
         self._last: tuple[Signal, Pieces] | None = None
@@ -83,10 +84,12 @@ class Simulator:
         before = drive.table[0]._replace(value=command.initial, slope=0.0, amplitude=0.0)
         start = self.model.command(Signal(pieces=Pieces((before,)), unit=command.unit, initial=command.initial))
         values = [self.model.start_angle(start.table[0].value), 0.0, 0.0]
+        if initial is not None and not isinstance(initial, Mapping):
+            raise InputError("initial", got=initial, allowed="a mapping of state names to numbers (SI)")
         for name, value in (initial or {}).items():
             if name not in self.model.layout:
                 raise UnknownNameError(f"state of {type(self.model).__name__}", name, self.model.layout)
-            if not math.isfinite(value):
+            if not is_finite(value):
                 raise InputError(f"initial {name}", got=value, allowed="a finite number (SI)")
             values[self.model.layout.index(name)] = float(value)
         if not self._plant.lower <= values[0] <= self._plant.upper:
@@ -120,13 +123,15 @@ class Simulator:
 
     def _run(self, state: State, until: float, command: Signal, external_torque: float,
              record: Record | None) -> State:
-        if not (math.isfinite(until) and until >= state.time):
+        if not isinstance(state, State):
+            raise InputError("advance(state)", got=state, allowed="a state of this simulator")
+        if not (is_finite(until) and until >= state.time):
             raise InputError("advance(until)", got=until, allowed=f"a finite time from {state.time:g} s on")
-        if not math.isfinite(external_torque):
+        if not is_finite(external_torque):
             raise InputError("external_torque", got=external_torque, allowed="a finite number [N m]")
         self.load.check_span(state.time, until)
         torque = self._torque.scaled(1.0, external_torque) if external_torque else self._torque
-        return engine.run(self._plant, self.drive(command), torque, state, until, record)
+        return engine.run(self._plant, self.drive(command), torque, state, float(until), record)
 
 
 def simulate(model: Model, command: Signal, *, duration: float, load: Load | Part | None = None,
@@ -165,7 +170,7 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
     >>> result["output_angle"].shape
     (1001,)
     """
-    if isinstance(duration, bool) or not (math.isfinite(duration) and duration > 0.0):
+    if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
     times = _times(duration, output_step, output_times)
     simulator = Simulator(model, load, seed)
@@ -180,18 +185,33 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
                   status=status, ended=ended, cause=cause)
 
 
+def _model(model: Model) -> Model:
+    if not isinstance(model, Model):
+        raise InputError("model", got=model, allowed="a model of a servo, such as BoundedServo(load_servo(...))")
+    return model
+
+
+def _seed(seed: int) -> int:
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
+        raise InputError("seed", got=seed, allowed="a whole number")
+    return int(seed)
+
+
 def _times(duration: float, output_step: float | None, output_times: ArrayLike | None) -> NDArray[np.float64]:
     if output_times is not None:
         if output_step is not None:
             raise InputError("output_step and output_times", allowed="one of them")
-        times = np.asarray(output_times, dtype=np.float64)
+        try:
+            times = np.asarray(output_times, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise InputError("output_times", got=output_times, allowed="numbers of seconds") from None
         inside = times.ndim == 1 and times.size > 0 and bool(np.isfinite(times).all())
         if not inside or times.min() < 0.0 or times.max() > duration or (np.diff(times) < 0.0).any():
             raise InputError("output_times", got=output_times,
                              allowed=f"finite times that do not decrease, from 0 to {duration:g} s")
         return times
     step = 1e-3 if output_step is None else output_step
-    if not (math.isfinite(step) and step > 0.0):
+    if not (is_finite(step) and step > 0.0):
         raise InputError("output_step", got=step, allowed="a positive number of seconds")
     if duration / step > _MOST_SAMPLES:
         raise InputError("duration / output_step", got=f"{duration / step:.3g} outputs",

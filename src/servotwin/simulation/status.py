@@ -18,6 +18,7 @@ class Status(Enum):
     DIVERGED = 1, "the state is no longer finite"
     STEP_TOO_SMALL = 2, "no step is short enough for the tolerance"
     CHATTER = 3, "events follow each other without time going on"
+    TOO_FAST = 4, "it oscillates too fast to be followed"
 
     def __init__(self, code: int, message: str) -> None:
         self.code = code
