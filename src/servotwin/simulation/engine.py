@@ -19,7 +19,7 @@ from servotwin.simulation.events import first_event
 from servotwin.simulation.motion import Inputs, Motion, Step, closed_motion, integrated_step
 from servotwin.simulation.status import Status
 
-_TOLERANCE = 1e-10  # error of one integrator step, relative to 1 + |state|
+_TOLERANCE = 3e-10  # error of one integrator step, relative to 1 + |state|
 _FIRST_STEP = 1e-4  # s
 _CHATTER = 200  # events without time going on
 _MOST_OSCILLATIONS = 1e7  # within one motion

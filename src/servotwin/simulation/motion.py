@@ -208,7 +208,7 @@ class Step:
 
     def state(self, s: float) -> Vector:
         """Return (q, w, i)."""
-        if s >= self.length:
+        if s >= self.length * (1.0 - 1e-15):  # the end, reached as a difference of two times
             return self.y1
         if s == 0.0:
             return self.y0

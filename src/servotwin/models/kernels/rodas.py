@@ -98,12 +98,16 @@ def step(rates: Callable[[float, float, float, float], tuple[float, float]], jac
 
 def dense_coefficients(ks: list[Vector]) -> tuple[Vector, Vector, Vector]:
     """Return the three vectors of the dense output from the stages of a step."""
-    rows = []
-    for row in DENSE:
-        rows.append((sum(h * k[0] for h, k in zip(row, ks, strict=True)),
-                     sum(h * k[1] for h, k in zip(row, ks, strict=True)),
-                     sum(h * k[2] for h, k in zip(row, ks, strict=True))))
-    return rows[0], rows[1], rows[2]
+    return _weighted(DENSE[0], ks), _weighted(DENSE[1], ks), _weighted(DENSE[2], ks)
+
+
+def _weighted(row: tuple[float, ...], ks: list[Vector]) -> Vector:
+    q = w = i = 0.0
+    for h, (kq, kw, ki) in zip(row, ks, strict=True):
+        q += h * kq
+        w += h * kw
+        i += h * ki
+    return q, w, i
 
 
 def interpolate(y0: Vector, y1: Vector, dense: tuple[Vector, Vector, Vector], x: float) -> Vector:
