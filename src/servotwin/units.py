@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from servotwin.errors import UnitError
 
 _DEG = math.pi / 180.0
+# micro sign and Greek mu, ohm sign and Greek omega, both dots, degree, square -> as in the table below
+_SPELLINGS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u2126": "ohm", "\u03a9": "ohm", "\u00b7": " ",
+                            "\u22c5": " ", "\u00b0": "deg", "\u00b2": "2"})
 _GRAVITY = 9.80665  # standard gravity, m/s^2 (CGPM 1901), for kgf
 
 # dimension -> {unit: factor to SI}; the first unit of each is the SI one.
@@ -69,7 +72,7 @@ def si_unit(dimension: str) -> str:
 
 
 def factor(unit: str, dimension: str) -> float:
-    """Return what a value in `unit` is multiplied by to be in SI.
+    """Return what a value in `unit` is multiplied by to be in SI; Ω, µ, °, · and ² may be written as such.
 
     Raises
     ------
@@ -78,13 +81,14 @@ def factor(unit: str, dimension: str) -> float:
 
     Examples
     --------
-    >>> factor("us", "time")
-    1e-06
+    >>> factor("us", "time"), factor("µs", "time")
+    (1e-06, 1e-06)
     """
     units = _units_of(dimension)
-    if unit not in units:
+    plain = unit.translate(_SPELLINGS).replace(" / ", "/") if isinstance(unit, str) else unit
+    if plain not in units:
         raise UnitError(f"unit of a {dimension}", got=unit, allowed=", ".join(units))
-    return units[unit]
+    return units[plain]
 
 
 @overload

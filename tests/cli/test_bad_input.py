@@ -205,3 +205,7 @@ def test_json_tells_errors_as_json_too(simulate, cli):
     usage = cli("simulate", "--json")
     assert json.loads(usage.out)["error"]["type"] == "UsageError"
     assert usage.error == usage.data["error"]["message"]
+
+
+def test_a_report_needs_a_folder_with_a_name(cli):
+    assert "--out" in cli("paper", "--out", "").error

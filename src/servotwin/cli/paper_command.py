@@ -11,18 +11,21 @@ from typing import Annotated
 import typer
 
 from servotwin.cli.terminal import emit_json, pairs, show
+from servotwin.errors import OutputError
 
 
 def paper(
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the report goes.")] = Path("paper-report"),
+    out: Annotated[str, typer.Option(metavar="FOLDER", help="Where the report goes.")] = "paper-report",
     force: Annotated[bool, typer.Option("--force", help="Replace a report that exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print paths and headline numbers as JSON.")] = False,
 ) -> None:
     """Reproduce the paper's figures and tables in a report."""
     from servotwin.cli.paper import write_paper_report
 
+    if not out.strip():
+        raise OutputError("--out", got=out, allowed="the name of a folder")
     with _progress() as progress:
-        report = write_paper_report(out, force=force, progress=progress)
+        report = write_paper_report(Path(out), force=force, progress=progress)
     if as_json:
         emit_json({
             "folder": str(report.folder), "report": str(report.page),

@@ -23,8 +23,7 @@ _REQUIRES = (
     "motor.motor_viscous_friction", "gear.gear_reduction",
     "friction.coulomb_torque_forward", "friction.coulomb_torque_backward", "friction.zero_crossing_slope",
     "electronics.bridge_gain", "electronics.comparator_gain", "electronics.voltage_to_pulse_gain",
-    "electronics.pulse_to_voltage_gain", "electronics.command_offset",
-    "potentiometer.feedback_gain", "potentiometer.feedback_offset",
+    "electronics.pulse_to_voltage_gain", "potentiometer.feedback_gain",
 )
 _SIGNALS = (
     "command_voltage", "command_angle", "pulse_width", "armature_voltage", "armature_current", "motor_angle",
@@ -35,7 +34,8 @@ _SIGNALS = (
 class _Averaged(Model):
     """What the two averaged servos share: (38) with offsets, (41), and the command chain."""
 
-    optional = ("electronics.command_pulse_offset", "gear.output_inertia")
+    optional = ("electronics.command_offset", "electronics.command_pulse_offset", "potentiometer.feedback_offset",
+                "gear.output_inertia")
     signals = _SIGNALS
 
     def _plant(self, load: Load, inductance: float) -> Plant:
@@ -44,12 +44,13 @@ class _Averaged(Model):
             friction=(self.value("friction.coulomb_torque_forward"), self.value("friction.coulomb_torque_backward")),
             slope=self.value("friction.zero_crossing_slope"),
             gain=self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain"),
-            p=self.value("potentiometer.feedback_gain"), b_o=self.value("potentiometer.feedback_offset"))
+            p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0))
 
     def _gains(self) -> tuple[float, float, float, float]:
         """k_p1, k_p2, b_i, t_0."""
         return (self.value("electronics.voltage_to_pulse_gain"), self.value("electronics.pulse_to_voltage_gain"),
-                self.value("electronics.command_offset"), self.value_or("electronics.command_pulse_offset", 0.0))
+                self.value_or("electronics.command_offset", 0.0),
+                self.value_or("electronics.command_pulse_offset", 0.0))
 
     def command(self, signal: Signal) -> Pieces:
         """Return v_c [V]: k_p v_i + b_i of a voltage, k_p2 (t_a − t_0) + b_i of a pulse, p q* + b_o of an angle."""
@@ -60,7 +61,7 @@ class _Averaged(Model):
             return signal.pieces.scaled(k_p2, b_i - k_p2 * t_0)
         check_travel(signal, self.servo)
         return signal.pieces.scaled(self.value("potentiometer.feedback_gain"),
-                                    self.value("potentiometer.feedback_offset"))
+                                    self.value_or("potentiometer.feedback_offset", 0.0))
 
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
@@ -71,11 +72,11 @@ class _Averaged(Model):
         if name == "pulse_width":
             return np.asarray(electronics.pulse_width_from_voltage(v_i, k_p1, t_0))
         return np.asarray(potentiometer.angle_from_voltage(
-            drive, self.value("potentiometer.feedback_gain"), self.value("potentiometer.feedback_offset")))
+            drive, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)))
 
     def start_angle(self, drive: float) -> float:
         """Return the angle without error, (v_c − b_o)/p [rad]."""
-        return (drive - self.value("potentiometer.feedback_offset")) / self.value("potentiometer.feedback_gain")
+        return (drive - self.value_or("potentiometer.feedback_offset", 0.0)) / self.value("potentiometer.feedback_gain")
 
 
 @final

@@ -46,10 +46,11 @@ class BoundedServo(Model):
         "motor.motor_viscous_friction", "gear.gear_reduction",
         "friction.coulomb_torque_forward", "friction.coulomb_torque_backward",
         "electronics.bridge_gain", "electronics.comparator_gain",
-        "potentiometer.feedback_gain", "potentiometer.feedback_offset", "supply.open_circuit_voltage",
+        "potentiometer.feedback_gain", "supply.open_circuit_voltage",
     )
     optional = (
-        "gear.output_inertia", "electronics.voltage_deadband", "supply.bridge_drop_voltage", "friction.breakaway_ratio",
+        "gear.output_inertia", "potentiometer.feedback_offset",
+        "electronics.voltage_deadband", "supply.bridge_drop_voltage", "friction.breakaway_ratio",
         "stops.lower_angle", "stops.upper_angle", "stops.restitution",
         "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset", "electronics.command_offset",
         "electronics.pulse_to_voltage_gain", "electronics.one_shot_slope", "electronics.one_shot_offset",
@@ -66,9 +67,6 @@ class BoundedServo(Model):
         if slope is None and k_p2 is None:
             raise MissingParameterError(type(self).__name__, self.servo.name, [
                 "electronics.one_shot_slope (or electronics.pulse_to_voltage_gain)"])
-        if given("electronics.one_shot_offset") is None and given("electronics.command_offset") is None:
-            raise MissingParameterError(type(self).__name__, self.servo.name, [
-                "electronics.one_shot_offset (or electronics.command_offset)"])
         if slope is None:
             self._k_p2 = self.value("electronics.pulse_to_voltage_gain")
             self._slope = 1.0 / self._k_p2
@@ -76,20 +74,26 @@ class BoundedServo(Model):
             self._slope = self.value("electronics.one_shot_slope")
             self._k_p2 = self.value_or("electronics.pulse_to_voltage_gain", 1.0 / self._slope)
         self._t_0 = self.value_or("electronics.command_pulse_offset", 0.0)
-        offset = self.value_or("electronics.command_offset", math.nan)
-        self._T_0 = self.value_or("electronics.one_shot_offset", self._slope * (self._k_p2 * self._t_0 - offset))
-        self._b_i = offset if offset == offset else self._k_p2 * self._t_0 - self._T_0 / self._slope
-        self._compare_calibrations()
+        if given("electronics.one_shot_offset") is None and given("electronics.command_offset") is None:
+            self._T_0 = self._b_i = 0.0
+        else:
+            b_i = self.value_or("electronics.command_offset", math.nan)
+            self._T_0 = self.value_or("electronics.one_shot_offset", self._slope * (self._k_p2 * self._t_0 - b_i))
+            self._b_i = self.value_or("electronics.command_offset",
+                                      self._k_p2 * self._t_0 - self._T_0 / self._slope)
+            self._compare_calibrations()
 
     def _compare_calibrations(self) -> None:
-        width = 1.5e-3  # s, the middle of the RC standard
-        of_pulse = (width - self._T_0) / self._slope
-        of_voltage = self._k_p2 * (width - self._t_0) + self._b_i
-        if abs(of_pulse - of_voltage) > 0.01 * self.value("supply.open_circuit_voltage"):
+        for width in (0.5e-3, 2.5e-3):  # s, the range of Table I; between them both are straight
+            of_pulse = (width - self._T_0) / self._slope
+            of_voltage = self._k_p2 * (width - self._t_0) + self._b_i
+            if abs(of_pulse - of_voltage) <= 0.01 * self.value("supply.open_circuit_voltage"):
+                continue
             warnings.warn(
-                f"{self.servo.name}: at 1500 us electronics.one_shot_slope/one_shot_offset give {of_pulse:.4g} V and "
-                f"electronics.pulse_to_voltage_gain/command_offset {of_voltage:.4g} V; each is used for its own kind "
+                f"{self.servo.name}: at {1e6 * width:.0f} us electronics.one_shot_slope/one_shot_offset give "
+                f"{of_pulse:.4g} V and electronics.pulse_to_voltage_gain/command_offset {of_voltage:.4g} V; each is used for its own kind "
                 "of command", stacklevel=4)
+            return
 
     @property
     def available(self) -> tuple[str, ...]:
@@ -110,7 +114,7 @@ class BoundedServo(Model):
             friction=(self.value("friction.coulomb_torque_forward"), self.value("friction.coulomb_torque_backward")),
             breakaway=self.value_or("friction.breakaway_ratio", 1.0),
             gain=self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain"),
-            p=self.value("potentiometer.feedback_gain"), b_o=self.value("potentiometer.feedback_offset"),
+            p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0),
             deadband=self.value_or("electronics.voltage_deadband", 0.0), voltage_limit=self.voltage_limit,
             stops=(self.value_or("stops.lower_angle", -math.inf), self.value_or("stops.upper_angle", math.inf)),
             restitution=self.value_or("stops.restitution", 0.0))
@@ -123,7 +127,7 @@ class BoundedServo(Model):
             return signal.pieces.scaled(1.0 / self._slope, -self._T_0 / self._slope)
         check_travel(signal, self.servo)
         return signal.pieces.scaled(self.value("potentiometer.feedback_gain"),
-                                    self.value("potentiometer.feedback_offset"))
+                                    self.value_or("potentiometer.feedback_offset", 0.0))
 
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
@@ -132,11 +136,11 @@ class BoundedServo(Model):
         if name == "command_voltage":
             return (drive - self._b_i) / (self.value("electronics.voltage_to_pulse_gain") * self._k_p2)
         return np.asarray(potentiometer.angle_from_voltage(
-            drive, self.value("potentiometer.feedback_gain"), self.value("potentiometer.feedback_offset")))
+            drive, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)))
 
     def start_angle(self, drive: float) -> float:
         """Return the angle without error, (v_c − b_o)/p, within the stops [rad]."""
-        q = (drive - self.value("potentiometer.feedback_offset")) / self.value("potentiometer.feedback_gain")
+        q = (drive - self.value_or("potentiometer.feedback_offset", 0.0)) / self.value("potentiometer.feedback_gain")
         return min(max(q, self.value_or("stops.lower_angle", -math.inf)),
                    self.value_or("stops.upper_angle", math.inf))
 

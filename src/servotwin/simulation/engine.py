@@ -51,6 +51,8 @@ class State:
         Where the present motion began, and the state there.
     inputs : Inputs
         The pieces of command and external torque in force since then.
+    plant : Plant
+        The numbers of servo and load by which it moves since then.
     step : float
         Length that the integrator would try next [s].
     """
@@ -62,6 +64,7 @@ class State:
     anchor_time: float = 0.0
     anchor: Vector = (0.0, 0.0, 0.0)
     inputs: Inputs | None = None
+    plant: Plant | None = None
     step: float = _FIRST_STEP
 
     def __getitem__(self, name: str) -> float:
@@ -115,7 +118,7 @@ def run(plant: Plant, command: Pieces, torque: Pieces, state: State, until: floa
         if idle > _CHATTER:
             raise _failure(Status.CHATTER, before)
         if record is not None:
-            if segment.end > segment.start:
+            if segment.end > segment.start or not record.segments:
                 record.segments.append(segment)
             if event is not None:
                 record.events.append(event)
@@ -131,13 +134,14 @@ def _anchored(plant: Plant, command: Pieces, torque: Pieces, state: State) -> tu
     u, u_end = command.at(state.time)
     tau, tau_end = torque.at(state.time)
     inputs = Inputs(u, tau)
-    if state.mode is None or inputs != state.inputs:
+    if state.mode is None or inputs != state.inputs or plant != state.plant:
         t = state.time
         q, w, i = state.values
         v, dv, load = piece_value(u, t), piece_rate(u, t), piece_value(tau, t)
         zone = hybrid.zone_of(plant, v - plant.p * q - plant.b_o, dv - plant.p * w)
         contact = hybrid.contact_of(plant, zone, v, load, q, w, i, _in_one_piece(plant, inputs))
-        state = replace(state, mode=Mode(zone, contact), anchor_time=t, anchor=state.values, inputs=inputs)
+        state = replace(state, mode=Mode(zone, contact), anchor_time=t, anchor=state.values, inputs=inputs,
+                        plant=plant)
     return state, min(u_end, tau_end)
 
 

@@ -66,13 +66,13 @@ def _crossing(guard: Callable[[float], tuple[float, float]], a: float, at_a: tup
     if at_b[0] >= _BELOW:
         return math.inf
     if at_a[0] <= 0.0:
-        # It starts at zero. If it rises first, the fall is after its highest point.
-        if at_a[1] <= 0.0 or at_b[1] >= 0.0:
-            return a
-        top = _root(lambda s: (guard(s)[1], math.nan), a, b, at_a[1], at_b[1])
-        if guard(top)[0] <= 0.0:
-            return a
-        return _root(guard, top, b, 1.0, at_b[0])
+        # It starts at zero, to rounding, and so may its rate: look whether it rises before it falls.
+        for k in range(1, 50):
+            s = a + (b - a) * 0.5**k
+            value = guard(s)[0]
+            if value > 0.0:
+                return _root(guard, s, b, value, at_b[0])
+        return a
     return _root(guard, a, b, at_a[0], at_b[0])
 
 

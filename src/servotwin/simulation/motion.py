@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Protocol
 
 from servotwin.models.kernels import hybrid, rodas, second_order
@@ -259,14 +259,10 @@ def integrated_step(plant: Plant, mode: Mode, y: Vector, inputs: Inputs, t0: flo
     """
     u, tau = inputs.u, inputs.tau
 
-    u0, tau0 = piece_value(u, t0), piece_value(tau, t0)
-    steady = u.slope == u.amplitude == tau.slope == tau.amplitude == 0.0
-
-    def rates(t: float, q: float, w: float, i: float) -> tuple[float, float]:
-        if steady:
-            return hybrid.rates(plant, mode, u0, tau0, q, w, i)
-        return hybrid.rates(plant, mode, piece_value(u, t), piece_value(tau, t), q, w, i)
-
+    if u.slope == u.amplitude == tau.slope == tau.amplitude == 0.0:
+        rates = partial(_rates_under_constants, plant, mode, u.value, tau.value)
+    else:
+        rates = partial(_rates_under_pieces, plant, mode, u, tau)
     *jac, Fu, Ft, Eu = hybrid.jacobian(plant, mode, y[0], y[1])
     du, dtau = piece_rate(u, t0), piece_rate(tau, t0)
     slopes = (Fu * du + Ft * dtau, Eu * du)
@@ -283,6 +279,16 @@ def integrated_step(plant: Plant, mode: Mode, y: Vector, inputs: Inputs, t0: flo
         if t0 + h == t0:
             break
     return None, h
+
+
+def _rates_under_constants(plant: Plant, mode: Mode, u: float, tau: float, t: float, q: float, w: float,
+                           i: float) -> tuple[float, float]:
+    return hybrid.rates(plant, mode, u, tau, q, w, i)
+
+
+def _rates_under_pieces(plant: Plant, mode: Mode, u: Piece, tau: Piece, t: float, q: float, w: float,
+                        i: float) -> tuple[float, float]:
+    return hybrid.rates(plant, mode, piece_value(u, t), piece_value(tau, t), q, w, i)
 
 
 def _polynomial(piece: Piece, t0: float) -> tuple[float, float]:

@@ -125,6 +125,9 @@ class Simulator:
              record: Record | None) -> State:
         if not isinstance(state, State):
             raise InputError("advance(state)", got=state, allowed="a state of this simulator")
+        if state.names != self.model.layout:
+            raise InputError("advance(state)", got=f"a state of {', '.join(state.names)}",
+                             allowed=f"one of {', '.join(self.model.layout)}, as {type(self.model).__name__} has")
         if not (is_finite(until) and until >= state.time):
             raise InputError("advance(until)", got=until, allowed=f"a finite time from {state.time:g} s on")
         if not is_finite(external_torque):

@@ -62,6 +62,7 @@ EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper st
 
 _SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
 _REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
+_REST_HEIGHT = 4e-15  # relative to the angle: a rebound this low is rounding
 _TIE = 1e-13  # V
 
 
@@ -306,7 +307,9 @@ def _rebound(plant: Plant, zone: int, kind: int, u: float, tau: float, w: float,
              i: float) -> tuple[Mode, float, float]:
     q = plant.upper if kind == UPPER else plant.lower
     w = -plant.restitution * w
-    if abs(w) < _REST_SPEED:
+    back, _ = rates(plant, Mode(zone, _sliding(plant, w > 0.0)), u, tau, q, w, i)
+    low = back * w < 0.0 and 0.5 * w * w < abs(back) * _REST_HEIGHT * max(abs(q), 1.0)
+    if abs(w) < _REST_SPEED or low:
         torque = driving_torque(plant, zone, u, tau, q, i)
         return Mode(zone, _contact_from_rest(plant, torque, q)), q, 0.0
     return Mode(zone, _sliding(plant, w > 0.0)), q, w

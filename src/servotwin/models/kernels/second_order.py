@@ -123,17 +123,20 @@ def propagate_with_integral(coefficients: tuple[float, ...], s: float) -> tuple[
     w = w0 * dg + r * g + f1 * G1
     integral = q0 * s + w0 * G1 + r * G2 + f1 * G3
     if fs != 0.0:
-        # The steady sinusoid, less the free motion that starts as it does.
+        # The steady sinusoid, less the free motion that starts as it does; by differences, so that a short motion
+        # loses no digits. Its start is qp, wp, and 1 - ġ = 2 a g + c G1.
         re = c - omega * omega
         im = 2.0 * a * omega
         scale = fs / (re * re + im * im)
-        sp, cp = math.sin(phase), math.cos(phase)
-        st, ct = math.sin(phase + omega * s), math.cos(phase + omega * s)
-        qp = scale * (re * sp - im * cp)
-        wp = scale * omega * (re * cp + im * sp)
-        q += scale * (re * st - im * ct) - qp * (1.0 - c * G1) - wp * g
-        w += scale * omega * (re * ct + im * st) - wp * dg + c * qp * g
-        integral += (scale / omega * (re * (cp - ct) - im * (st - sp)) - qp * (s - c * G2) - wp * G1)
+        qp = scale * (re * math.sin(phase) - im * math.cos(phase))
+        wp = scale * omega * (re * math.cos(phase) + im * math.sin(phase))
+        half = 0.5 * omega * s
+        chord = 2.0 * scale * math.sin(half)
+        ds = chord * math.cos(phase + half)
+        dc = -chord * math.sin(phase + half)
+        q += re * ds - im * dc + qp * c * G1 - wp * g
+        w += omega * (re * dc + im * ds) + wp * (2.0 * a * g + c * G1) + c * qp * g
+        integral += -(re * dc + im * ds) / omega - qp * (s - c * G2) - wp * G1
     return q, w, integral
 
 
