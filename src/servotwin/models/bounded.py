@@ -91,8 +91,8 @@ class BoundedServo(Model):
                 continue
             warnings.warn(
                 f"{self.servo.name}: at {1e6 * width:.0f} us electronics.one_shot_slope/one_shot_offset give "
-                f"{of_pulse:.4g} V and electronics.pulse_to_voltage_gain/command_offset {of_voltage:.4g} V; each is used for its own kind "
-                "of command", stacklevel=4)
+                f"{of_pulse:.4g} V and electronics.pulse_to_voltage_gain/command_offset "
+                f"{of_voltage:.4g} V; each is used for its own kind of command", stacklevel=4)
             return
 
     @property
