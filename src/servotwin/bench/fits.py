@@ -44,11 +44,6 @@ class LineFit:
         """The largest magnitude of a residual."""
         return max(abs(r) for r in self.residuals)
 
-    @property
-    def residual_deviation(self) -> float:
-        """Standard deviation of the residuals, with n − 2 degrees of freedom."""
-        return math.sqrt(sum(r * r for r in self.residuals) / (len(self.residuals) - 2))
-
     @overload
     def __call__(self, x: float) -> float: ...
     @overload

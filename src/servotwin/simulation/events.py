@@ -22,30 +22,26 @@ def first_event(plant: Plant, mode: Mode, motion: Motion, inputs: Inputs, kinds:
     """Return the time since the anchor t0 and the kind of the first event in (s0, s1]; (inf, -1) where none is."""
     u, tau = inputs.u, inputs.tau
 
-    def values(s: float) -> list[tuple[float, float]]:
+    def values(s: float, kinds: tuple[int, ...]) -> list[tuple[float, float]]:
         t = t0 + s
         y = motion.state(s)
         dw, di = motion.acceleration(s, y)
         inputs_now = (piece_value(u, t), piece_rate(u, t), piece_value(tau, t), piece_rate(tau, t))
         return [hybrid.guard(plant, mode, kind, *inputs_now, *y, dw, di) for kind in kinds]
 
-    def one(kind: int, s: float) -> tuple[float, float]:
-        t = t0 + s
-        y = motion.state(s)
-        dw, di = motion.acceleration(s, y)
-        return hybrid.guard(plant, mode, kind, piece_value(u, t), piece_rate(u, t), piece_value(tau, t),
-                            piece_rate(tau, t), *y, dw, di)
+    def guard_of(kind: int) -> Callable[[float], tuple[float, float]]:
+        return lambda s: values(s, (kind,))[0]
 
     if not kinds:
         return math.inf, -1
-    left, at_left = s0, values(s0)
+    left, at_left = s0, values(s0, kinds)
     for right in motion.intervals(s0, s1):
         if right <= left:
             continue
-        at_right = values(right)
+        at_right = values(right, kinds)
         first, found = math.inf, -1
         for k, kind in enumerate(kinds):
-            s = _crossing(lambda s, kind=kind: one(kind, s), left, at_left[k], right, at_right[k])  # type: ignore[misc]
+            s = _crossing(guard_of(kind), left, at_left[k], right, at_right[k])
             if s < first:
                 first, found = s, kind
         if found >= 0:

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels import hybrid
 from servotwin.models.samples import Samples
 from servotwin.simulation.engine import Segment
 
@@ -84,7 +83,3 @@ class Trajectory:
         fractions = np.linspace(0.0, 1.0, per_interval, endpoint=False)
         inner = (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel()
         return np.append(inner, edges[-1])
-
-    def is_still(self, index: int) -> bool:
-        """Whether the shaft stands still during a segment."""
-        return hybrid.at_rest(self.segments[index].mode.contact)

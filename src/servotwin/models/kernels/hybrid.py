@@ -53,7 +53,6 @@ class Mode(NamedTuple):
 
 SATURATED_BACKWARD, LINEAR_BACKWARD, DEAD, LINEAR, SATURATED = -2, -1, 0, 1, 2
 FREE, FORWARD, BACKWARD, CORE, STUCK, ON_LOWER, ON_UPPER = range(7)
-CONTACT_NAMES = ("free", "forward", "backward", "core", "stuck", "on lower stop", "on upper stop")
 
 # What can end a mode. A guard is at least zero as long as the mode lasts.
 SPEED, CORE_FORWARD, CORE_BACKWARD, ZONE_UP, ZONE_DOWN, UPPER, LOWER, RELEASE_FORWARD, RELEASE_BACKWARD = range(9)
