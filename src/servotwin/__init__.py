@@ -12,7 +12,7 @@ __version__ = "0.1.0"
 _LAZY = {
     **dict.fromkeys(("Servo", "catalog_names", "load_dataset", "load_servo", "servo_from_values"), "parameters"),
     **dict.fromkeys(
-        ("AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor"), "models"),
+        ("AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "PulseServo"), "models"),
     **dict.fromkeys(("Result", "Simulator", "State", "Status", "simulate"), "simulation"),
 }
 _MODULES = ("bench", "errors", "linear", "loads", "models", "parameters", "physics", "plotting", "signals",

@@ -14,6 +14,7 @@ from servotwin.models import AveragedServoInductive as AveragedServoInductive
 from servotwin.models import BoundedServo as BoundedServo
 from servotwin.models import DCMotor as DCMotor
 from servotwin.models import GearedMotor as GearedMotor
+from servotwin.models import PulseServo as PulseServo
 from servotwin.parameters import Servo as Servo
 from servotwin.parameters import catalog_names as catalog_names
 from servotwin.parameters import load_dataset as load_dataset

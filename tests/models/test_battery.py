@@ -173,7 +173,7 @@ def test_power_at_the_spindle_is_what_the_load_gets(servo, name):
     """Work of load_torque = kinetic energy of the load + its losses."""
     model = MODELS[name](servo)
     load = loads.Inertia(3e-3) + loads.Viscous(1e-2)
-    result = st.simulate(model, COMMANDS["step"], duration=0.5, load=load, output_step=1e-4)
+    result = st.simulate(model, COMMANDS["step"], duration=0.5, load=load, output_step=2e-5)
     work = np.trapezoid(result["load_torque"] * result["output_speed"], result.time)
     kinetic = 0.5 * 3e-3 * result["output_speed"][-1] ** 2
     assert work == pytest.approx(kinetic + result.energy.load, rel=2e-3, abs=1e-7)

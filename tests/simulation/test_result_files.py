@@ -22,6 +22,8 @@ COLUMNS = {
     "motor_speed_deg_per_s": ("motor_speed", 180.0 / math.pi), "motor_torque_Nm": ("motor_torque", 1.0),
     "output_angle_deg": ("output_angle", 180.0 / math.pi), "output_speed_deg_per_s": ("output_speed", 180.0 / math.pi),
     "load_torque_Nm": ("load_torque", 1.0), "feedback_voltage_V": ("feedback_voltage", 1.0),
+    "error_time_us": ("error_time", 1e6), "drive": ("drive", 1.0), "bus_voltage_V": ("bus_voltage", 1.0),
+    "supply_current_A": ("supply_current", 1.0),
 }
 
 
@@ -58,7 +60,7 @@ def test_a_signal_cannot_be_changed(result):
     assert result[name] is result[name]
 
 
-@pytest.mark.parametrize("name", ["speed", "", "output_angel", "Time", "bus_voltage", 0, None, ("time",)])
+@pytest.mark.parametrize("name", ["speed", "", "output_angel", "Time", "winding_temperature", 0, None, ("time",)])
 def test_an_unknown_signal_is_a_key_error_with_the_known_ones(result, name):
     with pytest.raises(KeyError) as caught:
         result[name]

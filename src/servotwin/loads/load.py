@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -61,6 +61,8 @@ class Load:
     (0.003, 0.1)
     """
 
+    not_negative: ClassVar[tuple[str, ...]] = ("inertia", "viscous_friction", "coulomb_torque")
+
     inertia: float = 0.0
     viscous_friction: float = 0.0
     torque: float = 0.0
@@ -70,7 +72,7 @@ class Load:
     recorded: tuple[Recorded, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("inertia", "viscous_friction", "coulomb_torque"):
+        for name in self.not_negative:
             value = getattr(self, name)
             if not (is_finite(value) and value >= 0.0):
                 raise LoadError(f"load.{name}", got=value, allowed="a finite number of at least 0")
@@ -114,29 +116,36 @@ class Load:
     @cached_property
     def elasticity(self) -> tuple[float, float]:
         """Stiffness [N m/rad] and rest angle [rad] of the one spring that all springs add up to."""
+        if len(self.springs) == 1:
+            return self.springs[0].stiffness, self.springs[0].rest_angle
         stiffness = sum(s.stiffness for s in self.springs)
-        if stiffness == 0.0:
-            return 0.0, 0.0
-        return stiffness, sum(s.stiffness * s.rest_angle for s in self.springs) / stiffness
+        torque = sum(s.stiffness * s.rest_angle for s in self.springs)
+        return _number(stiffness), _number(torque / (stiffness + (stiffness == 0.0)))
 
     @cached_property
     def gravity(self) -> tuple[float, float]:
         """Amplitude [N m] and hanging angle [rad] of the one sine of q that all pendulums add up to."""
         if len(self.pendulums) == 1:
             return self.pendulums[0].gravity_torque, self.pendulums[0].hanging_angle
-        c = sum(p.gravity_torque * math.cos(p.hanging_angle) for p in self.pendulums)
-        s = sum(p.gravity_torque * math.sin(p.hanging_angle) for p in self.pendulums)
-        return math.hypot(c, s), math.atan2(s, c)
+        c = sum(p.gravity_torque * np.cos(p.hanging_angle) for p in self.pendulums)
+        s = sum(p.gravity_torque * np.sin(p.hanging_angle) for p in self.pendulums)
+        return _number(np.hypot(c, s)), _number(np.arctan2(s, c))
 
     @cached_property
     def torque_pieces(self) -> Pieces:
         """The part of τ_ext that depends on time alone [N m]."""
-        if not self.recorded:
-            return constant_pieces(self.torque)
+        return self._recorded_pieces(self.torque) if self.recorded else constant_pieces(self.torque)
+
+    @cached_property
+    def recorded_pieces(self) -> Pieces | None:
+        """The sum of all recordings [N m], None without any."""
+        return self._recorded_pieces(0.0) if self.recorded else None
+
+    def _recorded_pieces(self, constant: float) -> Pieces:
         t = np.unique(np.concatenate([r.time for r in self.recorded]))
         first, last = self.time_span
         t = t[(t >= first) & (t <= last)]
-        y = self.torque + sum(np.interp(t, r.time, r.torque) for r in self.recorded)
+        y = constant + sum(np.interp(t, r.time, r.torque) for r in self.recorded)
         with np.errstate(over="ignore"):
             slope = np.diff(y) / np.diff(t)
         if not np.isfinite(slope).all():
@@ -171,6 +180,11 @@ class Load:
         if start < first - slack or end > last + slack:
             raise LoadError("recorded torque", got=f"a run from {start:g} to {end:g} s",
                             allowed=f"times from {first:g} to {last:g} s, which the record covers")
+
+
+def _number(value: Any) -> float:
+    """Return a number as a plain float, and a column as it is."""
+    return value if np.ndim(value) else float(value)
 
 
 def as_load(load: Part | Load | None) -> Load:

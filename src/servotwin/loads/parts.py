@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -20,6 +20,8 @@ STANDARD_GRAVITY = 9.80665  # m/s², 3rd CGPM (1901)
 class _Numbers(Part):
     """A part that is given by numbers: all finite, kept as floats, and summed by name unless it says otherwise."""
 
+    not_negative: ClassVar[tuple[str, ...]] = ()
+
     def __post_init__(self) -> None:
         for f in fields(self):  # type: ignore[arg-type]
             value = getattr(self, f.name)
@@ -28,15 +30,12 @@ class _Numbers(Part):
             if not is_finite(value):
                 raise LoadError(f"{type(self).__name__}({f.name})", got=value, allowed="a finite number")
             object.__setattr__(self, f.name, float(value))  # a float32 would lower the precision of all that it meets
+            if f.name in self.not_negative and not value >= 0.0:
+                raise LoadError(f"{type(self).__name__}({f.name})", got=value, allowed="a number of at least 0")
 
     def as_load(self) -> Load:
         """Return this part alone, in normal form."""
         return Load(**vars(self))
-
-
-def _check(part: Part, name: str, good: bool, allowed: str) -> None:
-    if not good:
-        raise LoadError(f"{type(part).__name__}({name})", got=getattr(part, name), allowed=allowed)
 
 
 @dataclass(frozen=True)
@@ -60,11 +59,9 @@ class Inertia(_Numbers):
     0.001
     """
 
-    inertia: float
+    not_negative: ClassVar[tuple[str, ...]] = ("inertia",)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check(self, "inertia", self.inertia >= 0.0, "a number of at least 0 [kg m²]")
+    inertia: float
 
 
 @dataclass(frozen=True)
@@ -77,11 +74,9 @@ class Viscous(_Numbers):
     0.0001
     """
 
-    viscous_friction: float
+    not_negative: ClassVar[tuple[str, ...]] = ("viscous_friction",)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check(self, "viscous_friction", self.viscous_friction >= 0.0, "a number of at least 0 [N m s/rad]")
+    viscous_friction: float
 
 
 @dataclass(frozen=True)
@@ -107,11 +102,9 @@ class Coulomb(_Numbers):
     0.05
     """
 
-    coulomb_torque: float
+    not_negative: ClassVar[tuple[str, ...]] = ("coulomb_torque",)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check(self, "coulomb_torque", self.coulomb_torque >= 0.0, "a number of at least 0 [N m]")
+    coulomb_torque: float
 
 
 @dataclass(frozen=True)
@@ -131,12 +124,10 @@ class Spring(_Numbers):
     (2.0, 0.5)
     """
 
+    not_negative: ClassVar[tuple[str, ...]] = ("stiffness",)
+
     stiffness: float
     rest_angle: float = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        _check(self, "stiffness", self.stiffness >= 0.0, "a number of at least 0 [N m/rad]")
 
     def as_load(self) -> Load:
         """Return this part alone, in normal form."""
@@ -166,17 +157,13 @@ class Pendulum(_Numbers):
     0.11768
     """
 
+    not_negative: ClassVar[tuple[str, ...]] = ("mass", "length", "inertia", "gravity")
+
     mass: float
     length: float
     inertia: float | None = None
     hanging_angle: float = 0.0
     gravity: float = STANDARD_GRAVITY
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        for name in ("mass", "length", "gravity"):
-            _check(self, name, getattr(self, name) >= 0.0, "a number of at least 0")
-        _check(self, "inertia", self.inertia is None or self.inertia >= 0.0, "a number of at least 0 [kg m²]")
 
     def as_load(self) -> Load:
         """Return this part alone, in normal form."""

@@ -4,6 +4,7 @@ from servotwin.models.averaged import AveragedServo, AveragedServoInductive
 from servotwin.models.base import Model
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.motors import DCMotor, GearedMotor
+from servotwin.models.pulse import PulseServo
 
 MODELS: dict[str, type[Model]] = {
     "dc-motor": DCMotor,
@@ -11,6 +12,8 @@ MODELS: dict[str, type[Model]] = {
     "averaged": AveragedServo,
     "averaged-inductive": AveragedServoInductive,
     "bounded": BoundedServo,
+    "pulse": PulseServo,
 }
 
-__all__ = ["MODELS", "AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "Model"]
+__all__ = ["MODELS", "AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "Model",
+           "PulseServo"]

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, ClassVar, final
+from typing import TYPE_CHECKING, Any, ClassVar, Self, final
+
+import numpy as np
 
 from servotwin.errors import CommandError, InputError, MissingParameterError, UnknownNameError
 from servotwin.models import outputs
+from servotwin.models.columns import LaneServo, LaneSignal
 from servotwin.parameters import Servo
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
+    from servotwin.models.kernels.frame import Chip
     from servotwin.models.kernels.hybrid import Plant
     from servotwin.models.samples import Samples
     from servotwin.physics.pieces import Pieces
@@ -52,9 +55,21 @@ class Model(ABC):
             raise MissingParameterError(type(self).__name__, servo.name, missing)
         self._servo = servo
         self._prepare()
+        self._warn()
+
+    @final
+    def over(self, servo: LaneServo) -> Self:
+        """Return this model over many lanes: its numbers may be columns (B, 1), and so is what it computes of them."""
+        lanes = object.__new__(type(self))
+        lanes._servo = servo  # type: ignore[assignment]  # reads as a servo does
+        lanes._prepare()
+        return lanes
 
     def _prepare(self) -> None:  # noqa: B027 - a hook that most models do not need
-        """Check what depends on several parameters, once."""
+        """Derive what depends on several parameters, once."""
+
+    def _warn(self) -> None:  # noqa: B027 - likewise
+        """Warn of what is odd in one servo."""
 
     @property
     def servo(self) -> Servo:
@@ -78,8 +93,10 @@ class Model(ABC):
 
     @final
     def value(self, name: str) -> float:
-        """Return a required parameter (SI)."""
-        number = self._servo.get(name)
+        """Return a required parameter (SI); over lanes it may be a column."""
+        number: Any = self._servo.get(name)
+        if isinstance(number, np.ndarray):
+            return number  # type: ignore[return-value]  # the formulas take both
         if not isinstance(number, int | float):
             raise MissingParameterError(type(self).__name__, self._servo.name, [name])
         return float(number)
@@ -87,7 +104,9 @@ class Model(ABC):
     @final
     def value_or(self, name: str, default: float) -> float:
         """Return an optional parameter (SI), or its default where the servo does not give it."""
-        number = self._servo.get(name)
+        number: Any = self._servo.get(name)
+        if isinstance(number, np.ndarray):
+            return number  # type: ignore[return-value]
         return float(number) if isinstance(number, int | float) else default
 
     @final
@@ -134,21 +153,47 @@ class Model(ABC):
             raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.available))
         return outputs.SIGNALS[name].compute(self, samples, drive, load)
 
+    def chip(self, signal: Signal | None = None) -> Chip | None:
+        """Return the numbers of the frame logic under this command; None for models without pulses."""
+        return None
+
+    def edges(self, signal: Signal) -> tuple[float, ...] | None:
+        """Return when the frames of a command start [s]; None where they come regularly, or there are none."""
+        return None
+
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
         raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.available))
 
 
-def check_travel(signal: Signal, servo: Servo) -> None:
+def clipped(x: float, low: float, high: float) -> float:
+    """Return the number, or each of a column, within its bounds."""
+    if any(isinstance(number, np.ndarray) for number in (x, low, high)):
+        return np.minimum(np.maximum(x, low), high)  # type: ignore[no-any-return]
+    return min(max(x, low), high)
+
+
+def check_travel(signal: Signal | LaneSignal, servo: Servo) -> None:
     """Raise CommandError if an angle command leaves the travel that the servo gives."""
-    lowest, highest = signal.pieces.bounds(signal.pieces.table[-1].start)
-    lower = servo.get("stops.lower_angle")
-    upper = servo.get("stops.upper_angle")
-    low = lower if isinstance(lower, int | float) else -math.inf
-    high = upper if isinstance(upper, int | float) else math.inf
+    lowest: Any
+    highest: Any
+    if isinstance(signal, LaneSignal):
+        lowest, highest = signal.extremes
+    else:
+        lowest, highest = signal.pieces.bounds(signal.pieces.table[-1].start)
+    lower: Any = servo.get("stops.lower_angle")
+    upper: Any = servo.get("stops.upper_angle")
+    low = -math.inf if lower is None else lower
+    high = math.inf if upper is None else upper
     slack = 1e-9
-    if lowest < low - slack or highest > high + slack:
-        angle = lowest if lowest < low - slack else highest
-        raise CommandError(
-            "angle command", got=f"{math.degrees(angle):.6g} deg",
-            allowed=f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg, the travel of {servo.name}")
+    outside = (lowest < low - slack) | (highest > high + slack)
+    if not np.any(outside):
+        return
+    lane = int(np.argmax(np.ravel(outside)))
+    lowest, highest, low, high = (float(np.ravel(x)[lane if np.size(x) > 1 else 0])
+                                  for x in (lowest, highest, low, high))
+    angle = lowest if lowest < low - slack else highest
+    raise CommandError(
+        f"angle command of lane {signal.lanes[lane]}" if isinstance(signal, LaneSignal) else "angle command",
+        got=f"{math.degrees(angle):.6g} deg",
+        allowed=f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg, the travel of {servo.name}")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from servotwin.errors import MissingParameterError
-from servotwin.models.base import Model, check_travel
+from servotwin.models.base import Model, check_travel, clipped
 from servotwin.models.kernels.hybrid import Plant
 from servotwin.models.plant import make_plant
 from servotwin.physics import potentiometer
@@ -81,9 +81,11 @@ class BoundedServo(Model):
             self._T_0 = self.value_or("electronics.one_shot_offset", self._slope * (self._k_p2 * self._t_0 - b_i))
             self._b_i = self.value_or("electronics.command_offset",
                                       self._k_p2 * self._t_0 - self._T_0 / self._slope)
-            self._compare_calibrations()
 
-    def _compare_calibrations(self) -> None:
+    def _warn(self) -> None:
+        given = self.servo.get
+        if given("electronics.one_shot_offset") is None and given("electronics.command_offset") is None:
+            return
         for width in (0.5e-3, 2.5e-3):  # s, the range of Table I; between them both are straight
             of_pulse = (width - self._T_0) / self._slope
             of_voltage = self._k_p2 * (width - self._t_0) + self._b_i
@@ -92,7 +94,7 @@ class BoundedServo(Model):
             warnings.warn(
                 f"{self.servo.name}: at {1e6 * width:.0f} us electronics.one_shot_slope/one_shot_offset give "
                 f"{of_pulse:.4g} V and electronics.pulse_to_voltage_gain/command_offset "
-                f"{of_voltage:.4g} V; each is used for its own kind of command", stacklevel=4)
+                f"{of_voltage:.4g} V; each is used for its own kind of command", stacklevel=3)
             return
 
     @property
@@ -141,7 +143,6 @@ class BoundedServo(Model):
     def start_angle(self, drive: float) -> float:
         """Return the angle without error, (v_c − b_o)/p, within the stops [rad]."""
         q = (drive - self.value_or("potentiometer.feedback_offset", 0.0)) / self.value("potentiometer.feedback_gain")
-        return min(max(q, self.value_or("stops.lower_angle", -math.inf)),
-                   self.value_or("stops.upper_angle", math.inf))
+        return clipped(q, self.value_or("stops.lower_angle", -math.inf), self.value_or("stops.upper_angle", math.inf))
 
 

@@ -1,4 +1,7 @@
-"""Output signals: what each one is, from states at many times, by the laws of `physics`."""
+"""Output signals: what each one is, from states at many times, by the laws of `physics`.
+
+Everything broadcasts: over n times, and over lanes and times (B, T) where numbers of the model are columns (B, 1).
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.models.circuit import circuit_of
 from servotwin.models.kernels import hybrid
-from servotwin.physics import electronics, friction, gear, motor, potentiometer
+from servotwin.physics import friction, gear, motor, potentiometer
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
@@ -29,26 +33,6 @@ class Output(NamedTuple):
     compute: Callable[[Model, Samples, Pieces, Load], Array]
 
 
-def armature_voltage(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
-    """Return v_a [V]: the command itself for motors, (38) with offsets, deadband and limit for servos."""
-    return voltage_of(model.pack(load), samples, drive(samples.time))
-
-
-def voltage_of(plant: Plant, samples: Samples, u: Array) -> Array:
-    """Return v_a [V] for a command u [V]."""
-    error = electronics.feedback_error(u, potentiometer.feedback_voltage(samples.angle, plant.p, plant.b_o))
-    return np.asarray(electronics.bounded_armature_voltage(
-        error, 2.0 * plant.half_deadband, plant.gain, 1.0, plant.V_max))
-
-
-def current_of(plant: Plant, samples: Samples, u: Array) -> Array:
-    """Return i_a [A]: the state where there is inductance, else what follows from (7) at once."""
-    if plant.L > 0.0:
-        return samples.current
-    return np.asarray(motor.steady_armature_current(
-        voltage_of(plant, samples, u), samples.speed, plant.R, plant.K_b))
-
-
 def friction_of(plant: Plant, samples: Samples, net: Array) -> tuple[Array, Array]:
     """Return the friction torques of servo and load [N m], against +q; `net` is N k_a i − τ_ext [N m].
 
@@ -56,7 +40,7 @@ def friction_of(plant: Plant, samples: Samples, net: Array) -> tuple[Array, Arra
     sharing is assumed: statics does not tell); what remains then is carried by a stop.
     """
     w = samples.speed
-    if plant.kappa > 0.0:
+    if np.any(plant.kappa > 0.0):
         own = friction.smoothed_coulomb_torque(w, plant.F_forward, plant.F_backward, plant.kappa)
         return np.asarray(own), plant.coulomb * np.tanh(plant.kappa * w)
     forward, backward = samples.contact == hybrid.FORWARD, samples.contact == hybrid.BACKWARD
@@ -83,8 +67,7 @@ class Torques(NamedTuple):
 def torques_of(model: Model, samples: Samples, drive: Pieces, load: Load) -> Torques:
     """Return all torques that act at the output shaft."""
     plant = model.pack(load)
-    u = drive(samples.time)
-    drive_torque = plant.K * current_of(plant, samples, u)
+    drive_torque = plant.K * circuit_of(model, plant, samples, drive).armature_current
     external = load.external_torque(samples.time, samples.angle)
     own, of_load = friction_of(plant, samples, drive_torque - external)
     acceleration = (drive_torque - plant.b * samples.speed - own - of_load - external) / plant.J
@@ -103,8 +86,15 @@ def _reduction(model: Model) -> float:
     return model.value("gear.gear_reduction") if "gear.gear_reduction" in model.requires else 1.0
 
 
+def _electrical(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
+    def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+        values: Array = getattr(circuit_of(model, model.pack(load), samples, drive), name)
+        return values
+    return compute
+
+
 def _current(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
-    return current_of(model.pack(load), samples, drive(samples.time))
+    return circuit_of(model, model.pack(load), samples, drive).armature_current
 
 
 def _motor_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
@@ -127,8 +117,11 @@ SIGNALS: dict[str, Output] = {
     "command_voltage": Output("V", "voltage command v_i", _commanded("command_voltage")),
     "command_angle": Output("rad", "angle that the command asks for", _commanded("command_angle")),
     "pulse_width": Output("s", "pulse width t_a of the command", _commanded("pulse_width")),
-    "armature_voltage": Output("V", "voltage v_a at the motor", armature_voltage),
-    "armature_current": Output("A", "current i_a through the motor", _current),
+    "error_time": Output("s", "error e that the chip has decided on last",
+                         lambda model, samples, drive, load: samples.error),
+    "drive": Output("1", "how the bridge drives: -1, 0 or +1", lambda model, samples, drive, load: samples.drive),
+    "armature_voltage": Output("V", "voltage v_a at the motor", _electrical("armature_voltage")),
+    "armature_current": Output("A", "current i_a through the motor", _electrical("armature_current")),
     "motor_angle": Output("rad", "motor shaft angle q_m", lambda model, samples, drive, load: np.asarray(
         gear.motor_from_output(samples.angle, _reduction(model)))),
     "motor_speed": Output("rad/s", "motor shaft speed", lambda model, samples, drive, load: np.asarray(
@@ -138,4 +131,6 @@ SIGNALS: dict[str, Output] = {
     "output_speed": Output("rad/s", "output shaft speed", lambda model, samples, drive, load: samples.speed),
     "load_torque": Output("N m", "torque τ_L delivered to the load", load_torque),
     "feedback_voltage": Output("V", "potentiometer voltage v_o", _feedback),
+    "bus_voltage": Output("V", "voltage of the supply under load", _electrical("bus_voltage")),
+    "supply_current": Output("A", "current that the supply gives", _electrical("supply_current")),
 }

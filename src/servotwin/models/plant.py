@@ -16,7 +16,7 @@ def make_plant(model: Model, load: Load, *, reduction: float, inductance: float 
                friction: tuple[float, float] = (0.0, 0.0), breakaway: float = 1.0, slope: float = 0.0,
                gain: float = 1.0, p: float = 0.0, b_o: float = 0.0, deadband: float = 0.0,
                voltage_limit: float = math.inf, stops: tuple[float, float] = (-math.inf, math.inf),
-               restitution: float = 0.0) -> Plant:
+               restitution: float = 0.0, bridge: tuple[float, float, float, float, float] = (0.0,) * 5) -> Plant:
     """Return the plant at the output shaft: the motor reflected through the gear, and the load on it."""
     N = reduction
     stiffness, rest_angle = load.elasticity
@@ -33,4 +33,5 @@ def make_plant(model: Model, load: Load, *, reduction: float, inductance: float 
         gravity=gravity, hanging_angle=hanging,
         gain=gain, p=p, b_o=b_o, half_deadband=0.5 * deadband, V_max=voltage_limit,
         lower=stops[0], upper=stops[1], restitution=restitution,
+        V=bridge[0], D_drive=bridge[1], R_drive=bridge[2], D_off=bridge[3], R_off=bridge[4],
     )

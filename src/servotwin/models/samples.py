@@ -22,6 +22,8 @@ class Samples:
         State variables [rad], [rad/s], [A]; the current is used only where it is a state.
     zone, contact : ndarray of int
         Mode.
+    drive, error : ndarray
+        Of a pulse servo: how the bridge drives (−1, 0, +1), and the latest error decided on [s].
     """
 
     time: Array
@@ -30,8 +32,11 @@ class Samples:
     current: Array
     zone: NDArray[np.int64]
     contact: NDArray[np.int64]
+    drive: Array
+    error: Array
 
     @classmethod
-    def make(cls, time: Array, states: Array, zone: Array, contact: Array) -> Samples:
+    def make(cls, time: Array, states: Array, zone: Array, contact: Array, drive: Array, error: Array) -> Samples:
         """Build from an array of states, shape (3, n)."""
-        return cls(time, states[0], states[1], states[2], zone.astype(np.int64), contact.astype(np.int64))
+        return cls(time, states[0], states[1], states[2], zone.astype(np.int64), contact.astype(np.int64),
+                   drive, error)

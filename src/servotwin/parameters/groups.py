@@ -6,12 +6,13 @@ A field that is None is absent: the effect is off, or not known.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from servotwin.errors import ParameterError
 from servotwin.units import is_finite, si_unit
@@ -22,13 +23,36 @@ ANY = "a finite number"
 AT_LEAST_ONE = "a number of at least 1"
 FRACTION = "a number from 0 to 1"
 
-_RULES: dict[str, Callable[[float], bool]] = {
+_RULES: dict[str, Callable[[Any], Any]] = {  # of a number, or of each number of a column
     POSITIVE: lambda x: x > 0.0,
     NOT_NEGATIVE: lambda x: x >= 0.0,
-    ANY: lambda x: True,
+    ANY: lambda x: x == x,
     AT_LEAST_ONE: lambda x: x >= 1.0,
-    FRACTION: lambda x: 0.0 <= x <= 1.0,
+    FRACTION: lambda x: (x >= 0.0) & (x <= 1.0),
 }
+
+
+class Relation(NamedTuple):
+    """What has to hold between fields of a group; of columns, lane by lane."""
+
+    what: str
+    holds: bool | NDArray[np.bool_]
+    got: Any
+    allowed: str
+    bound: Any = None  # a number that `allowed` ends with
+
+    def check(self) -> None:
+        """Raise ParameterError if it does not hold; of columns, for the first such lane."""
+        if np.all(self.holds):
+            return
+        lane = int(np.argmin(self.holds)) if isinstance(self.holds, np.ndarray) else None
+        got, bound = (_of_lane(x, lane) for x in (self.got, self.bound))
+        raise ParameterError(self.what if lane is None else f"{self.what} of lane {lane}", got=got,
+                             allowed=self.allowed if bound is None else f"{self.allowed} = {bound!r}")
+
+
+def _of_lane(value: Any, lane: int | None) -> Any:
+    return value[lane].item() if isinstance(value, np.ndarray) else value
 
 
 def parameter(symbol: str, dimension: str, rule: str, meaning: str) -> Any:
@@ -58,7 +82,8 @@ class Group:
             value = getattr(self, f.name)
             if value is not None:
                 object.__setattr__(self, f.name, self._checked(f.name, value, f.metadata))
-        self._check_relations()
+        for relation in self._relations():
+            relation.check()
 
     def _checked(self, name: str, value: Any, metadata: Any) -> Any:
         rule = metadata["rule"]
@@ -78,13 +103,53 @@ class Group:
             raise ParameterError(what, got=value, allowed=f"{rule} [{unit}]")
         return float(value)
 
-    def _check_relations(self) -> None:
-        """Check what depends on several fields."""
+    def _relations(self) -> Iterator[Relation]:
+        """Return what has to hold between several fields."""
+        return iter(())
 
-    def _ordered(self, low: str, high: str) -> None:
+    def _less(self, low: str, high: str) -> Iterator[Relation]:
         a, b = getattr(self, low), getattr(self, high)
-        if a is not None and b is not None and not a < b:
-            raise ParameterError(f"{self.title}.{low}", got=a, allowed=f"less than {self.title}.{high} = {b!r}")
+        if a is not None and b is not None:
+            yield Relation(f"{self.title}.{low}", a < b, a, f"less than {self.title}.{high}", b)
+
+
+def check_column(what: str, column: NDArray[np.float64], rule: str, unit: str) -> None:
+    """Raise ParameterError that names the first lane whose number is not finite or breaks the rule.
+
+    Examples
+    --------
+    >>> check_column("gear.gear_reduction", np.array([2.0, 1.0]), AT_LEAST_ONE, "1")
+    """
+    Relation(what, np.isfinite(column) & _RULES[rule](column), column, f"{rule} [{unit}]").check()
+
+
+def check_columns(group: str, values: Mapping[str, Any]) -> None:
+    """Check the values of a group of which some are columns, one number per lane.
+
+    Parameters
+    ----------
+    group : str
+    values : mapping
+        Value by field, None where absent; a column has shape (B,).
+
+    Raises
+    ------
+    ParameterError
+        If a value breaks its range, or two break their relation; names the lane where columns take part.
+    """
+    checked: Group = object.__new__(GROUPS[group])
+    for f in fields(GROUPS[group]):
+        value = values.get(f.name)
+        if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+            check_column(f"{group}.{f.name}", value, f.metadata["rule"], si_unit(f.metadata["dimension"]))
+        elif isinstance(value, np.ndarray):
+            options = f.metadata["rule"]
+            Relation(f"{group}.{f.name}", np.isin(value, options), value, " or ".join(options)).check()
+        elif value is not None:
+            value = checked._checked(f.name, value, f.metadata)
+        object.__setattr__(checked, f.name, value)
+    for relation in checked._relations():
+        relation.check()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,16 +203,16 @@ class Friction(Group):
     load_friction_external_quad: float | None = parameter(
         "K_eq", "inverse torque", NOT_NEGATIVE, "quadratic in load torque")
 
-    def _check_relations(self) -> None:
+    def _relations(self) -> Iterator[Relation]:
         if self.stribeck_exponent is not None and self.stribeck_speed is None:
-            raise ParameterError("friction.stribeck_exponent", got=self.stribeck_exponent,
-                                 allowed="only together with friction.stribeck_speed")
+            yield Relation("friction.stribeck_exponent", False, self.stribeck_exponent,
+                           "only together with friction.stribeck_speed")
         # Models M3 and M4 know one share for all torque through the gear, M5 and M6 one for each side of it.
         one = [name for name in _ONE_SHARE if getattr(self, name) is not None]
         two = [name for name in _TWO_SHARES if getattr(self, name) is not None]
         if one and two:
-            raise ParameterError(f"friction.{two[0]}", got=getattr(self, two[0]),
-                                 allowed=f"not beside friction.{one[0]}, which belongs to another friction law")
+            yield Relation(f"friction.{two[0]}", False, getattr(self, two[0]),
+                           f"not beside friction.{one[0]}, which belongs to another friction law")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,13 +228,13 @@ class Potentiometer(Group):
     linearity_error: tuple[float, ...] | None = table("", "voltage", "voltage added at these angles")
     quantisation: float | None = parameter("", "voltage per count", POSITIVE, "voltage per count")
 
-    def _check_relations(self) -> None:
+    def _relations(self) -> Iterator[Relation]:
         angles, errors = self.linearity_angle, self.linearity_error
         if (angles is None) != (errors is None) or (angles and errors and len(angles) != len(errors)):
-            raise ParameterError("potentiometer.linearity_error", got=errors,
-                                 allowed="as many values as potentiometer.linearity_angle")
+            yield Relation("potentiometer.linearity_error", False, errors,
+                           "as many values as potentiometer.linearity_angle")
         if angles and any(b <= a for a, b in pairwise(angles)):
-            raise ParameterError("potentiometer.linearity_angle", got=angles, allowed="increasing angles")
+            yield Relation("potentiometer.linearity_angle", False, angles, "increasing angles")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -202,8 +267,8 @@ class Electronics(Group):
     pulse_width_min: float | None = parameter("", "time", POSITIVE, "shortest pulse accepted")
     pulse_width_max: float | None = parameter("", "time", POSITIVE, "longest pulse accepted")
 
-    def _check_relations(self) -> None:
-        self._ordered("pulse_width_min", "pulse_width_max")
+    def _relations(self) -> Iterator[Relation]:
+        yield from self._less("pulse_width_min", "pulse_width_max")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,11 +284,8 @@ class Supply(Group):
         "r_c", "resistance", NOT_NEGATIVE, "resistance of a conducting pair")
     current_limit: float | None = parameter("", "current", POSITIVE, "most that the source gives")
 
-    def _check_relations(self) -> None:
-        V_oc, V_ce0 = self.open_circuit_voltage, self.bridge_drop_voltage
-        if V_oc is not None and V_ce0 is not None and V_ce0 >= V_oc:
-            raise ParameterError("supply.bridge_drop_voltage", got=V_ce0,
-                                 allowed=f"less than supply.open_circuit_voltage = {V_oc!r}")
+    def _relations(self) -> Iterator[Relation]:
+        yield from self._less("bridge_drop_voltage", "open_circuit_voltage")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,8 +297,8 @@ class Stops(Group):
     upper_angle: float | None = parameter("", "angle", ANY, "highest output angle")
     restitution: float | None = parameter("", "number", FRACTION, "speed after over speed before an impact")
 
-    def _check_relations(self) -> None:
-        self._ordered("lower_angle", "upper_angle")
+    def _relations(self) -> Iterator[Relation]:
+        yield from self._less("lower_angle", "upper_angle")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from servotwin.models.kernels import hybrid
-from servotwin.models.outputs import current_of, torques_of, voltage_of
+from servotwin.models.kernels import hybrid, motion
+from servotwin.models.circuit import circuit_of
+from servotwin.models.outputs import torques_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +28,8 @@ class Energy:
     Parameters
     ----------
     supply : float
-        Delivered to the motor's terminals, ∫ v_a i_a dt; negative when the motor brakes into the supply.
+        Delivered by the supply: ∫ V_bus i dt of a pulse servo's bus, ∫ v_a i_a dt at the motor's terminals for models
+        with a mean voltage; negative when the motor feeds back.
     winding : float
         Heat in the armature resistance.
     bridge, brush : float
@@ -63,18 +65,18 @@ def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -
     plant = model.pack(load)
 
     def powers(samples: Samples) -> NDArray[np.float64]:
-        u = drive(samples.time)
-        v, i, w = voltage_of(plant, samples, u), current_of(plant, samples, u), samples.speed
+        circuit = circuit_of(model, plant, samples, drive)
+        i, w = circuit.armature_current, samples.speed
         torques = torques_of(model, samples, drive, load)
         own_viscous = (plant.b - load.viscous_friction) * w
         to_load = (load.viscous_friction * w + torques.load_friction + torques.external) * w
-        return np.array([v * i, plant.R * i * i, (plant.K_b - plant.K) * i * w,
-                         (own_viscous + torques.servo_friction) * w, to_load])
+        return np.array([circuit.supply_power, plant.R * i * i, circuit.bridge_power, circuit.brush_power,
+                         (plant.K_b - plant.K) * i * w, (own_viscous + torques.servo_friction) * w, to_load])
 
-    supply, winding, conversion, friction, to_load = trajectory.integral(powers).tolist()
+    supply, winding, bridge, brush, conversion, friction, to_load = trajectory.integral(powers).tolist()
     stored, stops = _kinetic(plant, trajectory)
-    return Energy(supply, winding, 0.0, 0.0, conversion, friction, stops, to_load, stored,
-                  supply - winding - conversion - friction - stops - to_load - stored)
+    return Energy(supply, winding, bridge, brush, conversion, friction, stops, to_load, stored,
+                  supply - winding - bridge - brush - conversion - friction - stops - to_load - stored)
 
 
 def _kinetic(plant: hybrid.Plant, trajectory: Trajectory) -> tuple[float, float]:
@@ -85,7 +87,7 @@ def _kinetic(plant: hybrid.Plant, trajectory: Trajectory) -> tuple[float, float]
         return 0.0, 0.0
 
     def stored(k: int, at: float) -> float:
-        _, w, i = segments[k].motion.state(at - segments[k].anchor)
+        _, w, i = motion.state(segments[k].motion, at - segments[k].anchor)
         return 0.5 * plant.J * w * w + 0.5 * plant.L * i * i
 
     for k in range(1, len(segments)):

@@ -1,28 +1,23 @@
 """The engine: from event to event, exactly where the mode is linear, with error control where it is not.
 
-It keeps the state at the *anchor*, where the present motion began, and evaluates from there. So the result depends
-neither on the output step nor on how a run is split into calls.
+It drives the kernels and keeps what they leave behind: states to go on from, segments of motion, and events.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from servotwin.errors import SimulationError
-from servotwin.models.kernels import hybrid
+from servotwin.models.kernels import frame, hybrid, walk
+from servotwin.models.kernels.frame import Chip, Frame
 from servotwin.models.kernels.hybrid import Mode, Plant
+from servotwin.models.kernels.motion import IMPOSSIBLE, STEP, Motion
 from servotwin.models.kernels.rodas import Vector
-from servotwin.physics.pieces import Pieces, piece_rate, piece_value
-from servotwin.simulation.events import first_event
-from servotwin.simulation.motion import Inputs, Motion, Step, closed_motion, integrated_step
+from servotwin.models.kernels.walk import FIRST_STEP, MOST_IDLE, Point
+from servotwin.physics.pieces import Piece, Pieces, piece_value
 from servotwin.simulation.status import Status
-
-_TOLERANCE = 3e-10  # error of one integrator step, relative to 1 + |state|
-_FIRST_STEP = 1e-4  # s
-_CHATTER = 200  # events without time going on
-_MOST_OSCILLATIONS = 1e7  # within one motion
 
 
 class Event(NamedTuple):
@@ -31,6 +26,39 @@ class Event(NamedTuple):
     time: float
     kind: str
     value: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What stays the same during a run.
+
+    Parameters
+    ----------
+    plant : Plant
+        The numbers of servo and load.
+    command : Pieces
+        What the plant follows [V]; of a pulse servo the width of the pulses [s].
+    torque : Pieces
+        The external torque that depends on time alone [N m].
+    chip : Chip, optional
+        The numbers of the frame logic, for a pulse servo.
+    edges : tuple of float, optional
+        When its frames start [s]; None: regularly.
+    seed : int
+        Of its noise.
+    """
+
+    plant: Plant
+    command: Pieces
+    torque: Pieces
+    chip: Chip | None = None
+    edges: tuple[float, ...] | None = None
+    seed: int = 0
+
+    @property
+    def period(self) -> float:
+        """Of regular frames [s]; 0 where the edges are listed."""
+        return self.chip.frame_period if self.chip is not None and self.edges is None else 0.0
 
 
 @dataclass(frozen=True)
@@ -45,27 +73,23 @@ class State:
         Signal names of `values`.
     values : tuple of float
         Angle [rad], speed [rad/s] and, with inductance, current [A].
-    mode : Mode
-        Zone of the voltage law and contact of the shaft.
-    anchor_time, anchor : float, tuple of float
-        Where the present motion began, and the state there.
-    inputs : Inputs
-        The pieces of command and external torque in force since then.
+    point : Point
+        Mode of the present motion, where it began, and the step that the integrator would try next.
+    inputs : tuple of Piece
+        The pieces of voltage and external torque in force since then.
     plant : Plant
         The numbers of servo and load by which it moves since then.
-    step : float
-        Length that the integrator would try next [s].
+    frame : Frame
+        What the chip of a pulse servo remembers: its drive and when that ends, what it has decided, its clock.
     """
 
     time: float
     names: tuple[str, ...]
     values: Vector
-    mode: Mode | None = None
-    anchor_time: float = 0.0
-    anchor: Vector = (0.0, 0.0, 0.0)
-    inputs: Inputs | None = None
+    point: Point | None = None
+    inputs: tuple[Piece, Piece] | None = None
     plant: Plant | None = None
-    step: float = _FIRST_STEP
+    frame: Frame = frame.AT_START
 
     def __getitem__(self, name: str) -> float:
         """Return one value by its signal name."""
@@ -76,14 +100,23 @@ class State:
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of one motion between two times [s]; its anchor may lie before its start."""
+    """A stretch of one motion between two times [s], and the latest error [s] that the chip has decided on."""
 
     start: float
     end: float
-    anchor: float
-    mode: Mode
     motion: Motion
-    inputs: Inputs
+    error: float
+
+    @property
+    def anchor(self) -> float:
+        """When the motion began [s]; it may be before the segment's start."""
+        return self.motion.t0
+
+    @property
+    def drive(self) -> float:
+        """How a bridge drives: −1, 0 or +1."""
+        u = self.motion.u.value
+        return math.copysign(1.0, u) if self.motion.plant.V > 0.0 and u != 0.0 else 0.0
 
 
 @dataclass
@@ -94,8 +127,7 @@ class Record:
     events: list[Event]
 
 
-def run(plant: Plant, command: Pieces, torque: Pieces, state: State, until: float,
-        record: Record | None = None) -> State:
+def run(plan: Plan, state: State, until: float, record: Record | None = None) -> State:
     """Return the state at `until` [s], and add what happened to `record`.
 
     Raises
@@ -103,96 +135,71 @@ def run(plant: Plant, command: Pieces, torque: Pieces, state: State, until: floa
     SimulationError
         If the run cannot go on; it carries status, time and cause.
     """
+    plant = plan.plant
+    point = state.point if state.point is not None else Point(
+        state.time, state.values, Mode(0, 0), state.time, state.values, FIRST_STEP)
+    inputs = state.inputs if plant == state.plant else None
+    chip_frame = state.frame
+    motion: Motion | None = None
     idle = 0
-    while state.time < until:
-        before = state.time
+    while point.time < until:
+        before = point.time
         try:
-            state, piece_end = _anchored(plant, command, torque, state)
-            motion, next_step = _motion(plant, state, piece_end)
-            state, segment, event = _advanced(plant, state, motion, next_step, min(until, piece_end))
+            if plan.chip is None:
+                u, u_end = plan.command.at(before)
+            else:
+                chip_frame = _switched(plan, plan.chip, chip_frame, point, record)
+                u = walk.source(plant, chip_frame)
+                u_end = min(frame.next_switch(chip_frame),
+                            frame.edge_time(plan.period, plan.edges or (), chip_frame.index))
+            tau, tau_end = plan.torque.at(before)
+            limit = min(u_end, tau_end)
+            if (u, tau) != inputs:
+                inputs, motion = (u, tau), None
+                point = walk.anchored(plant, u, tau, before, point.y, point.step)
+            if motion is None or motion.kind == STEP:
+                motion = walk.motion_of(plant, point, u, tau, limit)
+            if motion.kind == IMPOSSIBLE:
+                raise _failure(Status.STEP_TOO_SMALL, before)
+            point, kind, status = walk.follow(motion, point, min(until, limit))
         except ArithmeticError:  # numbers beyond what a float holds
             raise _failure(Status.DIVERGED, before) from None
-        if not all(map(math.isfinite, state.values)):
-            raise _failure(Status.DIVERGED, before)
-        idle = idle + 1 if state.time == before else 0
-        if idle > _CHATTER:
+        if status != walk.COMPLETED:
+            raise _failure(Status.of_code(status), before)
+        idle = idle + 1 if point.time == before else 0
+        if idle > MOST_IDLE:
             raise _failure(Status.CHATTER, before)
         if record is not None:
-            if segment.end > segment.start or not record.segments:
-                record.segments.append(segment)
-            if event is not None:
-                record.events.append(event)
-    return state
+            if point.time > before or not record.segments:
+                record.segments.append(Segment(before, point.time, motion, chip_frame.error))
+            if kind >= 0:
+                record.events.append(Event(point.time, _event_name(kind, point.mode), point.y[0]))
+        if kind >= 0:
+            motion = None
+    return State(time=point.time, names=state.names, values=point.y, point=point, inputs=inputs, plant=plant,
+                 frame=chip_frame)
 
 
 def _failure(status: Status, time: float) -> SimulationError:
     return SimulationError(status.name, time, status.message)
 
 
-def _anchored(plant: Plant, command: Pieces, torque: Pieces, state: State) -> tuple[State, float]:
-    """Return the state with its motion anchored under the inputs of now, and when these change [s]."""
-    u, u_end = command.at(state.time)
-    tau, tau_end = torque.at(state.time)
-    inputs = Inputs(u, tau)
-    if state.mode is None or inputs != state.inputs or plant != state.plant:
-        t = state.time
-        q, w, i = state.values
-        v, dv, load = piece_value(u, t), piece_rate(u, t), piece_value(tau, t)
-        zone = hybrid.zone_of(plant, v - plant.p * q - plant.b_o, dv - plant.p * w)
-        contact = hybrid.contact_of(plant, zone, v, load, q, w, i, _in_one_piece(plant, inputs))
-        state = replace(state, mode=Mode(zone, contact), anchor_time=t, anchor=state.values, inputs=inputs,
-                        plant=plant)
-    return state, min(u_end, tau_end)
+def _switched(plan: Plan, chip: Chip, now: Frame, point: Point, record: Record | None) -> Frame:
+    """Return the frame state after all that the chip does at the time of a point."""
+    time, drive = point.time, now.drive
+    if frame.next_switch(now) <= time:
+        now = frame.switched(now, time)
+        if record is not None and now.drive != drive:
+            record.events.append(Event(time, _DRIVES[int(now.drive)], point.y[0]))
+    if frame.edge_time(plan.period, plan.edges or (), now.index) <= time:
+        t_in = piece_value(plan.command.at(time)[0], time)
+        if record is not None and not frame.accepted(chip, t_in):
+            record.events.append(Event(time, "pulse refused", point.y[0]))
+        now = walk.measured(plan.plant, chip, now, time, t_in, point.y, plan.seed)
+    return now
 
 
-def _in_one_piece(plant: Plant, inputs: Inputs) -> bool:
-    """Whether a smoothed friction is integrated throughout: where no part of it would be linear."""
-    return plant.kappa > 0.0 and (plant.L > 0.0 or plant.gravity != 0.0 or inputs.u.sweep != 0.0)
-
-
-def _motion(plant: Plant, state: State, piece_end: float) -> tuple[Motion, float]:
-    mode, inputs = state.mode, state.inputs
-    if mode is None or inputs is None:  # pragma: no cover - _anchored sets both
-        raise _failure(Status.DIVERGED, state.time)
-    motion = closed_motion(plant, mode, state.anchor, inputs, state.anchor_time)
-    if motion is not None:
-        return motion, state.step
-    step, next_step = integrated_step(plant, mode, state.anchor, inputs, state.anchor_time, state.step,
-                                      piece_end - state.anchor_time, _TOLERANCE)
-    if step is None:
-        raise _failure(Status.STEP_TOO_SMALL, state.time)
-    return step, next_step
-
-
-def _advanced(plant: Plant, state: State, motion: Motion, next_step: float,
-              horizon: float) -> tuple[State, Segment, Event | None]:
-    """Follow a motion to its first event, its end or the horizon [s], whichever comes first."""
-    mode, inputs, t0 = state.mode, state.inputs, state.anchor_time
-    if mode is None or inputs is None:  # pragma: no cover - _anchored sets both
-        raise _failure(Status.DIVERGED, state.time)
-    step_end = t0 + motion.length
-    if abs(step_end - horizon) <= 4e-16 * abs(horizon):
-        step_end = horizon
-    end = min(horizon, step_end)
-    fine, settled = motion.scales()
-    if min(end - t0, settled) > _MOST_OSCILLATIONS * fine:
-        raise _failure(Status.TOO_FAST, state.time)
-    kinds = hybrid.guards(plant, mode, _in_one_piece(plant, inputs))
-    s, kind = first_event(plant, mode, motion, inputs, kinds, t0, state.time - t0, end - t0)
-    if kind < 0:
-        y = motion.state(end - t0)
-        segment = Segment(state.time, end, t0, mode, motion, inputs)
-        if isinstance(motion, Step) and end == step_end:
-            return replace(state, time=end, values=y, anchor_time=end, anchor=y, step=next_step), segment, None
-        return replace(state, time=end, values=y), segment, None
-    t = min(max(t0 + s, state.time), end)
-    q, w, i = motion.state(s)
-    after, q_after, w_after = hybrid.cross(plant, mode, kind, piece_value(inputs.u, t), piece_value(inputs.tau, t),
-                                           q, w, i)
-    segment = Segment(state.time, t, t0, mode, motion, inputs)
-    y = (q_after, w_after, i)
-    moved = replace(state, time=t, values=y, mode=after, anchor_time=t, anchor=y)
-    return moved, segment, Event(t, _event_name(kind, after), q_after)
+_DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}
 
 
 def _event_name(kind: int, after: Mode) -> str:
@@ -200,4 +207,6 @@ def _event_name(kind: int, after: Mode) -> str:
         return "stick"
     if kind == hybrid.SPEED and after.contact != hybrid.CORE:
         return "reversal"
+    if after.zone >= hybrid.CONDUCTING and kind in (hybrid.ZONE_UP, hybrid.ZONE_DOWN):
+        return "current stops" if after.zone == hybrid.NO_CURRENT else "current starts"
     return hybrid.EVENT_NAMES[kind]

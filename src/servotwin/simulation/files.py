@@ -15,8 +15,9 @@ from servotwin.parameters import write_file
 _COLUMNS = {
     "s": ("s", "s", "time"), "V": ("V", "V", "voltage"), "A": ("A", "A", "current"),
     "rad": ("deg", "deg", "angle"), "rad/s": ("deg_per_s", "deg/s", "speed"), "N m": ("Nm", "N m", "torque"),
+    "1": ("", "1", "number"),
 }
-_OWN = {"pulse_width": ("us", "us", "time")}
+_OWN = dict.fromkeys(("pulse_width", "error_time"), ("us", "us", "time"))
 
 
 def save_csv(path: str | Path, signals: Mapping[str, NDArray[np.float64]], si_units: Mapping[str, str], *,
@@ -33,7 +34,7 @@ def save_csv(path: str | Path, signals: Mapping[str, NDArray[np.float64]], si_un
     names, columns = [], []
     for name, values in signals.items():
         suffix, unit, dimension = _OWN.get(name) or _COLUMNS[si_units[name]]
-        names.append(f"{name}_{suffix}")
+        names.append(f"{name}_{suffix}" if suffix else name)
         columns.append(np.asarray(units.from_si(values, unit, dimension)))
     table = np.column_stack(columns)
     write_file(path, lambda file: np.savetxt(file, table, fmt="%.12g", delimiter=",", header=",".join(names),

@@ -14,7 +14,7 @@ from servotwin.models import Model
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
-from servotwin.simulation.engine import Record, State
+from servotwin.simulation.engine import Plan, Record, State
 from servotwin.simulation.result import Result
 from servotwin.simulation.status import Status
 from servotwin.simulation.trajectory import Trajectory
@@ -96,7 +96,7 @@ class Simulator:
             raise InputError(f"initial {self.model.layout[0]}", got=values[0],
                              allowed=f"{self._plant.lower:.6g} to {self._plant.upper:.6g} rad, between the stops")
         y = (values[0], values[1], values[2])
-        return State(time=0.0, names=self.model.layout, values=y, anchor=y)
+        return State(time=0.0, names=self.model.layout, values=y)
 
     def advance(self, state: State, until: float, command: Signal, *, external_torque: float = 0.0) -> State:
         """Return the state at `until` [s] under a command.
@@ -134,7 +134,9 @@ class Simulator:
             raise InputError("external_torque", got=external_torque, allowed="a finite number [N m]")
         self.load.check_span(state.time, until)
         torque = self._torque.scaled(1.0, external_torque) if external_torque else self._torque
-        return engine.run(self._plant, self.drive(command), torque, state, float(until), record)
+        plan = Plan(self._plant, self.drive(command), torque, self.model.chip(command), self.model.edges(command),
+                    self.seed)
+        return engine.run(plan, state, float(until), record)
 
 
 def simulate(model: Model, command: Signal, *, duration: float, load: Load | Part | None = None,

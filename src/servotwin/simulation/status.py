@@ -24,6 +24,11 @@ class Status(Enum):
         self.code = code
         self.message = message
 
+    @classmethod
+    def of_code(cls, code: int) -> Status:
+        """Return the member with this code."""
+        return next(status for status in cls if status.code == code)
+
     @property
     def ok(self) -> bool:
         """Whether the whole time was simulated."""

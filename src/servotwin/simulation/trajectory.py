@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.models.kernels import motion, rodas
 from servotwin.models.samples import Samples
 from servotwin.simulation.engine import Segment
 
@@ -32,7 +33,7 @@ class Trajectory:
         t = np.asarray(time, dtype=np.float64)
         if not self.segments:
             nothing = np.full(t.size, math.nan)
-            return Samples.make(t, np.tile(nothing, (3, 1)), np.zeros(t.size), np.zeros(t.size))
+            return Samples.make(t, np.tile(nothing, (3, 1)), *np.zeros((4, t.size)))
         index = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
         return self._states(t, index)
 
@@ -42,23 +43,24 @@ class Trajectory:
 
     def _states(self, t: Array, index: NDArray[np.intp]) -> Samples:
         y = np.full((3, t.size), math.nan)
-        zone, contact = np.zeros(t.size), np.zeros(t.size)
+        zone, contact, drive, error = np.zeros((4, t.size))
         for k in np.unique(index):
             segment = self.segments[k]
             where = np.flatnonzero((index == k) & (t <= segment.end) & (t >= segment.start))
             if where.size == 0:
                 continue
             s = t[where] - segment.anchor
-            y[:, where] = np.array([segment.motion.state(x) for x in s.tolist()]).T
-            zone[where], contact[where] = segment.mode
-        return Samples.make(t, y, zone, contact)
+            y[:, where] = _states(segment.motion, s)
+            zone[where], contact[where] = segment.motion.mode
+            drive[where], error[where] = segment.drive, segment.error
+        return Samples.make(t, y, zone, contact, drive, error)
 
     def intervals(self, index: int) -> Array:
         """Return the ends of short intervals of one segment, in each of which all signals are smooth and gentle."""
         segment = self.segments[index]
         start, end = segment.start, segment.end
-        width = segment.inputs.period(start, end) / 4.0
-        fine, settled = segment.motion.scales()
+        width = motion.period(segment.motion.u, segment.motion.tau, start, end) / 4.0
+        fine, settled = motion.scales(segment.motion)
         edges = [start]
         while edges[-1] < end:
             age = edges[-1] - segment.anchor
@@ -83,3 +85,11 @@ class Trajectory:
         fractions = np.linspace(0.0, 1.0, per_interval, endpoint=False)
         inner = (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel()
         return np.append(inner, edges[-1])
+
+
+def _states(m: motion.Motion, s: Array) -> Array:
+    """Return the states (q, w, i) of a motion at times s after its anchor, shape (3, n)."""
+    if m.kind != motion.STEP:
+        return np.array([motion.state(m, x) for x in s.tolist()]).T
+    inside = np.array(rodas.interpolate(m.start, m.end, rodas.dense_coefficients(m.stages), s / m.length))
+    return np.where(s >= m.length * (1.0 - 1e-15), np.array(m.end)[:, None], inside)

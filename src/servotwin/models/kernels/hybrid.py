@@ -1,9 +1,10 @@
 """The servo as a hybrid automaton: its modes, what holds in each, and what ends each.
 
-One automaton serves the motors and the servos without pulses. What a model lacks has a neutral value (no supply
-limit: infinite; no deadband, stop or friction: absent), so every law stands here once. A mode is a pair:
+One automaton serves all models. What a model lacks has a neutral value (no supply limit: infinite; no deadband,
+stop or friction: absent), so every law stands here once. A mode is a pair:
 
-zone     how the armature voltage follows the error v_e = u − p q − b_o: saturated (±2), linear (±1), deadband (0)
+zone     without a bridge, how the armature voltage follows the error v_e = u − p q − b_o: saturated (±2), linear
+         (±1), deadband (0); behind a switched bridge with u = ±V or 0 (off), which way the current flows
 contact  how the shaft moves: without friction, sliding forward or backward, in the core of a smoothed friction,
          stuck, or resting on the lower or upper stop
 
@@ -42,6 +43,11 @@ class Plant(NamedTuple):
     lower: float
     upper: float
     restitution: float
+    V: float  # V_oc behind a switched bridge; 0: there is none, and the voltage follows the error
+    D_drive: float  # V_ce0 + V_br: no current flows where |s V − K_b w| is less
+    R_drive: float  # R_a + r_c + R_b
+    D_off: float  # the same two between drives
+    R_off: float
 
 
 class Mode(NamedTuple):
@@ -52,6 +58,7 @@ class Mode(NamedTuple):
 
 
 SATURATED_BACKWARD, LINEAR_BACKWARD, DEAD, LINEAR, SATURATED = -2, -1, 0, 1, 2
+CONDUCTING, CURRENT_BACKWARD, NO_CURRENT, CURRENT_FORWARD = 3, 4, 5, 6  # conducting: without drops, either way
 FREE, FORWARD, BACKWARD, CORE, STUCK, ON_LOWER, ON_UPPER = range(7)
 
 # What can end a mode. A guard is at least zero as long as the mode lasts.
@@ -75,8 +82,15 @@ def core_speed(plant: Plant) -> float:
     return _SATURATED_TANH / plant.kappa if plant.kappa > 0.0 else 0.0
 
 
-def zone_limits(plant: Plant, zone: int) -> tuple[float, float]:
-    """Return the errors v_e [V] between which a zone lies."""
+def zone_limits(plant: Plant, zone: int, u: float) -> tuple[float, float]:
+    """Return the values of `zone_variable` [V] between which a zone lies."""
+    if zone >= CONDUCTING:
+        D, _ = bridge(plant, u)
+        if zone == CURRENT_FORWARD:
+            return D, math.inf
+        if zone == CURRENT_BACKWARD:
+            return -math.inf, -D
+        return (-D, D) if zone == NO_CURRENT else (-math.inf, math.inf)
     e1 = plant.half_deadband
     e2 = e1 + plant.V_max / plant.gain
     if zone == SATURATED:
@@ -90,10 +104,27 @@ def zone_limits(plant: Plant, zone: int) -> tuple[float, float]:
     return (e1, e2) if zone == LINEAR else (-e2, -e1)
 
 
-def zone_of(plant: Plant, error: float, error_rate: float) -> int:
-    """Return the zone in which the error lies; on a boundary, the one that it moves into."""
-    tie = _TIE * (1.0 + abs(error))
-    e = error + (math.copysign(2.0 * tie, error_rate) if error_rate != 0.0 else 0.0)
+def zone_variable(plant: Plant, u: float, q: float, w: float) -> float:
+    """Return what decides the zone [V]: the error v_e, or behind a bridge the voltage that drives the current."""
+    if plant.V > 0.0:
+        return u - plant.K_b * w
+    return u - plant.p * q - plant.b_o
+
+
+def zone_of(plant: Plant, u: float, du: float, q: float, w: float) -> int:
+    """Return the zone of a state; on a boundary of the error, the one that it moves into."""
+    x = zone_variable(plant, u, q, w)
+    if plant.V > 0.0:
+        D, _ = bridge(plant, u)
+        if D == 0.0:
+            return CONDUCTING
+        if abs(x) <= D:
+            return NO_CURRENT
+        return CURRENT_FORWARD if x > 0.0 else CURRENT_BACKWARD
+    rate = du - plant.p * w
+    e = x
+    if rate != 0.0:
+        e += math.copysign(2.0 * _TIE * (1.0 + abs(x)), rate)
     size = abs(e)
     if size > plant.half_deadband + plant.V_max / plant.gain:
         return SATURATED if e > 0.0 else SATURATED_BACKWARD
@@ -102,6 +133,28 @@ def zone_of(plant: Plant, error: float, error_rate: float) -> int:
     if size <= plant.half_deadband:
         return DEAD
     return LINEAR if e > 0.0 else LINEAR_BACKWARD
+
+
+def bridge(plant: Plant, u: float) -> tuple[float, float]:
+    """Return the drop [V] and the resistance [Ω] of the circuit while the bridge drives, or between drives (u = 0)."""
+    if u != 0.0:
+        return plant.D_drive, plant.R_drive
+    return plant.D_off, plant.R_off
+
+
+def current(plant: Plant, zone: int, u: float, q: float, w: float) -> float:
+    """Return the armature current [A] without inductance."""
+    if zone < CONDUCTING:
+        return (voltage(plant, zone, u - plant.p * q - plant.b_o) - plant.K_b * w) / plant.R
+    if zone == NO_CURRENT:
+        return 0.0
+    D, R = bridge(plant, u)
+    return (u - sign_of(zone) * D - plant.K_b * w) / R
+
+
+def sign_of(zone: int) -> float:
+    """Return the sign of the current in a zone behind a bridge; 0 where it does not matter."""
+    return 1.0 if zone == CURRENT_FORWARD else -1.0 if zone == CURRENT_BACKWARD else 0.0
 
 
 def voltage(plant: Plant, zone: int, error: float) -> float:
@@ -134,7 +187,7 @@ def holding_bounds(plant: Plant) -> tuple[float, float]:
 def driving_torque(plant: Plant, zone: int, u: float, tau: float, q: float, i: float) -> float:
     """Return N k_a i − τ_ext [N m] at rest: what friction has to hold."""
     if plant.L == 0.0:
-        i = voltage(plant, zone, u - plant.p * q - plant.b_o) / plant.R
+        i = current(plant, zone, u, q, 0.0)
     return plant.K * i - external_torque(plant, tau, q)
 
 
@@ -185,20 +238,29 @@ def friction_torque(plant: Plant, contact: int, w: float) -> float:
 
 def rates(plant: Plant, mode: Mode, u: float, tau: float, q: float, w: float, i: float) -> tuple[float, float]:
     """Return ẇ [rad/s²] and di/dt [A/s] (0 without inductance)."""
-    v = voltage(plant, mode.zone, u - plant.p * q - plant.b_o)
     di = 0.0
     if plant.L > 0.0:
-        di = (v - plant.R * i - plant.K_b * w) / plant.L
+        di = (voltage(plant, mode.zone, u - plant.p * q - plant.b_o) - plant.R * i - plant.K_b * w) / plant.L
     else:
-        i = (v - plant.K_b * w) / plant.R
+        i = current(plant, mode.zone, u, q, w)
     if at_rest(mode.contact):
         return 0.0, di
     torque = plant.K * i - plant.b * w - friction_torque(plant, mode.contact, w) - external_torque(plant, tau, q)
     return torque / plant.J, di
 
 
-def jacobian(plant: Plant, mode: Mode, q: float, w: float) -> tuple[float, ...]:
-    """Return ∂ẇ/∂(q, w, i), ∂(di/dt)/∂(q, w, i), and the gains of u and τ: ∂ẇ/∂u, ∂ẇ/∂τ, ∂(di/dt)/∂u."""
+def conductance(plant: Plant, zone: int, u: float) -> float:
+    """Return by how much the current changes per volt in this zone [S]."""
+    if zone < CONDUCTING:
+        return 1.0 / plant.R
+    if zone == NO_CURRENT:
+        return 0.0
+    _, R = bridge(plant, u)
+    return 1.0 / R
+
+
+def jacobian(plant: Plant, mode: Mode, u: float, du: float, dtau: float, q: float, w: float) -> tuple[float, ...]:
+    """Return ∂ẇ/∂(q, w, i), ∂(di/dt)/∂(q, w, i), and the rates of ẇ and di/dt with time alone."""
     gain = plant.gain if in_linear_zone(mode.zone) else 0.0
     Eq = Ew = Ei = Eu = 0.0
     Fq = -plant.stiffness
@@ -214,41 +276,41 @@ def jacobian(plant: Plant, mode: Mode, q: float, w: float) -> tuple[float, ...]:
         Eq, Ew, Ei, Eu = -gain * plant.p / plant.L, -plant.K_b / plant.L, -plant.R / plant.L, gain / plant.L
         Fi = plant.K
     else:
-        per_volt = plant.K / plant.R
+        per_volt = plant.K * conductance(plant, mode.zone, u)
         Fq -= per_volt * gain * plant.p
         Fw -= per_volt * plant.K_b
         Fu = per_volt * gain
     J = plant.J
     if at_rest(mode.contact):
-        return 0.0, 0.0, 0.0, 0.0, 0.0, Ei, 0.0, 0.0, Eu
-    return Fq / J, Fw / J, Fi / J, Eq, Ew, Ei, Fu / J, -1.0 / J, Eu
+        return 0.0, 0.0, 0.0, 0.0, 0.0, Ei, 0.0, Eu * du
+    return Fq / J, Fw / J, Fi / J, Eq, Ew, Ei, (Fu * du - dtau) / J, Eu * du
 
 
-def guards(plant: Plant, mode: Mode, smooth: bool) -> tuple[int, ...]:
-    """Return what can end this mode."""
+def guards(plant: Plant, mode: Mode, u: float, smooth: bool) -> int:
+    """Return what can end this mode, as a sum of 1 << kind."""
     zone, contact = mode
-    kinds: list[int] = []
+    kinds = 0
     if contact == CORE:
         if not smooth:
-            kinds += (CORE_FORWARD, CORE_BACKWARD)
+            kinds |= 1 << CORE_FORWARD | 1 << CORE_BACKWARD
     elif contact == STUCK:
-        kinds += (RELEASE_FORWARD, RELEASE_BACKWARD)
+        kinds |= 1 << RELEASE_FORWARD | 1 << RELEASE_BACKWARD
     elif contact == ON_UPPER:
-        kinds.append(RELEASE_BACKWARD)
+        kinds |= 1 << RELEASE_BACKWARD
     elif contact == ON_LOWER:
-        kinds.append(RELEASE_FORWARD)
+        kinds |= 1 << RELEASE_FORWARD
     elif contact != FREE:
-        kinds.append(SPEED)
-    low, high = zone_limits(plant, zone)
+        kinds |= 1 << SPEED
+    low, high = zone_limits(plant, zone, u)
     if high < math.inf:
-        kinds.append(ZONE_UP)
+        kinds |= 1 << ZONE_UP
     if low > -math.inf:
-        kinds.append(ZONE_DOWN)
-    if plant.upper < math.inf and contact in (FREE, FORWARD, CORE):
-        kinds.append(UPPER)
-    if plant.lower > -math.inf and contact in (FREE, BACKWARD, CORE):
-        kinds.append(LOWER)
-    return tuple(kinds)
+        kinds |= 1 << ZONE_DOWN
+    if plant.upper < math.inf and (contact == FREE or contact == FORWARD or contact == CORE):
+        kinds |= 1 << UPPER
+    if plant.lower > -math.inf and (contact == FREE or contact == BACKWARD or contact == CORE):
+        kinds |= 1 << LOWER
+    return kinds
 
 
 def guard(plant: Plant, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float,
@@ -266,16 +328,14 @@ def guard(plant: Plant, mode: Mode, kind: int, u: float, du: float, tau: float, 
         return plant.upper - q, -w
     if kind == LOWER:
         return q - plant.lower, w
-    error = u - plant.p * q - plant.b_o
-    error_rate = du - plant.p * w
-    low, high = zone_limits(plant, zone)
-    if kind == ZONE_UP:
-        return high - error, -error_rate
-    if kind == ZONE_DOWN:
-        return error - low, error_rate
+    rate = du - (plant.K_b * dw if plant.V > 0.0 else plant.p * w)
+    if kind == ZONE_UP or kind == ZONE_DOWN:
+        x = zone_variable(plant, u, q, w)
+        low, high = zone_limits(plant, zone, u)
+        return (high - x, -rate) if kind == ZONE_UP else (x - low, rate)
     torque = driving_torque(plant, zone, u, tau, q, i)
     if plant.L == 0.0:
-        di = plant.gain * error_rate / plant.R if in_linear_zone(zone) else 0.0
+        di = plant.gain * rate / plant.R if in_linear_zone(zone) else 0.0
     rate = plant.K * di - dtau
     backward, forward = holding_bounds(plant)
     if kind == RELEASE_FORWARD:
@@ -306,6 +366,8 @@ def _rebound(plant: Plant, zone: int, kind: int, u: float, tau: float, w: float,
              i: float) -> tuple[Mode, float, float]:
     q = plant.upper if kind == UPPER else plant.lower
     w = -plant.restitution * w
+    if plant.V > 0.0:  # the current goes with the speed
+        zone = zone_of(plant, u, 0.0, q, w)
     back, _ = rates(plant, Mode(zone, _sliding(plant, w > 0.0)), u, tau, q, w, i)
     low = back * w < 0.0 and 0.5 * w * w < abs(back) * _REST_HEIGHT * max(abs(q), 1.0)
     if abs(w) < _REST_SPEED or low:
@@ -316,7 +378,7 @@ def _rebound(plant: Plant, zone: int, kind: int, u: float, tau: float, w: float,
 
 def _neighbour(plant: Plant, zone: int, kind: int) -> int:
     step = 1 if kind == ZONE_UP else -1
-    if plant.half_deadband > 0.0:
+    if zone >= CONDUCTING or plant.half_deadband > 0.0:
         return zone + step
     if zone == LINEAR:
         return 2 * step
@@ -330,7 +392,7 @@ def linear_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], tau: tup
     `u` is (value, slope, amplitude, frequency, phase) of the command at the start of the motion, `tau` (value,
     slope) of the external torque; see `second_order`.
     """
-    per_volt = plant.K / plant.R
+    per_volt = plant.K * conductance(plant, mode.zone, u[0])
     damping = plant.b + per_volt * plant.K_b
     stiffness = plant.stiffness
     torque = plant.stiffness * plant.rest_angle - friction_torque(plant, mode.contact, w) - tau[0]
@@ -342,6 +404,9 @@ def linear_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], tau: tup
         torque += gain * (u[0] - plant.b_o - mode.zone * plant.half_deadband)
         rate += gain * u[1]
         sinusoid = gain * u[2]
+    elif mode.zone >= CONDUCTING:
+        D, _ = bridge(plant, u[0])
+        torque += per_volt * (u[0] - sign_of(mode.zone) * D)
     else:
         torque += per_volt * voltage(plant, mode.zone, 0.0)
     J = plant.J

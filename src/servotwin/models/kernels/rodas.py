@@ -9,101 +9,117 @@ Julia Differential Equations package", BIT Numerical Mathematics 63, 27 (2023).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from servotwin.models.kernels import hybrid
+from servotwin.models.kernels.hybrid import Mode, Plant
+from servotwin.physics.pieces import Piece, piece_value
 
 Vector = tuple[float, float, float]
 
 GAMMA = 0.21193756319429014
-# per stage: fraction of the step, weight of the time derivative, A row, C row
-STAGES: tuple[tuple[float, float, tuple[float, ...], tuple[float, ...]], ...] = (
-    (0.0, 0.21193756319429014, (), ()),
-    (0.6358126895828704, -0.42387512638858027, (3.0,), (-14.155112264123755,)),
-    (0.4095798393397535, -0.3384627126235924, (2.849394379747939, 0.45842242204463923),
-     (-17.97296035885952, -2.859693295451294)),
-    (0.9769306725060716, 1.8046452872882734, (-6.954028509809101, 2.489845061869568, -10.358996098473584),
-     (147.12150275711716, -1.41221402718213, 71.68940251302358)),
-    (0.4288403609558664, 2.325825639765069,
-     (2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641),
-     (165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306)),
-    (1.0, 0.0,
-     (-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946),
-     (24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471)),
-    (1.0, 0.0,
-     (-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, 1.0),
-     (30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783, -19.097331116725623,
-      -28.087943162872662)),
-    (1.0, 0.0,
-     (-7.502846399306121, 2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, 1.0,
-      1.0),
-     (37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047, -40.06618937091002,
-      -54.66780262877968, -9.48861652309627)),
+# Per stage: fraction of the step and weight of the time derivative.
+FRACTIONS = (
+    0.0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1.0, 1.0, 1.0,
 )
-DENSE: tuple[tuple[float, ...], ...] = (
-    (25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
-     1.1241088310450404, 0.4272876194431874, -0.17202221070155493),
-    (-9.91568850695171, -0.9689944594115154, 3.0438037242978453, -24.495224566215796, 20.176138334709044,
-     15.98066361424651, -6.789040303419874, -6.710236069923372),
-    (11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643, -52.072871366152654,
-     -59.78993625266729, -0.15582684282751913, 4.883087185713722),
+WEIGHTS = (
+    0.21193756319429014, -0.42387512638858027, -0.3384627126235924, 1.8046452872882734, 2.325825639765069, 0.0, 0.0,
+    0.0,
+)
+# Weights of the stages before, stage after stage: one, two, … seven numbers.
+A = (
+    3.0, 2.849394379747939, 0.45842242204463923, -6.954028509809101, 2.489845061869568, -10.358996098473584,
+    2.8029986275628964, 0.5072464736228206, -0.3988312541770524, -0.04721187230404641, -7.502846399306121,
+    2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, -7.502846399306121,
+    2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, 1.0, -7.502846399306121,
+    2.561846144803919, -11.627539656261098, -0.18268767659942256, 0.030198172008377946, 1.0, 1.0,
+)
+C = (
+    -14.155112264123755, -17.97296035885952, -2.859693295451294, 147.12150275711716, -1.41221402718213,
+    71.68940251302358, 165.43517024871676, -0.4592823456491126, 42.90938336958603, -5.961986721573306,
+    24.854864614690072, -3.0009227002832186, 47.4931110020768, 5.5814197821558125, -0.6610691825249471,
+    30.91273214028599, -3.1208243349937974, 77.79954646070892, 34.28646028294783, -19.097331116725623,
+    -28.087943162872662, 37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047,
+    -40.06618937091002, -54.66780262877968, -9.48861652309627,
+)
+# Three rows of eight, one after the other.
+DENSE = (
+    25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204, 0.524948541321073,
+    1.1241088310450404, 0.4272876194431874, -0.17202221070155493, -9.91568850695171, -0.9689944594115154,
+    3.0438037242978453, -24.495224566215796, 20.176138334709044, 15.98066361424651, -6.789040303419874,
+    -6.710236069923372, 11.419903575922262, 2.8879645146136994, 72.92137995996029, 80.12511834622643,
+    -52.072871366152654, -59.78993625266729, -0.15582684282751913, 4.883087185713722,
 )
 
 
-def step(rates: Callable[[float, float, float, float], tuple[float, float]], jac: tuple[float, ...],
-         time_rates: tuple[float, float], t: float, y: Vector, h: float) -> tuple[Vector, Vector, list[Vector]]:
+def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...], t: float, y: Vector,
+         h: float) -> tuple[Vector, Vector, tuple[Vector, ...]]:
     """Return the state after a step of `h` [s], its error estimate, and the stages for the dense output.
 
     Parameters
     ----------
-    rates : callable
-        (t, q, w, i) -> (F, E).
+    plant, mode, u, tau
+        What moves, and under which inputs.
     jac : tuple
-        ∂F/∂(q, w, i), ∂E/∂(q, w, i) at the start.
-    time_rates : tuple
-        ∂F/∂t, ∂E/∂t at the start.
+        ∂F/∂(q, w, i), ∂E/∂(q, w, i), ∂F/∂t, ∂E/∂t at the start.
     t, y, h
         Start [s], state (q, w, i) there, length [s].
     """
     q, w, i = y
-    Fq, Fw, Fi, Eq, Ew, Ei = jac
-    Ft, Et = time_rates
+    Fq, Fw, Fi, Eq, Ew, Ei, Ft, Et = jac
     # (1/(γ h) − J) k = r, by elimination of the angle and of the current
     g = 1.0 / (GAMMA * h)
     e = g - Ei
     Ewq = Ew + Eq / g
     pivot = 1.0 / (g - Fw - Fq / g - Fi * Ewq / e)
     inv_h = 1.0 / h
-    ks: list[Vector] = []
-    for fraction, weight, a_row, c_row in STAGES:
+    follows_u, follows_tau = not_constant(u), not_constant(tau)
+    u_now, tau_now = u.value, tau.value
+    qs, ws, cs = y
+    ks = [(0.0, 0.0, 0.0)] * 8
+    at = 0
+    for j in range(8):
         qs, ws, cs = q, w, i
         rq = rw = ri = 0.0
-        for a, c, (kq, kw, ki) in zip(a_row, c_row, ks, strict=False):
+        for m in range(j):
+            kq, kw, ki = ks[m]
+            a, c = A[at], C[at]
+            at += 1
             qs += a * kq
             ws += a * kw
             cs += a * ki
             rq += c * kq
             rw += c * kw
             ri += c * ki
-        F, E = rates(t + fraction * h, qs, ws, cs)
-        hd = h * weight
+        if follows_u:
+            u_now = piece_value(u, t + FRACTIONS[j] * h)
+        if follows_tau:
+            tau_now = piece_value(tau, t + FRACTIONS[j] * h)
+        F, E = hybrid.rates(plant, mode, u_now, tau_now, qs, ws, cs)
+        hd = h * WEIGHTS[j]
         rq = rq * inv_h + ws
         rw = rw * inv_h + F + hd * Ft
         ri = ri * inv_h + E + hd * Et
         kw = (rw + Fq * rq / g + Fi * (ri + Eq * rq / g) / e) * pivot
-        kq = (rq + kw) / g
-        ki = (ri + Eq * kq + Ew * kw) / e
-        ks.append((kq, kw, ki))
+        ks[j] = ((rq + kw) / g, kw, (ri + Eq * (rq + kw) / g + Ew * kw) / e)
     error = ks[7]
-    return (qs + error[0], ws + error[1], cs + error[2]), error, ks
+    return ((qs + error[0], ws + error[1], cs + error[2]), error,
+            (ks[0], ks[1], ks[2], ks[3], ks[4], ks[5], ks[6], ks[7]))
 
 
-def dense_coefficients(ks: list[Vector]) -> tuple[Vector, Vector, Vector]:
+def not_constant(piece: Piece) -> bool:
+    """Tell whether a piece changes with time."""
+    return piece.slope != 0.0 or piece.amplitude != 0.0
+
+
+def dense_coefficients(ks: tuple[Vector, ...]) -> tuple[Vector, Vector, Vector]:
     """Return the three vectors of the dense output from the stages of a step."""
-    return _weighted(DENSE[0], ks), _weighted(DENSE[1], ks), _weighted(DENSE[2], ks)
+    return _weighted(0, ks), _weighted(8, ks), _weighted(16, ks)
 
 
-def _weighted(row: tuple[float, ...], ks: list[Vector]) -> Vector:
+def _weighted(row: int, ks: tuple[Vector, ...]) -> Vector:
     q = w = i = 0.0
-    for h, (kq, kw, ki) in zip(row, ks, strict=True):
+    for j in range(8):
+        h = DENSE[row + j]
+        kq, kw, ki = ks[j]
         q += h * kq
         w += h * kw
         i += h * ki

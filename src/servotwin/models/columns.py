@@ -1,0 +1,154 @@
+"""Many lanes at once: a servo, a command and a table of pieces whose numbers are columns, one row per lane.
+
+A column has the shape (B, 1), so that it broadcasts over times: what a formula makes of columns and of a signal over
+time is an array (B, T). The models' formulas take a number and a column alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from servotwin.parameters import Servo
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+def part_of(value: Any, lanes: slice | Indices) -> Any:
+    """Return some rows of a column; a number holds for all lanes."""
+    return value[lanes] if isinstance(value, np.ndarray) and value.ndim else value
+
+
+@dataclass(frozen=True, eq=False)
+class LaneServo:
+    """A servo of which some numbers are columns; reads as a `Servo` does.
+
+    Parameters
+    ----------
+    servo : Servo
+        Gives what is the same in all lanes.
+    columns : mapping of str to ndarray, shape (B, 1)
+        By dotted name (SI); checked before.
+    """
+
+    servo: Servo
+    columns: Mapping[str, Array]
+
+    @property
+    def name(self) -> str:
+        """That of the servo."""
+        return self.servo.name
+
+    def get(self, name: str) -> Any:
+        """Return a value (SI) by its dotted name, a column where lanes differ, None where it is absent."""
+        column = self.columns.get(name)
+        return self.servo.get(name) if column is None else column
+
+    def part(self, lanes: slice | Indices) -> LaneServo:
+        """Return some lanes."""
+        return replace(self, columns={name: column[lanes] for name, column in self.columns.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class LanePieces:
+    """A function of time per lane, gain · y + offset of a table of pieces; lanes may share tables.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n, 7)
+        Pieces as in `physics.pieces.Piece`, table behind table.
+    first, count : ndarray of int, shape (B,)
+        The table of a lane is rows[first : first + count].
+    gain, offset : float or ndarray, shape (B, 1)
+
+    Examples
+    --------
+    >>> rows = np.zeros((2, 7))
+    >>> rows[:, 1] = 1.0, 2.0
+    >>> LanePieces(rows, np.array([0, 1]), np.array([1, 1])).scaled(10.0, 1.0)([0.0, 5.0])
+    array([[11., 11.],
+           [21., 21.]])
+    """
+
+    rows: Array
+    first: Indices
+    count: Indices
+    gain: float | Array = 1.0
+    offset: float | Array = 0.0
+
+    def scaled(self, gain: float | Array, offset: float | Array) -> LanePieces:
+        """Return gain · y + offset."""
+        return replace(self, gain=gain * self.gain, offset=gain * self.offset + offset)
+
+    def part(self, lanes: slice | Indices) -> LanePieces:
+        """Return some lanes."""
+        return replace(self, first=self.first[lanes], count=self.count[lanes], gain=part_of(self.gain, lanes),
+                       offset=part_of(self.offset, lanes))
+
+    @property
+    def initial(self) -> Array:
+        """The value of each lane's first piece, shape (B, 1)."""
+        return np.asarray(self.gain * self.rows[self.first, 1:2] + self.offset)
+
+    def __call__(self, time: ArrayLike) -> Array:
+        """Return the values at `time` [s], an array (T,); shape (B, T), or (1, T) where all lanes are the same."""
+        t = np.asarray(time, dtype=np.float64)
+        first, lane = np.unique(self.first, return_inverse=True)
+        count = np.zeros_like(first)
+        count[lane] = self.count
+        low = np.repeat(first[:, None], t.size, axis=1)
+        high = low + count[:, None]
+        for _ in range(int(count.max(initial=1)).bit_length()):  # bisection, in all tables at once
+            middle = (low + high) // 2
+            begun = (middle > low) & (self.rows[middle, 0] <= t)
+            low, high = np.where(begun, middle, low), np.where(begun, high, np.maximum(middle, low + 1))
+        start, value, slope, amplitude, frequency, phase, sweep = np.moveaxis(self.rows[low], -1, 0)
+        s = t - start
+        y = value + slope * s + amplitude * np.sin(phase + (frequency + 0.5 * sweep * s) * s)
+        return np.asarray(self.gain * (y if len(first) == 1 else y[lane]) + self.offset)
+
+    def tables(self) -> tuple[Indices, Indices, Array]:
+        """Return first and count of each lane, and the rows with gain and offset applied; only rows that are used."""
+        if isinstance(self.gain, np.ndarray) or isinstance(self.offset, np.ndarray):
+            first, count, lane = self.first, self.count, np.arange(len(self.first))
+        else:
+            first, lane = np.unique(self.first, return_inverse=True)
+            count = np.zeros_like(first)
+            count[lane] = self.count
+        place = np.cumsum(count) - count
+        rows = self.rows[np.repeat(first - place, count) + np.arange(count.sum())]
+        gain, offset = (np.repeat(np.broadcast_to(x, (len(first), 1)), count, axis=0) for x in (self.gain, self.offset))
+        rows[:, 1:2] = gain * rows[:, 1:2] + offset
+        rows[:, 2:4] *= gain  # slope and amplitude
+        return place[lane].astype(np.int64), count[lane].astype(np.int64), rows
+
+
+@dataclass(frozen=True, eq=False)
+class LaneSignal:
+    """A command per lane, all of one kind; reads as a `Signal` does.
+
+    Parameters
+    ----------
+    kind : str
+        "angle", "pulse_width" or "voltage".
+    pieces : LanePieces
+        Values in SI.
+    extremes : tuple of ndarray, shape (B, 1)
+        Lowest and highest value (SI).
+    frame_period : ndarray, shape (B, 1), optional
+        [s]
+    lanes : ndarray of int, shape (B,)
+        Numbers of the lanes, for errors.
+    """
+
+    kind: str
+    pieces: LanePieces
+    extremes: tuple[Array, Array]
+    frame_period: Array | None
+    lanes: Indices

@@ -1,0 +1,147 @@
+"""What the chip does with each pulse: measure, decide, drive. All times in seconds, all of it at pulse level.
+
+A frame starts at the rising edge of its pulse. There the one-shot measures the shaft; when the longer of the two
+pulses is over, the bridge drives for as long as the stretcher says, or until the next decision.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from servotwin.models.kernels.noise import gaussian
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+class Chip(NamedTuple):
+    """Everything that the frame logic reads, as plain floats in SI."""
+
+    T_0: float
+    slope: float  # 1/s_r
+    p: float
+    b_o: float
+    beta: float
+    c_s: float
+    noise: float  # V rms
+    half_deadband: float
+    K: float
+    t_min: float
+    tau_s: float  # 0: linear stretcher
+    shortest: float  # pulse widths that are taken, bounds included
+    longest: float
+    timeout: float  # inf: none
+    frame_period: float
+    R_a: float
+    R_b: float
+    V_br: float
+    V_oc: float
+    coast: float  # 1: the bridge opens between drives; 0: it brakes
+
+
+class Decision(NamedTuple):
+    """What a frame has decided: from `time` on, drive with `sign` for `duration`."""
+
+    time: float
+    sign: float
+    duration: float
+    error: float
+
+
+class Frame(NamedTuple):
+    """Everything that the chip remembers."""
+
+    index: int  # edges so far, lost pulses included
+    drive: float  # −1, 0, +1: how the bridge drives now
+    drive_end: float
+    clock: float  # the drive ends here at the latest
+    error: float  # of the latest decision
+    pending: Decision
+    later: Decision  # a second one, where a frame starts before the one before has been decided
+
+
+NOTHING = Decision(math.inf, 0.0, 0.0, 0.0)
+AT_START = Frame(0, 0.0, math.inf, math.inf, 0.0, NOTHING, NOTHING)
+
+
+def one_shot(T_0: float, slope: float, v_eff: float) -> float:
+    """Return the width of the one-shot's pulse at the voltage v_eff."""
+    return max(0.0, T_0 + slope * v_eff)
+
+
+def drive_time(u: float, K: float, t_min: float, tau_s: float) -> float:
+    """Return how long the stretcher drives for an error that exceeds half the deadband by u."""
+    if u <= 0.0:
+        return 0.0
+    if tau_s > 0.0:
+        return t_min + tau_s * math.log1p(K * u / tau_s)
+    return t_min + K * u
+
+
+def terminal_voltage(chip: Chip, drive: float, back_emf: float, i: float) -> tuple[float, float]:
+    """Return v_m at the motor's terminals and V_bus of the supply, for the current i."""
+    if i != 0.0:
+        v_m = back_emf + chip.R_a * i + math.copysign(chip.V_br, i)
+        if drive != 0.0:
+            return v_m, chip.V_oc - chip.R_b * drive * i
+        return v_m, chip.V_oc + (chip.R_b * abs(i) if chip.coast > 0.0 else 0.0)
+    return (back_emf if drive != 0.0 or chip.coast > 0.0 else 0.0), chip.V_oc
+
+
+def decide(chip: Chip, time: float, t_in: float, q: float, v_m: float, V_bus: float, draw: float) -> Decision:
+    """Return what the frame that starts at `time` decides; `draw` is its Gaussian draw."""
+    v_eff = chip.p * q + chip.b_o + chip.noise * draw + chip.beta * v_m + chip.c_s * (V_bus - chip.V_oc)
+    T_os = one_shot(chip.T_0, chip.slope, v_eff)
+    e = t_in - T_os
+    t_on = drive_time(abs(e) - chip.half_deadband, chip.K, chip.t_min, chip.tau_s)
+    sign = 0.0 if t_on == 0.0 else math.copysign(1.0, e)
+    return Decision(time + max(t_in, T_os), sign, t_on, e)
+
+
+def accepted(chip: Chip, t_in: float) -> bool:
+    """Tell whether a pulse is neither too short nor too long."""
+    return chip.shortest <= t_in <= chip.longest
+
+
+def edge(chip: Chip, frame: Frame, time: float, t_in: float, q: float, back_emf: float, i: float, seed: int) -> Frame:
+    """Return the frame state after the rising edge of a pulse of the width t_in."""
+    if not accepted(chip, t_in):
+        return Frame(frame.index + 1, frame.drive, frame.drive_end, frame.clock, frame.error, frame.pending, frame.later)
+    draw = gaussian(seed, frame.index) if chip.noise > 0.0 else 0.0
+    v_m, V_bus = terminal_voltage(chip, frame.drive, back_emf, i)
+    new = decide(chip, time, t_in, q, v_m, V_bus, draw)
+    pending, later = frame.pending, frame.later
+    if new.time <= pending.time:  # where another waits, it would be replaced as soon as it comes
+        pending, later = new, NOTHING
+    else:
+        later = new
+    return Frame(frame.index + 1, frame.drive, frame.drive_end, time + chip.timeout, frame.error, pending, later)
+
+
+def edge_time(period: float, edges: Sequence[float], k: int) -> float:
+    """Return when frame k starts: every `period`, or where that is 0 at its own edge; inf after the last."""
+    if period > 0.0:
+        return k * period
+    return edges[k] if k < len(edges) else math.inf
+
+
+def next_switch(frame: Frame) -> float:
+    """Return when the bridge switches next, edges apart."""
+    if frame.drive != 0.0:
+        return min(frame.pending.time, frame.drive_end, frame.clock)
+    return frame.pending.time
+
+
+def switched(frame: Frame, time: float) -> Frame:
+    """Return the frame state after all that switches at `time`: the end of a drive, then decisions."""
+    drive, end, error = frame.drive, frame.drive_end, frame.error
+    pending, later = frame.pending, frame.later
+    if drive != 0.0 and (end <= time or frame.clock <= time):
+        drive, end = 0.0, math.inf
+    while pending.time <= time:
+        drive, end, error = pending.sign, pending.time + pending.duration, pending.error
+        if drive == 0.0 or end <= time or frame.clock <= time:
+            drive, end = 0.0, math.inf
+        pending, later = later, NOTHING
+    return Frame(frame.index, drive, end, frame.clock, error, pending, later)

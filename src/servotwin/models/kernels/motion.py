@@ -1,0 +1,206 @@
+"""How the state moves within one mode: in closed form wherever the mode is linear, else one integrator step.
+
+A motion starts at its anchor t0 and gives the state (q, w, i) at any later time t0 + s until its `length` is over.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from servotwin.models.kernels import first_order, hybrid, rodas, second_order
+from servotwin.models.kernels.hybrid import Mode, Plant
+from servotwin.models.kernels.rodas import Vector
+from servotwin.physics.pieces import Piece, piece_rate, piece_value
+
+# Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
+REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, STEP, IMPOSSIBLE = range(6)
+
+_TURN = 2.0 * math.pi
+_TOLERANCE = 3e-10  # error of one integrator step, relative to 1 + |state|
+_ORIGIN = (0.0, 0.0, 0.0)
+_NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
+_NO_DENSE = (_ORIGIN, _ORIGIN, _ORIGIN)
+_NO_COEFFICIENTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Motion(NamedTuple):
+    """What moves, from where, and how."""
+
+    kind: int
+    plant: Plant
+    mode: Mode
+    u: Piece
+    tau: Piece
+    t0: float
+    start: Vector
+    length: float
+    coefficients: tuple[float, ...]  # of second_order; first_order uses (λ, f) at the front
+    against: tuple[float, float]  # WITH_CURRENT: value and slope of all torque that does not depend on speed
+    end: Vector  # STEP only, as all that follows
+    stages: tuple[Vector, ...]
+    dense: tuple[Vector, Vector, Vector]
+    has_dense: bool
+    next_step: float  # length to try next [s]
+
+
+def nothing(plant: Plant, u: Piece, tau: Piece) -> Motion:
+    """Return a motion that is none yet."""
+    return _closed(IMPOSSIBLE, plant, Mode(0, 0), u, tau, -1.0, _ORIGIN, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+
+
+def begin(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float) -> Motion:
+    """Return the motion from y at t0 [s]: exact, or one accepted step of at most `limit` [s]."""
+    if hybrid.at_rest(mode.contact) and plant.L == 0.0:
+        return _closed(REST, plant, mode, u, tau, t0, (y[0], 0.0, 0.0), _NO_COEFFICIENTS, (0.0, 0.0), step)
+    follows = hybrid.in_linear_zone(mode.zone)
+    if (hybrid.at_rest(mode.contact) or plant.gravity != 0.0 or mode.contact == hybrid.CORE
+            or (follows and u.sweep != 0.0)
+            or (plant.L > 0.0 and (plant.p != 0.0 or plant.stiffness != 0.0))):  # of third order
+        return _integrated(plant, mode, u, tau, t0, y, step, limit)
+    wave = (u.value + u.slope * (t0 - u.start), u.slope, 0.0, 0.0, 0.0)
+    if follows:
+        wave = (wave[0], u.slope, u.amplitude, u.frequency, u.phase + u.frequency * (t0 - u.start))
+    torque = (tau.value + tau.slope * (t0 - tau.start), tau.slope)
+    if plant.L > 0.0:
+        against = (torque[0] + hybrid.friction_torque(plant, mode.contact, y[1]), torque[1])
+        coefficients = hybrid.speed_coefficients(plant, mode, wave, against, y[1], y[2])
+        return _closed(WITH_CURRENT, plant, mode, u, tau, t0, y, coefficients, against, step)
+    coefficients = hybrid.linear_coefficients(plant, mode, wave, torque, y[0], y[1])
+    _, c, _, f1, fs, _, _, _, _ = coefficients
+    kind = FIRST_ORDER if c == 0.0 and f1 == 0.0 and fs == 0.0 else SECOND_ORDER
+    return _closed(kind, plant, mode, u, tau, t0, (y[0], y[1], 0.0), coefficients, (0.0, 0.0), step)
+
+
+def _closed(kind: int, plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
+            coefficients: tuple[float, ...], against: tuple[float, float], step: float) -> Motion:
+    return Motion(kind, plant, mode, u, tau, t0, y, math.inf, coefficients, against, y, _NO_STAGES, _NO_DENSE, False,
+                  step)
+
+
+def _integrated(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
+                limit: float) -> Motion:
+    jac = hybrid.jacobian(plant, mode, piece_value(u, t0), piece_rate(u, t0), piece_rate(tau, t0), y[0], y[1])
+    h = min(step, limit)
+    h = min(h, period(u, tau, t0, t0 + h) / 6.0)
+    for _ in range(60):
+        y1, error, stages = rodas.step(plant, mode, u, tau, jac, t0, y, h)
+        size = max(abs(error[0]) / (1.0 + abs(y1[0])), abs(error[1]) / (1.0 + abs(y1[1])),
+                   abs(error[2]) / (1.0 + abs(y1[2]))) / _TOLERANCE
+        if not size < 1e6:
+            size = 1e6
+        factor = min(5.0, max(0.1, 0.85 * size**-0.2)) if size > 0.0 else 5.0
+        if size <= 1.0:
+            return Motion(STEP, plant, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, stages, _NO_DENSE,
+                          False, h * factor)
+        h *= factor
+        if t0 + h == t0:
+            break
+    return _closed(IMPOSSIBLE, plant, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+
+
+def prepared(motion: Motion) -> Motion:
+    """Return the motion ready to be evaluated between the ends of a step."""
+    if motion.kind != STEP or motion.has_dense:
+        return motion
+    return Motion(motion.kind, motion.plant, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
+                  motion.length, motion.coefficients, motion.against, motion.end, motion.stages,
+                  rodas.dense_coefficients(motion.stages), True, motion.next_step)
+
+
+def state(motion: Motion, s: float) -> Vector:
+    """Return (q, w, i) at s after the anchor; a step that is looked at in between has to be `prepared`."""
+    kind = motion.kind
+    if kind == REST:
+        return motion.start
+    if kind == FIRST_ORDER:
+        c = motion.coefficients
+        q, w = first_order.propagate(2.0 * c[0], c[2], c[7], c[8], s)
+        return q, w, 0.0
+    if kind == SECOND_ORDER:
+        q, w = second_order.propagate(motion.coefficients, s)
+        return q, w, 0.0
+    if kind == WITH_CURRENT:
+        w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
+        plant, against = motion.plant, motion.against
+        return motion.start[0] + way, w, (plant.J * dw + plant.b * w + against[0] + against[1] * s) / plant.K
+    if s >= motion.length * (1.0 - 1e-15):  # the end, reached as a difference of two times
+        return motion.end
+    if s == 0.0:
+        return motion.start
+    dense = motion.dense if motion.has_dense else rodas.dense_coefficients(motion.stages)
+    return rodas.interpolate(motion.start, motion.end, dense, s / motion.length)
+
+
+def acceleration(motion: Motion, s: float, y: Vector) -> tuple[float, float]:
+    """Return ẇ and di/dt at s, where the state is y."""
+    kind = motion.kind
+    if kind == REST:
+        return 0.0, 0.0
+    if kind == FIRST_ORDER or kind == SECOND_ORDER:
+        return second_order.acceleration(motion.coefficients, s, y[0], y[1]), 0.0
+    plant = motion.plant
+    if kind == WITH_CURRENT:
+        w, dw = second_order.propagate(motion.coefficients, s)
+        ddw = second_order.acceleration(motion.coefficients, s, w, dw)
+        return dw, (plant.J * ddw + plant.b * dw + motion.against[1]) / plant.K
+    t = motion.t0 + s
+    return hybrid.rates(plant, motion.mode, piece_value(motion.u, t), piece_value(motion.tau, t), y[0], y[1], y[2])
+
+
+def scales(motion: Motion) -> tuple[float, float]:
+    """Return the time in which the free motion changes, and the time after which it has settled [s]."""
+    if motion.kind == REST:
+        return math.inf, 0.0
+    if motion.kind == STEP:  # the error control keeps it short beside what happens in it
+        return motion.length, math.inf
+    a, c = motion.coefficients[0], motion.coefficients[1]
+    rate = 2.0 * a + math.sqrt(abs(c))
+    if rate == 0.0:
+        return math.inf, 0.0
+    if a * a >= c:
+        return 1.0 / rate, 40.0 / rate
+    return 1.0 / rate, 45.0 / a if a > 0.0 else math.inf
+
+
+def periodic(u: Piece, tau: Piece) -> bool:
+    """Tell whether either of two inputs oscillates."""
+    return u.amplitude != 0.0 or tau.amplitude != 0.0
+
+
+def period(u: Piece, tau: Piece, t0: float, t1: float) -> float:
+    """Return the shortest period [s] of two inputs between two times; inf where neither oscillates."""
+    fastest = max(_frequency(u, t0, t1), _frequency(tau, t0, t1))
+    return _TURN / fastest if fastest > 0.0 else math.inf
+
+
+def _frequency(piece: Piece, t0: float, t1: float) -> float:
+    if piece.amplitude == 0.0:
+        return 0.0
+    return max(abs(piece.frequency + piece.sweep * (t0 - piece.start)),
+               abs(piece.frequency + piece.sweep * (t1 - piece.start)))
+
+
+def monotone_until(motion: Motion, s: float, s1: float) -> float:
+    """Return the end of an interval from s on, at most s1, in which the speed is monotone and inputs are simple."""
+    kind = motion.kind
+    if kind == STEP or s1 - s <= 0.0:
+        return s1
+    if kind == REST or periodic(motion.u, motion.tau):
+        if not periodic(motion.u, motion.tau) or not s1 < math.inf:
+            return s1
+        fine, settled = scales(motion)
+        width = period(motion.u, motion.tau, motion.t0 + s, motion.t0 + s1) / 12.0
+        if kind != REST and s < settled:
+            width = min(width, 0.5 * fine)
+        return s + width if s + width < s1 else s1
+    # Between the zeros of the acceleration, which are known.
+    a, c, f0, f1, _, _, _, q0, w0 = motion.coefficients
+    dw = f0 - c * q0 - 2.0 * a * w0
+    zero, spacing = second_order.first_zero(a, c, dw, f1 - c * w0 - 2.0 * a * dw)
+    if zero <= s and spacing < math.inf:
+        zero += math.floor((s - zero) / spacing) * spacing
+        if zero <= s:
+            zero += spacing
+    settled = 45.0 / a if a > 0.0 else math.inf  # the free motion is below rounding from here on
+    return zero if s < zero < min(s1, settled) else s1
