@@ -13,7 +13,8 @@ _LAZY = {
     **dict.fromkeys(("Servo", "catalog_names", "load_dataset", "load_servo", "servo_from_values"), "parameters"),
     **dict.fromkeys(
         ("AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "PulseServo"), "models"),
-    **dict.fromkeys(("Result", "Simulator", "State", "Status", "simulate"), "simulation"),
+    **dict.fromkeys(("Batch", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_many"),
+                    "simulation"),
 }
 _MODULES = ("bench", "errors", "linear", "loads", "models", "parameters", "physics", "plotting", "signals",
             "simulation", "units")

@@ -20,10 +20,13 @@ from servotwin.parameters import catalog_names as catalog_names
 from servotwin.parameters import load_dataset as load_dataset
 from servotwin.parameters import load_servo as load_servo
 from servotwin.parameters import servo_from_values as servo_from_values
+from servotwin.simulation import Batch as Batch
 from servotwin.simulation import Result as Result
 from servotwin.simulation import Simulator as Simulator
 from servotwin.simulation import State as State
 from servotwin.simulation import Status as Status
+from servotwin.simulation import grid as grid
 from servotwin.simulation import simulate as simulate
+from servotwin.simulation import simulate_many as simulate_many
 
 __version__: str

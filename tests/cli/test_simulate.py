@@ -122,7 +122,7 @@ def test_set_replaces_a_parameter(simulate):
     assert simulate(*words, "--set", "electronics.off_state=coast").code == 0
 
 
-@pytest.mark.parametrize("model", ["averaged", "averaged-inductive", "bounded", "geared-motor", "dc-motor"])
+@pytest.mark.parametrize("model", ["averaged", "averaged-inductive", "bounded", "pulse", "geared-motor", "dc-motor"])
 def test_every_model_runs_and_is_drawn(cli, tmp_path, model):
     ended = cli("simulate", SERVO, "--model", model, "--step", "0.5:1", "--unit", "V", "--duration", "0.3",
                 "--plot", "run.svg", "--json")
@@ -135,3 +135,53 @@ def test_a_servo_file_is_a_servo(cli, tmp_path):
     st.load_servo(SERVO).save(tmp_path / "mine.toml")
     same = [cli("simulate", servo, "--step", "0:90", "--json").data["final_angle"] for servo in (SERVO, "mine.toml")]
     assert same[0] == same[1]
+
+
+def test_a_pulse_servo_gives_the_numbers_of_the_result(simulate):
+    found = simulate("--model", "pulse", "--step", "0:60", "--duration", "0.5", "--json").data
+    result = st.simulate(st.PulseServo(st.load_servo(SERVO)), st.signals.step(0.0, 60.0, at=0.1, unit="deg"),
+                         duration=0.5)
+    assert found["model"] == "pulse"
+    assert found["final_angle"] == pytest.approx(float(result["output_angle"][-1]), rel=1e-12)
+    assert found["energy"]["supply"] == pytest.approx(result.energy.supply, rel=1e-12)
+    assert "electronics.stretcher_gain" in found["assumed"]
+    assert "electronics.bridge_gain" in found["ignored"]
+
+
+def test_a_pulse_servo_writes_what_its_chip_does(simulate, tmp_path):
+    ended = simulate("--model", "pulse", "--step", "1500:1600", "--unit", "us", "--duration", "0.3",
+                     "--out", "run.csv", "--plot", "run.png")
+    assert ended.code == 0, ended.err
+    assert "model pulse" in ended.out
+    written = columns(tmp_path / "run.csv")
+    assert set(np.unique(written["drive"])) == {0.0, 1.0}
+    assert written["error_time_us"].max() == pytest.approx(100.0, abs=0.01)
+    assert {"bus_voltage_V", "supply_current_A"} < set(written)
+
+
+def test_pulses_one_by_one_are_the_frames_of_a_pulse_servo(simulate, tmp_path):
+    (tmp_path / "pulses.csv").write_text("time_s,pulse_width_us\n0,1500\n0.011,1600\n0.029,1600\n")
+    words = ["--model", "pulse", "--duration", "0.1", "--json"]
+    few = simulate(*words, "--pulses", "pulses.csv").data
+    regular = simulate(*words, "--command", "pulses.csv").data
+    train = st.signals.pulse_train([0.0, 0.011, 0.029], [1500.0, 1600.0, 1600.0])
+    result = st.simulate(st.PulseServo(st.load_servo(SERVO)), train, duration=0.1)
+    assert few["final_angle"] == pytest.approx(float(result["output_angle"][-1]), rel=1e-12)
+    assert few["final_angle"] != regular["final_angle"]
+
+
+@pytest.mark.parametrize(("words", "parts"), [
+    (["--constant", "0", "--unit", "us"], ["pulse width", "got 0", "a positive width"]),
+    (["--constant", "0", "--unit", "V"], ["pulse width", "-21.5262 us", "more than 0 us"]),
+    (["--constant", "1500", "--unit", "us", "--set", "electronics.frame_period=0.001"],
+     ["pulse width", "1500 us", "less than a frame of 1000 us"]),
+    (["--step", "0:400"], ["angle command", "400 deg", "-15 to 195 deg"]),
+    (["--pulses", "unsorted.csv"], ["unsorted.csv", "sample 2", "0.02", "more than 0.04 s"]),
+    (["--pulses", "long.csv"], ["long.csv", "width 0.0015 s", "ends before the next"]),
+])
+def test_a_pulse_servo_refuses_in_one_line(simulate, tmp_path, words, parts):
+    (tmp_path / "unsorted.csv").write_text("time_s,pulse_width_us\n0,1500\n0.04,1600\n0.02,1600\n")
+    (tmp_path / "long.csv").write_text("time_s,pulse_width_us\n0,1500\n0.001,1600\n")
+    error = simulate("--model", "pulse", *words).error
+    for part in parts:
+        assert part in error

@@ -5,11 +5,11 @@ import inspect
 import numpy as np
 import pytest
 
-from servotwin.physics import analog_servo, electronics, friction, gear, motor, potentiometer
+from servotwin.physics import analog_servo, bridge, electronics, friction, gear, motor, potentiometer, pulse
 
 LAWS = [
     law
-    for module in (analog_servo, electronics, friction, gear, motor, potentiometer)
+    for module in (analog_servo, bridge, electronics, friction, gear, motor, potentiometer, pulse)
     for name, law in inspect.getmembers(module, inspect.isfunction)
     if law.__module__ == module.__name__ and not name.startswith("_")
 ]

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from servotwin.simulation import Result, State
 
 _LOOK = 0.25  # s between two looks whether the shaft stands
-_LOOP = "electronics.bridge_gain"
+_LOOP, _STRETCH = "electronics.bridge_gain", "electronics.stretcher_gain"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,8 +98,7 @@ class Bench:
         self._simulator = Simulator(model, load)
         self._p = model.value("potentiometer.feedback_gain")
         self._b_o = model.value("potentiometer.feedback_offset")
-        read = "electronics.voltage_deadband" in model.optional
-        self._deadband = model.value_or("electronics.voltage_deadband", 0.0) if read else 0.0
+        self._half_deadband = _half_deadband(model)
 
     def pulse_width(self, command_voltage: float) -> float:
         """Return the pulse width that a constant command voltage [V] becomes [s]."""
@@ -185,37 +184,54 @@ class Bench:
         period = self.generator.frame_period
         pulses = constant(self.pulse_width(voltage), unit="s", frame_period=period)
         target = self._simulator.initial(pulses)["output_angle"]
-        below, above = (self._settled(pulses, target + side * approach, dwell) for side in (-1.0, 1.0))
+        (below, rests_below), (above, rests_above) = (
+            self._settled(pulses, target + side * approach, dwell) for side in (-1.0, 1.0))
         low, high = below["output_angle"], above["output_angle"]
         band = 0.5 * abs(high - low)
-        dead = min(band, 0.5 * self._deadband / self._p)
+        dead = min(band, self._half_deadband)
         mean = 0.5 * (low + high)
         return TableRow(
             reading=self.reading(voltage, mean), from_below=self.reading(voltage, low),
             from_above=self.reading(voltage, high), target_angle=target,
             target_voltage=float(feedback_voltage(target, self._p, self._b_o)), standing_band=band,
             deadband_band=dead, friction_band=band - dead,
-            at_rest=below["output_speed"] == above["output_speed"] == 0.0, dwell=max(below.time, above.time))
+            at_rest=rests_below and rests_above, dwell=max(below.time, above.time))
 
-    def _settled(self, pulses: Signal, start: float, dwell: float) -> State:
-        """Return the state once the shaft stands still, or after the longest wait."""
+    def _settled(self, pulses: Signal, start: float, dwell: float) -> tuple[State, bool]:
+        """Return the state once the shaft stands still, or after the longest wait, and whether it stands still.
+
+        Between two pulses a servo may stand without being at rest, so it also has to be where it was a look ago.
+        """
         lower = self.model.servo.get("stops.lower_angle")
         upper = self.model.servo.get("stops.upper_angle")
         low = lower if isinstance(lower, int | float) else -math.inf
         high = upper if isinstance(upper, int | float) else math.inf
         state = self._simulator.initial(pulses, {"output_angle": min(max(start, low), high)})
-        looks = math.ceil(dwell / _LOOK)
+        looks = max(math.ceil(dwell / _LOOK), 2)
         for k in range(1, looks + 1):
+            before = state["output_angle"]
             state = self._simulator.advance(state, dwell * k / looks, pulses)
-            if state["output_speed"] == 0.0:
-                break
-        return state
+            if state["output_speed"] == 0.0 and state["output_angle"] == before:
+                return state, True
+        return state, False
+
+
+def _half_deadband(model: Model) -> float:
+    """Return how far from the target the electronics of a model give up [rad]."""
+    p = model.value("potentiometer.feedback_gain")
+    if "electronics.deadband" in model.optional:
+        width = model.value_or("electronics.deadband", 0.0)
+        return 0.5 * width / (p * model.value("electronics.one_shot_slope"))
+    if "electronics.voltage_deadband" in model.optional:
+        return 0.5 * model.value_or("electronics.voltage_deadband", 0.0) / p
+    return 0.0
 
 
 def bench_servo(servo: Servo, generator: PulseGenerator | None = None) -> Servo:
-    """Return a servo at the frame period of the bench, its loop gain rescaled.
+    """Return a servo at the frame period of the bench, the loop gain of its mean voltage rescaled.
 
-    By `physics.electronics.averaged_bridge_gain` the product A k_s goes as 1/T_f: more pulses a second drive more.
+    By `physics.electronics.averaged_bridge_gain` the product A k_s goes as 1/T_f: more pulses a second drive more. A
+    servo that gives a stretcher gain and no bridge gain, as `PulseServo` needs it, only gets the frame period.
 
     Parameters
     ----------
@@ -227,7 +243,7 @@ def bench_servo(servo: Servo, generator: PulseGenerator | None = None) -> Servo:
     Raises
     ------
     MissingParameterError
-        If the servo gives no bridge gain.
+        If the servo gives neither a bridge gain nor a stretcher gain.
 
     Examples
     --------
@@ -237,8 +253,10 @@ def bench_servo(servo: Servo, generator: PulseGenerator | None = None) -> Servo:
     16.384
     """
     gain, period = servo.get(_LOOP), servo.get("electronics.frame_period")
+    after = (generator or PulseGenerator()).frame_period
+    if gain is None and servo.get(_STRETCH) is not None:
+        return servo.replace({"electronics.frame_period": after})
     if not isinstance(gain, int | float):
         raise MissingParameterError("Bench", servo.name, [_LOOP])
     before = float(period) if isinstance(period, int | float) else 0.02
-    after = (generator or PulseGenerator()).frame_period
     return servo.replace({"electronics.frame_period": after, _LOOP: gain * before / after})

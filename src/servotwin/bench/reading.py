@@ -61,9 +61,10 @@ class TableRow:
     deadband_band : float
         The part of it that half the electrical deadband explains [rad].
     friction_band : float
-        The rest of it: friction, and for the averaged models the creep that had no time to end [rad].
+        The rest of it: friction, and the creep that had no time to end [rad].
     at_rest : bool
-        Whether both approaches ended with a shaft that stands still; a smoothed friction creeps for minutes.
+        Whether both approaches ended with a shaft that stands still; a smoothed friction creeps for minutes, and the
+        pulses of a `PulseServo` move it by ever smaller steps.
     dwell : float
         The longer of the two waiting times [s].
     """

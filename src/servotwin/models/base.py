@@ -10,7 +10,7 @@ import numpy as np
 
 from servotwin.errors import CommandError, InputError, MissingParameterError, UnknownNameError
 from servotwin.models import outputs
-from servotwin.models.columns import LaneServo, LaneSignal
+from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.parameters import Servo
 
 if TYPE_CHECKING:
@@ -175,25 +175,51 @@ def clipped(x: float, low: float, high: float) -> float:
 
 def check_travel(signal: Signal | LaneSignal, servo: Servo) -> None:
     """Raise CommandError if an angle command leaves the travel that the servo gives."""
-    lowest: Any
-    highest: Any
-    if isinstance(signal, LaneSignal):
-        lowest, highest = signal.extremes
-    else:
-        lowest, highest = signal.pieces.bounds(signal.pieces.table[-1].start)
     lower: Any = servo.get("stops.lower_angle")
     upper: Any = servo.get("stops.upper_angle")
     low = -math.inf if lower is None else lower
     high = math.inf if upper is None else upper
+    lowest, highest = _extremes(signal.pieces)
     slack = 1e-9
-    outside = (lowest < low - slack) | (highest > high + slack)
-    if not np.any(outside):
-        return
-    lane = int(np.argmax(np.ravel(outside)))
-    lowest, highest, low, high = (float(np.ravel(x)[lane if np.size(x) > 1 else 0])
-                                  for x in (lowest, highest, low, high))
-    angle = lowest if lowest < low - slack else highest
-    raise CommandError(
-        f"angle command of lane {signal.lanes[lane]}" if isinstance(signal, LaneSignal) else "angle command",
-        got=f"{math.degrees(angle):.6g} deg",
-        allowed=f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg, the travel of {servo.name}")
+    bad = _First((lowest < low - slack) | (highest > high + slack))
+    if bad:
+        low, high = bad.of(low), bad.of(high)
+        angle = bad.of(lowest) if bad.of(lowest) < low - slack else bad.of(highest)
+        raise CommandError(
+            f"angle command{bad.lane(signal)}", got=f"{math.degrees(angle):.6g} deg",
+            allowed=f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg, the travel of {servo.name}")
+
+
+def check_widths(signal: Signal | LaneSignal, widths: Pieces | LanePieces, period: float) -> None:
+    """Raise CommandError if a pulse width [s] is not positive, or not shorter than a frame [s]."""
+    lowest, highest = _extremes(widths)
+    bad = _First((lowest <= 0.0) | (highest >= period))
+    if bad:
+        width = bad.of(lowest) if bad.of(lowest) <= 0.0 else bad.of(highest)
+        frame = bad.of(period)
+        raise CommandError(
+            f"pulse width{bad.lane(signal)}", got=f"{1e6 * width:.6g} us",
+            allowed="more than 0 us" + (f" and less than a frame of {1e6 * frame:.6g} us" if frame < math.inf else ""))
+
+
+def _extremes(pieces: Pieces | LanePieces) -> tuple[Any, Any]:
+    return pieces.extremes if isinstance(pieces, LanePieces) else pieces.bounds(pieces.table[-1].start)
+
+
+class _First:
+    """The first lane for which something is so; without lanes, whether it is."""
+
+    def __init__(self, so: Any) -> None:
+        self._so = np.ravel(so)
+        self._lane = int(np.argmax(self._so))
+
+    def __bool__(self) -> bool:
+        return bool(self._so[self._lane])
+
+    def of(self, value: Any) -> float:
+        """Return that lane's of a column, or the number."""
+        return float(np.ravel(value)[self._lane if np.size(value) > 1 else 0])
+
+    def lane(self, signal: Signal | LaneSignal) -> str:
+        """Return how an error names the lane."""
+        return f" of lane {signal.lanes[self._lane]}" if isinstance(signal, LaneSignal) else ""

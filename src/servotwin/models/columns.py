@@ -20,11 +20,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-def part_of(value: Any, lanes: slice | Indices) -> Any:
-    """Return some rows of a column; a number holds for all lanes."""
-    return value[lanes] if isinstance(value, np.ndarray) and value.ndim else value
-
-
 @dataclass(frozen=True, eq=False)
 class LaneServo:
     """A servo of which some numbers are columns; reads as a `Servo` does.
@@ -50,10 +45,6 @@ class LaneServo:
         column = self.columns.get(name)
         return self.servo.get(name) if column is None else column
 
-    def part(self, lanes: slice | Indices) -> LaneServo:
-        """Return some lanes."""
-        return replace(self, columns={name: column[lanes] for name, column in self.columns.items()})
-
 
 @dataclass(frozen=True, eq=False)
 class LanePieces:
@@ -66,6 +57,8 @@ class LanePieces:
     first, count : ndarray of int, shape (B,)
         The table of a lane is rows[first : first + count].
     gain, offset : float or ndarray, shape (B, 1)
+    low, high : float or ndarray, shape (B, 1)
+        Lowest and highest value of each lane's table.
 
     Examples
     --------
@@ -81,15 +74,18 @@ class LanePieces:
     count: Indices
     gain: float | Array = 1.0
     offset: float | Array = 0.0
+    low: float | Array = 0.0
+    high: float | Array = 0.0
+
+    @property
+    def extremes(self) -> tuple[Any, Any]:
+        """Lowest and highest value of each lane, numbers or columns."""
+        a, b = self.gain * self.low + self.offset, self.gain * self.high + self.offset
+        return np.minimum(a, b), np.maximum(a, b)
 
     def scaled(self, gain: float | Array, offset: float | Array) -> LanePieces:
         """Return gain · y + offset."""
         return replace(self, gain=gain * self.gain, offset=gain * self.offset + offset)
-
-    def part(self, lanes: slice | Indices) -> LanePieces:
-        """Return some lanes."""
-        return replace(self, first=self.first[lanes], count=self.count[lanes], gain=part_of(self.gain, lanes),
-                       offset=part_of(self.offset, lanes))
 
     @property
     def initial(self) -> Array:
@@ -126,7 +122,7 @@ class LanePieces:
         gain, offset = (np.repeat(np.broadcast_to(x, (len(first), 1)), count, axis=0) for x in (self.gain, self.offset))
         rows[:, 1:2] = gain * rows[:, 1:2] + offset
         rows[:, 2:4] *= gain  # slope and amplitude
-        return place[lane].astype(np.int64), count[lane].astype(np.int64), rows
+        return place[lane], count[lane], rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,16 +135,16 @@ class LaneSignal:
         "angle", "pulse_width" or "voltage".
     pieces : LanePieces
         Values in SI.
-    extremes : tuple of ndarray, shape (B, 1)
-        Lowest and highest value (SI).
-    frame_period : ndarray, shape (B, 1), optional
+    frame_period : float or ndarray, shape (B, 1), optional
         [s]
+    edges : tuple, optional
+        Anything but None where the frames do not come regularly.
     lanes : ndarray of int, shape (B,)
         Numbers of the lanes, for errors.
     """
 
     kind: str
     pieces: LanePieces
-    extremes: tuple[Array, Array]
-    frame_period: Array | None
+    frame_period: float | Array | None
+    edges: tuple[()] | None
     lanes: Indices

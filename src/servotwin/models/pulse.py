@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from servotwin.errors import CommandError, InputError
-from servotwin.models.base import Model, check_travel, clipped
+from servotwin.errors import InputError
+from servotwin.models.base import Model, check_travel, check_widths, clipped
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.hybrid import Plant
 from servotwin.models.plant import make_plant
 from servotwin.physics import electronics, potentiometer
 
-from servotwin.physics.pieces import Pieces
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
+    from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
 
@@ -144,18 +143,8 @@ class PulseServo(Model):
                 + slope * self.value_or("potentiometer.feedback_offset", 0.0))
         else:
             pieces = signal.pieces
-        if isinstance(pieces, Pieces):
-            self._check_widths(signal, pieces)
+        check_widths(signal, pieces, self.chip(signal).frame_period if signal.edges is None else math.inf)
         return pieces
-
-    def _check_widths(self, signal: Signal, widths: Pieces) -> None:
-        lowest, highest = widths.bounds(widths.table[-1].start)
-        period = math.inf if signal.edges is not None else self.chip(signal).frame_period
-        if not 0.0 < lowest <= highest < period:
-            bad = lowest if lowest <= 0.0 else highest
-            raise CommandError(
-                "pulse width", got=f"{1e6 * bad:.6g} us",
-                allowed="more than 0 us" + (f" and less than a frame of {1e6 * period:.6g} us" if period < math.inf else ""))
 
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a pulse width [s]."""

@@ -6,6 +6,7 @@ A mechanical quantity names its shaft, `motor_` or `output_`, unless it can belo
 """
 
 from servotwin.physics.analog_servo import driven_spindle_torque, forward_acceleration, loop_voltage, spindle_torque
+from servotwin.physics.bridge import bridge_current, motor_voltage
 from servotwin.physics.electronics import (
     averaged_bridge_gain,
     bounded_armature_voltage,
@@ -38,6 +39,7 @@ from servotwin.physics.motor import (
     steady_armature_current,
 )
 from servotwin.physics.potentiometer import angle_from_voltage, feedback_voltage, quantised
+from servotwin.physics.pulse import drive_time, full_drive_error, one_shot_width, pulse_stiffness
 from servotwin.physics.sheet import SheetMotor, motor_from_sheet
 
 __all__ = [
@@ -47,21 +49,27 @@ __all__ = [
     "averaged_bridge_gain",
     "back_emf",
     "bounded_armature_voltage",
+    "bridge_current",
     "comparator_voltage",
     "control_voltage_from_pulse",
     "control_voltage_from_voltage",
     "coulomb_torque",
     "creep_speed",
+    "drive_time",
     "driven_spindle_torque",
     "electromagnetic_torque",
     "feedback_error",
     "feedback_voltage",
     "forward_acceleration",
+    "full_drive_error",
     "loop_voltage",
     "motor_from_output",
     "motor_from_sheet",
+    "motor_voltage",
+    "one_shot_width",
     "output_inertia",
     "output_viscous_friction",
+    "pulse_stiffness",
     "pulse_width_from_voltage",
     "quantised",
     "reflected_inertia",

@@ -69,4 +69,5 @@ def motor_voltage(armature_current: Real, back_emf: Real, armature_resistance: R
     3.3
     """
     i, v_b, R_a, V_br = armature_current, back_emf, armature_resistance, brush_drop_voltage
-    return np.where(i == 0.0, open_circuit_voltage, v_b + R_a * i + np.copysign(V_br, i))
+    v_a: Real = np.where(i == 0.0, open_circuit_voltage, v_b + R_a * i + np.copysign(V_br, i))[()]
+    return v_a

@@ -63,7 +63,8 @@ def drive_time(error_time: Real, stretcher_gain: Real, deadband: Real = 0.0, min
     stretched = stretcher_gain * u
     if stretcher_time_constant is not None:
         stretched = stretcher_time_constant * np.log1p(stretched / stretcher_time_constant)
-    return np.where(u > 0.0, minimum_drive_time + stretched, 0.0)
+    t_on: Real = np.where(u > 0.0, minimum_drive_time + stretched, 0.0)[()]
+    return t_on
 
 
 def full_drive_error(frame_period: Real, stretcher_gain: Real, deadband: Real = 0.0, minimum_drive_time: Real = 0.0,

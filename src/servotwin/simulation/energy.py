@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from servotwin.models.kernels import hybrid, motion
 from servotwin.models.circuit import circuit_of
+from servotwin.models.kernels import hybrid, motion
 from servotwin.models.outputs import torques_of
 
 if TYPE_CHECKING:

@@ -151,7 +151,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
                 chip_frame = _switched(plan, plan.chip, chip_frame, point, record)
                 u = walk.source(plant, chip_frame)
                 u_end = min(frame.next_switch(chip_frame),
-                            frame.edge_time(plan.period, plan.edges or (), chip_frame.index))
+                            frame.edge_time(plan.period, plan.edges or (), chip_frame.number))
             tau, tau_end = plan.torque.at(before)
             limit = min(u_end, tau_end)
             if (u, tau) != inputs:
@@ -191,7 +191,7 @@ def _switched(plan: Plan, chip: Chip, now: Frame, point: Point, record: Record |
         now = frame.switched(now, time)
         if record is not None and now.drive != drive:
             record.events.append(Event(time, _DRIVES[int(now.drive)], point.y[0]))
-    if frame.edge_time(plan.period, plan.edges or (), now.index) <= time:
+    if frame.edge_time(plan.period, plan.edges or (), now.number) <= time:
         t_in = piece_value(plan.command.at(time)[0], time)
         if record is not None and not frame.accepted(chip, t_in):
             record.events.append(Event(time, "pulse refused", point.y[0]))

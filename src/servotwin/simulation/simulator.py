@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -82,7 +83,7 @@ class Simulator:
         """
         drive = self.drive(command)
         before = drive.table[0]._replace(value=command.initial, slope=0.0, amplitude=0.0)
-        start = self.model.command(Signal(pieces=Pieces((before,)), unit=command.unit, initial=command.initial))
+        start = self.model.command(replace(command, pieces=Pieces((before,))))
         values = [self.model.start_angle(start.table[0].value), 0.0, 0.0]
         if initial is not None and not isinstance(initial, Mapping):
             raise InputError("initial", got=initial, allowed="a mapping of state names to numbers (SI)")

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels import motion, rodas
+from servotwin.models.kernels import motion
 from servotwin.models.samples import Samples
 from servotwin.simulation.engine import Segment
 
@@ -89,7 +89,5 @@ class Trajectory:
 
 def _states(m: motion.Motion, s: Array) -> Array:
     """Return the states (q, w, i) of a motion at times s after its anchor, shape (3, n)."""
-    if m.kind != motion.STEP:
-        return np.array([motion.state(m, x) for x in s.tolist()]).T
-    inside = np.array(rodas.interpolate(m.start, m.end, rodas.dense_coefficients(m.stages), s / m.length))
-    return np.where(s >= m.length * (1.0 - 1e-15), np.array(m.end)[:, None], inside)
+    m = motion.prepared(m)
+    return np.array([motion.state(m, x) for x in s.tolist()]).T

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin import plotting
-from servotwin.cli.paper.study import LABELS, BenchStudy, Study
+from servotwin.cli.paper.study import APPROACH_ROW, LABELS, BenchStudy, Study
+from servotwin.cli.paper.words import fixed
 from servotwin.plotting import Curve, Limit
 
 if TYPE_CHECKING:
@@ -42,14 +43,21 @@ class Picture:
     columns: Mapping[str, Column] = field(default_factory=dict)
 
 
+_LAST = (0.7, 1.1)  # s: where the step of the two servos with a supply ends
+_SAMPLED = "Drawn once a millisecond, so a shorter pulse of the pulse servo may be missing."
+_BESIDE = 0.015  # of the horizontal axis, between bars that belong to one row
+_NEAR = 4.0  # °: more than any standing band, so the approach itself is left out
+
 # number of the figure or name -> (title, signal, label of the axis, unit in the column, caption)
 _RESPONSES: tuple[tuple[str, str, str, str, str, str], ...] = (
     ("figure-13", "Figure 13: spindle position", "output_angle", "output angle $q$ (°)", "deg",
      "The paper's Figure 13. The command steps from 0 to 180° at 0.1 s."),
     ("figure-14", "Figure 14: spindle speed", "output_speed", r"output speed $\dot{q}$ (°/s)", "deg_per_s",
-     "The paper's Figure 14. Only the bounded servo has a top speed: that of a motor at full supply voltage."),
+     "The paper's Figure 14. The averaged servo has no top speed; the two others have that of a motor at full supply "
+     "voltage. Near the target the pulse servo goes from pulse to pulse."),
     ("figure-15", "Figure 15: torque at the spindle", "load_torque", r"spindle torque $\tau_L$ (N m)", "Nm",
-     "The paper's Figure 15: the torque that the servo delivers to its load, here what accelerates an inertia."),
+     "The paper's Figure 15: the torque that the servo delivers to its load, here what accelerates an inertia. "
+     + _SAMPLED),
     ("figure-16", "Figure 16: feedback voltage", "feedback_voltage", "feedback voltage $v_o$ (V)", "V",
      "The paper's Figure 16: the voltage of the potentiometer."),
     ("figure-armature-voltage", "Not in the paper: armature voltage", "armature_voltage",
@@ -60,10 +68,11 @@ _RESPONSES: tuple[tuple[str, str, str, str, str, str], ...] = (
 def pictures(study: Study, progress: Callable[[float], None]) -> tuple[Picture, ...]:
     """Return all pictures; `progress` is told the fraction that is drawn."""
     makers: list[Callable[[], Picture]] = [lambda row=row: _response(study, *row) for row in _RESPONSES]  # type: ignore[misc]
-    makers.append(lambda: _feedback_over_position(study))
+    makers += [lambda: _last_degrees(study), lambda: _feedback_over_position(study)]
     makers += [lambda number=number, row=row: _pulses(study, number, row)  # type: ignore[misc]
                for number, row in ((22, 0), (23, 2), (24, 4))]
-    makers += [lambda: _over_voltage(study), lambda: _over_pulse(study), lambda: _over_angle(study)]
+    makers += [lambda: _over_voltage(study), lambda: _over_pulse(study), lambda: _over_angle(study),
+               lambda: _standing(study)]
     makers += [lambda number=number: _diagram(number) for number in plotting.PAPER_DIAGRAMS]  # type: ignore[misc]
     done = []
     for k, make in enumerate(makers):
@@ -81,8 +90,8 @@ def _response(study: Study, name: str, title: str, signal: str, label: str, unit
         times = study.peak_voltage["averaged"] / study.supply
         caption = (f"What drives the curves above. (38) knows no supply: the printed model puts "
                    f"{study.peak_voltage['averaged']:.1f} V on a motor that {study.supply:.3g} V feed, "
-                   f"<strong>{times:.1f} times the supply</strong>. The bounded servo stops at "
-                   f"{study.peak_voltage['bounded']:.2f} V, the supply less the drop of its bridge.")
+                   f"<strong>{times:.1f} times the supply</strong>. The two others stop at "
+                   f"{study.peak_voltage['bounded']:.2f} V, the supply less the drop of the bridge. {_SAMPLED}")
     if signal == "output_angle":
         limits = [Limit("command 180°", 180.0)]
     drawn = [Curve(LABELS[model], time, values[model]) for model in values]
@@ -90,6 +99,54 @@ def _response(study: Study, name: str, title: str, signal: str, label: str, unit
     columns: dict[str, Column] = {"time_s": time.tolist()}
     columns |= {f"{model}_{signal}_{unit}": values[model].tolist() for model in values}
     return Picture(name=name, title=title, caption=caption, figure=figure, columns=columns)
+
+
+def _last_degrees(study: Study) -> Picture:
+    """Draw how the servos that know a supply come to a stand, and the pulses that bring one of them there."""
+    time = np.linspace(*_LAST, 2001)
+    columns: dict[str, Column] = {"time_s": time.tolist()}
+    angles, voltages = [], []
+    for style, model in ((1, "bounded"), (2, "pulse")):
+        q, v_a = (plotting.shown(name, study.steps[model].at(name, time))
+                  for name in ("output_angle", "armature_voltage"))
+        columns |= {f"{model}_output_angle_deg": q.tolist(), f"{model}_armature_voltage_V": v_a.tolist()}
+        angles.append(Curve(LABELS[model], time, q, style=style))
+        voltages.append(Curve("", time, v_a, style=style))
+    figure = plotting.curves(angles, x_label="time (s)", y_label="output angle $q$ (°)",
+                             below=voltages, below_label="$v_a$ (V)", height=4.0)
+    caption = ("The end of the same step to 180°. The bounded servo gets a mean voltage, and comes to a stand where that "
+               "is too weak for the friction. The pulse servo gets pulses of the full voltage, ever shorter ones, and "
+               "each of them moves it.")
+    return Picture(name="figure-last-degrees", title="Not in the paper: the last degrees", caption=caption,
+                   figure=figure, columns=columns)
+
+
+def _standing(study: Study) -> Picture:
+    """Draw what is left to the target of one row, from below and from above, one curve for each model."""
+    columns: dict[str, Column] = {}
+    drawn = []
+    for model, one in study.on_bench.items():
+        target = math.degrees(one.rows[APPROACH_ROW].target_angle)
+        time = one.approaches[0].time
+        left = [plotting.shown("output_angle", run["output_angle"]) - target for run in one.approaches]
+        columns["time_s"] = time.tolist()
+        columns |= {f"{model}_from_{side}_deg": values.tolist()
+                    for side, values in zip(("below", "above"), left, strict=True)}
+        near = np.concatenate([left[0], [math.nan], left[1]])
+        near[np.abs(near) > _NEAR] = math.nan
+        drawn.append(Curve(LABELS[model], np.concatenate([time, [math.nan], time]), near))
+    row = study.on_bench["pulse"].rows[APPROACH_ROW]
+    edge = math.degrees(row.deadband_band)
+    figure = plotting.curves(drawn, x_label="time (s)", y_label="angle less target (°)", height=3.4,
+                             limits=[Limit(f"edge of the deadband, ±{edge:.2f}°", edge), Limit("", -edge)])
+    angle = study.table["q_deg"][APPROACH_ROW]
+    bounded = study.on_bench["bounded"].rows[APPROACH_ROW]
+    caption = (f"How each standing band comes about, in the row of {angle:.0f}°: from 30° below and above. The bounded "
+               f"servo stops {fixed(math.degrees(bounded.standing_band), 2)}° short. The pulse servo creeps on in ever "
+               f"smaller steps; after 5 s it is {fixed(math.degrees(row.standing_band), 2)}° short, and inside the "
+               "deadband nothing drives it.")
+    return Picture(name="figure-standing", title=f"Not in the paper: coming to a stand at {angle:.0f}°",
+                   caption=caption, figure=figure, columns=columns)
 
 
 def _feedback_over_position(study: Study) -> Picture:
@@ -105,7 +162,7 @@ def _feedback_over_position(study: Study) -> Picture:
     columns |= {"measured_q_deg": angle.tolist(), "measured_V_o_V": voltage.tolist(),
                 "table_1_q_deg": study.ranges["q_deg"].tolist(), "table_1_V_o_V": study.ranges["V_o_V"].tolist()}
     figure = plotting.curves(drawn, x_label="output angle $q$ (°)", y_label="feedback voltage $v_o$ (V)", height=3.4)
-    caption = ("The paper's Figure 17. Both models share one potentiometer, so their lines coincide; it is calibrated "
+    caption = ("The paper's Figure 17. All models share one potentiometer, so their lines coincide; it is calibrated "
                "with Table II. The line of Table I, the range that the paper states for analog servos, is steeper.")
     return Picture(name="figure-17", title="Figure 17: feedback voltage over position", caption=caption,
                    figure=figure, columns=columns)
@@ -172,14 +229,16 @@ def _comparison(study: Study, name: str, title: str, fit_name: str, quantity: st
         if bands is not None:
             columns[f"{model}_standing_band_deg"] = bands
         drawn.append(Curve(f"simulated, {LABELS[model]}", across, values, points=True, style=style))
-        below.append(Curve("", across, scale * (values - fit.line(across)), points=True, error=bands, style=style))
+        beside = (style - 2) * _BESIDE * (ends[1] - ends[0]) if is_angle else 0.0  # so that no bar hides another
+        below.append(Curve("", across + beside, scale * (values - fit.line(across)), points=True, error=bands,
+                           style=style))
     drawn.append(Curve("measured, Table II", x, y, points=True, style=0))
     below.append(Curve("", x, scale * (y - fit.line(x)), points=True, style=0))
     figure = plotting.curves(
         drawn, x_label=x_label, y_label="output angle $q$ (°)" if is_angle else "feedback voltage $v_o$ (V)",
         below=below, below_label=f"less the line ({unit})", height=4.4)
     if is_angle:
-        caption += " Bars: the standing band, where the shaft stops coming from below and from above."
+        caption += " Bars: the standing band, where the shaft stops coming from below and from above, set side by side."
     return Picture(name=name, title=title, caption=caption, figure=figure, columns=columns)
 
 

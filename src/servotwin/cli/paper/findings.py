@@ -48,13 +48,18 @@ def corrections(study: Study) -> tuple[Finding, ...]:
                 f"as printed, {at_zero:.3f} V asks for {fixed(math.degrees(k_p * at_zero / p), 1)}°; the servo stood "
                 "at 0°"),
         Finding("(38): no bound", "No bridge gives more than its supply. The averaged servo keeps (38) as printed, the "
-                "bounded servo limits it.",
+                "two others limit it.",
                 f"peak |v<sub>a</sub>| {fixed(study.peak_voltage['averaged'], 1)} V on a supply of "
                 f"{number(study.supply)} V: {fixed(study.peak_voltage['averaged'] / study.supply, 1)} times"),
-        Finding("(38): no deadband", "The chip ignores small errors. The bounded servo has a deadband, the averaged "
-                "servo has none.", f"8 µs of full width (sheet) are ± {fixed(math.degrees(half_band), 2)}°"),
+        Finding("(38): no deadband", "The chip ignores small errors. The averaged servo has no deadband, the two "
+                "others have one.", f"8 µs of full width (sheet) are ± {fixed(math.degrees(half_band), 2)}°"),
+        Finding("(38): a mean", "The chip drives in pulses, one a frame, and (38) is their mean. Pulses break a "
+                "friction that their mean does not. The pulse servo computes every pulse.",
+                "the shaft may stand up to ± " + fixed(math.degrees(study.on_bench["bounded"].widest), 2)
+                + "° from its target with the mean, ± " + fixed(math.degrees(study.on_bench["pulse"].widest), 2)
+                + "° with pulses"),
         Finding("(41): no static friction", "The text announces it, the formula has none and gives no force at rest: a "
-                "loaded shaft creeps. The bounded servo sticks.",
+                "loaded shaft creeps. In the two other models it sticks.",
                 f"with half the friction's torque on the braked, unpowered shaft (41) creeps "
                 f"{fixed(60.0 * math.degrees(creep), 1)}° a minute (at the assumed slope k)"),
         Finding("(37), (41): which shaft", "(37) to (40) take f<sub>ec</sub> at the motor's shaft and of the motor's "
@@ -160,7 +165,10 @@ def _printed(study: Study) -> tuple[Finding, ...]:
                 "5 V version. The voltage at the motor is stated nowhere else.",
                 f"{number(study.supply)} V is used (the label)"),
         Finding("Conclusion: vibration", "The servo vibrated until motor and electronics had separate supplies. (38) "
-                "has no path from supply to feedback, so no model of this report can show it.",
+                "has no path from supply to feedback. The pulse servo has one, a supply coupling, for which there is "
+                "no value; it acts only where the bridge still drives as the chip measures, far from the target. So "
+                "nothing in this report vibrates.",
+                f"the drive lasts until the next pulse only beyond an error of {fixed(_lasting_error(study), 1)}°; "
                 f"scale: 1 mV at the potentiometer is {fixed(per_millivolt, 2)} µs or {fixed(angle, 3)}°"),
         Finding("A word", "ADC_i and ADC_o are called values of a “digital-analog” converter. They are counts of "
                 "analog-digital converters.", "no number: a slip"),
@@ -168,3 +176,13 @@ def _printed(study: Study) -> tuple[Finding, ...]:
                 "L<sub>a</sub>, J<sub>m</sub>, B<sub>m</sub>, n, A, k<sub>s</sub>, k<sub>p</sub>, p, F<sub>ec</sub> or "
                 "k. Its simulated curves cannot be computed from it.", "13 symbols, 0 values"),
     )
+
+
+def _lasting_error(study: Study) -> float:
+    """Return from which error on the drive of one frame lasts into the next, in the middle of Table II [°]."""
+    row = study.on_bench["pulse"].rows[2]
+    frame = 1.0 / row.reading.pulse_rate
+    error = (0.5 * study.value("electronics.deadband")
+             + (frame - row.reading.pulse_width) / study.value("electronics.stretcher_gain"))
+    time_per_angle = study.value("electronics.one_shot_slope") * study.value("potentiometer.feedback_gain")
+    return math.degrees(error / time_per_angle)

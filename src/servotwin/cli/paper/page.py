@@ -89,9 +89,9 @@ Simulations and Experimental Results”, <cite>Canadian Journal on Automation, C
 
 def _summary(study: Study) -> str:
     peak = study.peak_voltage["averaged"]
-    bounded, averaged = study.on_bench["bounded"], study.on_bench["averaged"]
+    bounded, pulse = study.on_bench["bounded"], study.on_bench["pulse"]
     cards = []
-    for one, name in ((averaged, "averaged"), (bounded, "bounded")):
+    for name, one in study.on_bench.items():
         cards.append((f"{fixed(math.degrees(one.worst('output_angle')), 2)}°, "
                       f"{fixed(1e3 * one.worst('feedback_voltage'), 1)} mV",
                       f"largest difference to Table II of the {escape(LABELS[name])}: angle, feedback voltage; pulse "
@@ -103,20 +103,26 @@ def _summary(study: Study) -> str:
         (f"{fixed(study.metrics['averaged'].rise_time, 2)} s against {fixed(study.metrics['bounded'].rise_time, 2)} s",
          "rise time of that step, printed model against a servo whose supply ends"),
         (f"{fixed(math.degrees(study.metrics['bounded'].slew_rate), 0)} °/s",
-         f"top speed of the bounded servo{_sheet_speed(study)}"),
-        (f"{study.on_bench['bounded'].rows[0].reading.pulse_rate:.3f} Hz",
+         f"top speed of the bounded and the pulse servo{_sheet_speed(study)}"),
+        (f"± {fixed(math.degrees(bounded.widest), 2)}° against ± {fixed(math.degrees(pulse.widest), 2)}°",
+         "how far from its target the shaft may stand, with the mean voltage of the pulses and with the pulses"),
+        (f"{bounded.rows[0].reading.pulse_rate:.3f} Hz",
          "pulse rate of the bench, 1024 steps of 16 µs; the paper prints 61"),
     ]
     listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
-    share = max(abs(s.rest) + abs(s.standing) for s in bounded.angle_shares)
+    share = max(abs(s.rest) + abs(s.standing) for one in (bounded, pulse) for s in one.angle_shares)
     return f"""<ul class="numbers">{listed}</ul>
-<ul><li>All five rows of Table II are met by both models. What is left is the curvature of the measured angle over pulse
-width; everything else together stays below {fixed(math.degrees(share), 2)}° for the bounded servo. The potentiometer
-and the command chain were calibrated with the same table, so this shows that the chain is consistent; it is no
-independent test.</li>
-<li>The static characteristic, which is what the paper measured, cannot tell the two models apart. The step can: the
-printed model is {fixed(study.metrics['bounded'].rise_time / study.metrics['averaged'].rise_time, 1)} times as fast as
-the bounded one, because its armature voltage has no bound.</li>
+<ul><li>All five rows of Table II are met by all three models. What is left is the curvature of the measured angle over
+pulse width; everything else together stays below {fixed(math.degrees(share), 2)}° for the bounded and the pulse servo.
+The potentiometer and the command chain were calibrated with the same table, so this shows that the chain is consistent;
+it is no independent test.</li>
+<li>The static characteristic, which is what the paper measured, cannot tell the models apart. The step tells the
+printed model from the others: it is
+{fixed(study.metrics['bounded'].rise_time / study.metrics['averaged'].rise_time, 1)} times as fast, because its armature
+voltage has no bound.</li>
+<li>Where the shaft comes to a stand tells pulses from their mean: friction holds a servo of the mean voltage up to
+{fixed(math.degrees(bounded.friction), 2)}° before the edge of its deadband, the pulse servo only
+{fixed(math.degrees(pulse.friction), 2)}°. Until then the two move alike.</li>
 <li>{len(corrections(study))} places of the equations need a correction or a remark, and {len(disagreements(study))}
 places of the data disagree with each other or leave something out; each is listed with the number that shows
 it.</li></ul>
@@ -143,11 +149,13 @@ most have a range, and they have to be identified for a real unit. <a href="#par
 
 
 def _step(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
-    names = ("figure-13", "figure-14", "figure-15", "figure-16", "figure-armature-voltage", "figure-17")
+    names = ("figure-13", "figure-14", "figure-15", "figure-16", "figure-armature-voltage", "figure-last-degrees",
+             "figure-17")
     return f"""<p>The command goes from 0 to 180° at 0.1 s. The load is an inertia of {number(LOAD_INERTIA)} kg m²
-(assumed; the paper does not say what its simulated servo carried). Both models have the same parameters. The averaged
+(assumed; the paper does not say what its simulated servo carried). All models have the same servo file. The averaged
 servo is the paper's model, (35) to (41) with the two offsets that the measured servo needs. The bounded servo has in
-addition a supply that ends, a deadband, friction that holds, and end stops.</p>
+addition a supply that ends, a deadband, friction that holds, and end stops. The pulse servo does not average: in every
+frame its bridge gives the full voltage for as long as the error asks, and brakes for the rest.</p>
 <div class="figures">{_figures(names, pictures, svg)}</div>
 {tables.step_table(study)}"""
 
@@ -168,11 +176,12 @@ V<sub>i</sub> give all five printed pulse widths; the middle, {fixed(study.offse
 <li>The converter at the potentiometer is the fitted line ADC<sub>o</sub> = 432.65 V<sub>o</sub> − 44.1, rounded. It
 is a description and no circuit.</li>
 <li>The servo file is for frames of 20 ms. By the averaging theory A k<sub>s</sub> goes as 1/T<sub>f</sub>, so on the
-bench A goes from {gain} V/V.</li>
+bench A goes from {gain} V/V. The pulse servo needs no such rule: it takes the generator's frames and widths as they
+come.</li>
 <li>A servo stops short, from either side. Each angle is approached from 30° below and from 30° above (less where the
 travel ends), with a wait until the shaft stands or for 5 s; a row is the mean, and half the difference is its
-standing band. The smoothed friction (41) never quite stands: the averaged servo is read while it still
-creeps.</li></ul>
+standing band. The smoothed friction (41) never quite stands, and the pulses move the shaft by ever smaller
+steps: the averaged and the pulse servo are read while they still creep.</li></ul>
 <div class="figures">{_figures(("figure-22", "figure-23", "figure-24"), pictures, svg)}</div>
 {tables.ranges_table(study)}"""
 
@@ -182,11 +191,10 @@ def _measured(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes
     return f"""<div class="figures">{_figures(("figure-25", "figure-26", "figure-27"), pictures, svg)}</div>
 {tables.comparison_table(study)}
 {tables.difference_table(study)}
-<p>The paper does not say from which side its angles were approached. Its points lie within
-{fixed(study.fits['q(V_i)'].line.max_residual, 1)}° of a line, while the bounded servo may stop anywhere within
-± {fixed(math.degrees(max(row.standing_band for row in study.on_bench['bounded'].rows)), 1)}°. So its band is probably
-too wide: either the loop gain is higher (it is assumed), or single pulses free the shaft where their mean does not. A
-model of the mean voltage cannot show the latter.</p>
+<h3>How far from its target a servo may stand</h3>
+<div class="figures">{_figures(("figure-standing",), pictures, svg)}</div>
+{tables.band_table(study)}
+{_band_words(study)}
 <h3>What the differences are made of</h3>
 <p>The 16 µs steps move the measured and the simulated servo alike, so they are seen against a straight line over
 V<sub>i</sub> and not between the two:</p>
@@ -195,6 +203,27 @@ V<sub>i</sub> and not between the two:</p>
 straight servo cannot have, an unequal stop from either side, and the calibration of the servo file (V<sub>o</sub> over
 t<sub>a</sub> and V<sub>o</sub> over q, rounded, against q over t<sub>a</sub>). The shares add up.</p>
 {shares}"""
+
+
+def _band_words(study: Study) -> str:
+    """Return what the bands say about the paper's points, and why pulses narrow them."""
+    bounded, pulse = study.on_bench["bounded"], study.on_bench["pulse"]
+    dead = study.shortest_pulse
+    swallowed = dead / (study.value("electronics.stretcher_gain") * study.value("electronics.one_shot_slope")
+                        * study.value("potentiometer.feedback_gain"))
+    return f"""<p>The paper does not say from which side its angles were approached. Its points lie within
+{fixed(study.fits['q(V_i)'].line.max_residual, 1)}° of a line, yet a servo that gets the mean of its pulses may stop
+anywhere within ± {fixed(math.degrees(bounded.widest), 1)}°. <strong>The pulse servo, with the same parameters, stops
+within ± {fixed(math.degrees(pulse.widest), 2)}°: its band is {fixed(bounded.widest / pulse.widest, 1)} times
+narrower.</strong> The electrical deadband is the same for both; the share of friction falls from ±
+{fixed(math.degrees(bounded.friction), 2)}° to ± {fixed(math.degrees(pulse.friction), 2)}°, and the longer one waits,
+the less remains of it.</p>
+<p>The reason: a pulse, however short, has the full voltage, good for {number(study.full_torque, 3)} N m at a shaft at
+rest, against {number(study.friction_torque, 2)} N m of dry friction. So every pulse moves the shaft, while the mean of
+short pulses moves nothing. The wide band is a property of the mean and not of the servo; the paper's points do not ask
+for a higher loop gain. All this holds for the values of the servo file, most of which are not measured. The armature
+inductance, which this servo neglects, would swallow pulses of less than about {fixed(1e6 * dead, 0)} µs:
+{fixed(math.degrees(swallowed), 2)}° more.</p>"""
 
 
 def _fits(study: Study) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from servotwin import bench, signals
 from servotwin.loads import Inertia
-from servotwin.models import AveragedServo, BoundedServo
+from servotwin.models import AveragedServo, BoundedServo, PulseServo
 from servotwin.parameters import load_dataset, load_servo
 from servotwin.simulation import simulate
 
@@ -27,19 +27,34 @@ Progress = Callable[[str, float], None]
 SERVO = "hitec-hs-755hb"
 LOAD_INERTIA = 1e-3  # kg m²; assumed, the paper does not say what its simulated servo carried
 STEP_AT, STEP_DURATION = 0.1, 1.5  # s
-MODELS: Mapping[str, type[Model]] = {"averaged": AveragedServo, "bounded": BoundedServo}
-LABELS = {"averaged": "averaged servo (the paper's model)", "bounded": "bounded servo"}
+APPROACH_ROW, APPROACH, APPROACH_TIME = 2, math.radians(30.0), 5.0  # row of Table II, rad, s; the latter as `measure`
+MODELS: Mapping[str, type[Model]] = {"averaged": AveragedServo, "bounded": BoundedServo, "pulse": PulseServo}
+LABELS = {"averaged": "averaged servo (the paper's model)", "bounded": "bounded servo", "pulse": "pulse servo"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BenchStudy:
-    """One model on the bench: its table, and how that differs from the measured one."""
+    """One model on the bench: its table, how that differs from the measured one, and how the shaft comes to a stand.
+
+    `approaches` are the motions towards the angle of one row, from below and from above.
+    """
 
     bench: Bench
     rows: tuple[TableRow, ...]
     differences: tuple[Comparison, ...]
     angle_shares: tuple[ModelShares, ...]
     voltage_shares: tuple[ModelShares, ...]
+    approaches: tuple[Result, Result]
+
+    @property
+    def widest(self) -> float:
+        """Largest standing band of all rows [rad]."""
+        return max(row.standing_band for row in self.rows)
+
+    @property
+    def friction(self) -> float:
+        """Largest share of friction, or of creep without end, in it [rad]."""
+        return max(row.friction_band for row in self.rows)
 
     def worst(self, name: str) -> float:
         """Return the largest magnitude of one difference over all rows (SI, counts)."""
@@ -91,6 +106,24 @@ class Study:
         return _value(self.servo, "supply.open_circuit_voltage")
 
     @property
+    def friction_torque(self) -> float:
+        """Dry friction at the output shaft, the larger of both directions [N m]."""
+        return self.value("gear.gear_reduction") * max(
+            self.value(f"friction.coulomb_torque_{way}") for way in ("forward", "backward"))
+
+    @property
+    def full_torque(self) -> float:
+        """What the motor gives at the output shaft, at rest and with all that the supply leaves it [N m]."""
+        return (self.value("gear.gear_reduction") * self.value("motor.torque_constant") * self.voltage_limit
+                / self.value("motor.armature_resistance"))
+
+    @property
+    def shortest_pulse(self) -> float:
+        """How long the armature's inductance takes to a current that overcomes friction, at full voltage [s]."""
+        delay = self.value("motor.armature_inductance") / self.value("motor.armature_resistance")
+        return -delay * math.log1p(-self.friction_torque / self.full_torque)
+
+    @property
     def voltage_limit(self) -> float:
         """What the supply leaves for the motor, V_oc − V_ce0 [V]."""
         drop = self.servo.get("supply.bridge_drop_voltage")
@@ -140,7 +173,16 @@ def _bench(model: Model, table: Mapping[str, NDArray[np.float64]], fits: Mapping
     return BenchStudy(
         bench=apparatus, rows=rows, differences=bench.compare(rows, table),
         angle_shares=bench.model_shares(rows, fits),
-        voltage_shares=bench.model_shares(rows, fits, quantity="feedback_voltage"))
+        voltage_shares=bench.model_shares(rows, fits, quantity="feedback_voltage"),
+        approaches=(_approach(apparatus, rows[APPROACH_ROW], -APPROACH),
+                    _approach(apparatus, rows[APPROACH_ROW], APPROACH)))
+
+
+def _approach(apparatus: Bench, row: TableRow, away: float) -> Result:
+    """Return the motion to the angle of a row from so far away [rad], as the row itself was measured."""
+    pulses = signals.constant(row.reading.pulse_width, unit="s", frame_period=apparatus.generator.frame_period)
+    return simulate(apparatus.model, pulses, duration=APPROACH_TIME, output_step=4e-3,
+                    initial={"output_angle": row.target_angle + away}).raise_if_failed()
 
 
 def headline_numbers(study: Study) -> dict[str, float]:
@@ -151,6 +193,8 @@ def headline_numbers(study: Study) -> dict[str, float]:
         numbers[f"{name}_worst_feedback_voltage_mV"] = 1e3 * one.worst("feedback_voltage")
         numbers[f"{name}_worst_pulse_width_us"] = 1e6 * one.worst("pulse_width")
         numbers[f"{name}_worst_feedback_count"] = one.worst("feedback_count")
+        numbers[f"{name}_widest_standing_band_deg"] = math.degrees(one.widest)
+        numbers[f"{name}_widest_friction_band_deg"] = math.degrees(one.friction)
     for name, metrics in study.metrics.items():
         numbers[f"{name}_rise_time_s"] = metrics.rise_time
         numbers[f"{name}_top_speed_deg_per_s"] = math.degrees(metrics.slew_rate)

@@ -27,11 +27,10 @@ _READABLE: dict[str, tuple[tuple[float, str, str], ...]] = {
     "torque per current": ((0.0, "mN m/A", "mN m/A"),), "voltage per speed": ((0.0, "mV s/rad", "mV s/rad"),),
     "time per voltage": ((0.0, "us/V", "µs/V"),), "resistance": ((0.0, "ohm", "Ω"),), "number": ((0.0, "1", ""),),
 }
-_SHORT = {"averaged": "averaged", "bounded": "bounded"}
 
 
 def step_table(study: Study) -> str:
-    """Return the metrics of the step for both models."""
+    """Return the metrics of the step for all models."""
     rows: list[list[str]] = []
     one = study.metrics
     for words, unit, values in (
@@ -72,7 +71,7 @@ def comparison_table(study: Study) -> str:
         for name, one in study.on_bench.items():
             row = one.rows[k]
             r = row.reading
-            rows.append([_SHORT[name], volt, f"{r.command_count}", f"{1e6 * r.pulse_width:.0f}",
+            rows.append([name, volt, f"{r.command_count}", f"{1e6 * r.pulse_width:.0f}",
                          f"{r.pulse_rate:.3f}", fixed(math.degrees(r.output_angle), 2), f"{r.feedback_voltage:.4f}",
                          f"{r.feedback_count}", f"± {fixed(math.degrees(row.standing_band), 2)}"])
     return table(head, rows, caption="Table II of the paper, measured and simulated. The simulated rows are the mean "
@@ -84,11 +83,11 @@ def difference_table(study: Study) -> str:
     rows = []
     for name, one in study.on_bench.items():
         for k, (d, row) in enumerate(zip(one.differences, one.rows, strict=True)):
-            rows.append([_SHORT[name], f"{study.table['q_deg'][k]:.0f}", fixed(math.degrees(d.output_angle), 2),
+            rows.append([name, f"{study.table['q_deg'][k]:.0f}", fixed(math.degrees(d.output_angle), 2),
                          fixed(1e3 * d.feedback_voltage, 1), fixed(1e6 * d.pulse_width, 1), f"{d.command_count:+d}",
                          f"{d.feedback_count:+d}", fixed(math.degrees(row.deadband_band), 2),
                          fixed(math.degrees(row.friction_band), 2)])
-        rows.append([f"<strong>{_SHORT[name]}, largest</strong>", "", *(
+        rows.append([f"<strong>{name}, largest</strong>", "", *(
             f"<strong>{text}</strong>" for text in (
                 fixed(math.degrees(one.worst("output_angle")), 2), fixed(1e3 * one.worst("feedback_voltage"), 1),
                 fixed(1e6 * one.worst("pulse_width"), 1), f"{one.worst('command_count'):.0f}",
@@ -97,6 +96,23 @@ def difference_table(study: Study) -> str:
             "ΔADC<sub>o</sub>", "deadband (°)", "friction (°)"]
     return table(head, [[cell.replace("-", "−") if k > 1 else cell for k, cell in enumerate(r)] for r in rows],
                  caption="Simulated less measured, and what the standing band is made of")
+
+
+def band_table(study: Study) -> str:
+    """Return how far from its target each model may stand, row by row, and what the pulses make of it."""
+    models = study.on_bench
+    bands = [[math.degrees(row.standing_band) for row in one.rows] for one in models.values()]
+    rows = [[f"{q:.0f}", *(fixed(band[k], 2) for band in bands)] for k, q in enumerate(study.table["q_deg"].tolist())]
+    summary = (("largest", [one.widest for one in models.values()]),
+               ("of it electrical deadband", [max(row.deadband_band for row in one.rows) for one in models.values()]),
+               ("of it friction", [one.friction for one in models.values()]))
+    rows += [[words, *(f"<strong>{fixed(math.degrees(v), 2)}</strong>" for v in values)] for words, values in summary]
+    rows.append(["at rest after 5 s", *(
+        "all" if (n := sum(row.at_rest for row in one.rows)) == len(one.rows) else f"{n} of {len(one.rows)}"
+        for one in models.values())])
+    return table(["row (°)", *(escape(LABELS[name]) for name in models)], rows,
+                 caption="Standing band (± °), how far from its target each servo may stand: half of what lies between an "
+                 "approach from below and one from above. What is not at rest still creeps, and the creep counts as friction.")
 
 
 def measured_shares_table(study: Study) -> str:
@@ -177,7 +193,7 @@ def parameter_table(study: Study) -> str:
         group, field_name = name.split(".")
         metadata = next(f.metadata for f in fields(GROUPS[group]) if f.name == field_name)
         value, spread = _shown(quantity, str(metadata["dimension"]))
-        read = [_SHORT[key] for key, model in MODELS.items() if name in (*model.requires, *model.optional)]
+        read = [key for key, model in MODELS.items() if name in (*model.requires, *model.optional)]
         rows.append([f"<code>{escape(name)}</code>", _symbol(str(metadata["symbol"])), value, spread,
                      f'<span class="{quantity.origin}">{quantity.origin}</span>',
                      escape(quantity.source or "no source: a prior to be identified"),

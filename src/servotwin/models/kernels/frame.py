@@ -14,6 +14,9 @@ from servotwin.models.kernels.noise import gaussian
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import numpy as np
+    from numpy.typing import NDArray
+
 
 class Chip(NamedTuple):
     """Everything that the frame logic reads, as plain floats in SI."""
@@ -52,7 +55,7 @@ class Decision(NamedTuple):
 class Frame(NamedTuple):
     """Everything that the chip remembers."""
 
-    index: int  # edges so far, lost pulses included
+    number: int  # of the next frame, lost pulses counted
     drive: float  # −1, 0, +1: how the bridge drives now
     drive_end: float
     clock: float  # the drive ends here at the latest
@@ -107,8 +110,9 @@ def accepted(chip: Chip, t_in: float) -> bool:
 def edge(chip: Chip, frame: Frame, time: float, t_in: float, q: float, back_emf: float, i: float, seed: int) -> Frame:
     """Return the frame state after the rising edge of a pulse of the width t_in."""
     if not accepted(chip, t_in):
-        return Frame(frame.index + 1, frame.drive, frame.drive_end, frame.clock, frame.error, frame.pending, frame.later)
-    draw = gaussian(seed, frame.index) if chip.noise > 0.0 else 0.0
+        return Frame(frame.number + 1, frame.drive, frame.drive_end, frame.clock, frame.error, frame.pending,
+                     frame.later)
+    draw = gaussian(seed, frame.number) if chip.noise > 0.0 else 0.0
     v_m, V_bus = terminal_voltage(chip, frame.drive, back_emf, i)
     new = decide(chip, time, t_in, q, v_m, V_bus, draw)
     pending, later = frame.pending, frame.later
@@ -116,10 +120,10 @@ def edge(chip: Chip, frame: Frame, time: float, t_in: float, q: float, back_emf:
         pending, later = new, NOTHING
     else:
         later = new
-    return Frame(frame.index + 1, frame.drive, frame.drive_end, time + chip.timeout, frame.error, pending, later)
+    return Frame(frame.number + 1, frame.drive, frame.drive_end, time + chip.timeout, frame.error, pending, later)
 
 
-def edge_time(period: float, edges: Sequence[float], k: int) -> float:
+def edge_time(period: float, edges: Sequence[float] | NDArray[np.float64], k: int) -> float:
     """Return when frame k starts: every `period`, or where that is 0 at its own edge; inf after the last."""
     if period > 0.0:
         return k * period
@@ -144,4 +148,4 @@ def switched(frame: Frame, time: float) -> Frame:
         if drive == 0.0 or end <= time or frame.clock <= time:
             drive, end = 0.0, math.inf
         pending, later = later, NOTHING
-    return Frame(frame.index, drive, end, frame.clock, error, pending, later)
+    return Frame(frame.number, drive, end, frame.clock, error, pending, later)

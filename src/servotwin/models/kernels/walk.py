@@ -60,7 +60,7 @@ def motion_of(plant: Plant, point: Point, u: Piece, tau: Piece, limit: float) ->
 
 
 def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
-    """Follow a motion to its first event, its end or the horizon [s]; return also the kind of event (-1) and a status."""
+    """Follow a motion to its first event, its end or the horizon [s]; return also the event (−1: none) and a status."""
     t0 = m.t0
     step_end = t0 + m.length
     if abs(step_end - horizon) <= 4e-16 * abs(horizon):
@@ -135,12 +135,12 @@ def walk(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], t
         if pulsed:
             if frame.next_switch(now) <= t:
                 now = frame.switched(now, t)
-            if frame.edge_time(period, edges, now.index) <= t:
+            if frame.edge_time(period, edges, now.number) <= t:
                 while t >= _end(command, k_command):
                     k_command += 1
                 t_in = piece_value(_row(command, k_command, 0.0), t)
                 now = measured(plant, chip, now, t, t_in, point.y, seed)
-            u_end = min(frame.next_switch(now), frame.edge_time(period, edges, now.index))
+            u_end = min(frame.next_switch(now), frame.edge_time(period, edges, now.number))
             if new or u.value != now.drive * plant.V:
                 u, new = source(plant, now), True
         limit = min(u_end, tau_end)
@@ -157,7 +157,8 @@ def walk(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], t
         if idle > MOST_IDLE:
             return CHATTER, t
         while done < times.size and (times[done] < point.time or (point.time >= duration and times[done] <= duration)):
-            m = motion.prepared(m)
+            if m.kind == motion.STEP:
+                m = motion.prepared(m)
             y = motion.state(m, times[done] - m.t0)
             outputs[0, done], outputs[1, done], outputs[2, done] = y[0], y[1], m.mode.contact
             outputs[3, done], outputs[4, done] = now.drive, now.error
