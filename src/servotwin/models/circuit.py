@@ -55,5 +55,7 @@ def _behind_bridge(model: Model, plant: Plant, samples: Samples) -> Circuit:
     v = np.asarray(bridge.motor_voltage(i, v_b, plant.R, V_br, np.where(driven | coasts, v_b, 0.0)))
     of_supply = np.where(driven, s * i, np.where(coasts, -np.abs(i), 0.0))
     bus = plant.V - R_b * of_supply
-    supply, brush = bus * of_supply, V_br * np.abs(i)
-    return Circuit(v, i, bus, of_supply, supply, supply - v * i, brush)
+    V_ce0 = model.value_or("supply.bridge_drop_voltage", 0.0)
+    r_c = np.where(driven, model.value_or("supply.bridge_drop_resistance", 0.0), 0.0)
+    lost = np.where(driven | coasts, (V_ce0 + r_c * np.abs(i)) * np.abs(i), 0.0)
+    return Circuit(v, i, bus, of_supply, bus * of_supply, lost, V_br * np.abs(i))
