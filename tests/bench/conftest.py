@@ -14,7 +14,7 @@ def fits(table):
     return table_fits(table)
 
 
-@pytest.fixture(params=["BoundedServo", "AveragedServo"], scope="session")
+@pytest.fixture(params=["BoundedServo", "AveragedServo", "PulseServo"], scope="session")
 def bench(request, servo):
     return Bench(getattr(st, request.param)(bench_servo(servo)))
 

@@ -10,8 +10,9 @@ import pytest
 from servotwin.cli.paper import report as paper
 from servotwin.errors import OutputError, OutputExistsError
 
+MODELS = ("averaged", "bounded", "pulse")
 NUMBERS = (2, 4, 5, 6, 8, 13, 14, 15, 16, 17, 22, 23, 24, 25, 26, 27)
-VOID = {"meta", "img", "br", "hr", "link", "input"}
+VOID = {"meta", "img", "br", "hr", "link", "input", "wbr"}
 
 
 class Structure(HTMLParser):
@@ -101,20 +102,39 @@ def test_page_loads_nothing(report, page):
 def test_page_says_what_matters(page):
     words = re.sub(r"\s+", " ", "".join(page.words))
     for part in ("publishes no parameter values", "61.035", "times the supply", "identified from Table II",
-                 "Table I of the paper", "Table II of the paper", "10.7 to 2.9 mV", "66.9°", "11.6 %"):
+                 "Table I of the paper", "Table II of the paper", "10.7 to 2.9 mV", "66.9°", "11.6 %",
+                 "4.8 times narrower", "± 1.70° to ± 0.04°", "pulse, largest", "In the two other models it sticks"):
         assert part in words
     assert not re.search(r"\b(nan|inf|None)\b", words)
 
 
 def test_headline_numbers(report):
     numbers = report[0].numbers
-    for model in ("averaged", "bounded"):
-        assert numbers[f"{model}_worst_angle_deg"] < 1.5
-        assert numbers[f"{model}_worst_feedback_voltage_mV"] < 14.0
-        assert numbers[f"{model}_worst_pulse_width_us"] < 1.0
-        assert numbers[f"{model}_worst_feedback_count"] <= 6
+    for model in MODELS:
+        assert numbers[f"{model}_worst_angle_deg"] <= 1.1
+        assert numbers[f"{model}_worst_feedback_voltage_mV"] <= 11.0
+        assert numbers[f"{model}_worst_pulse_width_us"] == 0.0
+        assert numbers[f"{model}_worst_feedback_count"] <= 5
     assert numbers["averaged_peak_voltage_over_supply"] > 5.0
-    assert numbers["bounded_peak_armature_voltage_V"] <= 6.0
+    assert numbers["bounded_peak_armature_voltage_V"] == pytest.approx(5.6)
+    assert numbers["pulse_peak_armature_voltage_V"] == pytest.approx(5.6)
+    assert numbers["pulse_top_speed_deg_per_s"] == pytest.approx(numbers["bounded_top_speed_deg_per_s"], rel=1e-3)
+
+
+def test_pulses_narrow_the_standing_band(report):
+    numbers = report[0].numbers
+    assert numbers["bounded_widest_standing_band_deg"] == pytest.approx(2.10, abs=0.01)
+    assert numbers["pulse_widest_standing_band_deg"] == pytest.approx(0.44, abs=0.01)
+    assert numbers["bounded_widest_friction_band_deg"] > 20.0 * numbers["pulse_widest_friction_band_deg"]
+
+
+def test_every_model_is_in_the_numbers_of_the_figures(report):
+    for path in report[0].data:
+        with path.open(encoding="utf-8", newline="") as file:
+            head = next(csv.reader(file))
+        named = {model for model in MODELS if any(column.startswith(f"{model}_") for column in head)}
+        if path.stem in ("table-2", *(f"figure-{n}" for n in (13, 14, 15, 16, 17, 25, 26, 27)), "figure-standing"):
+            assert named == set(MODELS), path.name
 
 
 def test_a_report_that_is_there_is_kept(report):

@@ -115,11 +115,19 @@ def test_no_pulses_no_drive():
 
 
 def test_two_decisions_can_wait():
-    # T_os = 10 ms at 9 V s: frames of 4 ms start before the one before has been decided
-    model = servo(one_shot_offset=10e-3, frame_period=4e-3, stretcher_gain=1.0)
-    command = st.signals.constant(3000.0, unit="us")
-    starts = [start for start, _, _ in held(model, command, 0.025)]
-    assert starts[0] == pytest.approx(0.010, rel=1e-12)
+    # T_os = 10 ms: frames of 6 ms start before the one before has been decided
+    model = servo(one_shot_offset=10e-3, frame_period=6e-3, stretcher_gain=0.5)
+    found = held(model, st.signals.constant(3000.0, unit="us"), 0.03)
+    assert found == [pytest.approx((start, start + 0.5 * (7e-3 - 4e-6), -1), rel=1e-10)
+                     for start in (0.010, 0.016, 0.022)]
+
+
+def test_three_decisions_cannot_wait():
+    model = servo(one_shot_offset=10e-3, frame_period=3e-3)
+    result = st.simulate(model, st.signals.constant(2000.0, unit="us"), duration=0.05, load=HELD,
+                         initial={"output_angle": 0.0})
+    assert result.status is st.Status.CROWDED
+    assert result.ended == pytest.approx(6e-3)
 
 
 def test_a_decision_that_comes_first_replaces_the_one_that_waits():

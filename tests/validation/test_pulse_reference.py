@@ -117,7 +117,7 @@ def test_one_shot_longer_than_a_frame(angle: float) -> None:
 @pytest.mark.parametrize("off", ["brake", "coast"])
 def test_a_shaft_faster_than_its_drive_feeds_the_supply(speed: float, off: str) -> None:
     """Current returned while driving and while coasting lifts the bus, and through it the one-shot."""
-    case = set_s({"kind": "step", "unit": "deg", "before": 0.0, "after": math.copysign(200.0, speed), "at": 0.0},
+    case = set_s({"kind": "step", "unit": "deg", "before": 0.0, "after": math.copysign(50.0, speed), "at": 0.0},
                  off=off, initial={"output_speed": speed}, duration=0.3, inertia=0.1, coupling=0.02, resistance=0.8)
     at_edges = case.solve([edge for edge, _, _ in case.solve([]).frames])
     bus = [case.shaft.bus(int(s), w) for s, w in zip(at_edges.drive, at_edges.w, strict=True) if s or off == "coast"]
@@ -157,18 +157,12 @@ def step(degrees: float, **options: Any) -> PulseCase:
     return set_s({"kind": "step", "unit": "deg", "before": 0.0, "after": degrees, "at": 0.0}, **options)
 
 
-def by_reference(case: PulseCase, times: np.ndarray) -> np.ndarray:
+def angles(case: PulseCase, times: np.ndarray) -> np.ndarray:
+    """Of the reference alone; the package's own set S stands in test_set_s."""
     return case.solve(times).q
 
 
-def by_package(case: PulseCase, times: np.ndarray) -> np.ndarray:
-    return simulate(case, times)["output_angle"]
-
-
-both = pytest.mark.parametrize("angles", [by_reference, by_package])
-
-
-def sag(angles: Any, torque: float, period: float, start: float, end: float) -> float:
+def sag(torque: float, period: float, start: float, end: float) -> float:
     """Mean sag [deg] from `start` to `end`, the load there from t = 0 on."""
     times = start + (end - start) * (np.arange(1200) + 0.5) / 1200
     case = set_s({"kind": "step", "unit": "deg", "before": 0.0, "after": 0.0, "at": 0.0}, torque=torque,
@@ -176,20 +170,18 @@ def sag(angles: Any, torque: float, period: float, start: float, end: float) -> 
     return -math.degrees(float(np.mean(angles(case, times))))
 
 
-# The specification's numbers are means over the second half of 1.2 s; the settled ones are this package's reference's.
+# The printed numbers are means over the second half of 1.2 s, while the sag still grows; then the settled ones.
 SAGS = [(0.3, 0.02, 3.99, 4.355), (0.6, 0.02, 10.47, 10.637), (0.3, 0.01, 2.35, 2.439), (0.6, 0.01, 5.55, 5.568),
         (0.3, 0.005, 1.41, 1.4365), (0.6, 0.005, 3.00, 2.9965)]
 
 
-@both
 @pytest.mark.parametrize(("torque", "period", "printed", "settled"), SAGS)
-def test_sag_of_set_s(angles: Any, torque: float, period: float, printed: float, settled: float) -> None:
-    assert sag(angles, torque, period, 0.6, 1.2) == pytest.approx(printed, abs=0.02)
-    assert sag(angles, torque, period, 3.0, 4.0) == pytest.approx(settled, abs=0.005)
+def test_sag_of_set_s(torque: float, period: float, printed: float, settled: float) -> None:
+    assert sag(torque, period, 0.6, 1.2) == pytest.approx(printed, abs=0.01)
+    assert sag(torque, period, 3.0, 4.0) == pytest.approx(settled, abs=0.005)
 
 
-@both
-def test_steps_of_set_s(angles: Any) -> None:
+def test_steps_of_set_s() -> None:
     times = np.linspace(0.0, 1.2, 1201)
     braked = np.degrees(angles(step(60.0), times))
     assert braked[-1] == pytest.approx(58.66, abs=0.01)
@@ -200,8 +192,7 @@ def test_steps_of_set_s(angles: Any) -> None:
     assert small[1000] == pytest.approx(1.04, abs=0.01)
 
 
-@both
-def test_lost_frames_of_set_s(angles: Any) -> None:
+def test_lost_frames_of_set_s() -> None:
     """One frame of three lost at 0.6 N·m: the sag grows from 10.5° to about 15.5°."""
     edges = [0.02 * k for k in range(60) if k % 3 != 2]
     case = set_s({"kind": "pulse_train", "unit": "us", "edges": edges, "widths": [1e6 * CENTRE] * len(edges)},
@@ -210,8 +201,7 @@ def test_lost_frames_of_set_s(angles: Any) -> None:
     assert -math.degrees(float(np.mean(angles(case, times)))) == pytest.approx(15.5, abs=0.5)
 
 
-@both
-def test_no_pulses_in_set_s(angles: Any) -> None:
+def test_no_pulses_in_set_s() -> None:
     """The brake lets the load creep at (τ_L − τ_c) R/K_out²; open, it falls."""
     train = {"kind": "pulse_train", "unit": "us", "edges": [5.0, 5.02], "widths": [1e6 * CENTRE] * 2}
     creep = angles(set_s(train, torque=0.6), np.array([1.0, 1.2]))

@@ -25,7 +25,7 @@ def bridge_current(source_voltage: Real, back_emf: Real, voltage_drop: Real, res
     Returns
     -------
     float or array
-        i_a = (x − sgn(x) D)/R with x = s V_oc − v_b; 0 where |x| ≤ D [A].
+        i_a = (x − sgn(x) D)/R with x = s V_oc − v_b; 0 from x = −D to D [A].
 
     Notes
     -----

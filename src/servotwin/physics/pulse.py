@@ -52,7 +52,7 @@ def drive_time(error_time: Real, stretcher_gain: Real, deadband: Real = 0.0, min
     Returns
     -------
     float or array
-        With u = |e| − w/2: 0 for u ≤ 0, else t_min + K u, or t_min + τ_s ln(1 + K u/τ_s) [s].
+        With u = abs(e) − w/2: 0 for u ≤ 0, else t_min + K u, or t_min + τ_s ln(1 + K u/τ_s) [s].
 
     Examples
     --------

@@ -196,6 +196,8 @@ def _switched(plan: Plan, chip: Chip, now: Frame, point: Point, record: Record |
         if record is not None and not frame.accepted(chip, t_in):
             record.events.append(Event(time, "pulse refused", point.y[0]))
         now = walk.measured(plan.plant, chip, now, time, t_in, point.y, plan.seed)
+        if now.number == frame.CROWDED:
+            raise _failure(Status.CROWDED, time)
     return now
 
 

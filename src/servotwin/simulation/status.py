@@ -19,6 +19,7 @@ class Status(Enum):
     STEP_TOO_SMALL = 2, "no step is short enough for the tolerance"
     CHATTER = 3, "events follow each other without time going on"
     TOO_FAST = 4, "it oscillates too fast to be followed"
+    CROWDED = 5, "frames follow each other faster than the chip decides: a third decision would have to wait"
 
     def __init__(self, code: int, message: str) -> None:
         self.code = code

@@ -43,7 +43,7 @@ class Picture:
     columns: Mapping[str, Column] = field(default_factory=dict)
 
 
-_LAST = (0.7, 1.1)  # s: where the step of the two servos with a supply ends
+_LAST = (0.65, 1.1)  # s: where the step of the two servos with a supply ends
 _SAMPLED = "Drawn once a millisecond, so a shorter pulse of the pulse servo may be missing."
 _BESIDE = 0.015  # of the horizontal axis, between bars that belong to one row
 _NEAR = 4.0  # °: more than any standing band, so the approach itself is left out
@@ -114,9 +114,9 @@ def _last_degrees(study: Study) -> Picture:
         voltages.append(Curve("", time, v_a, style=style))
     figure = plotting.curves(angles, x_label="time (s)", y_label="output angle $q$ (°)",
                              below=voltages, below_label="$v_a$ (V)", height=4.0)
-    caption = ("The end of the same step to 180°. The bounded servo gets a mean voltage, and comes to a stand where that "
-               "is too weak for the friction. The pulse servo gets pulses of the full voltage, ever shorter ones, and "
-               "each of them moves it.")
+    caption = ("The end of the same step to 180°. The bounded servo gets a mean voltage, and comes to a stand where "
+               "that is too weak for the friction. The pulse servo gets pulses of the full voltage, ever shorter "
+               "ones, and each of them moves it.")
     return Picture(name="figure-last-degrees", title="Not in the paper: the last degrees", caption=caption,
                    figure=figure, columns=columns)
 

@@ -28,11 +28,8 @@ class Finding(NamedTuple):
 
 def corrections(study: Study) -> tuple[Finding, ...]:
     """Return what the equations need before they can be computed or believed."""
-    k_p, p = study.fits["V_o(V_i)"].line.slope, math.degrees(1.0) * study.fits["V_o(q)"].line.slope
-    at_zero = float(study.table["V_i_V"][0])
     N = study.value("gear.gear_reduction")
     F = study.value("friction.coulomb_torque_forward")
-    half_band = 0.5 * study.value("electronics.voltage_deadband") / study.value("potentiometer.feedback_gain")
     damping = (study.value("motor.torque_constant") * study.value("motor.back_emf_constant")
                / study.value("motor.armature_resistance") + study.value("motor.motor_viscous_friction"))
     creep = float(creep_speed(0.5 * N * F, N, F, study.value("friction.coulomb_torque_backward"),
@@ -43,6 +40,28 @@ def corrections(study: Study) -> tuple[Finding, ...]:
         Finding("(4), (5), (10), (41)", "Letters used twice: k is the factor of (5) and the slope of (41); "
                 "τ<sub>m</sub> is the torque of the current in (4) and what the bare rotor takes in (10) and (25). "
                 "Each has a name of its own here.", "no number: names"),
+        *_drive(study),
+        Finding("(41): no static friction", "The text announces it, the formula has none and gives no force at rest: a "
+                "loaded shaft creeps. In the two other models it sticks.",
+                f"with half the friction's torque on the braked, unpowered shaft (41) creeps "
+                f"{fixed(60.0 * math.degrees(creep), 1)}° a minute (at the assumed slope k)"),
+        Finding("(37), (41): which shaft", "(37) to (40) take f<sub>ec</sub> at the motor's shaft and of the motor's "
+                "speed; (41) writes q̇. Taken as (37).",
+                f"at the output it is N = {number(N)} times as large: {number(1e3 * F)} mN m become "
+                f"{number(N * F)} N m"),
+        Finding("(34)", "Gives τ̇<sub>L</sub> from the third derivative of q and cannot be run forward. The same "
+                "physics is simulated with the current as a state.", "no number: a change of form"),
+        Finding("(40)", "An inverse statement: motion in, torque out. Forward it needs a load, which the paper does "
+                "not name.", f"here J<sub>L</sub> = {number(LOAD_INERTIA)} kg m² (assumed)"),
+    )
+
+
+def _drive(study: Study) -> tuple[Finding, ...]:
+    """Return what (38) leaves out between the error and the motor."""
+    k_p, p = study.fits["V_o(V_i)"].line.slope, math.degrees(1.0) * study.fits["V_o(q)"].line.slope
+    at_zero = float(study.table["V_i_V"][0])
+    half_band = 0.5 * study.value("electronics.voltage_deadband") / study.value("potentiometer.feedback_gain")
+    return (
         Finding("(38): no offsets", "As printed, zero volts mean zero angle. The bench needs v<sub>a</sub> = A "
                 "k<sub>s</sub> [(k<sub>p</sub> v<sub>i</sub> + b<sub>i</sub>) − (p q + b<sub>o</sub>)].",
                 f"as printed, {at_zero:.3f} V asks for {fixed(math.degrees(k_p * at_zero / p), 1)}°; the servo stood "
@@ -58,18 +77,6 @@ def corrections(study: Study) -> tuple[Finding, ...]:
                 "the shaft may stand up to ± " + fixed(math.degrees(study.on_bench["bounded"].widest), 2)
                 + "° from its target with the mean, ± " + fixed(math.degrees(study.on_bench["pulse"].widest), 2)
                 + "° with pulses"),
-        Finding("(41): no static friction", "The text announces it, the formula has none and gives no force at rest: a "
-                "loaded shaft creeps. In the two other models it sticks.",
-                f"with half the friction's torque on the braked, unpowered shaft (41) creeps "
-                f"{fixed(60.0 * math.degrees(creep), 1)}° a minute (at the assumed slope k)"),
-        Finding("(37), (41): which shaft", "(37) to (40) take f<sub>ec</sub> at the motor's shaft and of the motor's "
-                "speed; (41) writes q̇. Taken as (37).",
-                f"at the output it is N = {number(N)} times as large: {number(1e3 * F)} mN m become "
-                f"{number(N * F)} N m"),
-        Finding("(34)", "Gives τ̇<sub>L</sub> from the third derivative of q and cannot be run forward. The same "
-                "physics is simulated with the current as a state.", "no number: a change of form"),
-        Finding("(40)", "An inverse statement: motion in, torque out. Forward it needs a load, which the paper does "
-                "not name.", f"here J<sub>L</sub> = {number(LOAD_INERTIA)} kg m² (assumed)"),
     )
 
 

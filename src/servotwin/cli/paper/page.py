@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from servotwin import __version__
 from servotwin.cli.paper import linear, tables
 from servotwin.cli.paper.findings import corrections, disagreements
-from servotwin.cli.paper.study import LABELS, LOAD_INERTIA, SERVO, Study
+from servotwin.cli.paper.study import LABELS, LOAD_INERTIA, SERVO, BenchStudy, Study
 from servotwin.cli.paper.words import escape, fixed, number, picture, plain
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ _STYLE = """
 *{box-sizing:border-box}
 body{margin:0 auto;max-width:64rem;padding:1rem 1.2rem 4rem;background:#fff;color:var(--ink);
 font:16px/1.55 system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",Arial,sans-serif}
+td code{overflow-wrap:normal}
 h1{font-size:1.7rem;line-height:1.25;margin:1rem 0 .3rem}h2{font-size:1.3rem;margin:2.6rem 0 .6rem;padding-top:.4rem;
 border-top:2px solid var(--line)}h3{font-size:1.05rem;margin:1.6rem 0 .4rem}
 p{margin:.5rem 0}a{color:var(--blue)}code{font-size:.9em;overflow-wrap:anywhere}.lead{color:var(--soft)}
@@ -221,9 +222,20 @@ the less remains of it.</p>
 <p>The reason: a pulse, however short, has the full voltage, good for {number(study.full_torque, 3)} N m at a shaft at
 rest, against {number(study.friction_torque, 2)} N m of dry friction. So every pulse moves the shaft, while the mean of
 short pulses moves nothing. The wide band is a property of the mean and not of the servo; the paper's points do not ask
-for a higher loop gain. All this holds for the values of the servo file, most of which are not measured. The armature
+for a higher loop gain.</p>
+<p>A narrow band leaves less to chance. The band of the bounded servo holds {_inside(bounded)} of the five measured
+angles, so that friction alone might have bent the line through them; the band of the pulse servo holds
+{_inside(pulse)}. With pulses the bend is not where friction happened to hold the shaft, and the paper says nothing of
+what else it may be: the potentiometer, the one-shot, or the reading of the dial.</p>
+<p>All this holds for the values of the servo file, most of which are not measured. The armature
 inductance, which this servo neglects, would swallow pulses of less than about {fixed(1e6 * dead, 0)} µs:
 {fixed(math.degrees(swallowed), 2)}° more.</p>"""
+
+
+def _inside(one: BenchStudy) -> str:
+    """Return how many measured angles lie within the standing band of the simulated row."""
+    count = sum(abs(d.output_angle) <= row.standing_band for d, row in zip(one.differences, one.rows, strict=True))
+    return "none" if count == 0 else "all" if count == len(one.rows) else f"{count}"
 
 
 def _fits(study: Study) -> str:

@@ -111,8 +111,9 @@ def band_table(study: Study) -> str:
         "all" if (n := sum(row.at_rest for row in one.rows)) == len(one.rows) else f"{n} of {len(one.rows)}"
         for one in models.values())])
     return table(["row (°)", *(escape(LABELS[name]) for name in models)], rows,
-                 caption="Standing band (± °), how far from its target each servo may stand: half of what lies between an "
-                 "approach from below and one from above. What is not at rest still creeps, and the creep counts as friction.")
+                 caption="Standing band (± °), how far from its target each servo may stand: half of what lies between "
+                 "an approach from below and one from above. What is not at rest still creeps, and the creep counts "
+                 "as friction.")
 
 
 def measured_shares_table(study: Study) -> str:
@@ -194,7 +195,7 @@ def parameter_table(study: Study) -> str:
         metadata = next(f.metadata for f in fields(GROUPS[group]) if f.name == field_name)
         value, spread = _shown(quantity, str(metadata["dimension"]))
         read = [key for key, model in MODELS.items() if name in (*model.requires, *model.optional)]
-        rows.append([f"<code>{escape(name)}</code>", _symbol(str(metadata["symbol"])), value, spread,
+        rows.append([_code(name), _symbol(str(metadata["symbol"])), value, spread,
                      f'<span class="{quantity.origin}">{quantity.origin}</span>',
                      escape(quantity.source or "no source: a prior to be identified"),
                      ", ".join(read) or "–"])
@@ -221,6 +222,12 @@ def _shown(quantity: Quantity, dimension: str) -> tuple[str, str]:
         low, high = ("…" if bound is None else number(shown(bound)) for bound in (quantity.lower, quantity.upper))
         spread = f"{low} to {high}"
     return f"{number(shown(value))} {printed}".rstrip(), spread
+
+
+def _code(name: str) -> str:
+    """Return the name of a parameter, to be broken between its words only."""
+    broken = re.sub(r"([._])", r"\1<wbr>", escape(name))
+    return f"<code>{broken}</code>"
 
 
 def _symbol(symbol: str) -> str:

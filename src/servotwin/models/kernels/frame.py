@@ -65,6 +65,7 @@ class Frame(NamedTuple):
 
 
 NOTHING = Decision(math.inf, 0.0, 0.0, 0.0)
+CROWDED = -1  # as the number of a frame: more than two decisions would have to wait
 AT_START = Frame(0, 0.0, math.inf, math.inf, 0.0, NOTHING, NOTHING)
 
 
@@ -115,12 +116,14 @@ def edge(chip: Chip, frame: Frame, time: float, t_in: float, q: float, back_emf:
     draw = gaussian(seed, frame.number) if chip.noise > 0.0 else 0.0
     v_m, V_bus = terminal_voltage(chip, frame.drive, back_emf, i)
     new = decide(chip, time, t_in, q, v_m, V_bus, draw)
-    pending, later = frame.pending, frame.later
+    number, pending, later = frame.number + 1, frame.pending, frame.later
     if new.time <= pending.time:  # where another waits, it would be replaced as soon as it comes
         pending, later = new, NOTHING
-    else:
+    elif new.time <= later.time:
         later = new
-    return Frame(frame.number + 1, frame.drive, frame.drive_end, time + chip.timeout, frame.error, pending, later)
+    else:
+        number = CROWDED
+    return Frame(number, frame.drive, frame.drive_end, time + chip.timeout, frame.error, pending, later)
 
 
 def edge_time(period: float, edges: Sequence[float] | NDArray[np.float64], k: int) -> float:

@@ -25,7 +25,7 @@ MOST_IDLE = 200  # events without time going on
 _MOST_OSCILLATIONS = 1e7  # within one motion
 
 # How a walk ends; the members of simulation.Status carry the same numbers.
-COMPLETED, DIVERGED, STEP_TOO_SMALL, CHATTER, TOO_FAST = range(5)
+COMPLETED, DIVERGED, STEP_TOO_SMALL, CHATTER, TOO_FAST, CROWDED = range(6)
 
 
 class Point(NamedTuple):
@@ -140,6 +140,8 @@ def walk(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], t
                     k_command += 1
                 t_in = piece_value(_row(command, k_command, 0.0), t)
                 now = measured(plant, chip, now, t, t_in, point.y, seed)
+                if now.number == frame.CROWDED:
+                    return CROWDED, t
             u_end = min(frame.next_switch(now), frame.edge_time(period, edges, now.number))
             if new or u.value != now.drive * plant.V:
                 u, new = source(plant, now), True

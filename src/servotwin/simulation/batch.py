@@ -1,0 +1,149 @@
+"""What `simulate_many` gives back: signals of all lanes, how each ended, and each lane as a result of its own."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, SupportsIndex, overload
+
+import numpy as np
+
+from servotwin.errors import MissingExtraError, SimulationError, UnknownNameError
+from servotwin.models.outputs import SIGNALS
+from servotwin.simulation.simulator import simulate
+from servotwin.simulation.status import Status
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from servotwin.simulation.lane_inputs import Lanes
+    from servotwin.simulation.result import Result
+
+
+class Failure(NamedTuple):
+    """A lane that ended before its time: its number, when [s], and why."""
+
+    lane: int
+    time: float
+    cause: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch:
+    """The outcome of many simulations; a sequence of lanes, and a mapping of signals.
+
+    Parameters
+    ----------
+    time : ndarray, shape (T,)
+        Output times [s].
+    status : ndarray of int8, shape (B,)
+        How each lane ended: the code of a `Status`, 0 where it reached the end.
+    failures : tuple of Failure
+        (lane, time [s], cause) of those that did not; their signals are nan from there on.
+    duration : float
+        [s]
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = st.BoundedServo(st.load_servo("hitec-hs-755hb"))
+    >>> batch = st.simulate_many(model, st.signals.step(0.0, 60.0, unit="deg"), duration=1.0,
+    ...                          parameters={"load.inertia": [0.0, 1e-3, 2e-3]}, output_step=0.1)
+    >>> batch["output_angle"].shape, len(batch), batch.ok
+    ((3, 11), 3, True)
+    >>> batch[2].step_metrics().rise_time > batch[0].step_metrics().rise_time
+    True
+    """
+
+    time: NDArray[np.float64]
+    status: NDArray[np.int8]
+    failures: tuple[Failure, ...]
+    duration: float
+    signals: Mapping[str, NDArray[np.floating]]
+    lanes: Lanes
+
+    def __repr__(self) -> str:
+        return (f"Batch({self.lanes.model!r}, lanes={len(self)}, times={len(self.time)}, "
+                f"signals={tuple(self.signals)}, failures={len(self.failures)})")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the signals that were asked for, `time` first."""
+        return ("time", *self.signals)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """SI unit of each signal."""
+        return {"time": "s", **{name: SIGNALS[name].unit for name in self.signals}}
+
+    @property
+    def ok(self) -> bool:
+        """Whether all lanes reached their end."""
+        return not self.failures
+
+    def __len__(self) -> int:
+        """Return the number of lanes."""
+        return len(self.status)
+
+    def __iter__(self) -> Iterator[Result]:
+        return (self._lane(lane) for lane in range(len(self)))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names
+
+    @overload
+    def __getitem__(self, item: str) -> NDArray[np.floating]: ...
+    @overload
+    def __getitem__(self, item: SupportsIndex) -> Result: ...
+    def __getitem__(self, item: str | SupportsIndex) -> NDArray[np.floating] | Result:
+        """Return a signal (SI) of all lanes, shape (B, T), or a lane as a `Result`.
+
+        A lane is simulated again, alone, which gives its events, metrics, energy and all signals; the signals that
+        were asked for are those of the batch.
+        """
+        if isinstance(item, str):
+            if item == "time":
+                return self.time
+            if item not in self.signals:
+                raise UnknownNameError("signal of the batch", item, self.names)
+            return self.signals[item]
+        lane = operator.index(item)
+        if not -len(self) <= lane < len(self):
+            raise IndexError(f"lane {lane}: the batch has {len(self)}")
+        return self._lane(lane % len(self))
+
+    def _lane(self, lane: int) -> Result:
+        lanes = self.lanes
+        result = simulate(
+            lanes.lane_model(lane), lanes.commands[lanes.command_of[lane]], duration=self.duration,
+            load=lanes.load(lane), output_times=self.time, initial=lanes.initial_of(lane), seed=int(lanes.seeds[lane]))
+        for name, values in self.signals.items():
+            own = values[lane].astype(np.float64)
+            own.setflags(write=False)
+            result._computed[name] = own
+        return result
+
+    def raise_if_failed(self) -> Batch:
+        """Return the batch itself, or raise SimulationError if a lane ended before its time; names the first."""
+        if self.failures:
+            lane, time, cause = self.failures[0]
+            more = len(self.failures) - 1
+            others = f" (and {more} more of {len(self)} lanes)" if more else ""
+            raise SimulationError(Status.of_code(int(self.status[lane])).name, time, f"lane {lane}: {cause}{others}")
+        return self
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return all signals (SI) as an xarray Dataset over `lane` and `time`, with what differs between lanes."""
+        try:
+            import xarray as xr
+        except ImportError:
+            raise MissingExtraError("xarray", "data") from None
+        data = {name: (("lane", "time"), values, {"units": self.units[name], "long_name": SIGNALS[name].meaning})
+                for name, values in self.signals.items()}
+        varied = {name: ("lane", column) for name, column in {**self.lanes.numbers, **self.lanes.words}.items()}
+        return xr.Dataset(
+            data | {"status": ("lane", self.status)},
+            coords={"lane": np.arange(len(self)), "time": ("time", self.time, {"units": "s"}), **varied},
+            attrs={"model": type(self.lanes.model).__name__, "servo": self.lanes.model.servo.name})

@@ -1,0 +1,38 @@
+"""Compile the kernels: derive a real module from them, keep it in the user's cache, let numba compile it once."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from functools import cache
+from importlib import import_module
+from importlib.metadata import version
+from types import ModuleType
+
+from servotwin.simulation.compile.storage import key_of, loaded, stored
+from servotwin.simulation.compile.derive import Recipe, derive, sources
+
+__all__ = ["Recipe", "kernels"]
+
+_lock = threading.Lock()
+
+
+def kernels(recipe: Recipe) -> ModuleType:
+    """Return the derived module, with the recipe's entries compiled when they are first called.
+
+    The first time on a machine a line on standard error says that this takes a while.
+    """
+    with _lock:
+        return _kernels(recipe)
+
+
+@cache
+def _kernels(recipe: Recipe) -> ModuleType:
+    text = derive(recipe)
+    name = f"servotwin_{recipe.name}_{key_of(text, *sources(recipe), version('numba'), version('llvmlite'))}"
+    path, known = stored(name, text)
+    if not known:
+        sys.stderr.write("servotwin: compiling the kernels for this machine, once (about 10 s)\n")
+        sys.stderr.flush()
+    import_module("numba")
+    return loaded(path)

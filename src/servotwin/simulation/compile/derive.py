@@ -1,0 +1,251 @@
+"""Derive one module that numba can compile and cache from the kernels, mechanically.
+
+Starting from the entries, every function that is called is collected from its own module under the name
+`module__function`; constants come along by value, classes are imported from where they are. A kernel is changed in
+these ways only: docstrings and annotations are dropped; in the float32 form every float literal gets that type; in
+the vector form `math.exp`, `math.log` and `math.log1p` become the polynomials of `kernels.elementary`.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import inspect
+import math
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
+from types import FunctionType, ModuleType
+
+_ELEMENTARY = "servotwin.models.kernels.elementary"
+_INTRINSICS = "servotwin.simulation.compile.intrinsics"
+_PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instructions in the vector form
+_POLYNOMIALS = ("exp", "log", "log1p")
+_DOUBLE = ("servotwin.models.kernels.noise", "servotwin.physics.pieces")  # in float64 throughout
+_PACKAGE = "servotwin."
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What to derive.
+
+    Parameters
+    ----------
+    name : str
+        Start of the derived module's name.
+    entries : tuple of str
+        "module:function"; the derived module has each under the function's name.
+    vector : bool
+        Whether the kernels run on many lanes side by side: everything is inlined, and exponentials and logarithms
+        become polynomials.
+    single : bool
+        Whether floats have 32 bits.
+    """
+
+    name: str
+    entries: tuple[str, ...]
+    vector: bool = False
+    single: bool = False
+
+
+def derive(recipe: Recipe) -> str:
+    """Return the source text of the derived module."""
+    work = _Derivation(recipe)
+    names = [work.function(*entry.split(":")) for entry in recipe.entries]
+    lines = ["# Derived from servotwin's kernels; do not edit.", "import math", "", "import numpy as np",
+             "from numba import njit", ""]
+    lines += [f"from {module} import {name} as {alias}" for alias, (module, name) in sorted(work.imports.items())]
+    lines += ["", f"_f = np.{'float32' if recipe.single else 'float64'}", ""]
+    lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
+    for flat in work.order:
+        lines += ["", "", f"@njit({_options(recipe, flat in names)})", work.functions[flat]]
+    lines += ["", *(f"{entry.split(':')[1]} = {flat}" for entry, flat in zip(recipe.entries, names, strict=True)), ""]
+    return "\n".join(lines)
+
+
+def _options(recipe: Recipe, entry: bool) -> str:
+    options = 'nogil=True, error_model="numpy"'
+    if entry:
+        return options + ", cache=True"
+    options += ", no_cpython_wrapper=True, no_cfunc_wrapper=True"  # only other kernels call it: a third less to compile
+    return options + (", forceinline=True" if recipe.vector else "")
+
+
+@dataclass
+class _Derivation:
+    """The functions, constants and imports collected so far."""
+
+    recipe: Recipe
+    order: list[str] = field(default_factory=list)
+    functions: dict[str, str] = field(default_factory=dict)
+    constants: dict[str, str] = field(default_factory=dict)
+    imports: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    def function(self, module: str, name: str) -> str:
+        """Collect a function after those that it calls, and return its name in the derived module."""
+        flat = _flat(module, name)
+        if flat not in self.functions:
+            self.functions[flat] = ""  # marks a call of itself
+            node = _definition(module, name)
+            rewritten = _Rewriting(self, module, _local_names(node)).visit(node)
+            rewritten.name = flat
+            self.functions[flat] = ast.unparse(ast.fix_missing_locations(rewritten))
+            self.order.append(flat)
+        return flat
+
+    def value(self, module: str, name: str, value: object) -> str:
+        """Return the name in the derived module of what `module` calls `name`."""
+        if isinstance(value, FunctionType):
+            return self._callable(value)
+        flat = _flat(module, name)
+        if isinstance(value, type):
+            flat = _flat(value.__module__, value.__name__)
+            self.imports[flat] = (value.__module__, value.__name__)
+        elif name == "SINGLE":
+            self.constants[flat] = repr(self.recipe.single)
+        else:
+            self.constants[flat] = self._constant(module, value)
+        return flat
+
+    def _callable(self, function: FunctionType) -> str:
+        module, name = function.__module__, function.__name__
+        if self.recipe.vector and module == _ELEMENTARY and name.lstrip("_") in _PRIMITIVES:
+            flat = _flat(_INTRINSICS, name.lstrip("_"))
+            self.imports[flat] = (_INTRINSICS, name.lstrip("_"))
+            return flat
+        return self.function(module, name)
+
+    def typed(self, module: str) -> bool:
+        """Tell whether float literals of this module get the type of the recipe."""
+        return self.recipe.single and module not in _DOUBLE
+
+    def _constant(self, module: str, value: object) -> str:
+        if isinstance(value, float):
+            text = repr(value) if math.isfinite(value) else f'float("{value}")'
+            return f"_f({text})" if self.typed(module) else text
+        if isinstance(value, tuple):
+            parts = ", ".join(self._constant(module, part) for part in value) + ("," if len(value) == 1 else "")
+            if type(value) is tuple:
+                return f"({parts})"
+            return f"{self.value(module, '', type(value))}({parts})"
+        if isinstance(value, (bool, int, str)):
+            return repr(value)
+        raise TypeError(f"{module}: a {type(value).__name__} cannot be carried into compiled code")
+
+
+class _Rewriting(ast.NodeTransformer):
+    """Rewrites one function: names of other things, literals, annotations."""
+
+    def __init__(self, work: _Derivation, module: str, local: set[str]) -> None:
+        self._work = work
+        self._module = module
+        self._local = local
+        self._space = vars(import_module(module))
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:  # noqa: N802
+        """Drop docstring, annotations and decorators."""
+        node.returns = None
+        node.decorator_list = []
+        for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs):
+            argument.annotation = None
+        if ast.get_docstring(node, clean=False) is not None:
+            node.body = node.body[1:]
+        node.body = [self.visit(statement) for statement in node.body]
+        node.args.defaults = [self.visit(default) for default in node.args.defaults]
+        return node
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:  # noqa: N802
+        """Drop the annotation of a local variable."""
+        if node.value is None:
+            return ast.Pass()
+        return ast.Assign(targets=[self.visit(node.target)], value=self.visit(node.value))
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:  # noqa: N802
+        """Give what is not local its name in the derived module."""
+        name = node.id
+        if name in self._local or name not in self._space:
+            if name == "float" and self._work.typed(self._module):
+                return ast.copy_location(ast.Name("_f", node.ctx), node)
+            if name not in self._local and not hasattr(builtins, name):
+                raise NameError(f"{self._module}: {name} is not known")
+            return node
+        value = self._space[name]
+        if isinstance(value, ModuleType):
+            return node
+        return ast.copy_location(ast.Name(self._work.value(*_home(self._module, name, value)), node.ctx), node)
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:  # noqa: N802
+        """Flatten `module.name`."""
+        owner = node.value
+        if isinstance(owner, ast.Name) and owner.id not in self._local:
+            module = self._space.get(owner.id)
+            if isinstance(module, ModuleType):
+                return self._of_module(module, node)
+        return self.generic_visit(node)
+
+    def _of_module(self, module: ModuleType, node: ast.Attribute) -> ast.AST:
+        if module is math:
+            if self._work.recipe.vector and node.attr in _POLYNOMIALS and self._module not in _DOUBLE:
+                return ast.copy_location(ast.Name(self._work.function(_ELEMENTARY, node.attr), node.ctx), node)
+            if isinstance(getattr(math, node.attr), float):
+                return self._typed(node)
+            return node
+        if not module.__name__.startswith(_PACKAGE):
+            raise NameError(f"{self._module}: {module.__name__} is out of a kernel's reach")
+        flat = self._work.value(*_home(module.__name__, node.attr, getattr(module, node.attr)))
+        return ast.copy_location(ast.Name(flat, node.ctx), node)
+
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:  # noqa: N802
+        """Give a float literal its type."""
+        return self._typed(node) if isinstance(node.value, float) else node
+
+    def _typed(self, node: ast.expr) -> ast.expr:
+        if not self._work.typed(self._module):
+            return node
+        return ast.copy_location(ast.Call(ast.Name("_f", ast.Load()), [node], []), node)
+
+
+def _home(module: str, name: str, value: object) -> tuple[str, str, object]:
+    """Return where a name that `module` has imported comes from, so that it is carried over once."""
+    if not isinstance(value, (FunctionType, type)):
+        for node in _tree(module).body:
+            if isinstance(node, ast.ImportFrom) and node.module:
+                for alias in node.names:
+                    if (alias.asname or alias.name) == name:
+                        return _home(node.module, alias.name, value)
+    return module, name, value
+
+
+def _flat(module: str, name: str) -> str:
+    return f"{module.rpartition('.')[2]}__{name}"
+
+
+@cache
+def _tree(module: str) -> ast.Module:
+    return ast.parse(inspect.getsource(import_module(module)))
+
+
+def _definition(module: str, name: str) -> ast.FunctionDef:
+    for node in _tree(module).body:
+        if isinstance(node, ast.FunctionDef) and node.name == name:
+            copy = ast.parse(ast.unparse(node)).body[0]
+            if isinstance(copy, ast.FunctionDef):
+                return copy
+    raise NameError(f"{module} has no function {name}")
+
+
+def _local_names(node: ast.FunctionDef) -> set[str]:
+    names = {argument.arg for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)}
+    return names | {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+
+
+def sources(recipe: Recipe) -> Iterable[str]:
+    """Return what else the compiled code depends on: the text of the compiler's own helpers."""
+    for module in (_INTRINSICS, __name__):
+        path = import_module(module.rpartition(".")[0]).__path__[0] if module == _INTRINSICS else None
+        if path is not None:
+            with open(f"{path}/intrinsics.py", encoding="utf-8") as file:
+                yield file.read()
+    yield f"{sys.version_info[:2]} {recipe}"

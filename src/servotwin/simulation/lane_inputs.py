@@ -1,0 +1,259 @@
+"""The arguments of `simulate_many`, checked before anything runs: what differs from lane to lane as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import CommandError, InputError, LoadError, ParameterError, UnknownNameError
+from servotwin.loads import Load, as_load
+from servotwin.models import BoundedServo, Model, PulseServo
+from servotwin.parameters import GROUPS, Servo
+from servotwin.parameters.groups import check_columns
+from servotwin.signals import Signal
+from servotwin.simulation.lane_loads import LOAD_NAMES, check_number, with_numbers
+from servotwin.units import is_finite
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Item = TypeVar("Item")
+
+LAWS: dict[type[Model], str] = {PulseServo: "pulse", BoundedServo: "bounded"}
+
+
+@dataclass(frozen=True, eq=False)
+class Lanes:
+    """What is simulated: what all lanes share once, what differs as arrays (B,).
+
+    Parameters
+    ----------
+    model : Model
+        Of lane 0.
+    count : int
+        Number of lanes B.
+    numbers, words : mapping of str to ndarray, shape (B,)
+        What differs of servo and load, by dotted name.
+    commands, loads : tuple
+        Each once; `command_of` and `load_of` say which is a lane's.
+    initial : mapping of str to ndarray, shape (B,) or (1,)
+        Initial values by state name.
+    seeds : ndarray of int64, shape (B,)
+    """
+
+    model: Model
+    count: int
+    numbers: Mapping[str, Array]
+    words: Mapping[str, NDArray[np.str_]]
+    commands: tuple[Signal, ...]
+    command_of: Indices
+    loads: tuple[Load, ...]
+    load_of: Indices
+    initial: Mapping[str, Array]
+    seeds: Indices
+
+    def load(self, lane: int) -> Load:
+        """Return the load of a lane."""
+        numbers = {name: float(column[lane]) for name, column in self.numbers.items() if name in LOAD_NAMES}
+        return with_numbers(self.loads[self.load_of[lane]], numbers)
+
+    def lane_model(self, lane: int) -> Model:
+        """Return the model of a lane."""
+        values: dict[str, Any] = {name: float(column[lane]) for name, column in self.numbers.items()
+                                  if name not in LOAD_NAMES}
+        values |= {name: str(column[lane]) for name, column in self.words.items()}
+        return type(self.model)(self.model.servo.replace(values)) if values else self.model
+
+    def initial_of(self, lane: int) -> dict[str, float]:
+        """Return the initial values of a lane."""
+        return {name: float(column[lane if len(column) > 1 else 0]) for name, column in self.initial.items()}
+
+
+def lanes_of(model: Model, command: object, load: object, parameters: object, initial: object,
+             seeds: object) -> Lanes:
+    """Check the arguments of `simulate_many` that differ from lane to lane, and zip them.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds; names what is wrong, and the lane.
+    """
+    if type(model) not in LAWS:
+        raise InputError("model of simulate_many", got=model, allowed=" or ".join(kind.__name__ for kind in LAWS))
+    given = _named("parameters", parameters)
+    for name in given:
+        _check_name(model, name)
+    values = {name: _value(name, value) for name, value in given.items()}
+    start = {name: _numbers(f"initial {name}", value) for name, value in _named("initial", initial).items()}
+    _check_states(model, start)
+    commands, command_of = _once(_commands(command))
+    loads, load_of = _once(_loads(load))
+    seed = None if seeds is None else _seeds(seeds)
+    count = _common_length({
+        **values, **{f"initial {name}": value for name, value in start.items()},
+        "command": command_of, "load": load_of, **({} if seed is None else {"seeds": seed})})
+    values = {name: value[0].item() if isinstance(value, np.ndarray) and value.size == 1 else value
+              for name, value in values.items()}
+    columns = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+    servo = _servo_of_first(model.servo, {name: v for name, v in values.items() if name not in LOAD_NAMES})
+    of_load = {name: value for name, value in values.items() if name in LOAD_NAMES}
+    loads = _with_numbers(loads, load_of, of_load)
+    return Lanes(
+        model=model if servo is model.servo else type(model)(servo), count=count,
+        numbers={name: column for name, column in columns.items() if column.dtype.kind == "f"},
+        words={name: column for name, column in columns.items() if column.dtype.kind == "U"},
+        commands=commands, command_of=_spread(command_of, count), loads=loads, load_of=_spread(load_of, count),
+        initial={name: np.atleast_1d(value) for name, value in start.items()},
+        seeds=np.arange(count) if seed is None else _spread(np.atleast_1d(seed), count))
+
+
+def _named(what: str, mapping: object) -> Mapping[str, Any]:
+    if mapping is None:
+        return {}
+    if not isinstance(mapping, Mapping) or not all(isinstance(name, str) for name in mapping):
+        raise InputError(what, got=mapping, allowed="a mapping of names to numbers or arrays (SI)")
+    return mapping
+
+
+def _check_name(model: Model, name: str) -> None:
+    """Raise unless the model, or a load, has this number."""
+    read = (*model.requires, *model.optional)
+    if name in LOAD_NAMES or name in read:
+        return
+    group, _, key = name.partition(".")
+    if group in GROUPS and key in GROUPS[group].__dataclass_fields__:
+        raise ParameterError(f"parameters: {type(model).__name__} does not read {name!r}",
+                             allowed=", ".join((*read, *LOAD_NAMES)))
+    raise UnknownNameError("parameter", name, (*read, *LOAD_NAMES))
+
+
+def _check_states(model: Model, start: Mapping[str, Any]) -> None:
+    for name, value in start.items():
+        if name not in model.layout:
+            raise UnknownNameError(f"state of {type(model).__name__}", name, model.layout)
+        good = np.isfinite(value)
+        if not np.all(good):
+            lane = int(np.argmin(good)) if np.ndim(value) else None
+            raise InputError(f"initial {name}" if lane is None else f"initial {name} of lane {lane}",
+                             got=float(np.ravel(value)[lane or 0]), allowed="a finite number (SI)")
+
+
+def _value(name: str, value: Any) -> Any:
+    """Return a parameter as None, word, table, number, or array (B,) of floats or words."""
+    group, _, key = name.partition(".")
+    field = GROUPS[group].__dataclass_fields__.get(key) if group in GROUPS else None
+    rule = field.metadata["rule"] if field else None
+    if (value is None and rule) or rule == "table":
+        return value
+    if not isinstance(rule, tuple):
+        return _numbers(name, value)
+    words = np.asarray(value)
+    if words.ndim > 1 or words.dtype.kind not in "UO" or not all(isinstance(w, str) for w in words.ravel().tolist()):
+        raise ParameterError(name, got=value, allowed=f"{' or '.join(rule)}, or one such word per lane")
+    return words.astype(np.str_) if words.ndim else value
+
+
+def _numbers(what: str, values: Any) -> Any:
+    """Return one number, or one per lane as an array (B,) of floats."""
+    try:
+        array = np.asarray(values)
+    except ValueError:  # rows of unequal lengths
+        array = np.empty((0, 0))
+    if array.ndim > 1:
+        raise InputError(what, got=values if array.size == 0 else f"an array of shape {array.shape}",
+                         allowed="a number, or one number per lane")
+    if array.dtype.kind in "iuf":
+        return array.astype(np.float64) if array.ndim else float(array)
+    for lane, value in enumerate(array.ravel().tolist()):
+        if not is_finite(value):
+            raise InputError(f"{what} of lane {lane}" if array.ndim else what, got=value, allowed="a finite number")
+    return np.array([float(value) for value in array.ravel().tolist()]) if array.ndim else float(array.item())
+
+
+def _seeds(seeds: Any) -> Indices:
+    array = np.asarray(seeds)
+    if array.ndim > 1 or array.dtype.kind not in "iu" or (array.size and array.max() > np.iinfo(np.int64).max):
+        raise InputError("seeds", got=seeds, allowed="a whole number, or one per lane")
+    return array.astype(np.int64)
+
+
+def _commands(command: object) -> list[Signal]:
+    signals = list(command) if isinstance(command, Sequence | np.ndarray) else [command]
+    for lane, signal in enumerate(signals):
+        if not isinstance(signal, Signal):
+            raise CommandError("command" if signals == [command] else f"command of lane {lane}",
+                               got=type(signal).__name__, allowed="a signal of servotwin.signals, or one per lane")
+    return signals  # type: ignore[return-value]
+
+
+def _loads(load: object) -> list[Load]:
+    if not isinstance(load, Sequence | np.ndarray):
+        return [as_load(load)]  # type: ignore[arg-type]  # it raises on anything else
+    known: dict[int, Load] = {}
+    for lane, item in enumerate(load):
+        try:
+            known.setdefault(id(item), as_load(item))
+        except LoadError as error:
+            raise LoadError(f"{error.what} of lane {lane}", got=error.got, allowed=error.allowed) from None
+    return [known[id(item)] for item in load]
+
+
+def _once(items: Iterable[Item]) -> tuple[tuple[Item, ...], Indices]:
+    """Return each item once, and for each lane which is its own."""
+    place: dict[int, int] = {}
+    once: list[Item] = []
+    index = []
+    for item in items:
+        if id(item) not in place:
+            place[id(item)] = len(once)
+            once.append(item)
+        index.append(place[id(item)])
+    return tuple(once), np.array(index, dtype=np.int64)
+
+
+def _common_length(values: Mapping[str, Any]) -> int:
+    lengths = {name: len(value) for name, value in values.items() if isinstance(value, np.ndarray) and value.ndim}
+    several = {name: n for name, n in lengths.items() if n != 1}
+    if 0 in several.values() or len(set(several.values())) > 1:
+        raise InputError("numbers of lanes", got=", ".join(f"{name}: {n}" for name, n in several.items()),
+                         allowed="one number of lanes, at least 1, or 1 for what all lanes share")
+    return next(iter(several.values()), 1)
+
+
+def _spread(index: Indices, count: int) -> Indices:
+    return index if len(index) == count else np.repeat(index, count)
+
+
+def _servo_of_first(servo: Servo, values: Mapping[str, Any]) -> Servo:
+    """Check the parameters of all lanes, and return the servo of lane 0."""
+    if not values:
+        return servo
+    for group, kind in GROUPS.items():
+        given = {name.partition(".")[2]: value for name, value in values.items() if name.startswith(f"{group}.")}
+        if given:
+            own = getattr(servo, group)
+            check_columns(group, {key: getattr(own, key) for key in kind.__dataclass_fields__} | given)
+    return servo.replace({name: value[0].item() if isinstance(value, np.ndarray) else value
+                          for name, value in values.items()})
+
+
+def _with_numbers(loads: tuple[Load, ...], load_of: Indices, values: Mapping[str, Any]) -> tuple[Load, ...]:
+    """Check the numbers of all lanes' loads, and return the loads with those that all lanes share."""
+    for name, value in values.items():
+        check_number(name, value)
+    first = {name: value[0].item() if isinstance(value, np.ndarray) else value for name, value in values.items()}
+    changed = []
+    for k, load in enumerate(loads):
+        try:
+            changed.append(with_numbers(load, first))
+        except LoadError as error:
+            if len(loads) == 1:
+                raise
+            lane = int(np.argmax(load_of == k))
+            raise LoadError(f"{error.what} of lane {lane}", got=error.got, allowed=error.allowed) from None
+    return tuple(changed)
+
+

@@ -1,0 +1,117 @@
+"""Bring a chunk of lanes into the shape of the compiled kernels, and run it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.models.kernels import blocks
+from servotwin.models.kernels.blocks import Lanes, Outputs
+from servotwin.models.kernels.frame import Chip
+from servotwin.models.kernels.hybrid import Plant
+from servotwin.simulation.compile import Recipe, kernels
+from servotwin.simulation.lanes import Floats, Raw, Work, empty_raw
+
+_BLOCKS = {
+    dtype: Recipe(f"blocks_{dtype}", ("servotwin.models.kernels.blocks:run",), vector=True, single=dtype == "float32")
+    for dtype in ("float64", "float32")
+}
+_WALKS = Recipe("walks", ("servotwin.models.kernels.walks:walk_lanes",))
+_FLOATS = ("angle", "speed", "error")
+
+
+def run(work: Work) -> Raw:
+    """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
+    raw = empty_raw(work)
+    lanes = _lanes(work)
+    given_up = np.ones(work.lanes, np.int8)
+    outputs = _outputs(work, raw, given_up)
+    times = np.ascontiguousarray(work.times, np.float64)
+    side = _side_by_side(work, lanes)
+    if side.all():
+        _run_blocks(work, lanes, times, outputs)
+    elif side.any():
+        _run_some(work, np.flatnonzero(side), raw, given_up)
+    rest = np.flatnonzero(given_up)
+    if len(rest):
+        _run_walks(work, lanes, rest, times, outputs, raw)
+    return raw
+
+
+def _run_blocks(work: Work, lanes: Lanes, times: Floats, outputs: Outputs) -> None:
+    numbers = np.zeros(blocks.NUMBERS, work.dtype)
+    kernels(_BLOCKS[work.dtype]).run(lanes, float(work.duration), times, outputs, numbers, np.zeros(blocks.TIMES),
+                                     np.zeros(blocks.INTEGERS, np.int64))
+
+
+def _run_some(work: Work, which: NDArray[np.int64], raw: Raw, given_up: NDArray[np.int8]) -> None:
+    """Run only some lanes side by side."""
+    some = _picked(work, which)
+    part = empty_raw(some)
+    mark = np.zeros(len(which), np.int8)
+    _run_blocks(some, _lanes(some), np.ascontiguousarray(work.times, np.float64), _outputs(some, part, mark))
+    for name, values in part.fields.items():
+        raw.fields[name][which] = values
+    given_up[which] = mark
+
+
+def _picked(work: Work, which: NDArray[np.int64]) -> Work:
+    raise NotImplementedError
+
+
+def _run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, outputs: Outputs, raw: Raw) -> None:
+    torque = work.torque
+    kernels(_WALKS).walk_lanes(
+        work.law == "pulse", lanes, _rows(torque.rows), _indices(torque.first), _indices(torque.count), which,
+        float(work.duration), times, outputs, raw.status, raw.ended, np.zeros((5, len(times))))
+    for lane in which[raw.status[which] != 0].tolist():
+        failed = times >= raw.ended[lane]
+        for name, values in raw.fields.items():
+            values[lane, failed] = np.nan if name in _FLOATS else 0
+
+
+def _side_by_side(work: Work, lanes: Lanes) -> NDArray[np.bool_]:
+    """Tell which lanes have nothing that takes the general way."""
+    if work.law != "pulse":
+        return np.zeros(work.lanes, np.bool_)
+    plant = Plant(*lanes.plants)
+    plain = (plant.L == 0.0) & (plant.kappa == 0.0) & (plant.stiffness == 0.0) & (plant.gravity == 0.0)  # type: ignore[attr-defined]
+    return np.asarray(plain & (plant.K_b > 0.0) & (work.torque.count == 0))
+
+
+def _lanes(work: Work) -> Lanes:
+    own = np.asarray(work.edges.rows, np.float64).reshape(-1)
+    return Lanes(
+        _columns(work.plant, work.lanes), _columns(work.chip or Chip(*([0.0] * len(Chip._fields))), work.lanes),
+        _column(work.constant_torque, work.lanes), _column(work.angle, work.lanes), _column(work.speed, work.lanes),
+        _indices(work.seeds), _rows(work.command.rows), _indices(work.command.first), _indices(work.command.count),
+        np.ascontiguousarray(own), _indices(work.edges.first), _indices(work.edges.count))
+
+
+def _columns(numbers: tuple[Any, ...], lanes: int) -> Floats:
+    columns = np.empty((len(numbers), lanes))
+    for row, values in zip(columns, numbers, strict=True):
+        row[:] = values
+    return columns
+
+
+def _column(values: Any, lanes: int) -> Floats:
+    column = np.empty(lanes)
+    column[:] = values
+    return column
+
+
+def _rows(rows: Floats) -> Floats:
+    return np.ascontiguousarray(rows, np.float64).reshape(-1, 7)
+
+
+def _indices(values: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.ascontiguousarray(values, np.int64)
+
+
+def _outputs(work: Work, raw: Raw, given_up: NDArray[np.int8]) -> Outputs:
+    none = {name: np.zeros((0, 0), np.int8 if name in ("contact", "drive") else work.dtype) for name in blocks.Outputs._fields}
+    none.update(raw.fields)  # type: ignore[arg-type]
+    return Outputs(none["angle"], none["speed"], none["contact"], none["drive"], none["error"], given_up)

@@ -1,0 +1,169 @@
+"""Many servos at once: what a chunk of lanes needs, what comes back, and the way through the compiled kernels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from servotwin.models.kernels.frame import Chip
+    from servotwin.models.kernels.hybrid import Plant
+
+Floats = NDArray[np.float64]
+Numbers = TypeVar("Numbers", bound=tuple[object, ...])
+
+FIELDS = ("angle", "speed", "contact", "drive", "error")
+_SMALL = ("contact", "drive")  # fields that are kept as int8
+
+
+@dataclass(frozen=True)
+class Tables:
+    """One table per lane, all in one array; lanes may share rows.
+
+    Parameters
+    ----------
+    first, count : ndarray of int64, shape (B,)
+        The table of a lane is rows[first : first + count].
+    rows : ndarray of float64, shape (n, 7) or (m,)
+        Pieces as in `physics.pieces.Piece`, or frame edges [s].
+    """
+
+    first: NDArray[np.int64]
+    count: NDArray[np.int64]
+    rows: Floats
+
+    def part(self, start: int, stop: int) -> Tables:
+        """Return the tables of some lanes."""
+        return Tables(self.first[start:stop], self.count[start:stop], self.rows)
+
+
+def no_tables(lanes: int, width: int = 7) -> Tables:
+    """Return tables without rows.
+
+    Examples
+    --------
+    >>> no_tables(2).count.tolist()
+    [0, 0]
+    """
+    none = np.zeros(lanes, dtype=np.int64)
+    return Tables(none, none, np.zeros((0, width) if width else (0,)))
+
+
+def regular_edges(lanes: int) -> Tables:
+    """Return the edges of lanes whose frames follow at `Chip.frame_period`.
+
+    Examples
+    --------
+    >>> regular_edges(2).count.tolist()
+    [-1, -1]
+    """
+    return Tables(np.zeros(lanes, dtype=np.int64), np.full(lanes, -1, dtype=np.int64), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a chunk of lanes needs; picklable.
+
+    Parameters
+    ----------
+    law : str
+        "pulse" or "bounded".
+    plant : Plant
+        Each field a number, or an array (B,).
+    chip : Chip or None
+        The same; its frame_period is that of the command where that gives one. None for "bounded".
+    command : Tables
+        Pulse width [s] for "pulse", v_c [V] for "bounded".
+    torque : Tables
+        Recorded external torque [N m] over time; count 0: none.
+    constant_torque : float or ndarray, shape (B,)
+        Added to it [N m]; positive pushes towards −q.
+    edges : Tables
+        Frame edges [s]; count −1: regular frames of `chip.frame_period`.
+    angle, speed : ndarray, shape (B,)
+        At t = 0 [rad, rad/s].
+    seeds : ndarray of int64, shape (B,)
+        Of the noise.
+    duration : float
+        [s]
+    times : ndarray, shape (T,)
+        Output times [s], not decreasing, within [0, duration].
+    fields : tuple of str
+        Of "angle" [rad], "speed" [rad/s], "contact" (`hybrid.FREE` … `hybrid.ON_UPPER`), "drive" (−1, 0, +1) and
+        "error" (of the latest decision [s]); only these are computed and kept.
+    dtype : str
+        "float64" or "float32".
+    """
+
+    law: str
+    plant: Plant
+    chip: Chip | None
+    command: Tables
+    torque: Tables
+    constant_torque: float | Floats
+    edges: Tables
+    angle: Floats
+    speed: Floats
+    seeds: NDArray[np.int64]
+    duration: float
+    times: Floats
+    fields: tuple[str, ...]
+    dtype: str
+
+    @property
+    def lanes(self) -> int:
+        """Number of lanes."""
+        return len(self.angle)
+
+    def part(self, start: int, stop: int) -> Work:
+        """Return the work of some lanes."""
+        lanes = slice(start, stop)
+        torque = self.constant_torque
+        return replace(
+            self, plant=_sliced(self.plant, lanes), chip=None if self.chip is None else _sliced(self.chip, lanes),
+            command=self.command.part(start, stop), torque=self.torque.part(start, stop),
+            constant_torque=torque[lanes] if isinstance(torque, np.ndarray) and torque.ndim else torque,
+            edges=self.edges.part(start, stop), angle=self.angle[lanes], speed=self.speed[lanes],
+            seeds=self.seeds[lanes])
+
+
+def _sliced(numbers: Numbers, lanes: slice) -> Numbers:
+    """Return a named tuple of numbers and columns with some rows of the columns."""
+    return type(numbers)(*(x[lanes] if isinstance(x, np.ndarray) and x.ndim else x for x in numbers))
+
+
+@dataclass(frozen=True)
+class Raw:
+    """What comes back.
+
+    Parameters
+    ----------
+    fields : dict of str to ndarray, shape (B, T)
+        Of the dtype asked for, contact and drive int8; nan (0) from a failure on.
+    status : ndarray of int8, shape (B,)
+        Codes of `Status`.
+    ended : ndarray of float64, shape (B,)
+        The time of the failure, or the duration [s].
+    """
+
+    fields: dict[str, NDArray[np.generic]]
+    status: NDArray[np.int8]
+    ended: Floats
+
+
+def empty_raw(work: Work) -> Raw:
+    """Return the arrays that the kernels fill."""
+    shape = (work.lanes, len(work.times))
+    kinds = {name: np.dtype(np.int8) if name in _SMALL else np.dtype(work.dtype) for name in work.fields}
+    return Raw({name: np.zeros(shape, kind) for name, kind in kinds.items()}, np.zeros(work.lanes, np.int8),
+               np.full(work.lanes, work.duration))
+
+
+def run_lanes(work: Work) -> Raw:
+    """Run the lanes one after the other, without threads of its own and without the interpreter's lock."""
+    from servotwin.simulation.lane_runs import run
+
+    return run(work)

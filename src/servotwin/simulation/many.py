@@ -1,0 +1,296 @@
+"""`simulate_many`: many servos at once, lane by lane, on all cores or wherever an executor takes them."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.simulation.batch import Batch, Failure
+from servotwin.simulation.lane_inputs import Lanes, lanes_of
+from servotwin.simulation.lanes import Raw, run_lanes
+from servotwin.simulation.packing import Asked, Chunk, Commands, groups
+from servotwin.simulation.simulator import _times
+from servotwin.simulation.status import Status
+from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, DTypeLike
+
+    from servotwin import loads
+    from servotwin.models import Model
+    from servotwin.signals import Signal
+
+    _Load = loads.Load | loads.Part | None
+
+_MOST_LANES = 65536  # of a chunk
+_LEAST_LANES = 256  # fewer do not pay for the way to a worker
+_CHUNK_BYTES = 16e6  # of a chunk's raw fields
+
+Progress = bool | Callable[[int, int], object]
+Indices = NDArray[np.int64]
+Part = tuple[Indices, tuple[str, ...]]
+
+
+def simulate_many(
+    model: Model, command: Signal | Sequence[Signal], *, duration: float,
+    load: _Load | Sequence[_Load] = None, parameters: Mapping[str, Any] | None = None,
+    output_step: float | None = None, output_times: ArrayLike | None = None,
+    outputs: Sequence[str] = ("output_angle",), initial: Mapping[str, ArrayLike] | None = None,
+    dtype: DTypeLike = "float64", seeds: ArrayLike | None = None, executor: Any = None, chunk: int | None = None,
+    progress: Progress = False,
+) -> Batch:
+    """Simulate many servos (lanes) from t = 0 to `duration`.
+
+    Whatever differs from lane to lane is an array, or a sequence, of one length B; all are zipped, and a single value
+    holds for all lanes. `grid` makes arrays of all combinations.
+
+    Parameters
+    ----------
+    model : PulseServo or BoundedServo
+    command : Signal or sequence of Signal
+    duration : float
+        Positive [s].
+    load : Load or sequence of Load, optional
+        Nothing unless given.
+    parameters : mapping, optional
+        Number or array (SI) by dotted name, of the servo ("electronics.stretcher_gain") or of the load
+        ("load.inertia", "load.pendulum.mass").
+    output_step, output_times
+        As in `simulate`; the same for all lanes.
+    outputs : sequence of str
+        Names of the signals that are computed and kept.
+    initial : mapping, optional
+        Initial values by state name (SI), each a number or an array.
+    dtype : str
+        "float64", or "float32": half the memory, often faster, and angles good to about 1e-5 rad.
+    seeds : int or array of int, optional
+        Of each lane's noise; the number of the lane unless given.
+    executor : optional
+        Anything with the `submit` of `concurrent.futures.Executor`; threads on all cores unless given. It is not shut
+        down. Results do not depend on it.
+    chunk : int, optional
+        Lanes that go to a worker at once; chosen so that memory stays bounded unless given. Results do not depend on
+        it.
+    progress : bool or callable
+        True shows a bar on stderr; a callable is called with the lanes that are done and all of them.
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    InputError
+        On bad input, before anything runs; names lane and parameter. A lane that ends early says so in
+        `Batch.status`, is nan from there on, and harms no other.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = st.BoundedServo(st.load_servo("hitec-hs-755hb"))
+    >>> batch = st.simulate_many(model, st.signals.step(0.0, 60.0, unit="deg"), duration=1.0, output_times=[1.0],
+    ...                          parameters={"load.torque": np.linspace(0.0, 0.3, 4)})
+    >>> batch["output_angle"].shape
+    (4, 1)
+    """
+    if not (is_finite(duration) and duration > 0.0):
+        raise InputError("duration", got=duration, allowed="a positive number of seconds")
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        raise InputError("executor", got=executor, allowed="one with a submit method, as in concurrent.futures")
+    if not (isinstance(progress, bool) or callable(progress)):
+        raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
+    lanes = lanes_of(model, command, load, parameters, initial, seeds)
+    asked = Asked(float(duration), _times(duration, output_step, output_times), _outputs(lanes.model, outputs),
+                  _dtype(dtype))
+    commands = Commands(lanes)
+    parts = _parts(lanes, commands, asked, chunk, _workers(executor))
+    signals = _space(lanes, asked)
+    done = 0
+    status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
+    with (_shown(progress, lanes.count) as show, _executor(executor) as own,
+          closing(_run(lanes, commands, parts, asked, own)) as running):
+        for which, raw, values in running:
+            place: Any = which
+            if which[-1] - which[0] == len(which) - 1:
+                place = slice(which[0], which[-1] + 1)  # written faster than a list of lanes
+            for name, column in values.items():
+                signals[name][place] = column
+            status[place], ended[place] = raw.status, raw.ended
+            done += len(which)
+            show(done)
+    for array in (asked.times, status, *signals.values()):
+        np.asarray(array).setflags(write=False)
+    failures = tuple(Failure(int(lane), float(ended[lane]), Status.of_code(int(status[lane])).message)
+                     for lane in np.flatnonzero(status))
+    return Batch(time=asked.times, status=status, failures=failures, duration=asked.duration, signals=signals,
+                 lanes=lanes)
+
+
+def grid(values: Mapping[str, ArrayLike] | None = None, /, **more: ArrayLike) -> dict[str, NDArray[Any]]:
+    """Return all combinations of some values, as one array per name; the first name varies slowest.
+
+    Parameters
+    ----------
+    values : mapping of str to array, shape (n,)
+        By dotted name.
+    **more
+        The same, for names without a dot.
+
+    Examples
+    --------
+    >>> grid({"electronics.stretcher_gain": [60.0, 120.0], "load.inertia": [0.0, 1e-3]})["load.inertia"].tolist()
+    [0.0, 0.001, 0.0, 0.001]
+    """
+    given = {**(values or {}), **more}
+    axes = {name: np.atleast_1d(np.asarray(axis)) for name, axis in given.items()}
+    for name, axis in axes.items():
+        if axis.ndim != 1 or axis.size == 0:
+            raise InputError(f"grid: {name}", got=f"an array of shape {axis.shape}", allowed="a list of at least one")
+    return {name: mesh.ravel() for name, mesh in zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True)}
+
+
+def _outputs(model: Model, outputs: Sequence[str]) -> tuple[str, ...]:
+    names = (outputs,) if isinstance(outputs, str) else outputs
+    try:
+        asked = dict.fromkeys(names)
+    except TypeError:
+        raise InputError("outputs", got=outputs, allowed="names of signals") from None
+    for name in asked:
+        if name != "time" and name not in model.available:
+            raise UnknownNameError(f"signal of {type(model).__name__}", name, ("time", *model.available))
+    asked.pop("time", None)  # it is always there
+    if not asked:
+        raise InputError("outputs", got=outputs, allowed="at least one of " + ", ".join(model.available))
+    return tuple(asked)
+
+
+def _dtype(dtype: DTypeLike) -> str:
+    try:
+        name = "" if dtype is None else np.dtype(dtype).name
+    except TypeError:
+        name = ""
+    if name not in ("float64", "float32"):
+        raise InputError("dtype", got=dtype, allowed='"float64" or "float32"')
+    return name
+
+
+def _space(lanes: Lanes, asked: Asked) -> dict[str, NDArray[Any]]:
+    """Return the arrays of the outputs, if the machine has the memory."""
+    shape = (lanes.count, len(asked.times))
+    size = len(asked.outputs) * math.prod(shape) * np.dtype(asked.dtype).itemsize
+    memory = _memory()
+    try:
+        if size > 0.8 * memory:
+            raise MemoryError
+        return {name: np.empty(shape, dtype=asked.dtype) for name in asked.outputs}
+    except MemoryError:
+        room = f" ({memory / 1e9:.3g} GB)" if math.isfinite(memory) else ""
+        raise InputError(
+            "outputs x lanes x times", got=f"{len(asked.outputs)} x {shape[0]} x {shape[1]}, {size / 1e9:.3g} GB",
+            allowed=f"what fits into memory{room}: take fewer of them, or float32") from None
+
+
+def _memory() -> float:
+    """Return how much memory this process may use [bytes]; inf where that is not known."""
+    sizes = [math.inf]
+    try:
+        sizes.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):  # not on Windows
+        pass
+    try:
+        with open("/sys/fs/cgroup/memory.max", encoding="ascii") as file:  # the limit of a container
+            sizes.append(float(file.read()))
+    except (OSError, ValueError):
+        pass
+    return min(sizes)
+
+
+def _workers(executor: Any) -> int:
+    own = getattr(executor, "_max_workers", None)
+    if isinstance(own, int) and own > 0:
+        return own
+    if sys.version_info >= (3, 13):
+        return os.process_cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _parts(lanes: Lanes, commands: Commands, asked: Asked, chunk: int | None, workers: int) -> list[Part]:
+    """Check every lane, and return the lanes of each chunk with the raw fields that it needs."""
+    if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, int | np.integer) or chunk < 1):
+        raise InputError("chunk", got=chunk, allowed="a whole number of lanes, at least 1")
+    found: list[Part] = []
+    for group in groups(lanes, commands):
+        whole = Chunk(lanes, commands, group)
+        whole.check(asked.duration)
+        fields = whole.fields(asked)
+        size = chunk or _chunk_size(len(group), len(asked.times) * len(fields), workers)
+        found += [(group[k:k + size], fields) for k in range(0, len(group), size)]
+    return found
+
+
+def _chunk_size(lanes: int, numbers_per_lane: int, workers: int) -> int:
+    """Return how many lanes go to a worker at once: some chunks for each, none too large for memory."""
+    for_all = math.ceil(lanes / (4 * workers))
+    in_memory = max(1, int(_CHUNK_BYTES / (8 * numbers_per_lane)))
+    return min(max(for_all, _LEAST_LANES), in_memory, _MOST_LANES)
+
+
+def _run(lanes: Lanes, commands: Commands, parts: list[Part], asked: Asked,
+         executor: Any) -> Generator[tuple[Indices, Raw, dict[str, NDArray[np.float64]]]]:
+    """Run all chunks, a few at a time; return lanes, raw fields and outputs of each."""
+    flying: deque[tuple[Chunk, Any]] = deque()
+    waiting = iter(parts)
+    try:
+        while True:
+            while len(flying) < 2 * _workers(executor) and (part := next(waiting, None)) is not None:
+                piece = Chunk(lanes, commands, part[0])
+                flying.append((piece, executor.submit(run_lanes, piece.work(asked, part[1]))))
+            if not flying:
+                return
+            piece, future = flying.popleft()
+            raw = future.result()
+            yield piece.which, raw, piece.outputs(asked, raw)
+    finally:
+        for _, future in flying:  # only after an error or an interrupt are there any
+            future.cancel()
+
+
+@contextmanager
+def _executor(given: Any) -> Iterator[Any]:
+    """Give the caller's executor, or threads of our own, which end with the work."""
+    if given is not None:
+        yield given
+        return
+    own = ThreadPoolExecutor(_workers(None), thread_name_prefix="servotwin")
+    try:
+        yield own
+    finally:
+        own.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _shown(progress: Progress, total: int) -> Iterator[Callable[[int], None]]:
+    """Give a function that is told how many lanes are done."""
+    if callable(progress):
+        yield lambda done: (progress(done, total), None)[1]
+    elif not progress:
+        yield lambda done: None
+    else:
+        from rich.console import Console
+        from rich.progress import Progress as Bar
+
+        with Bar(console=Console(file=sys.stderr), transient=True) as bar:
+            task = bar.add_task("simulate_many", total=total)
+            yield lambda done: bar.update(task, completed=done)

@@ -1,0 +1,241 @@
+"""From checked lanes to the work of a chunk, and from its raw fields to output signals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, LoadError
+from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
+from servotwin.simulation.lane_inputs import LAWS, Lanes
+from servotwin.simulation.lane_loads import LOAD_NAMES, column_load, recorded_torque, structure
+from servotwin.simulation.lanes import FIELDS, Raw, Tables, Work, no_tables, regular_edges
+
+if TYPE_CHECKING:
+    from servotwin.loads import Load
+    from servotwin.models import Model
+    from servotwin.models.samples import Samples
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What every chunk is asked for: see `Work`, and the names of the outputs."""
+
+    duration: float
+    times: Array
+    outputs: tuple[str, ...]
+    dtype: str
+
+
+class Commands:
+    """The commands of all lanes as one array of pieces."""
+
+    def __init__(self, lanes: Lanes) -> None:
+        signals, self.of = lanes.commands, lanes.command_of
+        self.kinds = np.array([signal.kind for signal in signals])
+        self.initial = np.array([signal.initial for signal in signals])
+        bounds = np.array([signal.pieces.bounds(signal.pieces.table[-1].start) for signal in signals])
+        self.low = np.minimum(bounds[:, 0], self.initial)
+        self.high = np.maximum(bounds[:, 1], self.initial)
+        self.periods = np.array([signal.frame_period or math.nan for signal in signals])
+        self.rows = np.concatenate([np.array(signal.pieces.table) for signal in signals])
+        self.count = np.array([len(signal.pieces.table) for signal in signals])
+        self.first = np.cumsum(self.count) - self.count
+        edges = [lanes.model.edges(signal) for signal in signals]
+        self.edge_count = np.array([-1 if some is None else len(some) for some in edges])
+        own = np.maximum(self.edge_count, 0)
+        self.edge_first = np.cumsum(own) - own
+        self.edges = np.array([t for some in edges for t in some or ()], dtype=np.float64)
+
+    def signal(self, lanes: Indices) -> LaneSignal:
+        """Return the commands of some lanes, all of one kind."""
+        of = self.of[lanes]
+        return self._signal(lanes, LanePieces(self.rows, self.first[of], self.count[of],
+                                              low=self._shared(self.low, of), high=self._shared(self.high, of)))
+
+    def before(self, lanes: Indices) -> LaneSignal:
+        """Return the commands of just before the start, held for ever."""
+        of = self.of[lanes]
+        rows = np.zeros((len(self.initial), 7))
+        rows[:, 1] = self.initial
+        value = self._shared(self.initial, of)
+        return self._signal(lanes, LanePieces(rows, of, np.ones_like(of), low=value, high=value))
+
+    def _shared(self, values: Array, of: Indices) -> Any:
+        return float(values[0]) if len(values) == 1 else values[of, None]
+
+    def _signal(self, lanes: Indices, pieces: LanePieces) -> LaneSignal:
+        of = self.of[lanes]
+        period = None if math.isnan(self.periods[of[0]]) else self._shared(self.periods, of)
+        return LaneSignal(str(self.kinds[of[0]]), pieces, period, None if self.edge_count[of[0]] < 0 else (), lanes)
+
+    def frame_edges(self, lanes: Indices) -> Tables:
+        """Return the edges of each lane's frames."""
+        of = self.of[lanes]
+        if (self.edge_count < 0).all():
+            return regular_edges(len(of))
+        return Tables(self.edge_first[of], self.edge_count[of], self.edges)
+
+
+def groups(lanes: Lanes, commands: Commands) -> Iterator[Indices]:
+    """Return the lanes in groups of one structure: one kind of command and frame, same words, loads of same parts."""
+    of_command = [(signal.kind, signal.frame_period is None, signal.edges is None) for signal in lanes.commands]
+    of_load = [structure(load) for load in lanes.loads]
+    code = np.zeros(lanes.count, dtype=np.int64)
+    for shapes, index in ((of_command, lanes.command_of), (of_load, lanes.load_of)):
+        known = {shape: k for k, shape in enumerate(dict.fromkeys(shapes))}
+        if len(known) > 1:
+            code = code * len(known) + np.array([known[shape] for shape in shapes])[index]
+    for words in lanes.words.values():
+        options, more = np.unique(words, return_inverse=True)
+        code = code * len(options) + more
+    if not code.any():
+        yield np.arange(lanes.count)
+        return
+    for value in np.unique(code):
+        yield np.flatnonzero(code == value)
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Some lanes of one structure, with columns (n, 1) where they differ."""
+
+    lanes: Lanes
+    commands: Commands
+    which: Indices
+
+    @cached_property
+    def _columns(self) -> dict[str, Array]:
+        return {name: column[self.which, None] for name, column in self.lanes.numbers.items()}
+
+    @cached_property
+    def _of_loads(self) -> tuple[list[Load], Indices]:
+        if len(self.lanes.loads) == 1:
+            return list(self.lanes.loads), np.zeros(len(self.which), dtype=np.int64)
+        used, of = np.unique(self.lanes.load_of[self.which], return_inverse=True)
+        return [self.lanes.loads[k] for k in used], of
+
+    @cached_property
+    def model(self) -> Model:
+        """The model over these lanes."""
+        servo, first = self.lanes.model.servo, int(self.which[0])
+        if self.lanes.words:
+            servo = servo.replace({name: str(words[first]) for name, words in self.lanes.words.items()})
+        own = {name: column for name, column in self._columns.items() if name not in LOAD_NAMES}
+        return self.lanes.model.over(LaneServo(servo, own))
+
+    @cached_property
+    def load(self) -> Load:
+        """Their loads."""
+        numbers = {name: column for name, column in self._columns.items() if name in LOAD_NAMES}
+        return column_load(*self._of_loads, numbers)
+
+    @cached_property
+    def drive(self) -> LanePieces:
+        """What the model follows."""
+        return cast("LanePieces", self.model.command(cast("Any", self.commands.signal(self.which))))
+
+    @cached_property
+    def start(self) -> tuple[Array, Array]:
+        """Angle and speed at t = 0 [rad, rad/s], shape (n,)."""
+        before = cast("LanePieces", self.model.command(cast("Any", self.commands.before(self.which))))
+        values = [self.model.start_angle(cast("Any", before.initial)), 0.0]
+        for name, column in self.lanes.initial.items():
+            values[self.model.layout.index(name)] = cast("Any", column[self.which if len(column) > 1 else [0], None])
+        return cast("tuple[Array, Array]", tuple(
+            np.ascontiguousarray(np.broadcast_to(x, (len(self.which), 1))[:, 0]) for x in values))
+
+    def check(self, duration: float) -> None:
+        """Raise where a command, an initial value or a load is not possible; names the lane."""
+        of_loads, of = self._of_loads
+        for k, load in enumerate(of_loads):
+            try:
+                load.check_span(0.0, duration)
+            except LoadError as error:
+                lane = self.which[np.argmax(of == k)]
+                raise LoadError(f"{error.what} of lane {lane}", got=error.got, allowed=error.allowed) from None
+        with np.errstate(all="ignore"):
+            self.model.command(cast("Any", self.commands.signal(self.which)))  # raises if it cannot be followed
+        name = self.model.layout[0]
+        if name not in self.lanes.initial:
+            return  # it starts between the stops
+        angle, plant = self.start[0], self.model.pack(self.load)
+        lower, upper = (np.broadcast_to(_flat(x), angle.shape) for x in (plant.lower, plant.upper))
+        outside = ~((angle >= lower) & (angle <= upper))
+        if outside.any():
+            k = int(np.argmax(outside))
+            raise InputError(f"initial {name} of lane {self.which[k]}", got=float(angle[k]),
+                             allowed=f"{lower[k]:.6g} to {upper[k]:.6g} rad, between the stops")
+
+    def work(self, asked: Asked, fields: tuple[str, ...]) -> Work:
+        """Return what the kernels need."""
+        with np.errstate(all="ignore"):
+            plant = self.model.pack(self.load)
+            chip = self.model.chip(cast("Any", self.commands.signal(self.which)))
+            angle, speed = self.start
+            command = Tables(*self.drive.tables())
+        torque = no_tables(len(self.which))
+        if any(load.recorded for load in self._of_loads[0]):
+            first, count, rows = recorded_torque(*self._of_loads).tables()
+            recorded = np.array([bool(load.recorded) for load in self._of_loads[0]])[self._of_loads[1]]
+            torque = Tables(first, np.where(recorded, count, 0), rows)
+        return Work(law=LAWS[type(self.model)], plant=type(plant)(*map(_flat, plant)),
+                    chip=None if chip is None else type(chip)(*map(_flat, chip)), command=command, torque=torque,
+                    constant_torque=_flat(self.load.torque), edges=self.commands.frame_edges(self.which),
+                    angle=angle, speed=speed, seeds=self.lanes.seeds[self.which], duration=asked.duration,
+                    times=asked.times, fields=fields, dtype=asked.dtype)
+
+    def fields(self, asked: Asked) -> tuple[str, ...]:
+        """Return the raw fields that the outputs read: those that they look at when they are computed for one lane."""
+        one = Chunk(self.lanes, self.commands, self.which[:1])
+        probe = _Probe(asked.times[:1])
+        with np.errstate(all="ignore"):
+            for name in asked.outputs:
+                one.model.output(name, cast("Samples", probe), cast("Any", one.drive), one.load)
+        return tuple(field for field in FIELDS if field in probe.seen) or FIELDS[:1]
+
+    def outputs(self, asked: Asked, raw: Raw) -> dict[str, Array]:
+        """Return the outputs (SI), each broadcastable to (n, T)."""
+        fields: Mapping[str, Any] = {name: values if values.dtype.kind == "i" else values.astype(np.float64, copy=False)
+                                     for name, values in raw.fields.items()}
+        samples = cast("Samples", SimpleNamespace(time=asked.times, current=math.nan, **fields))
+        gone = None
+        if raw.status.any():
+            gone = (raw.status != 0)[:, None] & (asked.times > raw.ended[:, None])
+        signals = {}
+        with np.errstate(all="ignore"):
+            for name in asked.outputs:
+                values = self.model.output(name, samples, cast("Any", self.drive), self.load)
+                signals[name] = values if gone is None else np.where(gone, math.nan, values)
+        return signals
+
+
+class _Probe:
+    """Samples of one lane that remember which fields were read."""
+
+    current = math.nan  # no model here has it as a state
+
+    def __init__(self, time: Array) -> None:
+        self.time = time
+        self.seen: set[str] = set()
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        if name not in FIELDS:
+            raise AttributeError(name)
+        self.seen.add(name)
+        return np.zeros((1, len(self.time)), dtype=np.int8 if name in ("contact", "drive") else np.float64)
+
+
+def _flat(value: Any) -> Any:
+    """Return a column as an array (n,), and a number as it is."""
+    return np.ascontiguousarray(value[:, 0]) if isinstance(value, np.ndarray) and value.ndim else value
