@@ -140,6 +140,15 @@ def test_one_lane_alone():
     compare(batch, [st.simulate(st.BoundedServo(SERVO), STEP, duration=0.3)])
 
 
+def test_what_the_caller_gave_stays_the_callers():
+    times, inertia = np.array([0.05, 0.1]), np.array([0.0, 1e-3])
+    batch = st.simulate_many(st.BoundedServo(SERVO), STEP, duration=0.1, output_times=times,
+                             parameters={"load.inertia": inertia})
+    times[:], inertia[:] = 7.0, 7.0
+    assert batch.time.tolist() == [0.05, 0.1]
+    assert batch[1].load.inertia == 1e-3
+
+
 def test_initial_values():
     start = {"output_angle": [0.1, 0.2, 0.3], "output_speed": 1.0}
     batch = st.simulate_many(st.PulseServo(SERVO), STEP, duration=0.2, initial=start, output_step=0.01)

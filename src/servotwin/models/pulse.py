@@ -38,7 +38,7 @@ class PulseServo(Model):
     >>> import servotwin as st
     >>> result = st.simulate(PulseServo(st.load_servo("hitec-hs-755hb")),
     ...                      st.signals.step(0.0, 60.0, at=0.1, unit="deg"), duration=1.0)
-    >>> 55.0 < 57.29578 * result["output_angle"][-1] < 62.0
+    >>> bool(55.0 < 57.29578 * result["output_angle"][-1] < 62.0)
     True
     """
 

@@ -20,49 +20,50 @@ _BLOCKS = {
 }
 _WALKS = Recipe("walks", ("servotwin.models.kernels.walks:walk_lanes",))
 _FLOATS = ("angle", "speed", "error")
+_SHARED = ("pieces", "edges")  # by all lanes
 
 
 def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw = empty_raw(work)
     lanes = _lanes(work)
-    given_up = np.ones(work.lanes, np.int8)
-    outputs = _outputs(work, raw, given_up)
     times = np.ascontiguousarray(work.times, np.float64)
     side = _side_by_side(work, lanes)
+    given_up = np.ones(work.lanes, np.int8)
     if side.all():
-        _run_blocks(work, lanes, times, outputs)
+        _run_blocks(work, lanes, times, _outputs(work, raw, given_up))
     elif side.any():
-        _run_some(work, np.flatnonzero(side), raw, given_up)
+        _run_some(work, lanes, np.flatnonzero(side), times, raw, given_up)
     rest = np.flatnonzero(given_up)
     if len(rest):
-        _run_walks(work, lanes, rest, times, outputs, raw)
+        _run_walks(work, lanes, rest, times, raw)
     return raw
 
 
 def _run_blocks(work: Work, lanes: Lanes, times: Floats, outputs: Outputs) -> None:
-    numbers = np.zeros(blocks.NUMBERS, work.dtype)
-    kernels(_BLOCKS[work.dtype]).run(lanes, float(work.duration), times, outputs, numbers, np.zeros(blocks.TIMES),
-                                     np.zeros(blocks.INTEGERS, np.int64))
+    if len(lanes.angle):
+        room = np.zeros(blocks.NUMBERS, work.dtype)
+        kernels(_BLOCKS[work.dtype]).run(lanes, float(work.duration), times, outputs, room, np.zeros(blocks.TIMES),
+                                         np.zeros(blocks.INTEGERS, np.int64))
 
 
-def _run_some(work: Work, which: NDArray[np.int64], raw: Raw, given_up: NDArray[np.int8]) -> None:
+def _run_some(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw,
+              given_up: NDArray[np.int8]) -> None:
     """Run only some lanes side by side."""
-    some = _picked(work, which)
-    part = empty_raw(some)
-    mark = np.zeros(len(which), np.int8)
-    _run_blocks(some, _lanes(some), np.ascontiguousarray(work.times, np.float64), _outputs(some, part, mark))
+    part = Raw({name: np.zeros((len(which), len(times)), values.dtype) for name, values in raw.fields.items()},
+               raw.status, raw.ended)
+    marks = np.zeros(len(which), np.int8)
+    some = Lanes(*(x if name in _SHARED else x[..., which] for name, x in zip(Lanes._fields, lanes, strict=True)))
+    _run_blocks(work, some, times, _outputs(work, part, marks))
     for name, values in part.fields.items():
         raw.fields[name][which] = values
-    given_up[which] = mark
+    given_up[which] = marks
 
 
-def _picked(work: Work, which: NDArray[np.int64]) -> Work:
-    raise NotImplementedError
-
-
-def _run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, outputs: Outputs, raw: Raw) -> None:
+def _run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw) -> None:
+    """Run some lanes one after the other."""
     torque = work.torque
+    outputs = _outputs(work, raw, np.zeros(0, np.int8))
     kernels(_WALKS).walk_lanes(
         work.law == "pulse", lanes, _rows(torque.rows), _indices(torque.first), _indices(torque.count), which,
         float(work.duration), times, outputs, raw.status, raw.ended, np.zeros((5, len(times))))

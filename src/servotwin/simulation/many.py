@@ -110,8 +110,8 @@ def simulate_many(
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     lanes = lanes_of(model, command, load, parameters, initial, seeds)
-    asked = Asked(float(duration), _times(duration, output_step, output_times), _outputs(lanes.model, outputs),
-                  _dtype(dtype))
+    times = np.array(_times(duration, output_step, output_times))  # a copy: it becomes read-only
+    asked = Asked(float(duration), times, _outputs(lanes.model, outputs), _dtype(dtype))
     commands = Commands(lanes)
     parts = _parts(lanes, commands, asked, chunk, _workers(executor))
     signals = _space(lanes, asked)
@@ -128,11 +128,12 @@ def simulate_many(
             status[place], ended[place] = raw.status, raw.ended
             done += len(which)
             show(done)
-    for array in (asked.times, status, *signals.values()):
-        np.asarray(array).setflags(write=False)
+    arrays: list[NDArray[Any]] = [times, status, *signals.values()]
+    for array in arrays:
+        array.setflags(write=False)
     failures = tuple(Failure(int(lane), float(ended[lane]), Status.of_code(int(status[lane])).message)
                      for lane in np.flatnonzero(status))
-    return Batch(time=asked.times, status=status, failures=failures, duration=asked.duration, signals=signals,
+    return Batch(time=times, status=status, failures=failures, duration=asked.duration, signals=signals,
                  lanes=lanes)
 
 

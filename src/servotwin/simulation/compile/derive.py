@@ -60,17 +60,18 @@ def derive(recipe: Recipe) -> str:
     lines += ["", f"_f = np.{'float32' if recipe.single else 'float64'}", ""]
     lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
     for flat in work.order:
-        lines += ["", "", f"@njit({_options(recipe, flat in names)})", work.functions[flat]]
+        lines += ["", "", f"@njit({_options(recipe, flat in names, work.functions[flat])})", work.functions[flat]]
     lines += ["", *(f"{entry.split(':')[1]} = {flat}" for entry, flat in zip(recipe.entries, names, strict=True)), ""]
     return "\n".join(lines)
 
 
-def _options(recipe: Recipe, entry: bool) -> str:
+def _options(recipe: Recipe, entry: bool, text: str) -> str:
     options = 'nogil=True, error_model="numpy"'
     if entry:
         return options + ", cache=True"
-    options += ", no_cpython_wrapper=True, no_cfunc_wrapper=True"  # only other kernels call it: a third less to compile
-    return options + (", forceinline=True" if recipe.vector else "")
+    options += ", no_cpython_wrapper=True, no_cfunc_wrapper=True"
+    loops = any(isinstance(node, (ast.For, ast.While)) for node in ast.walk(ast.parse(text)))
+    return options + (", forceinline=True" if recipe.vector and not loops else "")
 
 
 @dataclass
