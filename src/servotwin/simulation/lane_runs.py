@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels import blocks
-from servotwin.models.kernels.blocks import Lanes, Outputs
+from servotwin.models.kernels import block_rows
+from servotwin.models.kernels.block_rows import Lanes, Outputs
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.hybrid import Plant
 from servotwin.simulation.compile import Recipe, kernels
-from servotwin.simulation.lanes import Floats, Raw, Work, empty_raw
+from servotwin.simulation.lanes import FIELDS, Floats, Raw, Work, empty_raw
 
 _BLOCKS = {
     dtype: Recipe(f"blocks_{dtype}", ("servotwin.models.kernels.blocks:run",), vector=True, single=dtype == "float32")
@@ -42,9 +42,9 @@ def run(work: Work) -> Raw:
 
 def _run_blocks(work: Work, lanes: Lanes, times: Floats, outputs: Outputs) -> None:
     if len(lanes.angle):
-        room = np.zeros(blocks.NUMBERS, work.dtype)
-        kernels(_BLOCKS[work.dtype]).run(lanes, float(work.duration), times, outputs, room, np.zeros(blocks.TIMES),
-                                         np.zeros(blocks.INTEGERS, np.int64))
+        room = np.zeros(block_rows.NUMBERS, work.dtype)
+        kernels(_BLOCKS[work.dtype]).run(lanes, float(work.duration), times, outputs, room, np.zeros(block_rows.TIMES),
+                                         np.zeros(block_rows.INTEGERS, np.int64))
 
 
 def _run_some(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw,
@@ -53,8 +53,8 @@ def _run_some(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats,
     part = Raw({name: np.zeros((len(which), len(times)), values.dtype) for name, values in raw.fields.items()},
                raw.status, raw.ended)
     marks = np.zeros(len(which), np.int8)
-    some = Lanes(*(x if name in _SHARED else x[..., which] for name, x in zip(Lanes._fields, lanes, strict=True)))
-    _run_blocks(work, some, times, _outputs(work, part, marks))
+    columns: Any = (x if name in _SHARED else x[..., which] for name, x in zip(Lanes._fields, lanes, strict=True))
+    _run_blocks(work, Lanes(*columns), times, _outputs(work, part, marks))
     for name, values in part.fields.items():
         raw.fields[name][which] = values
     given_up[which] = marks
@@ -78,7 +78,7 @@ def _side_by_side(work: Work, lanes: Lanes) -> NDArray[np.bool_]:
     if work.law != "pulse":
         return np.zeros(work.lanes, np.bool_)
     plant = Plant(*lanes.plants)
-    plain = (plant.L == 0.0) & (plant.kappa == 0.0) & (plant.stiffness == 0.0) & (plant.gravity == 0.0)  # type: ignore[attr-defined]
+    plain = (plant.L == 0.0) & (plant.kappa == 0.0) & (plant.stiffness == 0.0) & (plant.gravity == 0.0)
     return np.asarray(plain & (plant.K_b > 0.0) & (work.torque.count == 0))
 
 
@@ -113,6 +113,6 @@ def _indices(values: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _outputs(work: Work, raw: Raw, given_up: NDArray[np.int8]) -> Outputs:
-    none = {name: np.zeros((0, 0), np.int8 if name in ("contact", "drive") else work.dtype) for name in blocks.Outputs._fields}
-    none.update(raw.fields)  # type: ignore[arg-type]
-    return Outputs(none["angle"], none["speed"], none["contact"], none["drive"], none["error"], given_up)
+    none = {name: np.zeros((0, 0), np.int8 if name in ("contact", "drive") else work.dtype) for name in FIELDS}
+    angle, speed, contact, drive, error = ({**none, **raw.fields}[name] for name in FIELDS)
+    return Outputs(angle, speed, contact, drive, error, given_up)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,7 +132,8 @@ class Work:
 
 def _sliced(numbers: Numbers, lanes: slice) -> Numbers:
     """Return a named tuple of numbers and columns with some rows of the columns."""
-    return type(numbers)(*(x[lanes] if isinstance(x, np.ndarray) and x.ndim else x for x in numbers))
+    columns: Any = (x[lanes] if isinstance(x, np.ndarray) and x.ndim else x for x in numbers)
+    return type(numbers)(*columns)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.simulation.batch import Batch, Failure
 from servotwin.simulation.lane_inputs import Lanes, lanes_of
-from servotwin.simulation.lanes import Raw, run_lanes
+from servotwin.simulation.lanes import Raw, Work, run_lanes
 from servotwin.simulation.packing import Asked, Chunk, Commands, groups
 from servotwin.simulation.simulator import _times
 from servotwin.simulation.status import Status
@@ -38,7 +38,6 @@ _CHUNK_BYTES = 16e6  # of a chunk's raw fields
 
 Progress = bool | Callable[[int, int], object]
 Indices = NDArray[np.int64]
-Part = tuple[Indices, tuple[str, ...]]
 
 
 def simulate_many(
@@ -113,12 +112,12 @@ def simulate_many(
     times = np.array(_times(duration, output_step, output_times))  # a copy: it becomes read-only
     asked = Asked(float(duration), times, _outputs(lanes.model, outputs), _dtype(dtype))
     commands = Commands(lanes)
-    parts = _parts(lanes, commands, asked, chunk, _workers(executor))
+    packs = _packs(lanes, commands, asked, chunk, _workers(executor))
     signals = _space(lanes, asked)
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
     with (_shown(progress, lanes.count) as show, _executor(executor) as own,
-          closing(_run(lanes, commands, parts, asked, own)) as running):
+          closing(_run(packs, asked, own)) as running):
         for which, raw, values in running:
             place: Any = which
             if which[-1] - which[0] == len(which) - 1:
@@ -227,17 +226,26 @@ def _workers(executor: Any) -> int:
     return os.cpu_count() or 1
 
 
-def _parts(lanes: Lanes, commands: Commands, asked: Asked, chunk: int | None, workers: int) -> list[Part]:
-    """Check every lane, and return the lanes of each chunk with the raw fields that it needs."""
+class _Pack(NamedTuple):
+    """Lanes of one structure that are packed together, the raw fields that they need, and how many run at once."""
+
+    lanes: Chunk
+    fields: tuple[str, ...]
+    size: int
+
+
+def _packs(lanes: Lanes, commands: Commands, asked: Asked, chunk: int | None, workers: int) -> list[_Pack]:
+    """Check every lane, and return them in packs."""
     if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, int | np.integer) or chunk < 1):
         raise InputError("chunk", got=chunk, allowed="a whole number of lanes, at least 1")
-    found: list[Part] = []
+    found: list[_Pack] = []
     for group in groups(lanes, commands):
         whole = Chunk(lanes, commands, group)
         whole.check(asked.duration)
         fields = whole.fields(asked)
         size = chunk or _chunk_size(len(group), len(asked.times) * len(fields), workers)
-        found += [(group[k:k + size], fields) for k in range(0, len(group), size)]
+        most = max(size, _MOST_LANES)
+        found += [_Pack(whole.part(k, k + most), fields, size) for k in range(0, len(group), most)]
     return found
 
 
@@ -248,16 +256,15 @@ def _chunk_size(lanes: int, numbers_per_lane: int, workers: int) -> int:
     return min(max(for_all, _LEAST_LANES), in_memory, _MOST_LANES)
 
 
-def _run(lanes: Lanes, commands: Commands, parts: list[Part], asked: Asked,
+def _run(packs: list[_Pack], asked: Asked,
          executor: Any) -> Generator[tuple[Indices, Raw, dict[str, NDArray[np.float64]]]]:
-    """Run all chunks, a few at a time; return lanes, raw fields and outputs of each."""
+    """Run all lanes, a few chunks at a time; return lanes, raw fields and outputs of each chunk."""
     flying: deque[tuple[Chunk, Any]] = deque()
-    waiting = iter(parts)
+    waiting = _chunks(packs, asked)
     try:
         while True:
-            while len(flying) < 2 * _workers(executor) and (part := next(waiting, None)) is not None:
-                piece = Chunk(lanes, commands, part[0])
-                flying.append((piece, executor.submit(run_lanes, piece.work(asked, part[1]))))
+            while len(flying) < 2 * _workers(executor) and (following := next(waiting, None)) is not None:
+                flying.append((following[0], executor.submit(run_lanes, following[1])))
             if not flying:
                 return
             piece, future = flying.popleft()
@@ -266,6 +273,14 @@ def _run(lanes: Lanes, commands: Commands, parts: list[Part], asked: Asked,
     finally:
         for _, future in flying:  # only after an error or an interrupt are there any
             future.cancel()
+
+
+def _chunks(packs: list[_Pack], asked: Asked) -> Iterator[tuple[Chunk, Work]]:
+    """Return all chunks with their work, one after the other."""
+    for pack in packs:
+        work = pack.lanes.work(asked, pack.fields)
+        for start in range(0, work.lanes, pack.size):
+            yield pack.lanes.part(start, start + pack.size), work.part(start, start + pack.size)
 
 
 @contextmanager

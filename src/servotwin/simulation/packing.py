@@ -114,6 +114,11 @@ class Chunk:
     commands: Commands
     which: Indices
 
+    def part(self, start: int, stop: int) -> Chunk:
+        """Return some of these lanes; the same, checks and all, where it is all of them."""
+        which = self.which[start:stop]
+        return self if len(which) == len(self.which) else Chunk(self.lanes, self.commands, which)
+
     @cached_property
     def _columns(self) -> dict[str, Array]:
         return {name: column[self.which, None] for name, column in self.lanes.numbers.items()}

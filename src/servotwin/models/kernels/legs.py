@@ -42,15 +42,13 @@ class Shaft(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """One leg, seen in the direction of motion (speed v ≥ 0)."""
+    """One leg: ẇ = pull − rate (w − start speed)."""
 
-    direction: float
-    v: float  # at the start
     rate: float
     per_rate: float
-    pull: float  # dv/dt at the start
-    edge: float  # the speed at which the leg ends
-    pull_there: float  # dv/dt there
+    pull: float  # ẇ at the start [rad/s²]
+    edge: float  # the speed at which the leg ends [rad/s]
+    pull_there: float  # ẇ there
 
 
 def shaft_of(plant: Plant, torque: float) -> Shaft:
@@ -93,39 +91,33 @@ def start_of(shaft: Shaft, drive: float) -> float:
 
 def leg_of(shaft: Shaft, drive: float, w: float) -> Leg:
     """Return the leg of a shaft with the speed w; at rest, the one in which it starts."""
-    start = start_of(shaft, drive)
-    forward = w > 0.0 or (w == 0.0 and start > 0.0)
-    direction = 1.0 if forward else -1.0
-    v = abs(w)
+    forward = w > 0.0 or (w == 0.0 and start_of(shaft, drive) > 0.0)
     off = drive == 0.0
-    with_drive = drive * direction
     gap = shaft.gap_off if off else shaft.gap_drive
-    v1 = with_drive * shaft.speed - gap  # below v1 the current pushes, beyond v2 it brakes
-    v2 = with_drive * shaft.speed + gap
-    resist = (shaft.friction_forward if forward else shaft.friction_backward) + shaft.against * direction
-    coasting = -fma(shaft.rate_free, v, resist)
-    below = v < v1 or (v == v1 and coasting < 0.0)  # on an edge, whereto it moves decides
-    above = v > v2 or (v == v2 and coasting > 0.0)
+    balance = drive * shaft.speed
+    low, high = balance - gap, balance + gap  # below `low` the current pushes forward, above `high` backward
+    load = (shaft.friction_forward if forward else -shaft.friction_backward) + shaft.against
+    coasting = -fma(shaft.rate_free, w, load)
+    below = w < low or (w == low and coasting < 0.0)  # on an edge, whereto it moves decides
+    above = w > high or (w == high and coasting > 0.0)
     drag = shaft.drag_off if off else shaft.drag_drive
-    rate_on = shaft.rate_off if off else shaft.rate_drive
-    per_rate_on = shaft.per_rate_off if off else shaft.per_rate_drive
     flows = below or above
-    rate = rate_on if flows else shaft.rate_free
-    per_rate = per_rate_on if flows else shaft.per_rate_free
-    f_on = fma(with_drive, shaft.push, (-drag if below else drag)) - resist
-    f = f_on if flows else -resist
-    pull = fma(-rate, v, f)
-    up = v1 if below else (math.inf if above else v2)
-    down = 0.0 if below else max(v2 if above else v1, 0.0)
-    edge = up if pull > 0.0 else down
-    return Leg(direction, v, rate, per_rate, pull, edge, fma(-rate, edge, f))
+    rate = (shaft.rate_off if off else shaft.rate_drive) if flows else shaft.rate_free
+    per_rate = (shaft.per_rate_off if off else shaft.per_rate_drive) if flows else shaft.per_rate_free
+    push = fma(drive, shaft.push, -drag if below else drag)
+    f = (push if flows else 0.0) - load
+    pull = fma(-rate, w, f)
+    up = low if below else (math.inf if above else high)
+    down = high if above else (-math.inf if below else low)
+    edge = (up if forward else min(up, 0.0)) if pull > 0.0 else (max(down, 0.0) if forward else down)
+    return Leg(rate, per_rate, pull, edge, fma(-rate, edge, f))
 
 
-def reaches_edge(leg: Leg, v: float) -> bool:
-    """Tell whether a leg that would have the speed v at the end of its time reaches its edge before."""
+def reaches_edge(leg: Leg, w: float) -> bool:
+    """Tell whether a leg that would have the speed w at the end of its time reaches its edge before."""
     if leg.pull > 0.0:
-        return v >= leg.edge and leg.pull_there > 0.0
-    return v <= leg.edge and leg.pull_there < 0.0
+        return w >= leg.edge and leg.pull_there > 0.0
+    return w <= leg.edge and leg.pull_there < 0.0
 
 
 def way_to_edge(w: float, edge: float, pull_there: float, rate: float, per_rate: float) -> tuple[float, float]:
@@ -157,14 +149,13 @@ def slide(shaft: Shaft, drive: float, q: float, w: float, time: float) -> tuple[
     while moves(shaft, drive, w):
         leg = leg_of(shaft, drive, w)
         once, twice = decay(leg.rate, leg.per_rate, time)
-        v = fma(leg.pull, once, leg.v)
-        ends = reaches_edge(leg, v)
+        after = fma(leg.pull, once, w)
+        ends = reaches_edge(leg, after)
         if ends:
-            edge = leg.direction * leg.edge
-            t, turn = way_to_edge(w, edge, leg.direction * leg.pull_there, leg.rate, leg.per_rate)
-            q, w, time = q + turn, edge, max(time - t, 0.0)
+            t, turn = way_to_edge(w, leg.edge, leg.pull_there, leg.rate, leg.per_rate)
+            q, w, time = q + turn, leg.edge, max(time - t, 0.0)
         else:
-            q, w = fma(leg.direction, fma(leg.pull, twice, leg.v * time), q), leg.direction * v
+            q, w = fma(leg.pull, twice, fma(w, time, q)), after
         legs += 1
         if not within_stops(shaft, q) or legs > MOST_LEGS:
             return q, w, 0.0

@@ -5,16 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from servotwin.models.kernels import walk
-from servotwin.models.kernels.blocks import Lanes, Outputs, plant_at
+from servotwin.models.kernels.block_rows import plant_at
 from servotwin.models.kernels.frame import Chip
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Numbers = NDArray[np.float64]
-    Indices = NDArray[np.int64]
-    Smalls = NDArray[np.int8]
+    from servotwin.models.kernels.block_rows import Indices, Lanes, Numbers, Outputs, Smalls
 
 
 def walk_lanes(pulsed: bool, lanes: Lanes, torques: Numbers, torque_first: Indices, torque_count: Indices,

@@ -9,8 +9,8 @@ from importlib import import_module
 from importlib.metadata import version
 from types import ModuleType
 
-from servotwin.simulation.compile.storage import key_of, loaded, stored
 from servotwin.simulation.compile.derive import Recipe, derive, sources
+from servotwin.simulation.compile.storage import key_of, loaded, stored
 
 __all__ = ["Recipe", "kernels"]
 

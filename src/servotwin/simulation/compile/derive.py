@@ -145,7 +145,7 @@ class _Rewriting(ast.NodeTransformer):
         self._local = local
         self._space = vars(import_module(module))
 
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:  # noqa: N802
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         """Drop docstring, annotations and decorators."""
         node.returns = None
         node.decorator_list = []
@@ -157,13 +157,13 @@ class _Rewriting(ast.NodeTransformer):
         node.args.defaults = [self.visit(default) for default in node.args.defaults]
         return node
 
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:  # noqa: N802
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
         """Drop the annotation of a local variable."""
         if node.value is None:
             return ast.Pass()
         return ast.Assign(targets=[self.visit(node.target)], value=self.visit(node.value))
 
-    def visit_Name(self, node: ast.Name) -> ast.AST:  # noqa: N802
+    def visit_Name(self, node: ast.Name) -> ast.AST:
         """Give what is not local its name in the derived module."""
         name = node.id
         if name in self._local or name not in self._space:
@@ -177,7 +177,7 @@ class _Rewriting(ast.NodeTransformer):
             return node
         return ast.copy_location(ast.Name(self._work.value(*_home(self._module, name, value)), node.ctx), node)
 
-    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:  # noqa: N802
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Flatten `module.name`."""
         owner = node.value
         if isinstance(owner, ast.Name) and owner.id not in self._local:
@@ -198,7 +198,7 @@ class _Rewriting(ast.NodeTransformer):
         flat = self._work.value(*_home(module.__name__, node.attr, getattr(module, node.attr)))
         return ast.copy_location(ast.Name(flat, node.ctx), node)
 
-    def visit_Constant(self, node: ast.Constant) -> ast.AST:  # noqa: N802
+    def visit_Constant(self, node: ast.Constant) -> ast.AST:
         """Give a float literal its type."""
         return self._typed(node) if isinstance(node.value, float) else node
 

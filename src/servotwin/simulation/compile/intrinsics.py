@@ -1,7 +1,7 @@
 """The primitives of `kernels.elementary` as single instructions; imported by derived modules alone."""
 
 # numba's and llvmlite's own types are not annotated
-# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped"
 
 from __future__ import annotations
 

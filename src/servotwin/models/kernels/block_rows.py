@@ -1,0 +1,186 @@
+"""The room in which pulse servos run side by side: what stands where.
+
+All numbers of a block stand in one array, a row of BLOCK lanes for each quantity, so that the compiler sees which
+places are apart. Times within a frame count from its edge, so that float32 keeps their digits; edges are float64.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from servotwin.models.kernels import legs
+from servotwin.models.kernels.frame import Chip
+from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.kernels.legs import Shaft
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Numbers = NDArray[np.float64]
+    Indices = NDArray[np.int64]
+    Smalls = NDArray[np.int8]
+
+VECTOR = 16  # lanes of a vector, or a multiple of it; BLOCK is one of this
+FEW = 1  # lanes that go on one by one rather than all together
+BLOCK = 128  # lanes that go together; their numbers fit into the first cache
+
+# Rows of the block: the shaft's numbers, the chip's, what the chip measures the current with, then state and plan.
+SHAFT = 0
+CHIP = SHAFT + 20 * BLOCK
+BACK_EMF, D_DRIVE, R_DRIVE, D_OFF, R_OFF = range(CHIP + 20 * BLOCK, CHIP + 25 * BLOCK, BLOCK)
+STATE = CHIP + 25 * BLOCK
+Q, W, DRIVE, LEFT, CLOCK, ERROR, WIDTH, DRAW, WINDOW, REMAINING, EDGE, LOST = range(
+    STATE, STATE + 12 * BLOCK, BLOCK)
+PLAN = STATE + 12 * BLOCK
+END1, END2, END3, TIME1, TIME2, TIME3, TIME4, DRIVE1, DRIVE3, NEW_ERROR, TIME, POWER, ENDS, V_M, V_BUS = range(
+    PLAN, PLAN + 15 * BLOCK, BLOCK)
+STARTS = PLAN + 15 * BLOCK  # angle and speed at the start of each phase
+Q1, W1, Q2, W2, Q3, W3, Q4, W4 = range(STARTS, STARTS + 8 * BLOCK, BLOCK)
+WAY = STARTS + 8 * BLOCK  # to the edge of a leg, by lane; and five rows for the lanes that go there
+EDGE_SPEED, PULL_THERE, RATE, PER_RATE, A, B, C, D, E, PULL = range(WAY, WAY + 10 * BLOCK, BLOCK)
+G = WAY + 10 * BLOCK  # what the further legs of such lanes read
+NUMBERS = G + 14 * BLOCK
+
+# Rows of float64: this frame's edge and the next one, when the command needs a look, the next output, the period
+NOW, NEXT, DUE, OUTPUT, PERIOD = range(0, 5 * BLOCK, BLOCK)
+TIMES = 5 * BLOCK
+# Rows of int64: the command's piece and its last one, the next output, first edge and number of edges (−1: regular)
+PIECE, LAST, INDEX, FIRST, COUNT, WHICH = range(0, 6 * BLOCK, BLOCK)
+INTEGERS = 6 * BLOCK
+
+
+class Lanes(NamedTuple):
+    """What comes in, for all lanes of a chunk; each array has a column or an entry for each lane."""
+
+    plants: Numbers  # (28, B), fields of Plant
+    chips: Numbers  # (20, B), fields of Chip
+    torque: Numbers
+    angle: Numbers
+    speed: Numbers
+    seeds: Indices
+    pieces: Numbers  # (n, 7)
+    piece_first: Indices
+    piece_count: Indices
+    edges: Numbers
+    edge_first: Indices
+    edge_count: Indices
+
+
+class Outputs(NamedTuple):
+    """What goes out: (B, T) each, or (0, 0) where it is not wanted; and which lanes were given up."""
+
+    angle: Numbers
+    speed: Numbers
+    contact: Smalls
+    drive: Smalls
+    error: Numbers
+    given_up: Smalls
+
+
+def fill(lanes: Lanes, lane: int, j: int, s: Numbers, t: Numbers, n: Indices) -> None:
+    """Put a lane's numbers into column j of the block."""
+    plant = plant_at(lanes.plants, lane)
+    _put_shaft(legs.shaft_of(plant, lanes.torque[lane]), s, j)
+    for i in range(20):
+        s[CHIP + i * BLOCK + j] = lanes.chips[i, lane]
+    s[BACK_EMF + j] = plant.K_b
+    s[D_DRIVE + j] = plant.D_drive
+    s[R_DRIVE + j] = plant.R_drive
+    s[D_OFF + j] = plant.D_off
+    s[R_OFF + j] = plant.R_off
+    s[Q + j] = lanes.angle[lane]
+    s[W + j] = lanes.speed[lane]
+    s[DRIVE + j] = s[LEFT + j] = s[ERROR + j] = s[LOST + j] = s[DRAW + j] = s[NEW_ERROR + j] = 0.0
+    s[CLOCK + j] = math.inf
+    t[PERIOD + j] = lanes.chips[14, lane]
+    t[DUE + j] = -math.inf
+    n[PIECE + j] = lanes.piece_first[lane]
+    n[LAST + j] = lanes.piece_first[lane] + lanes.piece_count[lane] - 1
+    n[FIRST + j] = lanes.edge_first[lane]
+    n[COUNT + j] = lanes.edge_count[lane]
+
+
+def plant_at(c: Numbers, j: int) -> Plant:
+    """Return the plant in column j."""
+    return Plant(c[0, j], c[1, j], c[2, j], c[3, j], c[4, j], c[5, j], c[6, j], c[7, j], c[8, j], c[9, j], c[10, j],
+                 c[11, j], c[12, j], c[13, j], c[14, j], c[15, j], c[16, j], c[17, j], c[18, j], c[19, j], c[20, j],
+                 c[21, j], c[22, j], c[23, j], c[24, j], c[25, j], c[26, j], c[27, j])
+
+
+def _put_shaft(shaft: Shaft, s: Numbers, j: int) -> None:
+    s[SHAFT + j] = shaft.rate_drive
+    s[SHAFT + BLOCK + j] = shaft.rate_off
+    s[SHAFT + 2 * BLOCK + j] = shaft.rate_free
+    s[SHAFT + 3 * BLOCK + j] = shaft.per_rate_drive
+    s[SHAFT + 4 * BLOCK + j] = shaft.per_rate_off
+    s[SHAFT + 5 * BLOCK + j] = shaft.per_rate_free
+    s[SHAFT + 6 * BLOCK + j] = shaft.push
+    s[SHAFT + 7 * BLOCK + j] = shaft.drag_drive
+    s[SHAFT + 8 * BLOCK + j] = shaft.drag_off
+    s[SHAFT + 9 * BLOCK + j] = shaft.speed
+    s[SHAFT + 10 * BLOCK + j] = shaft.gap_drive
+    s[SHAFT + 11 * BLOCK + j] = shaft.gap_off
+    s[SHAFT + 12 * BLOCK + j] = shaft.friction_forward
+    s[SHAFT + 13 * BLOCK + j] = shaft.friction_backward
+    s[SHAFT + 14 * BLOCK + j] = shaft.against
+    s[SHAFT + 15 * BLOCK + j] = shaft.start_forward
+    s[SHAFT + 16 * BLOCK + j] = shaft.start_backward
+    s[SHAFT + 17 * BLOCK + j] = shaft.start_off
+    s[SHAFT + 18 * BLOCK + j] = shaft.lower
+    s[SHAFT + 19 * BLOCK + j] = shaft.upper
+
+
+def shaft_at(s: Numbers, j: int) -> Shaft:
+    """Return what the legs of lane j read."""
+    return Shaft(
+        s[SHAFT + j], s[SHAFT + BLOCK + j], s[SHAFT + 2 * BLOCK + j], s[SHAFT + 3 * BLOCK + j],
+        s[SHAFT + 4 * BLOCK + j], s[SHAFT + 5 * BLOCK + j], s[SHAFT + 6 * BLOCK + j], s[SHAFT + 7 * BLOCK + j],
+        s[SHAFT + 8 * BLOCK + j], s[SHAFT + 9 * BLOCK + j], s[SHAFT + 10 * BLOCK + j], s[SHAFT + 11 * BLOCK + j],
+        s[SHAFT + 12 * BLOCK + j], s[SHAFT + 13 * BLOCK + j], s[SHAFT + 14 * BLOCK + j],
+        s[SHAFT + 15 * BLOCK + j], s[SHAFT + 16 * BLOCK + j], s[SHAFT + 17 * BLOCK + j],
+        s[SHAFT + 18 * BLOCK + j], s[SHAFT + 19 * BLOCK + j])
+
+
+def driven_shaft_at(s: Numbers, j: int) -> Shaft:
+    """Return a shaft for drives alone: the numbers between drives are replaced, so that choosing costs nothing."""
+    x = shaft_at(s, j)
+    return Shaft(x.rate_drive, x.rate_drive, x.rate_free, x.per_rate_drive, x.per_rate_drive, x.per_rate_free, x.push,
+                 x.drag_drive, x.drag_drive, x.speed, x.gap_drive, x.gap_drive, x.friction_forward,
+                 x.friction_backward, x.against, x.start_forward, x.start_backward, 0.0, x.lower, x.upper)
+
+
+def idle_shaft_at(s: Numbers, j: int) -> Shaft:
+    """Return a shaft for the time between drives alone."""
+    x = shaft_at(s, j)
+    return Shaft(x.rate_off, x.rate_off, x.rate_free, x.per_rate_off, x.per_rate_off, x.per_rate_free, 0.0,
+                 x.drag_off, x.drag_off, 0.0, x.gap_off, x.gap_off, x.friction_forward, x.friction_backward,
+                 x.against, x.start_off, x.start_off, x.start_off, x.lower, x.upper)
+
+
+def chip_at(s: Numbers, j: int) -> Chip:
+    """Return the chip of lane j."""
+    c = CHIP + j
+    return Chip(
+        s[c], s[c + BLOCK], s[c + 2 * BLOCK], s[c + 3 * BLOCK], s[c + 4 * BLOCK], s[c + 5 * BLOCK],
+        s[c + 6 * BLOCK], s[c + 7 * BLOCK], s[c + 8 * BLOCK], s[c + 9 * BLOCK], s[c + 10 * BLOCK],
+        s[c + 11 * BLOCK], s[c + 12 * BLOCK], s[c + 13 * BLOCK], s[c + 14 * BLOCK], s[c + 15 * BLOCK],
+        s[c + 16 * BLOCK], s[c + 17 * BLOCK], s[c + 18 * BLOCK], s[c + 19 * BLOCK])
+
+
+def plain_chip_at(s: Numbers, j: int) -> Chip:
+    """Return a chip without noise, coupling and RC stretcher."""
+    c = CHIP + j
+    return Chip(s[c], s[c + BLOCK], s[c + 2 * BLOCK], s[c + 3 * BLOCK], 0.0, 0.0, 0.0, s[c + 7 * BLOCK],
+                s[c + 8 * BLOCK], s[c + 9 * BLOCK], 0.0, s[c + 11 * BLOCK], s[c + 12 * BLOCK], s[c + 13 * BLOCK],
+                0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def gathered_shaft_at(s: Numbers, i: int) -> Shaft:
+    """Return what the further legs of the lane in column i read."""
+    g = G + i
+    rate, per_rate, drag, gap, start = s[g], s[g + 2 * BLOCK], s[g + 5 * BLOCK], s[g + 7 * BLOCK], s[g + 11 * BLOCK]
+    return Shaft(rate, rate, s[g + BLOCK], per_rate, per_rate, s[g + 3 * BLOCK], s[g + 4 * BLOCK], drag, drag,
+                 s[g + 6 * BLOCK], gap, gap, s[g + 8 * BLOCK], s[g + 9 * BLOCK], s[g + 10 * BLOCK], start, start,
+                 start, s[g + 12 * BLOCK], s[g + 13 * BLOCK])
