@@ -113,13 +113,23 @@ def _commanded(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
     return compute
 
 
+# Signals that are a field of the samples as it is
+FIELDS = {"output_angle": "angle", "output_speed": "speed", "error_time": "error", "drive": "drive"}
+
+
+def _sampled(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
+    def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+        values: Array = getattr(samples, FIELDS[name])
+        return values
+    return compute
+
+
 SIGNALS: dict[str, Output] = {
     "command_voltage": Output("V", "voltage command v_i", _commanded("command_voltage")),
     "command_angle": Output("rad", "angle that the command asks for", _commanded("command_angle")),
     "pulse_width": Output("s", "pulse width t_a of the command", _commanded("pulse_width")),
-    "error_time": Output("s", "error e that the chip has decided on last",
-                         lambda model, samples, drive, load: samples.error),
-    "drive": Output("1", "how the bridge drives: -1, 0 or +1", lambda model, samples, drive, load: samples.drive),
+    "error_time": Output("s", "error e that the chip has decided on last", _sampled("error_time")),
+    "drive": Output("1", "how the bridge drives: -1, 0 or +1", _sampled("drive")),
     "armature_voltage": Output("V", "voltage v_a at the motor", _electrical("armature_voltage")),
     "armature_current": Output("A", "current i_a through the motor", _electrical("armature_current")),
     "motor_angle": Output("rad", "motor shaft angle q_m", lambda model, samples, drive, load: np.asarray(
@@ -127,8 +137,8 @@ SIGNALS: dict[str, Output] = {
     "motor_speed": Output("rad/s", "motor shaft speed", lambda model, samples, drive, load: np.asarray(
         gear.motor_from_output(samples.speed, _reduction(model)))),
     "motor_torque": Output("N m", "electromagnetic torque τ_o = k_a i_a", _motor_torque),
-    "output_angle": Output("rad", "output shaft angle q", lambda model, samples, drive, load: samples.angle),
-    "output_speed": Output("rad/s", "output shaft speed", lambda model, samples, drive, load: samples.speed),
+    "output_angle": Output("rad", "output shaft angle q", _sampled("output_angle")),
+    "output_speed": Output("rad/s", "output shaft speed", _sampled("output_speed")),
     "load_torque": Output("N m", "torque τ_L delivered to the load", load_torque),
     "feedback_voltage": Output("V", "potentiometer voltage v_o", _feedback),
     "bus_voltage": Output("V", "voltage of the supply under load", _electrical("bus_voltage")),

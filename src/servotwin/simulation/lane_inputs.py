@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from servotwin.units import is_finite
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-Item = TypeVar("Item")
 
 LAWS: dict[type[Model], str] = {PulseServo: "pulse", BoundedServo: "bounded"}
 
@@ -89,8 +88,10 @@ def lanes_of(model: Model, command: object, load: object, parameters: object, in
     values = {name: _value(name, value) for name, value in given.items()}
     start = {name: _numbers(f"initial {name}", value) for name, value in _named("initial", initial).items()}
     _check_states(model, start)
-    commands, command_of = _once(_commands(command))
-    loads, load_of = _once(_loads(load))
+    commands, command_of = _once(command)
+    _check_commands(commands, command_of)
+    parts, load_of = _once(load)
+    loads = _loads(parts, load_of)
     seed = None if seeds is None else _seeds(seeds)
     count = _common_length({
         **values, **{f"initial {name}": value for name, value in start.items()},
@@ -180,38 +181,32 @@ def _seeds(seeds: Any) -> Indices:
     return array.astype(np.int64)
 
 
-def _commands(command: object) -> list[Signal]:
-    signals = list(command) if isinstance(command, Sequence | np.ndarray) else [command]
-    for lane, signal in enumerate(signals):
+def _check_commands(signals: Sequence[object], of: Indices) -> None:
+    for k, signal in enumerate(signals):
         if not isinstance(signal, Signal):
-            raise CommandError("command" if signals == [command] else f"command of lane {lane}",
+            raise CommandError("command" if len(of) == 1 else f"command of lane {np.argmax(of == k)}",
                                got=type(signal).__name__, allowed="a signal of servotwin.signals, or one per lane")
-    return signals  # type: ignore[return-value]
 
 
-def _loads(load: object) -> list[Load]:
-    if not isinstance(load, Sequence | np.ndarray):
-        return [as_load(load)]  # type: ignore[arg-type]  # it raises on anything else
-    known: dict[int, Load] = {}
-    for lane, item in enumerate(load):
+def _loads(parts: Sequence[Any], of: Indices) -> tuple[Load, ...]:
+    loads = []
+    for k, part in enumerate(parts):
         try:
-            known.setdefault(id(item), as_load(item))
+            loads.append(as_load(part))
         except LoadError as error:
-            raise LoadError(f"{error.what} of lane {lane}", got=error.got, allowed=error.allowed) from None
-    return [known[id(item)] for item in load]
+            lane = "" if len(of) == 1 else f" of lane {np.argmax(of == k)}"
+            raise LoadError(f"{error.what}{lane}", got=error.got, allowed=error.allowed) from None
+    return tuple(loads)
 
 
-def _once(items: Iterable[Item]) -> tuple[tuple[Item, ...], Indices]:
-    """Return each item once, and for each lane which is its own."""
-    place: dict[int, int] = {}
-    once: list[Item] = []
-    index = []
-    for item in items:
-        if id(item) not in place:
-            place[id(item)] = len(once)
-            once.append(item)
-        index.append(place[id(item)])
-    return tuple(once), np.array(index, dtype=np.int64)
+def _once(given: Any) -> tuple[tuple[Any, ...], Indices]:
+    """Return each item of a sequence once, and for each lane which is its own; a single thing is its only item."""
+    items = list(given) if isinstance(given, Sequence | np.ndarray) else [given]
+    ids = np.fromiter(map(id, items), dtype=np.uint64, count=len(items))
+    _, where, index = np.unique(ids, return_index=True, return_inverse=True)
+    place = np.empty_like(where)
+    place[np.argsort(where)] = np.arange(len(where))  # in the order of the lanes, not of addresses
+    return tuple(items[k] for k in np.sort(where).tolist()), place[index].astype(np.int64)
 
 
 def _common_length(values: Mapping[str, Any]) -> int:

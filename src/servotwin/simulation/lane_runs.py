@@ -26,17 +26,17 @@ _SHARED = ("pieces", "edges")  # by all lanes
 def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw = empty_raw(work)
-    lanes = _lanes(work)
+    lanes = lanes_of(work)
     times = np.ascontiguousarray(work.times, np.float64)
     side = _side_by_side(work, lanes)
     given_up = np.ones(work.lanes, np.int8)
     if side.all():
-        _run_blocks(work, lanes, times, _outputs(work, raw, given_up))
+        _run_blocks(work, lanes, times, outputs_of(work, raw, given_up))
     elif side.any():
         _run_some(work, lanes, np.flatnonzero(side), times, raw, given_up)
     rest = np.flatnonzero(given_up)
     if len(rest):
-        _run_walks(work, lanes, rest, times, raw)
+        run_walks(work, lanes, rest, times, raw)
     return raw
 
 
@@ -54,16 +54,16 @@ def _run_some(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats,
                raw.status, raw.ended)
     marks = np.zeros(len(which), np.int8)
     columns: Any = (x if name in _SHARED else x[..., which] for name, x in zip(Lanes._fields, lanes, strict=True))
-    _run_blocks(work, Lanes(*columns), times, _outputs(work, part, marks))
+    _run_blocks(work, Lanes(*columns), times, outputs_of(work, part, marks))
     for name, values in part.fields.items():
         raw.fields[name][which] = values
     given_up[which] = marks
 
 
-def _run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw) -> None:
+def run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw) -> None:
     """Run some lanes one after the other."""
     torque = work.torque
-    outputs = _outputs(work, raw, np.zeros(0, np.int8))
+    outputs = outputs_of(work, raw, np.zeros(0, np.int8))
     kernels(_WALKS).walk_lanes(
         work.law == "pulse", lanes, _rows(torque.rows), _indices(torque.first), _indices(torque.count), which,
         float(work.duration), times, outputs, raw.status, raw.ended, np.zeros((5, len(times))))
@@ -82,7 +82,8 @@ def _side_by_side(work: Work, lanes: Lanes) -> NDArray[np.bool_]:
     return np.asarray(plain & (plant.K_b > 0.0) & (work.torque.count == 0))
 
 
-def _lanes(work: Work) -> Lanes:
+def lanes_of(work: Work) -> Lanes:
+    """Return the numbers of all lanes as the kernels read them."""
     own = np.asarray(work.edges.rows, np.float64).reshape(-1)
     return Lanes(
         _columns(work.plant, work.lanes), _columns(work.chip or Chip(*([0.0] * len(Chip._fields))), work.lanes),
@@ -112,7 +113,8 @@ def _indices(values: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.ascontiguousarray(values, np.int64)
 
 
-def _outputs(work: Work, raw: Raw, given_up: NDArray[np.int8]) -> Outputs:
+def outputs_of(work: Work, raw: Raw, given_up: NDArray[np.int8]) -> Outputs:
+    """Return the arrays into which the kernels write."""
     none = {name: np.zeros((0, 0), np.int8 if name in ("contact", "drive") else work.dtype) for name in FIELDS}
     angle, speed, contact, drive, error = ({**none, **raw.fields}[name] for name in FIELDS)
     return Outputs(angle, speed, contact, drive, error, given_up)

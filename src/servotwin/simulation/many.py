@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -116,8 +117,8 @@ def simulate_many(
     signals = _space(lanes, asked)
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
-    with (_shown(progress, lanes.count) as show, _executor(executor) as own,
-          closing(_run(packs, asked, own)) as running):
+    own = _threads(os.getpid()) if executor is None else executor
+    with _shown(progress, lanes.count) as show, closing(_run(packs, asked, own)) as running:
         for which, raw, values in running:
             place: Any = which
             if which[-1] - which[0] == len(which) - 1:
@@ -251,7 +252,7 @@ def _packs(lanes: Lanes, commands: Commands, asked: Asked, chunk: int | None, wo
 
 def _chunk_size(lanes: int, numbers_per_lane: int, workers: int) -> int:
     """Return how many lanes go to a worker at once: some chunks for each, none too large for memory."""
-    for_all = math.ceil(lanes / (4 * workers))
+    for_all = math.ceil(lanes / (2 * workers))
     in_memory = max(1, int(_CHUNK_BYTES / (8 * numbers_per_lane)))
     return min(max(for_all, _LEAST_LANES), in_memory, _MOST_LANES)
 
@@ -283,17 +284,10 @@ def _chunks(packs: list[_Pack], asked: Asked) -> Iterator[tuple[Chunk, Work]]:
             yield pack.lanes.part(start, start + pack.size), work.part(start, start + pack.size)
 
 
-@contextmanager
-def _executor(given: Any) -> Iterator[Any]:
-    """Give the caller's executor, or threads of our own, which end with the work."""
-    if given is not None:
-        yield given
-        return
-    own = ThreadPoolExecutor(_workers(None), thread_name_prefix="servotwin")
-    try:
-        yield own
-    finally:
-        own.shutdown(wait=False, cancel_futures=True)
+@cache
+def _threads(process: int) -> ThreadPoolExecutor:
+    """Return the threads of this process, kept from call to call; a forked child has none of its parent's."""
+    return ThreadPoolExecutor(_workers(None), thread_name_prefix="servotwin")
 
 
 @contextmanager

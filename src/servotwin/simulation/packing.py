@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
+from servotwin.models.outputs import FIELDS as FIELDS_OF
 from servotwin.simulation.lane_inputs import LAWS, Lanes
 from servotwin.simulation.lane_loads import LOAD_NAMES, column_load, recorded_torque, structure
 from servotwin.simulation.lanes import FIELDS, Raw, Tables, Work, no_tables, regular_edges
@@ -220,7 +221,8 @@ class Chunk:
         signals = {}
         with np.errstate(all="ignore"):
             for name in asked.outputs:
-                values = self.model.output(name, samples, cast("Any", self.drive), self.load)
+                values = fields[FIELDS_OF[name]] if name in FIELDS_OF else self.model.output(
+                    name, samples, cast("Any", self.drive), self.load)
                 signals[name] = values if gone is None else np.where(gone, math.nan, values)
         return signals
 

@@ -23,14 +23,14 @@ def fma(a: float, b: float, c: float) -> float:
 
 
 def two_power(k: float) -> float:
-    """Return 2^k for a whole k with |k| < 1022 (126 in float32).
+    """Return 2^k for a whole k with |k| < 1022 (126 in float32); compiled, anything beyond.
 
     Examples
     --------
     >>> two_power(-2.0)
     0.25
     """
-    return math.ldexp(1.0, int(k))
+    return math.ldexp(1.0, int(k)) if abs(k) < 1022.0 else math.inf
 
 
 def binary_exponent(x: float) -> float:

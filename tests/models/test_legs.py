@@ -1,0 +1,166 @@
+"""Legs against a fine numerical solution, and the block of lanes against the general walk, plain and compiled."""
+
+import math
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from lane_cases import case
+from servotwin.models.kernels import block_rows, blocks, hybrid, legs
+from servotwin.simulation import lane_runs
+from servotwin.simulation.lanes import FIELDS, Tables, empty_raw, run_lanes
+
+PLANT = dict.fromkeys(hybrid.Plant._fields, 0.0) | {
+    "J": 6e-3, "b": 1e-3, "K": 1.03, "K_b": 1.0, "F_forward": 0.2, "F_backward": 0.25, "breakaway": 1.0,
+    "lower": -math.inf, "upper": math.inf, "V": 6.0, "R_drive": 3.1, "R_off": 3.0}
+DEAD_ZONES = ((0.0, 0.0), (0.5, 0.1), (0.4, 7.0))
+LOADS = (0.0, -0.3, 0.6, 1.5, -3.0)
+
+
+def fine(plant, torque, drive, q, w, end):
+    """Solve the leg's differential equation, stopping wherever the speed is zero."""
+    D, R = (plant.D_drive, plant.R_drive) if drive else (plant.D_off, plant.R_off)
+
+    def current(w):
+        x = drive * plant.V - plant.K_b * w
+        return 0.0 if abs(x) <= D else (x - math.copysign(D, x)) / R
+
+    t = 0.0
+    while t < end:
+        way = np.sign(w)
+        if w == 0.0:
+            backward, forward = hybrid.holding_bounds(plant)
+            pull = plant.K * current(0.0) - torque
+            way = 1.0 if pull > forward else -1.0 if pull < -backward else 0.0
+        if way == 0.0:
+            break
+        friction = plant.F_forward if way > 0.0 else -plant.F_backward
+
+        def rates(_, y, friction=friction):
+            return [y[1], (plant.K * current(y[1]) - plant.b * y[1] - friction - torque) / plant.J]
+
+        def stands(t, y, way=way, begin=t):
+            return y[1] if t > begin else way
+
+        stands.terminal, stands.direction = True, -way
+        run = solve_ivp(rates, (t, end), [q, w], method="DOP853", rtol=1e-11, atol=1e-13, events=stands,
+                        max_step=(end - t) / 50)
+        (q, w), t = run.y[:, -1], run.t[-1]
+        w = 0.0 if run.status == 1 else w
+    return q, w
+
+
+@pytest.mark.parametrize(("zones", "torque", "drive"), list(product(DEAD_ZONES, LOADS, (-1.0, 0.0, 1.0))))
+@pytest.mark.parametrize("w", [0.0, 4.0, -9.0])
+def test_legs_against_a_fine_solution(zones, torque, drive, w):
+    plant = hybrid.Plant(**PLANT | {"D_drive": zones[0], "D_off": zones[1]})
+    q, speed, done = legs.slide(legs.shaft_of(plant, torque), drive, 0.3, w, 0.06)
+    assert done == 1.0
+    assert (q, speed) == pytest.approx(fine(plant, torque, drive, 0.3, w, 0.06), abs=2e-8)
+
+
+@pytest.mark.parametrize("time", [1e-12, 1e-6, 1e-3, 1.0, 100.0])
+def test_a_free_shaft_has_no_cancellation(time):
+    plant = hybrid.Plant(**PLANT | {"b": 0.0, "F_forward": 0.0, "F_backward": 0.0, "R_off": 1e15})
+    q, w, _ = legs.slide(legs.shaft_of(plant, -0.006), 0.0, 0.0, 0.0, time)
+    assert q == pytest.approx(0.5 * time * time, rel=1e-9)  # a winding of 1e15 ohm hardly brakes
+    assert w == pytest.approx(time, rel=1e-9)
+
+
+FEATURES = {
+    "plain": {}, "coast": {"coast": 1.0, "D_off": 6.7, "R_off": 3.2}, "RC stretcher": {"tau_s": 0.02},
+    "couplings": {"beta": 0.01, "c_s": 0.02}, "noise": {"noise": 1e-3}, "timeout": {"timeout": 0.013},
+    "limits": {"shortest": 1e-3, "longest": 2e-3, "timeout": 0.05}, "stops": {"lower": 0.2, "upper": 1.6},
+    "no drops": {"D_drive": 0.0, "D_off": 0.0}, "brush drop": {"D_off": 0.15},
+    "no friction": {"F_forward": 0.0, "F_backward": 0.0}, "short frames": {"frame_period": 0.004},
+    "everything": {"coast": 1.0, "D_off": 6.7, "R_off": 3.2, "tau_s": 0.02, "beta": 0.01, "c_s": 0.02, "noise": 1e-3,
+                   "timeout": 0.025, "shortest": 0.9e-3, "lower": 0.1, "upper": 2.0}}
+
+
+def walked(work):
+    raw = empty_raw(work)
+    lane_runs.run_walks(work, lane_runs.lanes_of(work), np.arange(work.lanes), work.times, raw)
+    return raw
+
+
+@pytest.mark.parametrize("name", FEATURES)
+def test_side_by_side_against_one_by_one(name):
+    work = case(40, duration=0.7, times=np.linspace(0.0, 0.7, 39), fields=FIELDS, **FEATURES[name])
+    assert_same(run_lanes(work), walked(work), 1e-11)
+
+
+def assert_same(raw, other, tolerance):
+    np.testing.assert_array_equal(raw.status, other.status)
+    for name in ("angle", "error", "speed"):
+        np.testing.assert_allclose(raw.fields[name], other.fields[name], rtol=0,
+                                   atol=tolerance * (100.0 if name == "speed" else 1.0))
+    for name in ("contact", "drive"):
+        assert np.mean(raw.fields[name] != other.fields[name]) < 1e-3  # at the very instant of an event either holds
+
+
+def plain(work):
+    raw = empty_raw(work)
+    given_up = np.zeros(work.lanes, np.int8)
+    with np.errstate(all="ignore"):
+        blocks.run(lane_runs.lanes_of(work), work.duration, work.times, lane_runs.outputs_of(work, raw, given_up),
+                   np.zeros(block_rows.NUMBERS), np.zeros(block_rows.TIMES), np.zeros(block_rows.INTEGERS, np.int64))
+    assert not given_up.any()
+    return raw
+
+
+@pytest.mark.parametrize("name", [name for name in FEATURES if name not in ("stops", "everything")])
+def test_plain_source_against_compiled(name):
+    work = case(18, duration=0.12, times=np.linspace(0.0, 0.12, 7), fields=FIELDS, **FEATURES[name])
+    assert_same(plain(work), run_lanes(work), 1e-12)
+
+
+def test_edges_of_the_command():
+    """Late, jittered, missing, and none at all."""
+    edges = [[0.0, 0.021, 0.0385, 0.1, 0.12], [0.03, 0.05], [], [0.0]]
+    first = np.cumsum([0, *map(len, edges[:-1])])
+    own = Tables(first, np.array([len(e) for e in edges]), np.concatenate([np.asarray(e, float) for e in edges]))
+    work = replace(case(4, duration=0.3, times=np.linspace(0.0, 0.3, 61), fields=FIELDS), edges=own)
+    assert_same(run_lanes(work), walked(work), 1e-11)
+
+
+def test_commands_that_are_not_constant():
+    work = case(3, duration=0.5, times=np.linspace(0.0, 0.5, 11), fields=FIELDS)
+    rows = np.array([[0.0, 1.2e-3, 1e-3, 0, 0, 0, 0], [0.2, 1.4e-3, 0, 3e-4, 9.0, 0.5, 0],
+                     [0.0, 1.5e-3, 0, 2e-4, 5.0, 0, 40.0]])
+    work = replace(work, command=Tables(np.array([0, 1, 2]), np.array([2, 1, 1]), rows))
+    assert_same(run_lanes(work), walked(work), 1e-11)
+
+
+def test_lanes_know_nothing_of_each_other():
+    work = case(300, duration=0.5, times=np.linspace(0.0, 0.5, 5), fields=FIELDS)
+    whole = run_lanes(work)
+    for start, stop in ((0, 1), (7, 30), (100, 237)):
+        part = run_lanes(work.part(start, stop))
+        for name in FIELDS:
+            np.testing.assert_array_equal(part.fields[name], whole.fields[name][start:stop])
+
+
+def test_float32_follows_float64():
+    work = case(100, duration=0.5, times=np.array([0.5]), fields=FIELDS)
+    exact, single = run_lanes(work), run_lanes(replace(work, dtype="float32"))
+    assert single.fields["angle"].dtype == np.float32
+    assert np.median(np.abs(single.fields["angle"] - exact.fields["angle"])) < 2e-6
+
+
+def test_lanes_that_need_the_general_way_are_mixed_with_others():
+    spring = np.where(np.arange(12) % 3 == 0, 0.1, 0.0)
+    work = case(12, duration=0.3, times=np.array([0.1, 0.3]), fields=FIELDS, stiffness=spring)
+    assert_same(run_lanes(work), walked(work), 1e-11)
+
+
+def test_numbers_beyond_all_bounds_end_with_a_status():
+    work = case(3, duration=0.2, times=np.array([0.0, 0.2]), fields=FIELDS)
+    broken = replace(work, speed=np.array([0.0, math.nan, 0.0]))
+    raw = run_lanes(broken)
+    assert raw.status.tolist()[::2] == [0, 0]
+    assert raw.status[1] != 0
+    assert np.isnan(raw.fields["angle"][1, -1])
+    np.testing.assert_array_equal(raw.fields["angle"][::2], run_lanes(work).fields["angle"][::2])

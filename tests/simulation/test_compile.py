@@ -1,0 +1,100 @@
+"""Deriving a compiled module from the kernels, and keeping it."""
+
+import math
+import os
+import subprocess
+import sys
+
+import pytest
+
+from servotwin.models.kernels import legs
+from servotwin.models.kernels.legs import Shaft
+from servotwin.simulation.compile import Recipe, kernels
+from servotwin.simulation.compile.derive import derive
+
+SLIDE = Recipe("slide", ("servotwin.models.kernels.legs:slide",), vector=True)
+SHAFT = Shaft(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0, -1.0,
+              0.0, -math.inf, math.inf)
+SCRIPT = """
+from servotwin.models.kernels.legs import Shaft
+from servotwin.simulation.compile import Recipe, kernels
+from math import inf
+run = kernels(Recipe("slide", ("servotwin.models.kernels.legs:slide",), vector=True)).slide
+print(run({shaft}, 1.0, 0.3, -2.0, 0.02))
+"""
+
+
+def start(folder):
+    return subprocess.Popen([sys.executable, "-c", SCRIPT.format(shaft=SHAFT)], text=True, stdout=subprocess.PIPE,
+                            stderr=subprocess.PIPE, env={**os.environ, "SERVOTWIN_CACHE_DIR": str(folder)})
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def test_compiled_equals_plain():
+    for drive, w, time in ((1.0, -2.0, 0.02), (0.0, 3.0, 0.1), (-1.0, 0.0, 1e-5)):
+        compiled = kernels(SLIDE).slide(SHAFT, drive, 0.3, w, time)
+        assert compiled == pytest.approx(legs.slide(SHAFT, drive, 0.3, w, time), rel=1e-13, abs=1e-15)
+
+
+def test_what_is_derived():
+    text = derive(Recipe("walk", ("servotwin.models.kernels.walk:walk",)))
+    assert "def frame__decide(" in text
+    assert "from servotwin.models.kernels.walk import Point as walk__Point" in text
+    assert "math.log1p" in text  # the general form leaves it to the system's library
+    assert '"""' not in text
+    compile(text, "derived", "exec")
+
+
+def test_the_vector_form_has_polynomials():
+    text = derive(Recipe("blocks", ("servotwin.models.kernels.blocks:run",), vector=True))
+    assert "elementary__log1p(" in text
+    assert "math.log1p" not in text
+
+
+def test_float32_stays_float32(folder):
+    recipe = Recipe("single", ("servotwin.models.kernels.block_phases:phases",
+                               "servotwin.models.kernels.block_plan:plan_all"), vector=True, single=True)
+    module = kernels(recipe)
+    from numba import types
+
+    block, integers = types.Array(types.float32, 1, "C"), types.Array(types.int64, 1, "C")
+    module.phases.compile((types.int64, types.boolean, block, integers))
+    module.plan_all.compile((types.int64, block))
+    for entry in (module.phases, module.plan_all):
+        (code,) = entry.inspect_llvm().values()
+        assert "float" in code
+        assert "double" not in code
+
+
+def test_two_processes_at_once(tmp_path):
+    both = [start(tmp_path), start(tmp_path)]
+    outputs = [process.communicate(timeout=120) for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert outputs[0][0] == outputs[1][0] != ""
+    assert "compiling the kernels" in outputs[0][1] + outputs[1][1]
+    again, errors = start(tmp_path).communicate(timeout=120)
+    assert (again, errors) == (outputs[0][0], "")  # nothing is compiled again
+    assert len(list(tmp_path.glob("*.py"))) == 1
+    assert not list(tmp_path.glob("*.tmp"))
+
+
+def test_a_cache_that_cannot_be_written(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    process = start(blocked)
+    output, errors = process.communicate(timeout=120)
+    assert process.returncode == 0
+    assert output.startswith("(0.3")
+    assert "SERVOTWIN_CACHE_DIR" in errors
+    assert "Traceback" not in errors
+
+
+@pytest.mark.parametrize("module", ["servotwin.simulation.lane_runs", "servotwin.simulation.compile"])
+def test_numba_comes_late(module):
+    code = f"import sys, {module}; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
