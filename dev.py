@@ -48,9 +48,14 @@ def setup() -> None:
             venv.create(ENVIRONMENT, with_pip=True)
         except (subprocess.CalledProcessError, OSError, ImportError):
             sys.exit("dev.py: this Python cannot make virtual environments (on Debian: apt install python3-venv)")
-    run("python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
-        "--constraint", "constraints.txt", "--editable", ".[dev]")
+    install("dev")
     STAMP.write_text(wanted.hexdigest())
+
+
+def install(extra: str) -> None:
+    """Install the package with one of its extras, in pinned versions."""
+    run("python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check",
+        "--constraint", "constraints.txt", "--editable", f".[{extra}]")
 
 
 def test(arguments: list[str]) -> None:
@@ -92,6 +97,7 @@ def main(arguments: list[str]) -> None:
         run("python", "-m", "sphinx", "-W", "-q", "-b", "html", "docs", "docs/_build/html", *rest)
         print("docs/_build/html/index.html")
     elif task == "bench":
+        install("peers")
         for script in sorted((ROOT / "benchmarks").glob("*/run.py")):
             run("python", str(script), *rest)
     elif task != "setup":

@@ -117,7 +117,13 @@ class Model(ABC):
 
     @property
     def available(self) -> tuple[str, ...]:
-        """Names of the output signals that can be computed for this servo, `time` apart."""
+        """Names of the output signals that can be computed for this servo, `time` apart.
+
+        Where `electronics.voltage_to_pulse_gain` is optional and absent, no voltage stands for a command.
+        """
+        gain = "electronics.voltage_to_pulse_gain"
+        if gain in self.optional and self.servo.get(gain) is None:
+            return tuple(name for name in self.signals if name != "command_voltage")
         return self.signals
 
     @abstractmethod

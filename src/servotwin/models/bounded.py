@@ -98,13 +98,6 @@ class BoundedServo(Model):
             return
 
     @property
-    def available(self) -> tuple[str, ...]:
-        """All signals; without `electronics.voltage_to_pulse_gain` no voltage stands for a command."""
-        if self.servo.get("electronics.voltage_to_pulse_gain") is None:
-            return tuple(name for name in self.signals if name != "command_voltage")
-        return self.signals
-
-    @property
     def voltage_limit(self) -> float:
         """V_max = V_oc − V_ce0 [V]."""
         return self.value("supply.open_circuit_voltage") - self.value_or("supply.bridge_drop_voltage", 0.0)

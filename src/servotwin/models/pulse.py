@@ -68,13 +68,6 @@ class PulseServo(Model):
     )
 
     @property
-    def available(self) -> tuple[str, ...]:
-        """All signals; without `electronics.voltage_to_pulse_gain` no voltage stands for a command."""
-        if self.servo.get("electronics.voltage_to_pulse_gain") is None:
-            return tuple(name for name in self.signals if name != "command_voltage")
-        return self.signals
-
-    @property
     def frame_period(self) -> float:
         """T_f of a command that does not bring its own [s]; 20 ms unless the servo gives it."""
         return self.value_or("electronics.frame_period", 0.02)

@@ -32,7 +32,7 @@ def _kernels(recipe: Recipe) -> ModuleType:
     name = f"servotwin_{recipe.name}_{key_of(text, *sources(recipe), version('numba'), version('llvmlite'))}"
     path, known = stored(name, text)
     if not known:
-        sys.stderr.write("servotwin: compiling the kernels for this machine, once (about 10 s)\n")
+        sys.stderr.write("servotwin: compiling the kernels for this machine, once (about 15 s)\n")
         sys.stderr.flush()
     import_module("numba")
     return loaded(path)
