@@ -176,8 +176,13 @@ def _to_edges(count: int, size: int, s: Numbers, n: Indices) -> int:
             t, turn = legs.way_to_edge(s[at.A + i], s[at.B + i], s[at.C + i], s[at.D + i], s[at.E + i])
             s[at.D + i] = t
             s[at.E + i] = turn
+        moving = 0
         for i in range(count):
-            _arrive(s[at.D + i], s[at.E + i], s, n[at.WHICH + i])
+            j = n[at.WHICH + i]
+            _arrive(s[at.D + i], s[at.E + i], s, j)
+            n[at.WHICH + moving] = j
+            moving += 1 if s[at.ENDS + j] != 0.0 else 0
+        return moving
     return _list(size, s, n)
 
 

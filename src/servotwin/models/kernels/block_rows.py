@@ -80,11 +80,9 @@ class Outputs(NamedTuple):
 
 
 def fill(lanes: Lanes, lane: int, j: int, s: Numbers, t: Numbers, n: Indices) -> None:
-    """Put a lane's numbers into column j of the block."""
+    """Put a lane's numbers, but for its chip, into column j of the block."""
     plant = plant_at(lanes.plants, lane)
     _put_shaft(legs.shaft_of(plant, lanes.torque[lane]), s, j)
-    for i in range(20):
-        s[CHIP + i * BLOCK + j] = lanes.chips[i, lane]
     s[BACK_EMF + j] = plant.K_b
     s[D_DRIVE + j] = plant.D_drive
     s[R_DRIVE + j] = plant.R_drive
@@ -100,6 +98,13 @@ def fill(lanes: Lanes, lane: int, j: int, s: Numbers, t: Numbers, n: Indices) ->
     n[LAST + j] = lanes.piece_first[lane] + lanes.piece_count[lane] - 1
     n[FIRST + j] = lanes.edge_first[lane]
     n[COUNT + j] = lanes.edge_count[lane]
+
+
+def fill_chips(lanes: Lanes, start: int, size: int, s: Numbers) -> None:
+    """Put the chips of all lanes into the block."""
+    for i in range(20):
+        for j in range(size):
+            s[CHIP + i * BLOCK + j] = lanes.chips[i, start + j]
 
 
 def plant_at(c: Numbers, j: int) -> Plant:

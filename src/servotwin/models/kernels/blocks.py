@@ -34,6 +34,7 @@ def run_block(lanes: Lanes, start: int, size: int, duration: float, times: Numbe
               s: Numbers, t: Numbers, n: Indices) -> None:
     """Run the lanes from `start` on, `size` of them."""
     own_edges = full = noisy = late = False
+    at.fill_chips(lanes, start, size, s)
     for j in range(size):
         lane = start + j
         at.fill(lanes, lane, j, s, t, n)

@@ -9,7 +9,7 @@ from importlib import import_module
 from importlib.metadata import version
 from types import ModuleType
 
-from servotwin.simulation.compile.derive import Recipe, derive, sources
+from servotwin.simulation.compile.derive import Recipe, derive, surroundings
 from servotwin.simulation.compile.storage import key_of, loaded, stored
 
 __all__ = ["Recipe", "kernels"]
@@ -29,7 +29,7 @@ def kernels(recipe: Recipe) -> ModuleType:
 @cache
 def _kernels(recipe: Recipe) -> ModuleType:
     text = derive(recipe)
-    name = f"servotwin_{recipe.name}_{key_of(text, *sources(recipe), version('numba'), version('llvmlite'))}"
+    name = f"servotwin_{recipe.name}_{key_of(text, surroundings(recipe), version('numba'), version('llvmlite'))}"
     path, known = stored(name, text)
     if not known:
         sys.stderr.write("servotwin: compiling the kernels for this machine, once (about 15 s)\n")

@@ -13,10 +13,10 @@ import builtins
 import inspect
 import math
 import sys
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from types import FunctionType, ModuleType
 
 _ELEMENTARY = "servotwin.models.kernels.elementary"
@@ -242,11 +242,6 @@ def _local_names(node: ast.FunctionDef) -> set[str]:
     return names | {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
 
 
-def sources(recipe: Recipe) -> Iterable[str]:
-    """Return what else the compiled code depends on: the text of the compiler's own helpers."""
-    for module in (_INTRINSICS, __name__):
-        path = import_module(module.rpartition(".")[0]).__path__[0] if module == _INTRINSICS else None
-        if path is not None:
-            with open(f"{path}/intrinsics.py", encoding="utf-8") as file:
-                yield file.read()
-    yield f"{sys.version_info[:2]} {recipe}"
+def surroundings(recipe: Recipe) -> str:
+    """Return what the compiled code depends on besides the derived text."""
+    return f"{sys.version_info[:2]} {recipe} {Path(__file__).with_name('intrinsics.py').read_text(encoding='utf-8')}"
