@@ -176,6 +176,9 @@ def test_pulses_one_by_one_are_the_frames_of_a_pulse_servo(simulate, tmp_path):
     (["--constant", "1500", "--unit", "us", "--set", "electronics.frame_period=0.001"],
      ["pulse width", "1500 us", "less than a frame of 1000 us"]),
     (["--step", "0:400"], ["angle command", "400 deg", "-15 to 195 deg"]),
+    (["--step", "0:60", "--duration", "1e300", "--output-step", "1e300"],
+     ["--duration", "1e+300", "at most 1e+06 frames of 20 ms"]),
+    (["--prbs", "1400:1600:1e-300", "--unit", "us", "--duration", "1e9"], ["inf bits", "at most 10 000 000 bits"]),
     (["--pulses", "unsorted.csv"], ["unsorted.csv", "sample 2", "0.02", "more than 0.04 s"]),
     (["--pulses", "long.csv"], ["long.csv", "width 0.0015 s", "ends before the next"]),
 ])

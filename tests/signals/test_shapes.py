@@ -375,3 +375,16 @@ def test_the_frame_period_is_kept():
 
 def test_a_signal_made_by_hand_is_checked():
     refused(lambda: signals.Signal(pieces=Pieces((Piece(),)), unit="V", initial=math.nan), "just before")
+
+
+def test_a_sequence_of_more_bits_than_all_numbers():
+    with pytest.raises(CommandError, match="inf bits"):
+        signals.prbs(1.0, 2.0, bit_time=1e-300, duration=1e300, unit="V")
+
+
+@pytest.mark.parametrize("masked", ["time", "value"])
+def test_what_a_mask_hides_does_not_count_silently(masked):
+    numbers = {"time": np.array([0.0, 0.5, 1.0]), "value": np.array([1.0, 9e9, 2.0])}
+    numbers[masked] = np.ma.array(numbers[masked], mask=[False, True, False])
+    with pytest.raises(CommandError, match=f"samples: {masked}: got 'a masked array'"):
+        signals.samples(**numbers, unit="V")

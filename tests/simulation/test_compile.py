@@ -63,7 +63,7 @@ def test_float32_stays_float32(folder):
     from numba import types
 
     block, integers = types.Array(types.float32, 1, "C"), types.Array(types.int64, 1, "C")
-    module.phases.compile((types.int64, types.boolean, block, integers))
+    module.phases.compile((types.int64, types.boolean, types.boolean, block, integers))
     module.plan_all.compile((types.int64, block))
     for entry in (module.phases, module.plan_all):
         (code,) = entry.inspect_llvm().values()

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import warnings
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 
@@ -347,6 +348,37 @@ def test_grid():
     assert batch["output_angle"].shape == (6, 1)
     with pytest.raises(st.errors.InputError, match="grid: a"):
         st.grid(a=[[1.0]])
+
+
+def test_a_grid_may_have_many_names():
+    values = st.grid({f"{k}": [1.0, 2.0] if k in (3, 68) else [0.0] for k in range(70)})
+    assert values["3"].tolist() == [1.0, 1.0, 2.0, 2.0]
+    assert values["68"].tolist() == [1.0, 2.0, 1.0, 2.0]
+    assert values["0"].tolist() == [0.0] * 4
+
+
+def test_arrays_without_dimensions_are_what_they_hold():
+    batch = st.simulate_many(st.PulseServo(SERVO), np.array(STEP, dtype=object), load=np.array(None), duration=0.1,
+                             parameters={"electronics.off_state": np.array("coast")}, output_times=[0.1])
+    assert batch["output_angle"].shape == (1, 1)
+    assert batch[0].model.servo.electronics.off_state == "coast"
+
+
+def test_long_runs_go_in_small_chunks(monkeypatch):
+    lanes = []
+    monkeypatch.setattr(many, "_CHUNK_FRAMES", 20.0)  # an interrupt waits for what runs
+    monkeypatch.setattr(many, "run_lanes", lambda work: (lanes.append(work.lanes), run_lanes(work))[1])
+    st.simulate_many(st.PulseServo(SERVO), STEP, duration=0.2, parameters={"load.inertia": np.zeros(5)},
+                     output_times=[0.2])
+    assert sorted(lanes) == [1, 2, 2]
+
+
+def test_what_is_beyond_float32_is_infinite_without_a_warning():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        batch = st.simulate_many(st.BoundedServo(SERVO), STEP, duration=0.1, output_times=[0.0], dtype="float32",
+                                 initial={"output_speed": 1e200}, outputs="output_speed")
+    assert np.isinf(batch["output_speed"][0, 0])
 
 
 def test_a_lane_is_found_by_its_parameters():

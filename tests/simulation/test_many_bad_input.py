@@ -1,6 +1,7 @@
 """Bad input of `simulate_many` raises before anything runs, and names lane and parameter."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -50,10 +51,14 @@ def refused(error, words, model=st.PulseServo, command=STEP, **options):
     ("motor.rotor_inertia", [[1e-7], [1e-7, 2e-7]], InputError, ["motor.rotor_inertia", "one number per lane"]),
     ("motor.rotor_inertia", [], InputError, ["numbers of lanes", "motor.rotor_inertia: 0"]),
     ("motor.rotor_inertia", [1j, 2j], InputError, ["motor.rotor_inertia of lane 0"]),
+    ("motor.rotor_inertia", np.ma.array([1e-7, 2e-7], mask=[False, True]), InputError,
+     ["motor.rotor_inertia: got 'a masked array'"]),
     ("motor.rotor_inertia", "x", InputError, ["motor.rotor_inertia", "'x'"]),
     ("electronics.off_state", ["brake", "x"], ParameterError, ["electronics.off_state of lane 1", "brake or coast"]),
     ("electronics.off_state", ["brake", 1], ParameterError, ["electronics.off_state of lane 1", "brake or coast"]),
     ("electronics.off_state", 1.0, ParameterError, ["electronics.off_state", "one such word per lane"]),
+    ("electronics.off_state", [["brake"], ["brake", "coast"]], ParameterError, ["one such word per lane"]),
+    ("electronics.off_state", np.array("float"), ParameterError, ["electronics.off_state", "brake or coast"]),
     ("electronics.off_state", "float", ParameterError, ["electronics.off_state", "brake or coast"]),
     ("electronics.stretcher_gian", 60.0, UnknownNameError, ["stretcher_gian", "did you mean", "load.inertia"]),
     ("electronics.bridge_gain", 60.0, ParameterError, ["PulseServo does not read 'electronics.bridge_gain'"]),
@@ -94,13 +99,20 @@ def test_both_ends_of_a_relation_may_move():
     ({"outputs": 3}, InputError, ["outputs", "names"]),
     ({"output_times": [0.2]}, InputError, ["output_times", "0 to 0.1"]),
     ({"output_times": [0.1], "output_step": 0.1}, InputError, ["output_step and output_times"]),
+    ({"duration": 1e300}, InputError, ["duration / frame period of lane 0: got '5e+301 frames'", "1e+08"]),
+    ({"duration": 1e8, "command": [STEP, signals.constant(1500.0, unit="us", frame_period=2e-3)],
+      "parameters": {"electronics.frame_period": [1.0, 1.0]}}, InputError,
+     ["frame period of lane 1: got '5e+10 frames'"]),
+    ({"executor": ThreadPoolExecutor}, InputError, ["executor", "submit"]),
     ({"executor": 4}, InputError, ["executor", "submit"]),
     ({"chunk": 0}, InputError, ["chunk", "at least 1"]),
     ({"chunk": 1.5}, InputError, ["chunk"]),
     ({"chunk": True}, InputError, ["chunk"]),
     ({"progress": 1}, InputError, ["progress"]),
     ({"seeds": [0.5]}, InputError, ["seeds"]),
-    ({"seeds": [2**63]}, InputError, ["seeds"]),
+    ({"seeds": [2**63]}, InputError, ["seeds", "64 bits"]),
+    ({"seeds": [[1], [1, 2]]}, InputError, ["seeds"]),
+    ({"seeds": np.ma.array([1, 2], mask=[True, False])}, InputError, ["seeds"]),
     ({"parameters": [1.0]}, InputError, ["parameters", "a mapping"]),
     ({"parameters": {1: 1.0}}, InputError, ["parameters", "a mapping"]),
     ({"initial": {"output_angle": [0.1, NAN]}}, InputError, ["initial output_angle of lane 1"]),
@@ -108,6 +120,7 @@ def test_both_ends_of_a_relation_may_move():
     ({"initial": {"motor_angle": 0.1}}, UnknownNameError, ["motor_angle", "output_angle, output_speed"]),
     ({"initial": {"output_angle": [0.1, 9.0]}}, InputError, ["initial output_angle of lane 1: got 9.0", "stops"]),
     ({"load": 3.0}, LoadError, ["load", "float"]),
+    ({"load": np.array(3.0)}, LoadError, ["load", "float"]),
     ({"load": [None, 3.0]}, LoadError, ["load of lane 1", "float"]),
     ({"load": [None, loads.Recorded([0.0, 0.05], [0.0, 0.0])]}, LoadError, ["recorded torque of lane 1"]),
     ({"load": [loads.Pendulum(mass=0.1, length=0.1), None], "parameters": {"load.pendulum.mass": 0.2}}, LoadError,
@@ -123,6 +136,7 @@ def test_other_arguments(options, error, words):
 
 @pytest.mark.parametrize(("command", "words"), [
     (3.0, ["command: got 'float'"]),
+    (np.array(3.0), ["command: got 'float'"]),
     ([STEP, 3.0], ["command of lane 1"]),
     ([STEP, signals.step(0.0, 300.0, unit="deg")], ["angle command of lane 1", "300 deg", "travel"]),
     ([STEP, signals.step(300.0, 0.0, unit="deg")], ["angle command of lane 1", "300 deg", "travel"]),
@@ -138,6 +152,25 @@ def test_a_command_beyond_the_travel_of_some_lanes():
             parameters={"stops.upper_angle": [1.0, 2.0, 0.5]})
     refused(CommandError, ["pulse width of lane 1"], command=signals.constant(-1.0, unit="V"), parameters={
         "electronics.voltage_to_pulse_gain": 7e-4, "electronics.command_pulse_offset": [1e-3, 5e-4]})
+
+
+@pytest.mark.parametrize(("values", "words"), [
+    ([1.0, 2.0], ["grid: got [1.0, 2.0]", "mapping"]),
+    ({"load.inertia": [[0.0], [0.0, 1.0]]}, ["grid: load.inertia"]),
+    ({"load.inertia": []}, ["grid: load.inertia", "at least one"]),
+    ({"load.inertia": np.ma.array([0.0, 1.0], mask=[True, False])}, ["grid: load.inertia", "masked"]),
+    ({str(k): np.zeros(1000) for k in range(5)}, ["grid: got '1e+15 combinations'", "memory"]),
+])
+def test_grids(values, words):
+    with pytest.raises(InputError) as caught:
+        st.grid(values)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_grid_has_each_name_once():
+    with pytest.raises(InputError, match="grid: a: got 'two lists'"):
+        st.grid({"a": [1.0]}, a=[2.0])
 
 
 def test_models_without_a_way_to_run_many():

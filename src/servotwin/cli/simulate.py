@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from servotwin.simulation import Result
 
 _COMMAND, _PLANT, _OUTPUT = "Command (one of)", "Servo and load", "Run and output"
+_MOST_FRAMES = 1e6  # they take an hour, and each is kept for metrics and energy
 
 
 def simulate(
@@ -127,6 +128,10 @@ def _run(model: Model, words: CommandWords, load: list[str], duration: float, ou
     if output_step is not None and not (math.isfinite(output_step) and output_step > 0.0):
         raise InputError("--output-step", got=output_step, allowed="a positive number of seconds")
     signal = words.signal(duration)
+    chip = model.chip(signal)
+    if chip is not None and signal.edges is None and duration > _MOST_FRAMES * chip.frame_period:
+        raise InputError("--duration", got=duration,
+                         allowed=f"at most {_MOST_FRAMES:g} frames of {1e3 * chip.frame_period:g} ms")
     with patience("simulating"):
         result = run(model, signal, duration=duration, load=load_from(load), output_step=output_step)
     return result.raise_if_failed()

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from servotwin.signals import Signal
 
 
+_EDGE_FIRST = 1.0 + 1e-11  # an edge that comes as the time runs out restarts the clock, whatever the rounding
+
+
 @final
 class PulseServo(Model):
     """One-shot, comparator with deadband, pulse stretcher and switched bridge, with friction that truly sticks.
@@ -106,7 +109,7 @@ class PulseServo(Model):
             tau_s=self.value_or("electronics.stretcher_time_constant", 0.0),
             shortest=self.value_or("electronics.pulse_width_min", 0.0),
             longest=self.value_or("electronics.pulse_width_max", math.inf),
-            timeout=self.value_or("electronics.pulse_timeout", math.inf),
+            timeout=self.value_or("electronics.pulse_timeout", math.inf) * _EDGE_FIRST,
             frame_period=self.frame_period if own is None else own,
             R_a=self.value("motor.armature_resistance"), R_b=self.value_or("supply.internal_resistance", 0.0),
             V_br=self.value_or("motor.brush_drop_voltage", 0.0), V_oc=self.value("supply.open_circuit_voltage"),

@@ -130,9 +130,10 @@ def prbs(low: float, high: float, *, bit_time: float, duration: float, order: in
     length = 2**order - 1
     bits = max_len_seq(order, state=[(1 + seed % length) >> k & 1 for k in range(order)])[0]
     T = _positive(bit_time, "prbs(bit_time)")
-    count = max(1, math.ceil(_positive(duration, "prbs(duration)") / T - 1e-9))
-    if count > 10_000_000:
-        raise CommandError("prbs(duration / bit_time)", got=count, allowed="at most 10 000 000 bits")
+    bits_long = _positive(duration, "prbs(duration)") / T
+    if bits_long > 10_000_000:
+        raise CommandError("prbs(duration / bit_time)", got=f"{bits_long:.6g} bits", allowed="at most 10 000 000 bits")
+    count = max(1, math.ceil(bits_long - 1e-9))
     y0, y1 = in_si(low, unit, "prbs(low)"), in_si(high, unit, "prbs(high)")
     time = np.asarray(np.arange(count) * T, dtype=np.float64)
     return _held(time, np.where(np.resize(bits, count) == 1, y1, y0), unit, frame_period)
@@ -219,7 +220,9 @@ def _arrays(time: ArrayLike, value: ArrayLike, unit: str,
         raise CommandError(what, got=f"shapes {t.shape} and {y.shape}", allowed="two arrays of one length")
     if t.size == 0:
         raise CommandError(what, got="no samples", allowed="at least one")
-    for name, a in (("time", t), ("value", y)):
+    for name, a, given in (("time", t, time), ("value", y, value)):
+        if np.ma.is_masked(given):  # what a mask hides would count
+            raise CommandError(f"{what}: {name}", got="a masked array", allowed="numbers, none of them masked")
         bad = np.flatnonzero(~np.isfinite(a))
         if bad.size:
             raise CommandError(f"{what}: {name} of sample {bad[0]}", got=float(a[bad[0]]), allowed="a finite number")

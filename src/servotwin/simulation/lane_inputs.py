@@ -151,18 +151,17 @@ def _value(name: str, value: Any) -> Any:
         return value
     if not isinstance(rule, tuple):
         return _numbers(name, value)
-    words = np.asarray(value)
+    words = _array(value)
     if words.ndim > 1 or words.dtype.kind not in "UO" or not all(isinstance(w, str) for w in words.ravel().tolist()):
         raise ParameterError(name, got=value, allowed=f"{' or '.join(rule)}, or one such word per lane")
-    return words.astype(np.str_) if words.ndim else value
+    return words.astype(np.str_) if words.ndim else str(words)
 
 
 def _numbers(what: str, values: Any) -> Any:
     """Return one number, or one per lane as an array (B,) of floats."""
-    try:
-        array = np.asarray(values)
-    except ValueError:  # rows of unequal lengths
-        array = np.empty((0, 0))
+    if np.ma.is_masked(values):  # what the mask hides would count
+        raise InputError(what, got="a masked array", allowed="numbers, none of them masked")
+    array = _array(values)
     if array.ndim > 1:
         raise InputError(what, got=values if array.size == 0 else f"an array of shape {array.shape}",
                          allowed="a number, or one number per lane")
@@ -174,10 +173,18 @@ def _numbers(what: str, values: Any) -> Any:
     return np.array([float(value) for value in array.ravel().tolist()]) if array.ndim else float(array.item())
 
 
+def _array(values: Any) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except ValueError:  # rows of unequal lengths
+        return np.empty((0, 0))
+
+
 def _seeds(seeds: Any) -> Indices:
-    array = np.asarray(seeds)
-    if array.ndim > 1 or array.dtype.kind not in "iu" or (array.size and array.max() > np.iinfo(np.int64).max):
-        raise InputError("seeds", got=seeds, allowed="a whole number, or one per lane")
+    array = _array(seeds)
+    if (array.ndim > 1 or array.dtype.kind not in "iu" or np.ma.is_masked(seeds)
+            or (array.size and array.max() > np.iinfo(np.int64).max)):
+        raise InputError("seeds", got=seeds, allowed="a whole number of 64 bits with sign, or one per lane")
     return array.astype(np.int64)
 
 
@@ -201,7 +208,9 @@ def _loads(parts: Sequence[Any], of: Indices) -> tuple[Load, ...]:
 
 def _once(given: Any) -> tuple[tuple[Any, ...], Indices]:
     """Return each item of a sequence once, and for each lane which is its own; a single thing is its only item."""
-    items = list(given) if isinstance(given, Sequence | np.ndarray) else [given]
+    if isinstance(given, np.ndarray):
+        given = given.tolist()  # of no dimensions, it is the thing itself
+    items = list(given) if isinstance(given, Sequence) else [given]
     ids = np.fromiter(map(id, items), dtype=np.uint64, count=len(items))
     _, where, index = np.unique(ids, return_index=True, return_inverse=True)
     place = np.empty_like(where)

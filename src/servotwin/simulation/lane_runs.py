@@ -21,65 +21,77 @@ _BLOCKS = {
 _WALKS = Recipe("walks", ("servotwin.models.kernels.walks:walk_lanes",))
 _FLOATS = ("angle", "speed", "error")
 _SHARED = ("pieces", "edges")  # by all lanes
+_ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
 
 
 def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw = empty_raw(work)
     lanes = lanes_of(work)
-    times = np.ascontiguousarray(work.times, np.float64)
-    side = _side_by_side(work, lanes)
+    times = _own(work.times, np.float64)
+    side, braked = side_by_side(work, lanes)
     given_up = np.ones(work.lanes, np.int8)
-    if side.all():
-        _run_blocks(work, lanes, times, outputs_of(work, raw, given_up))
-    elif side.any():
-        _run_some(work, lanes, np.flatnonzero(side), times, raw, given_up)
+    for kind in (True, False):
+        which = side & (braked == kind)
+        if which.all():
+            _run_blocks(work, lanes, kind, times, outputs_of(work, raw, given_up))
+        elif which.any():
+            _run_some(work, lanes, kind, np.flatnonzero(which), times, raw, given_up)
     rest = np.flatnonzero(given_up)
     if len(rest):
         run_walks(work, lanes, rest, times, raw)
     return raw
 
 
-def _run_blocks(work: Work, lanes: Lanes, times: Floats, outputs: Outputs) -> None:
+def _run_blocks(work: Work, lanes: Lanes, braked: bool, times: Floats, outputs: Outputs) -> None:
     if len(lanes.angle):
         room = np.zeros(block_rows.NUMBERS, work.dtype)
-        kernels(_BLOCKS[work.dtype]).run(lanes, float(work.duration), times, outputs, room, np.zeros(block_rows.TIMES),
-                                         np.zeros(block_rows.INTEGERS, np.int64))
+        kernels(_BLOCKS[work.dtype]).run(lanes, braked, float(work.duration), times, outputs, room,
+                                         np.zeros(block_rows.TIMES), np.zeros(block_rows.INTEGERS, np.int64))
 
 
-def _run_some(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw,
+def _run_some(work: Work, lanes: Lanes, braked: bool, which: NDArray[np.int64], times: Floats, raw: Raw,
               given_up: NDArray[np.int8]) -> None:
     """Run only some lanes side by side."""
     part = Raw({name: np.zeros((len(which), len(times)), values.dtype) for name, values in raw.fields.items()},
                raw.status, raw.ended)
     marks = np.zeros(len(which), np.int8)
-    columns: Any = (x if name in _SHARED else x[..., which] for name, x in zip(Lanes._fields, lanes, strict=True))
-    _run_blocks(work, Lanes(*columns), times, outputs_of(work, part, marks))
+    columns: Any = (x if name in _SHARED else np.ascontiguousarray(x[..., which]) for name, x in zip(Lanes._fields, lanes, strict=True))
+    _run_blocks(work, Lanes(*columns), braked, times, outputs_of(work, part, marks))
     for name, values in part.fields.items():
         raw.fields[name][which] = values
     given_up[which] = marks
 
 
 def run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw) -> None:
-    """Run some lanes one after the other."""
-    torque = work.torque
-    outputs = outputs_of(work, raw, np.zeros(0, np.int8))
-    kernels(_WALKS).walk_lanes(
-        work.law == "pulse", lanes, _rows(torque.rows), _indices(torque.first), _indices(torque.count), which,
-        float(work.duration), times, outputs, raw.status, raw.ended, np.zeros((5, len(times))))
-    for lane in which[raw.status[which] != 0].tolist():
-        failed = times >= raw.ended[lane]
-        for name, values in raw.fields.items():
-            values[lane, failed] = np.nan if name in _FLOATS else 0
+    """Run some lanes one after the other, in float64."""
+    at_once = max(1, _ROOM // (5 * max(len(times), 1)))
+    for start in range(0, len(which), at_once):
+        part = which[start:start + at_once]
+        room, status, ended = np.zeros((len(part), 5, len(times))), np.zeros(len(part), np.int64), np.zeros(len(part))
+        kernels(_WALKS).walk_lanes(
+            work.law == "pulse", lanes, _rows(work.torque.rows), _indices(work.torque.first),
+            _indices(work.torque.count), part, float(work.duration), times, room, status, ended)
+        raw.status[part], raw.ended[part] = status, ended
+        failed = (status != 0)[:, None] & (times >= ended[:, None])
+        for k, name in enumerate(FIELDS):
+            if name in raw.fields:
+                with np.errstate(over="ignore"):
+                    raw.fields[name][part] = np.where(failed, np.nan if name in _FLOATS else 0, room[:, k])
 
 
-def _side_by_side(work: Work, lanes: Lanes) -> NDArray[np.bool_]:
-    """Tell which lanes have nothing that takes the general way."""
+def side_by_side(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell which lanes have nothing that takes the general way, and which of these brake without a dead zone."""
     if work.law != "pulse":
-        return np.zeros(work.lanes, np.bool_)
+        return np.zeros(work.lanes, np.bool_), np.zeros(work.lanes, np.bool_)
     plant = Plant(*lanes.plants)
+    if work.dtype == "float32":  # what is not zero has to stay so
+        kept = [((x == 0.0) | (abs(x.astype(np.float32)) > 0.0)).all(axis=0) for x in (lanes.plants, lanes.chips)]
+    else:
+        kept = [np.ones(work.lanes, np.bool_)]
     plain = (plant.L == 0.0) & (plant.kappa == 0.0) & (plant.stiffness == 0.0) & (plant.gravity == 0.0)
-    return np.asarray(plain & (plant.K_b > 0.0) & (work.torque.count == 0))
+    side = np.logical_and.reduce([plain, plant.K_b > 0.0, work.torque.count == 0, *kept])
+    return np.asarray(side), np.asarray((plant.D_off == 0.0) & (plant.D_drive < plant.V))
 
 
 def lanes_of(work: Work) -> Lanes:
@@ -89,7 +101,7 @@ def lanes_of(work: Work) -> Lanes:
         _columns(work.plant, work.lanes), _columns(work.chip or Chip(*([0.0] * len(Chip._fields))), work.lanes),
         _column(work.constant_torque, work.lanes), _column(work.angle, work.lanes), _column(work.speed, work.lanes),
         _indices(work.seeds), _rows(work.command.rows), _indices(work.command.first), _indices(work.command.count),
-        np.ascontiguousarray(own), _indices(work.edges.first), _indices(work.edges.count))
+        _own(own, np.float64), _indices(work.edges.first), _indices(work.edges.count))
 
 
 def _columns(numbers: tuple[Any, ...], lanes: int) -> Floats:
@@ -106,11 +118,16 @@ def _column(values: Any, lanes: int) -> Floats:
 
 
 def _rows(rows: Floats) -> Floats:
-    return np.ascontiguousarray(rows, np.float64).reshape(-1, 7)
+    return _own(rows, np.float64).reshape(-1, 7)
 
 
 def _indices(values: NDArray[np.int64]) -> NDArray[np.int64]:
-    return np.ascontiguousarray(values, np.int64)
+    return _own(values, np.int64)
+
+
+def _own(values: Any, kind: Any) -> NDArray[Any]:
+    """Return an array of one layout, so that the kernels are compiled for no other."""
+    return np.require(values, kind, ("C_CONTIGUOUS", "WRITEABLE"))
 
 
 def outputs_of(work: Work, raw: Raw, given_up: NDArray[np.int8]) -> Outputs:

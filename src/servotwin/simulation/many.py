@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 _MOST_LANES = 65536  # of a chunk
 _LEAST_LANES = 256  # fewer do not pay for the way to a worker
 _CHUNK_BYTES = 16e6  # of a chunk's raw fields
+_CHUNK_FRAMES = 2e7  # of a chunk's lanes together: seconds, and an interrupt waits no longer
 
 Progress = bool | Callable[[int, int], object]
 Indices = NDArray[np.int64]
@@ -105,7 +106,7 @@ def simulate_many(
     """
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
-    if executor is not None and not callable(getattr(executor, "submit", None)):
+    if executor is not None and (isinstance(executor, type) or not callable(getattr(executor, "submit", None))):
         raise InputError("executor", got=executor, allowed="one with a submit method, as in concurrent.futures")
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
@@ -123,8 +124,9 @@ def simulate_many(
             place: Any = which
             if which[-1] - which[0] == len(which) - 1:
                 place = slice(which[0], which[-1] + 1)  # written faster than a list of lanes
-            for name, column in values.items():
-                signals[name][place] = column
+            with np.errstate(over="ignore"):  # beyond float32 it is inf
+                for name, column in values.items():
+                    signals[name][place] = column
             status[place], ended[place] = raw.status, raw.ended
             done += len(which)
             show(done)
@@ -152,12 +154,30 @@ def grid(values: Mapping[str, ArrayLike] | None = None, /, **more: ArrayLike) ->
     >>> grid({"electronics.stretcher_gain": [60.0, 120.0], "load.inertia": [0.0, 1e-3]})["load.inertia"].tolist()
     [0.0, 0.001, 0.0, 0.001]
     """
-    given = {**(values or {}), **more}
-    axes = {name: np.atleast_1d(np.asarray(axis)) for name, axis in given.items()}
+    if values is not None and not isinstance(values, Mapping):
+        raise InputError("grid", got=values, allowed="a mapping of names to lists of values")
+    twice = [name for name in more if name in (values or {})]
+    if twice:
+        raise InputError(f"grid: {twice[0]}", got="two lists", allowed="one list of values for each name")
+    axes = {name: _axis(name, axis) for name, axis in {**(values or {}), **more}.items()}
+    total = math.prod(axis.size for axis in axes.values())
+    if total * sum(axis.itemsize for axis in axes.values()) > 0.8 * _memory():
+        raise InputError("grid", got=f"{total:.3g} combinations", allowed="what fits into memory: take fewer values")
+    found, after = {}, total
     for name, axis in axes.items():
-        if axis.ndim != 1 or axis.size == 0:
-            raise InputError(f"grid: {name}", got=f"an array of shape {axis.shape}", allowed="a list of at least one")
-    return {name: mesh.ravel() for name, mesh in zip(axes, np.meshgrid(*axes.values(), indexing="ij"), strict=True)}
+        after //= axis.size
+        found[name] = np.tile(np.repeat(axis, after), total // (after * axis.size))
+    return found
+
+
+def _axis(name: str, values: ArrayLike) -> NDArray[Any]:
+    try:
+        axis = np.atleast_1d(np.asarray(values))
+    except ValueError:  # rows of unequal lengths
+        axis = np.empty((0, 0))
+    if axis.ndim != 1 or axis.size == 0 or np.ma.is_masked(values):
+        raise InputError(f"grid: {name}", got=values, allowed="a list of at least one value, none of them masked")
+    return axis
 
 
 def _outputs(model: Model, outputs: Sequence[str]) -> tuple[str, ...]:
@@ -244,17 +264,19 @@ def _packs(lanes: Lanes, commands: Commands, asked: Asked, chunk: int | None, wo
         whole = Chunk(lanes, commands, group)
         whole.check(asked.duration)
         fields = whole.fields(asked)
-        size = chunk or _chunk_size(len(group), len(asked.times) * len(fields), workers)
+        frames = float(np.max(whole.frames(asked.duration)))
+        size = chunk or _chunk_size(len(group), len(asked.times) * len(fields), frames, workers)
         most = max(size, _MOST_LANES)
         found += [_Pack(whole.part(k, k + most), fields, size) for k in range(0, len(group), most)]
     return found
 
 
-def _chunk_size(lanes: int, numbers_per_lane: int, workers: int) -> int:
-    """Return how many lanes go to a worker at once: some chunks for each, none too large for memory."""
+def _chunk_size(lanes: int, numbers_per_lane: int, frames_per_lane: float, workers: int) -> int:
+    """Return how many lanes go to a worker at once: some chunks for each, none too large for memory or too long."""
     for_all = math.ceil(lanes / (2 * workers))
     in_memory = max(1, int(_CHUNK_BYTES / (8 * numbers_per_lane)))
-    return min(max(for_all, _LEAST_LANES), in_memory, _MOST_LANES)
+    in_time = max(1, int(_CHUNK_FRAMES / max(frames_per_lane, 1.0)))
+    return min(max(for_all, _LEAST_LANES), in_memory, in_time, _MOST_LANES)
 
 
 def _run(packs: list[_Pack], asked: Asked,

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+_MOST_FRAMES = 1e8  # of a lane: they take half a minute, in which nothing stops a kernel
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -172,6 +174,11 @@ class Chunk:
                 raise LoadError(f"{error.what} of lane {lane}", got=error.got, allowed=error.allowed) from None
         with np.errstate(all="ignore"):
             self.model.command(cast("Any", self.commands.signal(self.which)))  # raises if it cannot be followed
+        frames = np.broadcast_to(self.frames(duration), self.which.shape)
+        if (frames > _MOST_FRAMES).any():
+            k = int(np.argmax(frames > _MOST_FRAMES))
+            raise InputError(f"duration / frame period of lane {self.which[k]}", got=f"{frames[k]:.3g} frames",
+                             allowed=f"at most {_MOST_FRAMES:.0e} in one run")
         name = self.model.layout[0]
         if name not in self.lanes.initial:
             return  # it starts between the stops
@@ -183,11 +190,25 @@ class Chunk:
             raise InputError(f"initial {name} of lane {self.which[k]}", got=float(angle[k]),
                              allowed=f"{lower[k]:.6g} to {upper[k]:.6g} rad, between the stops")
 
+    @cached_property
+    def chip(self) -> Any:
+        """The numbers of the frame logic under these commands; None for a model without frames."""
+        with np.errstate(all="ignore"):
+            return self.model.chip(cast("Any", self.commands.signal(self.which)))
+
+    def frames(self, duration: float) -> Any:
+        """Return how many frames the lanes run through, a number or one per lane; 0 for a model without frames."""
+        if self.chip is None:
+            return 0.0
+        own = self.commands.edge_count[self.commands.of[self.which]]
+        with np.errstate(over="ignore"):
+            return np.where(own < 0, duration / np.asarray(_flat(self.chip.frame_period), dtype=np.float64), own)
+
     def work(self, asked: Asked, fields: tuple[str, ...]) -> Work:
         """Return what the kernels need."""
         with np.errstate(all="ignore"):
             plant = self.model.pack(self.load)
-            chip = self.model.chip(cast("Any", self.commands.signal(self.which)))
+            chip = self.chip
             angle, speed = self.start
             command = Tables(*self.drive.tables())
         torque = no_tables(len(self.which))

@@ -49,22 +49,28 @@ def commands(lanes: Lanes, size: int, t: Numbers, n: Indices, s: Numbers) -> Non
     """Look up the pulse width of every lane whose piece is over or not constant."""
     due = 0
     for j in range(size):
-        due += 1 if t[at.NOW + j] >= t[at.DUE + j] else 0
+        now, then = t[at.NOW + j], t[at.DUE + j]
+        due += 1 if then <= now < math.inf else 0
     if due == 0:
         return
+    due = 0
     for j in range(size):
+        now, then = t[at.NOW + j], t[at.DUE + j]
+        n[at.WHICH + due] = j
+        due += 1 if then <= now < math.inf else 0
+    r = lanes.pieces
+    for k in range(due):
+        j = n[at.WHICH + k]
         now = t[at.NOW + j]
-        if now >= t[at.DUE + j] and now < math.inf:
-            i = n[at.PIECE + j]
-            while i < n[at.LAST + j] and now >= lanes.pieces[i + 1, 0]:
-                i += 1
-            n[at.PIECE + j] = i
-            r = lanes.pieces
+        i, last = n[at.PIECE + j], n[at.LAST + j]
+        while i < last and now >= r[i + 1, 0]:
+            i += 1
+        n[at.PIECE + j] = i
+        if r[i, 2] != 0.0 or r[i, 3] != 0.0:
             s[at.WIDTH + j] = piece_value(Piece(r[i, 0], r[i, 1], r[i, 2], r[i, 3], r[i, 4], r[i, 5], r[i, 6]), now)
-            if r[i, 2] != 0.0 or r[i, 3] != 0.0:
-                t[at.DUE + j] = -math.inf
-            else:
-                t[at.DUE + j] = r[i + 1, 0] if i < n[at.LAST + j] else math.inf
+        else:
+            s[at.WIDTH + j] = r[i, 1]
+            t[at.DUE + j] = r[i + 1, 0] if i < last else math.inf
 
 
 def measure_voltages(size: int, s: Numbers) -> None:
@@ -121,8 +127,8 @@ def _plan_lane(chip: Chip, v_m: float, V_bus: float, draw: float, s: Numbers, j:
     s[at.DRIVE3 + j] = new.sign if valid else 0.0
     s[at.ERROR + j] = s[at.NEW_ERROR + j]
     s[at.NEW_ERROR + j] = new.error if valid else s[at.ERROR + j]
-    left = (new_end if valid else old_end) - window
-    goes_on = (new.sign if valid else drive) if left > 0.0 else 0.0
+    left = (new.time + new.duration if valid else s[at.LEFT + j]) - window
+    goes_on = (new.sign if valid else drive) if left > 0.0 and clock >= window else 0.0
     s[at.LEFT + j] = left if goes_on != 0.0 else 0.0
     s[at.DRIVE + j] = goes_on
     s[at.CLOCK + j] = clock - window

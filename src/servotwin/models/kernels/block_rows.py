@@ -22,12 +22,13 @@ if TYPE_CHECKING:
     Indices = NDArray[np.int64]
     Smalls = NDArray[np.int8]
 
-VECTOR = 16  # lanes of a vector, or a multiple of it; BLOCK is one of this
-FEW = 1  # lanes that go on one by one rather than all together
 BLOCK = 128  # lanes that go together; their numbers fit into the first cache
 
 # Rows of the block: the shaft's numbers, the chip's, what the chip measures the current with, then state and plan.
 SHAFT = 0
+(RATE_DRIVE, RATE_OFF, RATE_FREE, PER_RATE_DRIVE, PER_RATE_OFF, PER_RATE_FREE, PUSH, DRAG_DRIVE, DRAG_OFF, SPEED,
+ GAP_DRIVE, GAP_OFF, FRICTION_FORWARD, FRICTION_BACKWARD, AGAINST, START_FORWARD, START_BACKWARD, START_OFF, LOWER,
+ UPPER) = range(SHAFT, SHAFT + 20 * BLOCK, BLOCK)
 CHIP = SHAFT + 20 * BLOCK
 BACK_EMF, D_DRIVE, R_DRIVE, D_OFF, R_OFF = range(CHIP + 20 * BLOCK, CHIP + 25 * BLOCK, BLOCK)
 STATE = CHIP + 25 * BLOCK
@@ -38,15 +39,15 @@ END1, END2, END3, TIME1, TIME2, TIME3, TIME4, DRIVE1, DRIVE3, NEW_ERROR, TIME, P
     PLAN, PLAN + 15 * BLOCK, BLOCK)
 STARTS = PLAN + 15 * BLOCK  # angle and speed at the start of each phase
 Q1, W1, Q2, W2, Q3, W3, Q4, W4 = range(STARTS, STARTS + 8 * BLOCK, BLOCK)
-WAY = STARTS + 8 * BLOCK  # to the edge of a leg, by lane; and five rows for the lanes that go there
-EDGE_SPEED, PULL_THERE, RATE, PER_RATE, A, B, C, D, E, PULL = range(WAY, WAY + 10 * BLOCK, BLOCK)
-G = WAY + 10 * BLOCK  # what the further legs of such lanes read
-NUMBERS = G + 14 * BLOCK
+LEG = STARTS + 8 * BLOCK
+EDGE_SPEED, PULL_THERE, RATE, PER_RATE, PULL, WAY_TIME, WAY_ANGLE = range(LEG, LEG + 7 * BLOCK, BLOCK)
+NUMBERS = LEG + 7 * BLOCK
 
 # Rows of float64: this frame's edge and the next one, when the command needs a look, the next output, the period
 NOW, NEXT, DUE, OUTPUT, PERIOD = range(0, 5 * BLOCK, BLOCK)
 TIMES = 5 * BLOCK
-# Rows of int64: the command's piece and its last one, the next output, first edge and number of edges (−1: regular)
+# Rows of int64: the command's piece and its last one, the next output, first edge and number of edges (−1: regular),
+# and a list of lanes. Lists are written without branches: a wrong guess costs more than an entry.
 PIECE, LAST, INDEX, FIRST, COUNT, WHICH = range(0, 6 * BLOCK, BLOCK)
 INTEGERS = 6 * BLOCK
 
@@ -115,37 +116,35 @@ def plant_at(c: Numbers, j: int) -> Plant:
 
 
 def _put_shaft(shaft: Shaft, s: Numbers, j: int) -> None:
-    s[SHAFT + j] = shaft.rate_drive
-    s[SHAFT + BLOCK + j] = shaft.rate_off
-    s[SHAFT + 2 * BLOCK + j] = shaft.rate_free
-    s[SHAFT + 3 * BLOCK + j] = shaft.per_rate_drive
-    s[SHAFT + 4 * BLOCK + j] = shaft.per_rate_off
-    s[SHAFT + 5 * BLOCK + j] = shaft.per_rate_free
-    s[SHAFT + 6 * BLOCK + j] = shaft.push
-    s[SHAFT + 7 * BLOCK + j] = shaft.drag_drive
-    s[SHAFT + 8 * BLOCK + j] = shaft.drag_off
-    s[SHAFT + 9 * BLOCK + j] = shaft.speed
-    s[SHAFT + 10 * BLOCK + j] = shaft.gap_drive
-    s[SHAFT + 11 * BLOCK + j] = shaft.gap_off
-    s[SHAFT + 12 * BLOCK + j] = shaft.friction_forward
-    s[SHAFT + 13 * BLOCK + j] = shaft.friction_backward
-    s[SHAFT + 14 * BLOCK + j] = shaft.against
-    s[SHAFT + 15 * BLOCK + j] = shaft.start_forward
-    s[SHAFT + 16 * BLOCK + j] = shaft.start_backward
-    s[SHAFT + 17 * BLOCK + j] = shaft.start_off
-    s[SHAFT + 18 * BLOCK + j] = shaft.lower
-    s[SHAFT + 19 * BLOCK + j] = shaft.upper
+    s[RATE_DRIVE + j] = shaft.rate_drive
+    s[RATE_OFF + j] = shaft.rate_off
+    s[RATE_FREE + j] = shaft.rate_free
+    s[PER_RATE_DRIVE + j] = shaft.per_rate_drive
+    s[PER_RATE_OFF + j] = shaft.per_rate_off
+    s[PER_RATE_FREE + j] = shaft.per_rate_free
+    s[PUSH + j] = shaft.push
+    s[DRAG_DRIVE + j] = shaft.drag_drive
+    s[DRAG_OFF + j] = shaft.drag_off
+    s[SPEED + j] = shaft.speed
+    s[GAP_DRIVE + j] = shaft.gap_drive
+    s[GAP_OFF + j] = shaft.gap_off
+    s[FRICTION_FORWARD + j] = shaft.friction_forward
+    s[FRICTION_BACKWARD + j] = shaft.friction_backward
+    s[AGAINST + j] = shaft.against
+    s[START_FORWARD + j] = shaft.start_forward
+    s[START_BACKWARD + j] = shaft.start_backward
+    s[START_OFF + j] = shaft.start_off
+    s[LOWER + j] = shaft.lower
+    s[UPPER + j] = shaft.upper
 
 
 def shaft_at(s: Numbers, j: int) -> Shaft:
     """Return what the legs of lane j read."""
     return Shaft(
-        s[SHAFT + j], s[SHAFT + BLOCK + j], s[SHAFT + 2 * BLOCK + j], s[SHAFT + 3 * BLOCK + j],
-        s[SHAFT + 4 * BLOCK + j], s[SHAFT + 5 * BLOCK + j], s[SHAFT + 6 * BLOCK + j], s[SHAFT + 7 * BLOCK + j],
-        s[SHAFT + 8 * BLOCK + j], s[SHAFT + 9 * BLOCK + j], s[SHAFT + 10 * BLOCK + j], s[SHAFT + 11 * BLOCK + j],
-        s[SHAFT + 12 * BLOCK + j], s[SHAFT + 13 * BLOCK + j], s[SHAFT + 14 * BLOCK + j],
-        s[SHAFT + 15 * BLOCK + j], s[SHAFT + 16 * BLOCK + j], s[SHAFT + 17 * BLOCK + j],
-        s[SHAFT + 18 * BLOCK + j], s[SHAFT + 19 * BLOCK + j])
+        s[RATE_DRIVE + j], s[RATE_OFF + j], s[RATE_FREE + j], s[PER_RATE_DRIVE + j], s[PER_RATE_OFF + j],
+        s[PER_RATE_FREE + j], s[PUSH + j], s[DRAG_DRIVE + j], s[DRAG_OFF + j], s[SPEED + j], s[GAP_DRIVE + j],
+        s[GAP_OFF + j], s[FRICTION_FORWARD + j], s[FRICTION_BACKWARD + j], s[AGAINST + j], s[START_FORWARD + j],
+        s[START_BACKWARD + j], s[START_OFF + j], s[LOWER + j], s[UPPER + j])
 
 
 def driven_shaft_at(s: Numbers, j: int) -> Shaft:
@@ -180,12 +179,3 @@ def plain_chip_at(s: Numbers, j: int) -> Chip:
     return Chip(s[c], s[c + BLOCK], s[c + 2 * BLOCK], s[c + 3 * BLOCK], 0.0, 0.0, 0.0, s[c + 7 * BLOCK],
                 s[c + 8 * BLOCK], s[c + 9 * BLOCK], 0.0, s[c + 11 * BLOCK], s[c + 12 * BLOCK], s[c + 13 * BLOCK],
                 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-def gathered_shaft_at(s: Numbers, i: int) -> Shaft:
-    """Return what the further legs of the lane in column i read."""
-    g = G + i
-    rate, per_rate, drag, gap, start = s[g], s[g + 2 * BLOCK], s[g + 5 * BLOCK], s[g + 7 * BLOCK], s[g + 11 * BLOCK]
-    return Shaft(rate, rate, s[g + BLOCK], per_rate, per_rate, s[g + 3 * BLOCK], s[g + 4 * BLOCK], drag, drag,
-                 s[g + 6 * BLOCK], gap, gap, s[g + 8 * BLOCK], s[g + 9 * BLOCK], s[g + 10 * BLOCK], start, start,
-                 start, s[g + 12 * BLOCK], s[g + 13 * BLOCK])

@@ -20,17 +20,18 @@ if TYPE_CHECKING:
     from servotwin.models.kernels.block_rows import Indices, Lanes, Numbers, Outputs
 
 
-def run(lanes: Lanes, duration: float, times: Numbers, outputs: Outputs, s: Numbers, t: Numbers, n: Indices) -> None:
-    """Run all lanes of a chunk; `s`, `t` and `n` are room for at.NUMBERS, at.TIMES and at.INTEGERS."""
+def run(lanes: Lanes, braked: bool, duration: float, times: Numbers, outputs: Outputs, s: Numbers, t: Numbers,
+        n: Indices) -> None:
+    """Run all lanes of a chunk, all of them `braked` or none; `s`, `t` and `n` are room for at.NUMBERS, at.TIMES and at.INTEGERS."""
     start = 0
     total = lanes.angle.size
     while start < total:
         size = min(at.BLOCK, total - start)
-        run_block(lanes, start, size, duration, times, outputs, s, t, n)
+        run_block(lanes, start, size, braked, duration, times, outputs, s, t, n)
         start += size
 
 
-def run_block(lanes: Lanes, start: int, size: int, duration: float, times: Numbers, outputs: Outputs,
+def run_block(lanes: Lanes, start: int, size: int, braked: bool, duration: float, times: Numbers, outputs: Outputs,
               s: Numbers, t: Numbers, n: Indices) -> None:
     """Run the lanes from `start` on, `size` of them."""
     own_edges = full = noisy = late = False
@@ -56,7 +57,7 @@ def run_block(lanes: Lanes, start: int, size: int, duration: float, times: Numbe
         else:
             block_plan.plan(size, s)
         wanted = block_plan.wanted(size, t)
-        block_phases.phases(size, wanted > 0, s, n)
+        block_phases.phases(size, wanted > 0, braked, s, n)
         if wanted > 0:
             _write(start, size, times, outputs, s, t, n)
         k += 1

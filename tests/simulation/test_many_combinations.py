@@ -1,0 +1,63 @@
+"""The compiled form against the plain one: every combination of what a pulse servo can have, one lane each."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import servotwin as st
+
+# What a feature sets where it is on; where it is off, a number that leaves it out.
+FEATURES = {
+    "minimum drive": {"electronics.minimum_drive_time": (4e-4, 0.0)},
+    "coast": {"electronics.off_state": ("coast", "brake")},
+    "brush drop": {"motor.brush_drop_voltage": (0.3, 0.0)},
+    "bridge drop": {"supply.bridge_drop_voltage": (0.4, 0.0), "supply.bridge_drop_resistance": (0.1, 0.0)},
+    "source": {"supply.internal_resistance": (0.4, 0.0), "electronics.supply_coupling": (2e-3, 0.0)},
+    "injection": {"electronics.back_emf_injection": (1e-3, 0.0)},
+    "noise": {"potentiometer.noise": (2e-3, 0.0)},
+    "timeout": {"electronics.pulse_timeout": (0.013, 10.0)},
+    "limits": {"electronics.pulse_width_max": (1.9e-3, 3e-3)},
+    "sided friction": {"friction.coulomb_torque_backward": (1.6e-3, 0.9e-3), "friction.breakaway_ratio": (1.3, 1.0)},
+    "stops": {"stops.upper_angle": (1.5, 4.0)},
+}
+TIMES = np.linspace(0.0, 0.2, 9)
+COMMAND = st.signals.samples([0.0, 0.05, 0.11, 0.15], [1000.0, 1700.0, 2100.0, 1500.0], unit="us")
+LOAD = st.loads.Constant(0.1) + st.loads.Coulomb(0.02) + st.loads.Inertia(1e-3)
+
+
+def lanes():
+    """Return the parameters of all combinations."""
+    on = np.array(list(itertools.product((True, False), repeat=len(FEATURES)))).T
+    return {name: np.where(mask, *values) for mask, numbers in zip(on, FEATURES.values(), strict=True)
+            for name, values in numbers.items()}
+
+
+@pytest.mark.parametrize("stretcher", ["linear", "rc"])
+def test_every_combination_of_features(servo, stretcher):
+    model = st.PulseServo(servo.replace({"electronics.stretcher_time_constant": 0.02}) if stretcher == "rc" else servo)
+    parameters = lanes()
+    batch = st.simulate_many(model, COMMAND, duration=0.2, load=LOAD, parameters=parameters, output_times=TIMES,
+                             seeds=7, outputs=("output_angle", "drive"))
+    assert batch.ok
+    every = 1 if stretcher == "linear" else 3
+    for lane in range(0, len(batch), every):
+        own = {name: values[lane].item() for name, values in parameters.items()}
+        plain = st.simulate(st.PulseServo(model.servo.replace(own)), COMMAND, duration=0.2, load=LOAD,
+                            output_times=TIMES, seed=7)
+        np.testing.assert_allclose(batch["output_angle"][lane], plain["output_angle"], rtol=0.0, atol=1e-12,
+                                   err_msg=str(own))
+        np.testing.assert_array_equal(batch["drive"][lane], plain["drive"])
+
+
+def test_a_timeout_of_one_frame_is_renewed_by_every_edge(servo):
+    """Whatever the rounding of k T_f; found where a clock of 20 ms cut a full drive now and then."""
+    for timeout in (0.02, 0.0205):
+        model = st.PulseServo(servo.replace({"electronics.pulse_timeout": timeout}))
+        command = st.signals.step(0.0, 150.0, unit="deg")
+        times = np.linspace(0.03, 0.3, 500)
+        batch = st.simulate_many(model, command, duration=0.3, output_times=times, outputs=("output_angle", "drive"))
+        plain = st.simulate(model, command, duration=0.3, output_times=times)
+        assert (plain["drive"] == 1.0).all()
+        np.testing.assert_array_equal(batch["drive"][0], plain["drive"])
+        np.testing.assert_allclose(batch["output_angle"][0], plain["output_angle"], rtol=0.0, atol=1e-12)
