@@ -185,7 +185,7 @@ def check_travel(signal: Signal | LaneSignal, servo: Servo) -> None:
     upper: Any = servo.get("stops.upper_angle")
     low = -math.inf if lower is None else lower
     high = math.inf if upper is None else upper
-    lowest, highest = _extremes(signal.pieces)
+    lowest, highest = signal.pieces.extremes
     slack = 1e-9
     bad = _First((lowest < low - slack) | (highest > high + slack))
     if bad:
@@ -198,7 +198,7 @@ def check_travel(signal: Signal | LaneSignal, servo: Servo) -> None:
 
 def check_widths(signal: Signal | LaneSignal, widths: Pieces | LanePieces, period: float) -> None:
     """Raise CommandError if a pulse width [s] is not positive, or not shorter than a frame [s]."""
-    lowest, highest = _extremes(widths)
+    lowest, highest = widths.extremes
     bad = _First((lowest <= 0.0) | (highest >= period))
     if bad:
         width = bad.of(lowest) if bad.of(lowest) <= 0.0 else bad.of(highest)
@@ -206,10 +206,6 @@ def check_widths(signal: Signal | LaneSignal, widths: Pieces | LanePieces, perio
         raise CommandError(
             f"pulse width{bad.lane(signal)}", got=f"{1e6 * width:.6g} us",
             allowed="more than 0 us" + (f" and less than a frame of {1e6 * frame:.6g} us" if frame < math.inf else ""))
-
-
-def _extremes(pieces: Pieces | LanePieces) -> tuple[Any, Any]:
-    return pieces.extremes if isinstance(pieces, LanePieces) else pieces.bounds(pieces.table[-1].start)
 
 
 class _First:

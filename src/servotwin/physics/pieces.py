@@ -98,8 +98,14 @@ class Pieces:
         return tuple(piece.start for piece in self.table)
 
     @cached_property
-    def _columns(self) -> NDArray[np.float64]:
+    def rows(self) -> NDArray[np.float64]:
+        """The table as an array, a row for each piece; not to be written to."""
         return np.array(self.table, dtype=np.float64)
+
+    @cached_property
+    def extremes(self) -> tuple[float, float]:
+        """Lowest and highest value until the last piece starts (a sinusoid counts with its whole amplitude)."""
+        return self.bounds(self.table[-1].start)
 
     def __getstate__(self) -> dict[str, object]:
         """Leave caches out, so that equal tables pickle to equal bytes."""
@@ -120,8 +126,8 @@ class Pieces:
     def __call__(self, time: ArrayLike) -> NDArray[np.float64]:
         """Return the values at `time` [s], any shape."""
         t = np.asarray(time, dtype=np.float64)
-        k = np.maximum(np.searchsorted(self._columns[:, 0], t, side="right") - 1, 0)
-        start, value, slope, amplitude, frequency, phase, sweep = self._columns[k].transpose((-1, *range(t.ndim)))
+        k = np.maximum(np.searchsorted(self.rows[:, 0], t, side="right") - 1, 0)
+        start, value, slope, amplitude, frequency, phase, sweep = self.rows[k].transpose((-1, *range(t.ndim)))
         s = t - start
         return np.asarray(value + slope * s + amplitude * np.sin(phase + (frequency + 0.5 * sweep * s) * s))
 

@@ -64,8 +64,8 @@ class Signal:
                                    allowed="none: only a pulse signal (unit us, ms or s) has frames")
             if not (units.is_finite(self.frame_period) and self.frame_period > 0.0):
                 raise CommandError("frame_period", got=self.frame_period, allowed="a positive number [s]")
-        if self.kind == "pulse_width" and self.pieces.bounds(self.pieces.table[-1].start)[0] <= 0.0:
-            raise CommandError("pulse width", got=self.pieces.bounds(self.pieces.table[-1].start)[0],
+        if self.kind == "pulse_width" and self.pieces.extremes[0] <= 0.0:
+            raise CommandError("pulse width", got=self.pieces.extremes[0],
                                allowed="a positive width [s]")
 
     @property

@@ -47,11 +47,11 @@ class Commands:
         signals, self.of = lanes.commands, lanes.command_of
         self.kinds = np.array([signal.kind for signal in signals])
         self.initial = np.array([signal.initial for signal in signals])
-        bounds = np.array([signal.pieces.bounds(signal.pieces.table[-1].start) for signal in signals])
+        bounds = np.array([signal.pieces.extremes for signal in signals])
         self.low = np.minimum(bounds[:, 0], self.initial)
         self.high = np.maximum(bounds[:, 1], self.initial)
         self.periods = np.array([signal.frame_period or math.nan for signal in signals])
-        self.rows = np.concatenate([np.array(signal.pieces.table) for signal in signals])
+        self.rows = np.concatenate([signal.pieces.rows for signal in signals])
         self.count = np.array([len(signal.pieces.table) for signal in signals])
         self.first = np.cumsum(self.count) - self.count
         edges = [lanes.model.edges(signal) for signal in signals]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from servotwin.models.kernels import block_rows as at
 from servotwin.models.kernels import legs
-from servotwin.models.kernels.elementary import decay, fma, log
+from servotwin.models.kernels.elementary import fading, fma, log
 
 if TYPE_CHECKING:
     from servotwin.models.kernels.block_rows import Numbers
@@ -73,7 +73,7 @@ def _move(power: float, rate: float, per_rate: float, start: float, s: Numbers, 
     rests = stops or w == 0.0
     begin = 0.0 if rests else w
     pull = (g if start != 0.0 else 0.0) if rests else fma(-rate, w, f)
-    once, twice = decay(rate, per_rate, time - until if stops else time)
+    once, twice = fading(rate, per_rate, time - until if stops else time)
     to = fma(pull, twice, fma(begin, time, at_stop))
     after = fma(pull, once, begin)
     outside = max(at_stop, to) >= upper or min(at_stop, to) <= lower or power * w > top or power * after > top

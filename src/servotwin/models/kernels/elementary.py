@@ -101,6 +101,24 @@ def decay(rate: float, inverse: float, t: float) -> tuple[float, float]:
     return once, (t - once) * inverse
 
 
+def fading(rate: float, inverse: float, t: float) -> tuple[float, float]:
+    """Return the same for λ > 0, with fewer operations.
+
+    Examples
+    --------
+    >>> once, twice = fading(2.0, 0.5, 0.5)
+    >>> round(once, 12), round(twice, 12)
+    (0.316060279414, 0.091969860293)
+    """
+    x = rate * t
+    k, r = _reduced(min(x, _LARGEST_SINGLE if SINGLE else _LARGEST))
+    bend = r * r * _remainder(r)  # e^-r − 1 + r
+    power = two_power(-k)
+    once = fma(power, r - bend, 1.0 - power)  # 1 − e^-x, without cancellation where k = 0
+    twice = bend if k == 0.0 else x - once
+    return once * inverse, twice * (inverse * inverse)
+
+
 def _log_tail(e: float, f: float, rest: float) -> float:
     """Return f − (e ln 2 + ln(1 + f) + rest) for √½ ≤ 1 + f ≤ √2, but for the leading part of ln 2."""
     s = f / (2.0 + f)
