@@ -188,3 +188,9 @@ def test_a_pulse_servo_refuses_in_one_line(simulate, tmp_path, words, parts):
     error = simulate("--model", "pulse", *words).error
     for part in parts:
         assert part in error
+
+
+def test_noise_follows_the_seed(simulate):
+    noisy = ("--model", "pulse", "--step", "0:20", "--duration", "0.5", "--json", "--set", "potentiometer.noise=0.02")
+    first, again, other = (simulate(*noisy, "--seed", seed).out for seed in ("1", "1", "2"))
+    assert first == again != other

@@ -65,6 +65,8 @@ def simulate(
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, repeatable, SI.",
         rich_help_panel=_PLANT)] = None,
+    seed: Annotated[int, typer.Option(
+        metavar="NUMBER", help="Seed of a pulse servo's noise.", rich_help_panel=_PLANT)] = 0,
     duration: Annotated[float, typer.Option(
         metavar="SECONDS", help="Time to simulate.", rich_help_panel=_OUTPUT)] = 1.5,
     output_step: Annotated[float | None, typer.Option(
@@ -85,7 +87,7 @@ def simulate(
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     targets = _checked_targets(out, plot, servo, words, load or [], force=force)
-    result = _run(_model(servo, model, change or []), words, load or [], duration, output_step)
+    result = _run(_model(servo, model, change or []), words, load or [], duration, output_step, seed)
     found = _write(result, targets, force=force)
     found |= {"command": words.described(duration), "load": load_words.described(load or []),
               "files": [str(target.path) for target in targets]}
@@ -118,7 +120,8 @@ def _model(servo: str, name: str, change: list[str]) -> Model:
     return MODELS[name](loaded.replace(settings(change)) if change else loaded)
 
 
-def _run(model: Model, words: CommandWords, load: list[str], duration: float, output_step: float | None) -> Result:
+def _run(model: Model, words: CommandWords, load: list[str], duration: float, output_step: float | None,
+         seed: int) -> Result:
     from servotwin.cli.load_words import load_from
     from servotwin.errors import InputError
     from servotwin.simulation import simulate as run
@@ -133,7 +136,7 @@ def _run(model: Model, words: CommandWords, load: list[str], duration: float, ou
         raise InputError("--duration", got=duration,
                          allowed=f"at most {_MOST_FRAMES:g} frames of {1e3 * chip.frame_period:g} ms")
     with patience("simulating"):
-        result = run(model, signal, duration=duration, load=load_from(load), output_step=output_step)
+        result = run(model, signal, duration=duration, load=load_from(load), output_step=output_step, seed=seed)
     return result.raise_if_failed()
 
 

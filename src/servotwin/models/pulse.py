@@ -24,7 +24,16 @@ if TYPE_CHECKING:
     from servotwin.signals import Signal
 
 
-_EDGE_FIRST = 1.0 + 1e-11  # an edge that comes as the time runs out restarts the clock, whatever the rounding
+def _edges_first(timeout: Any, period: Any) -> Any:
+    """Return a timeout, longer by 1e-11 where it is a whole number of frames.
+
+    The edge that comes as it runs out then restarts the clock, whichever way k T_f is rounded.
+    """
+    if np.ndim(timeout) == 0 and math.isinf(timeout):
+        return timeout
+    frames = np.maximum(np.round(timeout / period), 1.0)
+    longer = np.where(abs(timeout - frames * period) <= 1e-9 * period, timeout * (1.0 + 1e-11), timeout)
+    return longer if longer.ndim else float(longer)
 
 
 @final
@@ -98,7 +107,7 @@ class PulseServo(Model):
 
     def chip(self, signal: Signal | None = None) -> Chip:
         """Return the numbers of the frame logic; the frame period is that of the command where it gives one."""
-        own = None if signal is None else signal.frame_period
+        period = self.frame_period if signal is None or signal.frame_period is None else signal.frame_period
         return Chip(
             T_0=self.value_or("electronics.one_shot_offset", 0.0), slope=self.value("electronics.one_shot_slope"),
             p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0),
@@ -109,8 +118,7 @@ class PulseServo(Model):
             tau_s=self.value_or("electronics.stretcher_time_constant", 0.0),
             shortest=self.value_or("electronics.pulse_width_min", 0.0),
             longest=self.value_or("electronics.pulse_width_max", math.inf),
-            timeout=self.value_or("electronics.pulse_timeout", math.inf) * _EDGE_FIRST,
-            frame_period=self.frame_period if own is None else own,
+            timeout=_edges_first(self.value_or("electronics.pulse_timeout", math.inf), period), frame_period=period,
             R_a=self.value("motor.armature_resistance"), R_b=self.value_or("supply.internal_resistance", 0.0),
             V_br=self.value_or("motor.brush_drop_voltage", 0.0), V_oc=self.value("supply.open_circuit_voltage"),
             coast=self._coasts())

@@ -56,7 +56,8 @@ def _run_some(work: Work, lanes: Lanes, braked: bool, which: NDArray[np.int64], 
     part = Raw({name: np.zeros((len(which), len(times)), values.dtype) for name, values in raw.fields.items()},
                raw.status, raw.ended)
     marks = np.zeros(len(which), np.int8)
-    columns: Any = (x if name in _SHARED else np.ascontiguousarray(x[..., which]) for name, x in zip(Lanes._fields, lanes, strict=True))
+    columns: Any = (x if name in _SHARED else np.ascontiguousarray(x[..., which])
+                    for name, x in zip(Lanes._fields, lanes, strict=True))
     _run_blocks(work, Lanes(*columns), braked, times, outputs_of(work, part, marks))
     for name, values in part.fields.items():
         raw.fields[name][which] = values

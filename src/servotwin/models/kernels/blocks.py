@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 def run(lanes: Lanes, braked: bool, duration: float, times: Numbers, outputs: Outputs, s: Numbers, t: Numbers,
         n: Indices) -> None:
-    """Run all lanes of a chunk, all of them `braked` or none; `s`, `t` and `n` are room for at.NUMBERS, at.TIMES and at.INTEGERS."""
+    """Run all lanes of a chunk, all of them `braked` or none.
+
+    `s`, `t` and `n` are room for at.NUMBERS, at.TIMES and at.INTEGERS numbers.
+    """
     start = 0
     total = lanes.angle.size
     while start < total:

@@ -9,7 +9,7 @@ from servotwin.models.kernels.block_rows import plant_at
 from servotwin.models.kernels.frame import Chip
 
 if TYPE_CHECKING:
-    from servotwin.models.kernels.block_rows import Indices, Lanes, Numbers, Outputs, Smalls
+    from servotwin.models.kernels.block_rows import Indices, Lanes, Numbers
 
 
 def walk_lanes(pulsed: bool, lanes: Lanes, torques: Numbers, torque_first: Indices, torque_count: Indices,
