@@ -39,9 +39,9 @@ def rest(size: int, s: Numbers) -> None:
     _alone(size, s)
 
 
-def rest_alone(s: Numbers, j: int) -> None:
-    """Move one lane through a time without drive."""
-    _move(0.0, s[at.RATE_OFF + j], s[at.PER_RATE_OFF + j], s[at.START_OFF + j], s, j)
+def alone(s: Numbers, j: int) -> None:
+    """Move one lane through a time with or without drive."""
+    _drive_or_rest(s, j)
     if s[at.ENDS + j] > 0.0:
         _leg_by_leg(s, j)
 

@@ -21,6 +21,10 @@ _FEW = 16  # one lane in so many is cheaper alone than all together
 
 def phases(size: int, keep: bool, braked: bool, s: Numbers, n: Indices) -> None:
     """Move all lanes through the four phases; keep the state at the start of each where it is wanted."""
+    if size <= at.FEW:
+        for j in range(size):
+            _lane(keep, braked, s, j)
+        return
     if keep:
         _keep(at.Q1, at.W1, size, s)
         for j in range(size):
@@ -43,6 +47,31 @@ def phases(size: int, keep: bool, braked: bool, s: Numbers, n: Indices) -> None:
     for j in range(size):
         s[at.TIME + j] = s[at.TIME4 + j]
     _idle(size, braked, s)
+
+
+def _lane(keep: bool, braked: bool, s: Numbers, j: int) -> None:
+    """Move one lane through the four phases, for blocks that are too small to go side by side."""
+    for phase in range(4):
+        if keep:
+            s[at.Q1 + 2 * phase * at.BLOCK + j] = s[at.Q + j]
+            s[at.W1 + 2 * phase * at.BLOCK + j] = s[at.W + j]
+        time = s[at.TIME1 + phase * at.BLOCK + j]
+        if time > 0.0:
+            power = s[at.DRIVE1 + j] if phase == 0 else s[at.DRIVE3 + j]
+            power = power if phase % 2 == 0 else 0.0
+            w, start = s[at.W + j], s[at.START_OFF + j]
+            if w != 0.0 or start != 0.0 or power != 0.0:
+                s[at.TIME + j] = time
+                s[at.POWER + j] = power
+                _alone(braked, s, j)
+
+
+def _alone(braked: bool, s: Numbers, j: int) -> None:
+    """Move one lane through one phase."""
+    if braked:
+        block_braked.alone(s, j)
+    else:
+        _slide(s[at.POWER + j], s[at.TIME + j], s, j)
 
 
 def _keep(angle: int, speed: int, size: int, s: Numbers) -> None:
@@ -81,10 +110,7 @@ def _before(size: int, braked: bool, s: Numbers, n: Indices) -> None:
             j = n[at.WHICH + k]
             s[at.TIME + j] = s[at.TIME2 + j]
             s[at.POWER + j] = 0.0
-            if braked:
-                block_braked.rest_alone(s, j)
-            else:
-                _slide(0.0, s[at.TIME + j], s, j)
+            _alone(braked, s, j)
 
 
 def _drive(size: int, braked: bool, s: Numbers) -> None:

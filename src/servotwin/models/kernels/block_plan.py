@@ -11,11 +11,14 @@ from servotwin.models.kernels.frame import Chip
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
-    from servotwin.models.kernels.block_rows import Indices, Lanes, Numbers
+    from servotwin.models.kernels.block_rows import Indices, Numbers
 
 
-def edges(lanes: Lanes, k: int, size: int, own: bool, duration: float, s: Numbers, t: Numbers, n: Indices) -> int:
-    """Enter frame k: set its edge, window and what remains of the run; return how many lanes go on."""
+def edges(listed: Numbers, k: int, size: int, own: bool, duration: float, s: Numbers, t: Numbers, n: Indices) -> int:
+    """Enter frame k: set its edge, window and what remains of the run; return how many lanes go on.
+
+    `listed` are the edges of commands that bring their own.
+    """
     alive = 0
     for j in range(size):
         t[at.NOW + j] = k * t[at.PERIOD + j]
@@ -23,7 +26,7 @@ def edges(lanes: Lanes, k: int, size: int, own: bool, duration: float, s: Number
         s[at.EDGE + j] = 1.0
     if own or k < 0:
         for j in range(size):
-            _own_edge(lanes, k, j, s, t, n)
+            _own_edge(listed, k, j, s, t, n)
     for j in range(size):
         now = t[at.NOW + j]
         s[at.WINDOW + j] = t[at.NEXT + j] - now
@@ -32,21 +35,21 @@ def edges(lanes: Lanes, k: int, size: int, own: bool, duration: float, s: Number
     return alive
 
 
-def _own_edge(lanes: Lanes, k: int, j: int, s: Numbers, t: Numbers, n: Indices) -> None:
+def _own_edge(listed: Numbers, k: int, j: int, s: Numbers, t: Numbers, n: Indices) -> None:
     """Set the edges of a lane whose command brings its own, or of the time before frame 0."""
     count = n[at.COUNT + j]
     if k < 0:
-        first = lanes.edges[n[at.FIRST + j]] if count > 0 else math.inf
+        first = listed[n[at.FIRST + j]] if count > 0 else math.inf
         t[at.NOW + j] = 0.0
         t[at.NEXT + j] = first if count >= 0 else 0.0
         s[at.EDGE + j] = 0.0
     elif count >= 0:
-        t[at.NOW + j] = lanes.edges[n[at.FIRST + j] + k] if k < count else math.inf
-        t[at.NEXT + j] = lanes.edges[n[at.FIRST + j] + k + 1] if k + 1 < count else math.inf
+        t[at.NOW + j] = listed[n[at.FIRST + j] + k] if k < count else math.inf
+        t[at.NEXT + j] = listed[n[at.FIRST + j] + k + 1] if k + 1 < count else math.inf
 
 
-def commands(lanes: Lanes, size: int, t: Numbers, n: Indices, s: Numbers) -> None:
-    """Look up the pulse width of every lane whose piece is over or not constant."""
+def commands(r: Numbers, size: int, t: Numbers, n: Indices, s: Numbers) -> None:
+    """Look up the pulse width of every lane whose piece is over or not constant, in the rows `r`."""
     due = 0
     for j in range(size):
         now, then = t[at.NOW + j], t[at.DUE + j]
@@ -58,7 +61,6 @@ def commands(lanes: Lanes, size: int, t: Numbers, n: Indices, s: Numbers) -> Non
         now, then = t[at.NOW + j], t[at.DUE + j]
         n[at.WHICH + due] = j
         due += 1 if then <= now < math.inf else 0
-    r = lanes.pieces
     for k in range(due):
         j = n[at.WHICH + k]
         now = t[at.NOW + j]

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     Indices = NDArray[np.int64]
     Smalls = NDArray[np.int8]
 
+FEW = 2  # lanes that are not worth going together
 BLOCK = 128  # lanes that go together; their numbers fit into the first cache
 
 # Rows of the block: the shaft's numbers, the chip's, what the chip measures the current with, then state and plan.

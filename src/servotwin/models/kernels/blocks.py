@@ -49,8 +49,8 @@ def run_block(lanes: Lanes, start: int, size: int, braked: bool, duration: float
         n[at.INDEX + j] = 0
         t[at.OUTPUT + j] = times[0] if times.size > 0 else math.inf
     k = -1 if late else 0
-    while block_plan.edges(lanes, k, size, own_edges, duration, s, t, n) > 0:
-        block_plan.commands(lanes, size, t, n, s)
+    while block_plan.edges(lanes.edges, k, size, own_edges, duration, s, t, n) > 0:
+        block_plan.commands(lanes.pieces, size, t, n, s)
         if noisy:
             for j in range(size):
                 s[at.DRAW + j] = gaussian(lanes.seeds[start + j], k)

@@ -7,8 +7,12 @@ import threading
 from functools import cache
 from importlib import import_module
 from importlib.metadata import version
+from pathlib import Path
 from types import ModuleType
 
+from servotwin.models import kernels as models_kernels
+from servotwin.physics import pieces
+from servotwin.simulation.compile import derive as derive_module
 from servotwin.simulation.compile.derive import Recipe, derive, surroundings
 from servotwin.simulation.compile.storage import key_of, loaded, stored
 
@@ -27,10 +31,17 @@ def kernels(recipe: Recipe) -> ModuleType:
 
 
 @cache
+def _sources() -> tuple[str, ...]:
+    """Return the text of everything from which a module is derived; to read it is quicker than to derive."""
+    files = [Path(file) for file in (derive_module.__file__, pieces.__file__)]
+    files += sorted(Path(models_kernels.__path__[0]).glob("*.py"))
+    return tuple(file.read_text(encoding="utf-8") for file in files)
+
+
+@cache
 def _kernels(recipe: Recipe) -> ModuleType:
-    text = derive(recipe)
-    name = f"servotwin_{recipe.name}_{key_of(text, surroundings(recipe), version('numba'), version('llvmlite'))}"
-    path, known = stored(name, text)
+    key = key_of(*_sources(), surroundings(recipe), version("numba"), version("llvmlite"))
+    path, known = stored(f"servotwin_{recipe.name}_{key}", lambda: derive(recipe))
     if not known:
         sys.stderr.write("servotwin: compiling the kernels for this machine, once (about 15 s)\n")
         sys.stderr.flush()

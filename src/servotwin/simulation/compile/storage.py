@@ -6,6 +6,7 @@ import hashlib
 import os
 import sys
 import tempfile
+from collections.abc import Callable
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -32,8 +33,11 @@ def key_of(*texts: str) -> str:
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
 
 
-def stored(name: str, text: str) -> tuple[Path, bool]:
-    """Return the file of a derived module and whether it was there already; without a cache, a temporary one."""
+def stored(name: str, text: Callable[[], str]) -> tuple[Path, bool]:
+    """Return the file of a derived module and whether it was there already; without a cache, a temporary one.
+
+    `text` derives it; the name says all that it depends on, so that a file of this name is the same.
+    """
     try:
         return _written(cache_folder(), name, text)
     except OSError as error:
@@ -42,18 +46,18 @@ def stored(name: str, text: str) -> tuple[Path, bool]:
         return _written(Path(tempfile.mkdtemp(prefix="servotwin-")), name, text)
 
 
-def _written(folder: Path, name: str, text: str) -> tuple[Path, bool]:
+def _written(folder: Path, name: str, text: Callable[[], str]) -> tuple[Path, bool]:
     path = folder / f"{name}.py"
     folder.mkdir(parents=True, exist_ok=True)
     compiled = folder / "__pycache__"
     compiled.mkdir(exist_ok=True)
     if not os.access(compiled, os.W_OK):
         raise PermissionError(13, "Permission denied", str(compiled))
-    if path.exists() and path.read_text(encoding="utf-8") == text:
+    if path.exists():
         return path, any(compiled.glob(f"{name}.*.nbi"))
     handle, temporary = tempfile.mkstemp(suffix=".tmp", dir=folder)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(text)
+        file.write(text())
     os.utime(temporary, (_STAMP, _STAMP))  # two processes that write at once write the same file
     os.replace(temporary, path)
     return path, False
