@@ -81,15 +81,20 @@ class Outputs(NamedTuple):
     given_up: Smalls
 
 
+def fill_shafts(plants: Numbers, torque: Numbers, start: int, size: int, s: Numbers) -> None:
+    """Put what the legs and the measurement of the current read into the block."""
+    for j in range(size):
+        plant = plant_at(plants, start + j)
+        _put_shaft(legs.shaft_of(plant, torque[start + j]), s, j)
+        s[BACK_EMF + j] = plant.K_b
+        s[D_DRIVE + j] = plant.D_drive
+        s[R_DRIVE + j] = plant.R_drive
+        s[D_OFF + j] = plant.D_off
+        s[R_OFF + j] = plant.R_off
+
+
 def fill(lanes: Lanes, lane: int, j: int, s: Numbers, t: Numbers, n: Indices) -> None:
-    """Put a lane's numbers, but for its chip, into column j of the block."""
-    plant = plant_at(lanes.plants, lane)
-    _put_shaft(legs.shaft_of(plant, lanes.torque[lane]), s, j)
-    s[BACK_EMF + j] = plant.K_b
-    s[D_DRIVE + j] = plant.D_drive
-    s[R_DRIVE + j] = plant.R_drive
-    s[D_OFF + j] = plant.D_off
-    s[R_OFF + j] = plant.R_off
+    """Put a lane's state and the places of its command into column j of the block."""
     s[Q + j] = lanes.angle[lane]
     s[W + j] = lanes.speed[lane]
     s[DRIVE + j] = s[LEFT + j] = s[ERROR + j] = s[LOST + j] = s[DRAW + j] = s[NEW_ERROR + j] = 0.0

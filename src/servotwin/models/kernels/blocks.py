@@ -39,6 +39,7 @@ def run_block(lanes: Lanes, start: int, size: int, braked: bool, duration: float
     """Run the lanes from `start` on, `size` of them."""
     own_edges = full = noisy = late = False
     at.fill_chips(lanes, start, size, s)
+    at.fill_shafts(lanes.plants, lanes.torque, start, size, s)
     for j in range(size):
         lane = start + j
         at.fill(lanes, lane, j, s, t, n)
