@@ -1,6 +1,6 @@
 """Seeded random servos, loads and commands, told twice: to the package in words, to the reference in SI.
 
-Ranges: physics.md §7 for the 40 g class; those of the 9 g class, of L, k, B_m, the breakaway ratio and the loads are
+Ranges: priors for the 40 g class; those of the 9 g class, of L, k, B_m, the breakaway ratio and the loads are
 assumed, chosen to be wide.
 
 Specifications are plain dicts, so this module needs nothing of the package:

@@ -1,8 +1,9 @@
 """Seeded random pulse-level servos, loads and commands, told twice: to the package in words, to the reference in SI.
 
-Ranges: physics.md §3 and §7; those of β, c_s, R_b, r_c, the timeout and the jitter of a pulse train are assumed, wide.
-Every option is on by chance, so that all meet all. Specifications are plain dicts as in `cases`. A command's unit is
-"us", "deg" or "V"; one in "us" may have a ``"frame_period"``, and there is one more kind,
+Ranges: priors of servos of the 40 g class and of their chips (docs/theory/pulse.md); those of β, c_s, R_b, r_c, the
+timeout and the jitter of a pulse train are assumed, wide. Every option is on by chance, so that all meet all.
+Specifications are plain dicts as in `cases`. A command's unit is "us", "deg" or "V"; one in "us" may have a
+``"frame_period"``, and there is one more kind,
 ``{"kind": "pulse_train", "unit": "us", "edges": [...], "widths": [...]}``. `initial` holds what the start overrides.
 """
 
