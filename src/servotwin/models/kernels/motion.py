@@ -9,6 +9,7 @@ import math
 from typing import NamedTuple
 
 from servotwin.models.kernels import first_order, hybrid, rodas, second_order
+from servotwin.models.kernels.coefficients import linear_coefficients, speed_coefficients
 from servotwin.models.kernels.hybrid import Mode, Plant
 from servotwin.models.kernels.rodas import Vector
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
@@ -64,9 +65,9 @@ def begin(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, 
     torque = (tau.value + tau.slope * (t0 - tau.start), tau.slope)
     if plant.L > 0.0:
         against = (torque[0] + hybrid.friction_torque(plant, mode.contact, y[1]), torque[1])
-        coefficients = hybrid.speed_coefficients(plant, mode, wave, against, y[1], y[2])
+        coefficients = speed_coefficients(plant, mode, wave, against, y[1], y[2])
         return _closed(WITH_CURRENT, plant, mode, u, tau, t0, y, coefficients, against, step)
-    coefficients = hybrid.linear_coefficients(plant, mode, wave, torque, y[0], y[1])
+    coefficients = linear_coefficients(plant, mode, wave, torque, y[0], y[1])
     _, c, _, f1, fs, _, _, _, _ = coefficients
     kind = FIRST_ORDER if c == 0.0 and f1 == 0.0 and fs == 0.0 else SECOND_ORDER
     return _closed(kind, plant, mode, u, tau, t0, (y[0], y[1], 0.0), coefficients, (0.0, 0.0), step)
