@@ -198,28 +198,6 @@ def test_results_do_not_depend_on_chunk_or_threads(model):
         assert threads.submit(int, "1").result() == 1  # it is the caller's to shut down
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-@pytest.mark.parametrize("model", MODELS)
-def test_results_do_not_depend_on_the_output_step(model, dtype):
-    """To the last bit: outputs are read from the motions, which do not know of them."""
-    count = 150
-    numbers = np.random.default_rng(8)
-    parameters = {"load.torque": numbers.uniform(-0.6, 0.6, count), "load.inertia": numbers.uniform(0.0, 5e-3, count),
-                  "motor.armature_resistance": numbers.uniform(2.5, 4.0, count)}
-    if model is st.PulseServo:
-        parameters |= {"electronics.frame_period": numbers.uniform(0.012, 0.02, count),
-                       "motor.brush_drop_voltage": np.where(np.arange(count) % 3 == 0, 0.3, 0.0)}
-    command = signals.samples([0.0, 0.1, 0.3, 0.45], [10.0, 80.0, 60.0, 61.0], unit="deg")
-
-    def angles(**outputs):
-        return st.simulate_many(model(SERVO), command, duration=0.6, parameters=parameters, dtype=dtype,
-                                **outputs)["output_angle"]
-
-    fine, coarse, end = angles(output_step=0.002), angles(output_step=0.004), angles(output_times=[0.6])
-    assert np.array_equal(fine[:, ::2], coarse)
-    assert np.array_equal(fine[:, -1], end[:, 0])
-
-
 @pytest.mark.slow
 def test_results_do_not_depend_on_processes():
     batch = st.simulate_many(st.PulseServo(SERVO), STEP, **ALL)

@@ -1,4 +1,4 @@
-"""The compiled form against the plain one: every combination of what a pulse servo can have, one lane each."""
+"""The compiled form against the plain one in every combination of features, and against itself at other outputs."""
 
 import itertools
 
@@ -61,3 +61,25 @@ def test_a_timeout_of_one_frame_is_renewed_by_every_edge(servo):
         assert (plain["drive"] == 1.0).all()
         np.testing.assert_array_equal(batch["drive"][0], plain["drive"])
         np.testing.assert_allclose(batch["output_angle"][0], plain["output_angle"], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize("model", [st.BoundedServo, st.PulseServo])
+def test_results_do_not_depend_on_the_output_step(servo, model, dtype):
+    """To the last bit: outputs are read from the motions, which do not know of them."""
+    count = 150
+    numbers = np.random.default_rng(8)
+    parameters = {"load.torque": numbers.uniform(-0.6, 0.6, count), "load.inertia": numbers.uniform(0.0, 5e-3, count),
+                  "motor.armature_resistance": numbers.uniform(2.5, 4.0, count)}
+    if model is st.PulseServo:
+        parameters |= {"electronics.frame_period": numbers.uniform(0.012, 0.02, count),
+                       "motor.brush_drop_voltage": np.where(np.arange(count) % 3 == 0, 0.3, 0.0)}
+    command = st.signals.samples([0.0, 0.1, 0.3, 0.45], [10.0, 80.0, 60.0, 61.0], unit="deg")
+
+    def angles(**outputs):
+        return st.simulate_many(model(servo), command, duration=0.6, parameters=parameters, dtype=dtype,
+                                **outputs)["output_angle"]
+
+    fine, coarse, end = angles(output_step=0.002), angles(output_step=0.004), angles(output_times=[0.6])
+    assert np.array_equal(fine[:, ::2], coarse)
+    assert np.array_equal(fine[:, -1], end[:, 0])

@@ -1,13 +1,30 @@
-"""Run a model under a command and a load, from event to event."""
+"""Run a model under a command and a load, from event to event; many of them compiled, which loads when it is used."""
 
-from servotwin.simulation.batch import Batch, Failure
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Event, State
-from servotwin.simulation.many import grid, simulate_many
 from servotwin.simulation.metrics import StepMetrics
 from servotwin.simulation.result import Result, Stats
 from servotwin.simulation.simulator import Simulator, simulate
 from servotwin.simulation.status import Status
 
+if TYPE_CHECKING:
+    from servotwin.simulation.batch import Batch, Failure
+    from servotwin.simulation.many import grid, simulate_many
+
+_LAZY = {"Batch": "batch", "Failure": "batch", "grid": "many", "simulate_many": "many"}
+
 __all__ = ["Batch", "Energy", "Event", "Failure", "Result", "Simulator", "State", "Stats", "Status", "StepMetrics",
            "grid", "simulate", "simulate_many"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _LAZY:
+        return getattr(import_module(f"servotwin.simulation.{_LAZY[name]}"), name)
+    raise AttributeError(f"module 'servotwin.simulation' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -16,7 +16,7 @@ from servotwin.models.kernels.legs import Shaft
 if TYPE_CHECKING:
     from servotwin.models.kernels.block_rows import Indices, Numbers
 
-_FEW = 16  # one lane in so many is cheaper alone than all together
+_ONE_IN = 16  # one lane in so many is cheaper alone than all together
 
 
 def phases(size: int, keep: bool, braked: bool, s: Numbers, n: Indices) -> None:
@@ -179,7 +179,7 @@ def _end_legs(size: int, s: Numbers) -> int:
     going = 0
     for j in range(size):
         going += 1 if s[at.TIME + j] > 0.0 else 0
-    if going * _FEW > size:
+    if going * _ONE_IN > size:
         return going
     if going > 0:
         for j in range(size):

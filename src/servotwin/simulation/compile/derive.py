@@ -57,9 +57,6 @@ def derive(recipe: Recipe) -> str:
     lines = ["# Derived from servotwin's kernels; do not edit.", "import math", "", "import numpy as np",
              "from numba import njit", ""]
     lines += [f"from {module} import {name} as {alias}" for alias, (module, name) in sorted(work.imports.items())]
-    for module, name in sorted(work.imports.values()):
-        fields = getattr(getattr(import_module(module), name), "_fields", None)
-        lines += [f"# {name}: {', '.join(fields)}"] if fields else []  # other fields are another module
     lines += ["", f"_f = np.{'float32' if recipe.single else 'float64'}", ""]
     lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
     for flat in work.order:
