@@ -21,6 +21,20 @@ def data_folder():
     return folder
 
 
-@pytest.fixture(params=list(MODELS), scope="session")
+# What no catalog servo states, all at once: play, Stribeck, load friction, heat, a regulator, a worn potentiometer
+EVERYTHING = {
+    "gear.backlash": 0.02, "gear.output_inertia": 1e-3, "friction.breakaway_ratio": 1.3,
+    "friction.stribeck_speed": 10.0, "friction.stribeck_exponent": 1.5, "friction.load_friction_motor": 0.06,
+    "friction.load_friction_external": 0.1, "friction.load_friction_motor_stribeck": 0.05,
+    "friction.load_friction_external_quad": 0.2, "supply.internal_resistance": 0.2, "supply.current_limit": 1.2,
+    "thermal.winding_capacity": 0.5, "thermal.housing_capacity": 5.0, "thermal.winding_to_housing": 10.0,
+    "thermal.housing_to_ambient": 20.0, "thermal.magnet_coefficient": -1e-3, "potentiometer.backlash": 0.01,
+    "potentiometer.linearity_angle": [0.0, 1.0, 2.0], "potentiometer.linearity_error": [0.0, 0.01, -0.01],
+    "potentiometer.quantisation": 1e-3,
+}
+
+
+@pytest.fixture(params=[*MODELS, "pulse with everything", "pulse-inductive with everything"], scope="session")
 def model(request, servo):
-    return MODELS[request.param](servo)
+    name, _, more = request.param.partition(" with ")
+    return MODELS[name](servo.replace(EVERYTHING) if more else servo)

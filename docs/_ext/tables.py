@@ -145,7 +145,7 @@ def top_level() -> str:
         if inspect.ismodule(item):
             rows.append((f"`st.{name}`", "module", f"{{py:mod}}`{item.__name__}`"))
             continue
-        module = item.__module__.split(".")[1]
+        module = st._LAZY[name]
         kind = "class" if inspect.isclass(item) else "function"
         rows.append((f"`st.{name}`", kind, f"{{py:obj}}`servotwin.{module}.{name}`"))
     return markdown(("name", "", "described under"), rows)

@@ -15,6 +15,7 @@ from servotwin.models import BoundedServo as BoundedServo
 from servotwin.models import DCMotor as DCMotor
 from servotwin.models import GearedMotor as GearedMotor
 from servotwin.models import PulseServo as PulseServo
+from servotwin.models import PulseServoInductive as PulseServoInductive
 from servotwin.parameters import Servo as Servo
 from servotwin.parameters import catalog_names as catalog_names
 from servotwin.parameters import load_dataset as load_dataset
@@ -28,5 +29,8 @@ from servotwin.simulation import Status as Status
 from servotwin.simulation import grid as grid
 from servotwin.simulation import simulate as simulate
 from servotwin.simulation import simulate_many as simulate_many
+from servotwin.simulation.sweep import Study as Study
+from servotwin.simulation.sweep import distributions as distributions
+from servotwin.simulation.sweep import sweep as sweep
 
 __version__: str

@@ -81,6 +81,25 @@ def test_every_plot_has_its_numbers(report):
         assert {len(row) for row in rows} == {len(rows[0])}
 
 
+def test_the_vibration_and_its_cure(report, page):
+    numbers = report[0].numbers
+    assert numbers["common_supply_swing_deg"] > 2.0
+    assert numbers["common_supply_swings_per_s"] > 5.0
+    assert numbers["separate_supply_swing_deg"] < 0.2
+    assert numbers["separate_supply_swings_per_s"] == 0.0
+    assert {"vibration", "figure-vibration", "figure-vibration-frames"} <= set(page.ids)
+    assert "#vibration" in page.links
+    words = re.sub(r"\s+", " ", "".join(page.words))
+    assert f"{numbers['common_supply_swing_deg']:.2f}° from end to end, 7 times a second" in words
+    with (report[0].folder / "data" / "figure-vibration.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    seen = {name: {float(row[f"{name}_control_supply_V"]) for row in rows if row[f"{name}_control_supply_V"]}
+            for name in ("common", "separate")}
+    assert seen["separate"] == {6.0}
+    assert min(seen["common"]) < 5.0
+    assert max(seen["common"]) == 6.0
+
+
 def test_nothing_else_is_left(report):
     assert sorted(path.name for path in report[0].folder.iterdir()) == ["data", "figures", "report.html"]
 

@@ -9,11 +9,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from lane_cases import case
-from servotwin.models.kernels import block_rows, blocks, hybrid, legs
+from servotwin.models.kernels import block_rows, blocks, contact, legs
+from servotwin.models.kernels.plant import Plant
 from servotwin.simulation import lane_runs
 from servotwin.simulation.lanes import FIELDS, Tables, empty_raw, run_lanes
 
-PLANT = dict.fromkeys(hybrid.Plant._fields, 0.0) | {
+PLANT = dict.fromkeys(Plant._fields, 0.0) | {
     "J": 6e-3, "b": 1e-3, "K": 1.03, "K_b": 1.0, "F_forward": 0.2, "F_backward": 0.25, "breakaway": 1.0,
     "lower": -math.inf, "upper": math.inf, "V": 6.0, "R_drive": 3.1, "R_off": 3.0}
 DEAD_ZONES = ((0.0, 0.0), (0.5, 0.1), (0.4, 7.0))
@@ -32,7 +33,7 @@ def fine(plant, torque, drive, q, w, end):
     while t < end:
         way = np.sign(w)
         if w == 0.0:
-            backward, forward = hybrid.holding_bounds(plant)
+            backward, forward = contact.holding_bounds(plant, 0.0, 0.0)
             pull = plant.K * current(0.0) - torque
             way = 1.0 if pull > forward else -1.0 if pull < -backward else 0.0
         if way == 0.0:
@@ -56,7 +57,7 @@ def fine(plant, torque, drive, q, w, end):
 @pytest.mark.parametrize(("zones", "torque", "drive"), list(product(DEAD_ZONES, LOADS, (-1.0, 0.0, 1.0))))
 @pytest.mark.parametrize("w", [0.0, 4.0, -9.0])
 def test_legs_against_a_fine_solution(zones, torque, drive, w):
-    plant = hybrid.Plant(**PLANT | {"D_drive": zones[0], "D_off": zones[1]})
+    plant = Plant(**PLANT | {"D_drive": zones[0], "D_off": zones[1]})
     q, speed, done = legs.slide(legs.shaft_of(plant, torque), drive, 0.3, w, 0.06)
     assert done == 1.0
     assert (q, speed) == pytest.approx(fine(plant, torque, drive, 0.3, w, 0.06), abs=2e-8)
@@ -64,7 +65,7 @@ def test_legs_against_a_fine_solution(zones, torque, drive, w):
 
 @pytest.mark.parametrize("time", [1e-12, 1e-6, 1e-3, 1.0, 100.0])
 def test_a_free_shaft_has_no_cancellation(time):
-    plant = hybrid.Plant(**PLANT | {"b": 0.0, "F_forward": 0.0, "F_backward": 0.0, "R_off": 1e15})
+    plant = Plant(**PLANT | {"b": 0.0, "F_forward": 0.0, "F_backward": 0.0, "R_off": 1e15})
     q, w, _ = legs.slide(legs.shaft_of(plant, -0.006), 0.0, 0.0, 0.0, time)
     assert q == pytest.approx(0.5 * time * time, rel=1e-9)  # a winding of 1e15 ohm hardly brakes
     assert w == pytest.approx(time, rel=1e-9)

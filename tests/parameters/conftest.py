@@ -1,4 +1,4 @@
-"""Random servos: every one that the groups accept."""
+"""Random servos, every one that the groups accept; and what stands beside a field that is refused alone."""
 
 import dataclasses
 
@@ -13,6 +13,10 @@ _NUMBERS = {
 }
 # What must not be together, or must be in order, is made so afterwards
 _OTHER_LAW = ("load_friction", "load_friction_stribeck")
+
+MASSES = {"winding_capacity": 2.0, "housing_capacity": 30.0, "winding_to_housing": 8.0, "housing_to_ambient": 16.0}
+COMPANIONS = {"friction.stribeck_exponent": {"stribeck_speed": 10.0}, "thermal.magnet_coefficient": MASSES,
+              **{f"thermal.{name}": {key: MASSES[key] for key in MASSES if key != name} for name in MASSES}}
 
 
 @st.composite
@@ -33,6 +37,10 @@ def group_values(draw, kind):
         values.pop("stribeck_exponent", None)
     if any(name in values for name in _OTHER_LAW):
         values = {k: v for k, v in values.items() if not k.startswith("load_friction") or k in _OTHER_LAW}
+    if kind is GROUPS["thermal"]:
+        heat = draw(st.booleans())
+        values |= {name: draw(_NUMBERS["a positive number"]) for name in MASSES if heat and name not in values}
+        values = {k: v for k, v in values.items() if heat or k == "ambient"}
     if kind is GROUPS["potentiometer"] and draw(st.booleans()):
         angles = sorted(draw(st.sets(st.floats(-4.0, 4.0), min_size=1, max_size=6)))
         values["linearity_angle"] = tuple(angles)

@@ -12,6 +12,8 @@ from servotwin import units
 from servotwin.errors import ParameterError
 from servotwin.parameters import GROUPS
 
+from .conftest import COMPANIONS, MASSES
+
 # The names of physics, group by group
 NAMES = {
     "motor": "armature_resistance armature_inductance torque_constant back_emf_constant rotor_inertia "
@@ -34,8 +36,6 @@ FIELDS = [(group, f.name, f.metadata) for group, kind in GROUPS.items() for f in
 NUMBERS = [(group, name, meta) for group, name, meta in FIELDS if isinstance(meta["rule"], str)
            and meta["rule"] != "table"]
 IDS = [f"{group}.{name}" for group, name, _ in NUMBERS]
-# A value that stands on its own: some fields are refused alone
-COMPANIONS = {"friction.stribeck_exponent": {"stribeck_speed": 10.0}}
 
 
 def build(group, name, value):
@@ -141,6 +141,10 @@ def test_off_state_refuses(word):
     ("electronics", {"pulse_width_min": 2e-3, "pulse_width_max": 1e-3}, "electronics.pulse_width_max"),
     ("supply", {"open_circuit_voltage": 6.0, "bridge_drop_voltage": 6.0}, "supply.open_circuit_voltage"),
     ("friction", {"stribeck_exponent": 2.0}, "friction.stribeck_speed"),
+    ("thermal", {"winding_capacity": 2.0}, "thermal.housing_to_ambient"),
+    ("thermal", {name: MASSES[name] for name in list(MASSES)[1:]}, "thermal.winding_capacity"),
+    ("thermal", {"magnet_coefficient": -0.001}, "thermal.winding_capacity"),
+    ("thermal", {"magnet_coefficient": -0.001, "housing_capacity": 30.0}, "thermal.winding_capacity"),
     ("friction", {"load_friction": 0.1, "load_friction_motor": 0.1}, "friction.load_friction_motor"),
     ("friction", {"load_friction_stribeck": 0.1, "load_friction_external": 0.1}, "friction.load_friction_external"),
     ("potentiometer", {"linearity_angle": (0.0, 1.0)}, "potentiometer.linearity_angle"),
@@ -154,6 +158,14 @@ def test_what_contradicts_is_refused(group, values, named):
         GROUPS[group](**values)
     assert named in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_the_air_has_a_temperature_without_any_heat():
+    assert GROUPS["thermal"](ambient=310.0).ambient == 310.0
+
+
+def test_a_gear_may_lock_itself():
+    assert GROUPS["friction"](load_friction_external=1.2).load_friction_external == 1.2
 
 
 @pytest.mark.parametrize("bad", [3.0, (), [], "0 1", (0.0, math.nan), (0.0, "1"), (0.0, True), {0.0: 1.0}])

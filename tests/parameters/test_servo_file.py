@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from servotwin import units
 from servotwin.errors import OutputError, OutputExistsError, ServoFileError
-from servotwin.parameters import GROUPS, load_servo, servo_from_values
+from servotwin.parameters import GROUPS, load_servo, servo_from_values, unit_of
 
-from .conftest import servos
+from .conftest import COMPANIONS, servos
 
 GOOD = """
 name = "mine"
@@ -100,10 +100,13 @@ bounds = { "motor.armature_resistance" = [1.0, 5.0] }
     (group, name, f.metadata["dimension"]) for group, kind in GROUPS.items()
     for name, f in kind.__dataclass_fields__.items()
     if f.metadata.get("rule") in ("a positive number", "a finite number")
-    and name not in ("stribeck_exponent", "pulse_width_min")])
+    and name != "pulse_width_min"])
 def test_every_unit_of_the_dimension_is_read(write, group, name, dimension):
+    beside = "".join(f'{key} = {{ value = {value}, unit = "{unit_of(f"{group}.{key}")}", origin = "assumed" }}\n'
+                     for key, value in COMPANIONS.get(f"{group}.{name}", {}).items())
     for unit, factor in units.DIMENSIONS[dimension].items():
-        path = write(f'name="a"\n[{group}]\n{name} = {{ value = 3, unit = "{unit}", origin = "assumed", std = 1 }}\n')
+        path = write(f'name="a"\n[{group}]\n{name} = {{ value = 3, unit = "{unit}", origin = "assumed", std = 1 }}\n'
+                     + beside)
         servo = load_servo(path)
         assert servo.get(f"{group}.{name}") == pytest.approx(3 * factor, rel=1e-15)
         quantity = servo.source(f"{group}.{name}")

@@ -5,48 +5,71 @@ import inspect
 import numpy as np
 import pytest
 
-from servotwin.physics import analog_servo, bridge, electronics, friction, gear, motor, potentiometer, pulse
+from servotwin.physics import (
+    analog_servo,
+    backlash,
+    bridge,
+    electronics,
+    friction,
+    gear,
+    load_friction,
+    motor,
+    potentiometer,
+    pulse,
+    supply,
+    thermal,
+)
+
+MODULES = (analog_servo, backlash, bridge, electronics, friction, gear, load_friction, motor, potentiometer, pulse,
+           supply, thermal)
+
+
+def _arguments(law):
+    """The names of a law's arguments; what it takes as one table or as further shares is left out."""
+    return [name for name, p in inspect.signature(law).parameters.items()
+            if p.annotation in ("Real", "Real | None") and p.kind is not p.VAR_KEYWORD]
+
 
 LAWS = [
     law
-    for module in (analog_servo, bridge, electronics, friction, gear, motor, potentiometer, pulse)
+    for module in MODULES
     for name, law in inspect.getmembers(module, inspect.isfunction)
     if law.__module__ == module.__name__ and not name.startswith("_")
+    and "ArrayLike" not in {p.annotation for p in inspect.signature(law).parameters.values()
+                            if p.default is p.empty}
 ]
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)
 def test_numbers_give_a_number(law):
-    result = _call(law, {name: 1.5 for name in inspect.signature(law).parameters})
-    assert isinstance(result, float | bool)
+    for result in _parts(law(**{name: 1.5 for name in _arguments(law)})):
+        assert isinstance(result, float | bool)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)
 def test_each_argument_broadcasts_and_each_lane_equals_its_own_call(law):
-    names = list(inspect.signature(law).parameters)
+    names = _arguments(law)
     rng = np.random.default_rng(3)
     base = {name: float(x) for name, x in zip(names, rng.uniform(0.5, 2.0, len(names)), strict=True)}
     for name in names:
         column = rng.uniform(0.5, 2.0, (3, 1))
-        result = _call(law, {**base, name: column})
-        assert isinstance(result, np.ndarray)
-        assert result.shape == (3, 1)
-        alone = [_call(law, {**base, name: float(x)}) for x in column[:, 0]]
-        np.testing.assert_allclose(np.asarray(result[:, 0], dtype=float), np.asarray(alone, dtype=float), rtol=1e-13)
+        results = np.broadcast_arrays(*_parts(law(**{**base, name: column})))
+        alone = [_parts(law(**{**base, name: float(x)})) for x in column[:, 0]]
+        for k, result in enumerate(results):
+            assert result.shape == (3, 1)
+            np.testing.assert_allclose(result[:, 0].astype(float), [float(one[k]) for one in alone], rtol=1e-13)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)
 def test_rows_and_columns_make_a_table_and_nothing_is_changed(law):
-    names = list(inspect.signature(law).parameters)
+    names = _arguments(law)
     rng = np.random.default_rng(4)
     given = {name: rng.uniform(0.5, 2.0, (4, 1) if k % 2 else (1, 5)) for k, name in enumerate(names)}
     before = {name: value.copy() for name, value in given.items()}
-    assert _call(law, given).shape == (4, 5)
+    assert np.broadcast_shapes(*(part.shape for part in _parts(law(**given)))) == (4, 5)
     for name in names:
         np.testing.assert_array_equal(given[name], before[name])
 
 
-def _call(law, arguments):
-    positional = [n for n, p in inspect.signature(law).parameters.items() if p.kind is not p.KEYWORD_ONLY]
-    rest = {name: value for name, value in arguments.items() if name not in positional}
-    return law(*(arguments[name] for name in positional), **rest)
+def _parts(result):
+    return result if isinstance(result, tuple) else (result,)

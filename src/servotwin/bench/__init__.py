@@ -6,6 +6,7 @@ converter → V_i, ADC_i, V_o, ADC_o, f, q, t_a.
 
 from servotwin.bench.bench import Bench, BenchRun, bench_servo
 from servotwin.bench.calibration import Interval, command_voltage_interval, zero_offset_interval
+from servotwin.bench.control_supply import ControlSupply, run_on_one_supply
 from servotwin.bench.converter import FEEDBACK_CONVERTER, INPUT_CONVERTER, Converter
 from servotwin.bench.fits import CurvatureTest, LineFit, TableFit, curvature_test, fit_line, table_fits
 from servotwin.bench.generator import PulseGenerator
@@ -18,6 +19,7 @@ from servotwin.bench.residuals import (
     measured_shares,
     model_shares,
 )
+from servotwin.bench.standing import Standing, standing
 
 __all__ = [
     "FEEDBACK_CONVERTER",
@@ -25,6 +27,7 @@ __all__ = [
     "Bench",
     "BenchRun",
     "Comparison",
+    "ControlSupply",
     "Converter",
     "CurvatureTest",
     "Interval",
@@ -33,6 +36,7 @@ __all__ = [
     "PulseGenerator",
     "Reading",
     "Shares",
+    "Standing",
     "TableFit",
     "TableRow",
     "bench_servo",
@@ -42,6 +46,8 @@ __all__ = [
     "fit_line",
     "measured_shares",
     "model_shares",
+    "run_on_one_supply",
+    "standing",
     "table_fits",
     "zero_offset_interval",
 ]

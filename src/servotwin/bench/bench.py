@@ -17,7 +17,9 @@ from servotwin.signals import constant, pulse_train
 from servotwin.simulation import Simulator, simulate
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
 
     from servotwin.loads import Load, Part
     from servotwin.models import Model
@@ -100,6 +102,11 @@ class Bench:
         self._b_o = model.value("potentiometer.feedback_offset")
         self._half_deadband = _half_deadband(model)
 
+    @property
+    def load(self) -> Load:
+        """What hangs on the shaft."""
+        return self._simulator.load
+
     def pulse_width(self, command_voltage: float) -> float:
         """Return the pulse width that a constant command voltage [V] becomes [s]."""
         return self.generator.width(self.input_converter.count(command_voltage))
@@ -142,16 +149,53 @@ class Bench:
         >>> run.counts[0], run.counts[-1], run.reading(1.0).command_count
         (248, 582, 582)
         """
+        counts = [self.input_converter.count(float(v)) for v in command(self.frames(command, duration))]
+        return self.follow(command, counts, duration, output_step=output_step)
+
+    def frames(self, command: Signal, duration: float) -> NDArray[np.float64]:
+        """Return when the pulses of a run start [s], shape (n,).
+
+        Raises
+        ------
+        CommandError
+            If the command is no voltage.
+        InputError
+            If the duration is not positive.
+        """
         if command.kind != "voltage":
             raise CommandError("command of the bench", got=f"unit {command.unit}", allowed="V, mV")
         if isinstance(duration, bool) or not (math.isfinite(duration) and duration > 0.0):
             raise InputError("duration", got=duration, allowed="a positive number of seconds")
-        edges = np.arange(math.ceil(duration / self.generator.frame_period)) * self.generator.frame_period
-        counts = tuple(self.input_converter.count(float(v)) for v in command(edges))
+        period = self.generator.frame_period
+        return np.asarray(np.arange(math.ceil(duration / period)) * period, dtype=np.float64)
+
+    def follow(self, command: Signal, counts: Sequence[int], duration: float, *,
+               output_step: float | None = None) -> BenchRun:
+        """Return the run in which the converter has read these counts, one a frame.
+
+        Parameters
+        ----------
+        command : Signal
+            Of which the counts were read; the servo rests where `command.initial` asks.
+        counts : sequence of int
+            As many as `frames` has edges.
+        duration : float
+            Positive [s].
+        output_step : float, optional
+            As for `simulate`.
+
+        Raises
+        ------
+        InputError
+            If there are more or fewer counts than frames.
+        """
+        edges = self.frames(command, duration)
+        if len(counts) != edges.size:
+            raise InputError("counts of a run", got=len(counts), allowed=f"{edges.size}, one a frame")
         train = pulse_train(edges, [self.generator.width(count) for count in counts], unit="s")
         pulses = replace(train, initial=self.pulse_width(command.initial))
-        result = simulate(self.model, pulses, duration=duration, load=self._simulator.load, output_step=output_step)
-        return BenchRun(bench=self, command=command, counts=counts, pulses=pulses, result=result)
+        result = simulate(self.model, pulses, duration=duration, load=self.load, output_step=output_step)
+        return BenchRun(bench=self, command=command, counts=tuple(counts), pulses=pulses, result=result)
 
     def measure(self, command_voltages: ArrayLike, *, approach: float = math.radians(30.0),
                 dwell: float = 5.0) -> tuple[TableRow, ...]:

@@ -10,6 +10,7 @@ from servotwin import __version__
 from servotwin.cli.catalog import catalog
 from servotwin.cli.paper_command import paper
 from servotwin.cli.simulate import simulate
+from servotwin.cli.sweep import sweep
 from servotwin.cli.terminal import emit, emit_help
 
 app = typer.Typer(
@@ -41,4 +42,7 @@ app.command("paper", help="Reproduce the paper's figures and tables in a report.
 app.command("simulate", help="Simulate one servo under one command and one load.",
             epilog="Example: servotwin simulate hitec-hs-755hb --step 0:180 --plot run.png\n\n"
                    "Example: servotwin simulate my-servo.toml --sine 1500:200:2 --unit us --out run.csv")(simulate)
+app.command("sweep", help="Draw the parameters of a servo, simulate all, and say which of them matter.",
+            epilog="Example: servotwin sweep hitec-hs-755hb --step 0:60 --vary motor.torque_constant=normal:10% "
+                   "--vary electronics.deadband=uniform:4us..8us --lanes 10000 --out study --plot")(sweep)
 app.add_typer(catalog, name="catalog")

@@ -9,7 +9,7 @@ import numpy as np
 from servotwin.errors import LoadError, UnknownNameError
 from servotwin.loads import as_load
 from servotwin.models import DCMotor, GearedMotor
-from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.kernels.plant import Plant
 from servotwin.physics.pieces import constant_pieces
 from servotwin.signals import Signal
 

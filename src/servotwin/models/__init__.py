@@ -4,7 +4,7 @@ from servotwin.models.averaged import AveragedServo, AveragedServoInductive
 from servotwin.models.base import Model
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.motors import DCMotor, GearedMotor
-from servotwin.models.pulse import PulseServo
+from servotwin.models.pulse import PulseServo, PulseServoInductive
 
 MODELS: dict[str, type[Model]] = {
     "dc-motor": DCMotor,
@@ -13,7 +13,8 @@ MODELS: dict[str, type[Model]] = {
     "averaged-inductive": AveragedServoInductive,
     "bounded": BoundedServo,
     "pulse": PulseServo,
+    "pulse-inductive": PulseServoInductive,
 }
 
 __all__ = ["MODELS", "AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "Model",
-           "PulseServo"]
+           "PulseServo", "PulseServoInductive"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from servotwin.models.base import Model, check_travel
-from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
 from servotwin.physics import electronics, potentiometer
 

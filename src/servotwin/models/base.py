@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Self, final
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, final
 
 import numpy as np
 
@@ -18,10 +18,18 @@ if TYPE_CHECKING:
 
     from servotwin.loads import Load
     from servotwin.models.kernels.frame import Chip
-    from servotwin.models.kernels.hybrid import Plant
+    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
+
+
+class Place(NamedTuple):
+    """A state: its signal name, its place among the numbers of the engine, and the factor from there to the signal."""
+
+    name: str
+    at: int
+    factor: float
 
 
 class Model(ABC):
@@ -43,7 +51,7 @@ class Model(ABC):
     optional: ClassVar[tuple[str, ...]] = ()
     """Dotted names that are used where given."""
     layout: ClassVar[tuple[str, ...]]
-    """Signal names of the state: angle, speed and, with inductance, current."""
+    """Signal names of all states that the class can have, angle and speed first."""
     signals: ClassVar[tuple[str, ...]]
     """Names of all output signals that the class can have, `time` apart."""
 
@@ -126,6 +134,11 @@ class Model(ABC):
             return tuple(name for name in self.signals if name != "command_voltage")
         return self.signals
 
+    @property
+    def states(self) -> tuple[Place, ...]:
+        """Which signals are states of this servo, and where the engine keeps them."""
+        return tuple(Place(name, k, 1.0) for k, name in enumerate(self.layout))
+
     @abstractmethod
     def pack(self, load: Load) -> Plant:
         """Return everything that the engine reads, as plain floats."""
@@ -166,6 +179,10 @@ class Model(ABC):
     def edges(self, signal: Signal) -> tuple[float, ...] | None:
         """Return when the frames of a command start [s]; None where they come regularly, or there are none."""
         return None
+
+    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return angles [rad] and errors [V] of the potentiometer's linearity table; empty without one."""
+        return (), ()
 
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""

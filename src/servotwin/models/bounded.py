@@ -10,7 +10,7 @@ import numpy as np
 
 from servotwin.errors import MissingParameterError
 from servotwin.models.base import Model, check_travel, clipped
-from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
 from servotwin.physics import potentiometer
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, final
 
 from servotwin.errors import CommandError
 from servotwin.models.base import Model
-from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
 
 if TYPE_CHECKING:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from servotwin.errors import InputError
-from servotwin.models.base import Model, check_travel, check_widths, clipped
+from servotwin.models.base import Model, Place, check_travel, check_widths, clipped
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
+from servotwin.models.pulse_plant import gear_numbers, sensor_numbers, source_numbers, thermal_numbers
 from servotwin.physics import electronics, potentiometer
 
 if TYPE_CHECKING:
@@ -36,48 +37,69 @@ def _edges_first(timeout: Any, period: Any) -> Any:
     return longer if longer.ndim else float(longer)
 
 
-@final
-class PulseServo(Model):
-    """One-shot, comparator with deadband, pulse stretcher and switched bridge, with friction that truly sticks.
+_REQUIRES = (
+    "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
+    "motor.motor_viscous_friction", "gear.gear_reduction",
+    "friction.coulomb_torque_forward", "friction.coulomb_torque_backward",
+    "electronics.stretcher_gain", "electronics.one_shot_slope",
+    "potentiometer.feedback_gain", "supply.open_circuit_voltage",
+)
+_SHAFT = ("output_angle", "output_speed")
+_HIDDEN = ("winding_temperature", "housing_temperature", "motor_angle", "motor_speed")
+_HEAT = ("winding_temperature", "housing_temperature")
 
-    Every frame the width of the command's pulse is compared with that of a one-shot, which the potentiometer sets. The
-    difference, stretched, is how long the bridge drives; then it brakes or coasts until the next decision. Armature
-    inductance is neglected. Frames come from the command where it gives their period or their edges, else from
-    `electronics.frame_period`.
 
-    Examples
-    --------
-    >>> import servotwin as st
-    >>> result = st.simulate(PulseServo(st.load_servo("hitec-hs-755hb")),
-    ...                      st.signals.step(0.0, 60.0, at=0.1, unit="deg"), duration=1.0)
-    >>> bool(55.0 < 57.29578 * result["output_angle"][-1] < 62.0)
-    True
-    """
+class _Pulsed(Model):
+    """What both pulse servos share: the chip, the bridge, the shaft, and how a command becomes pulses."""
 
-    requires = (
-        "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
-        "motor.motor_viscous_friction", "gear.gear_reduction",
-        "friction.coulomb_torque_forward", "friction.coulomb_torque_backward",
-        "electronics.stretcher_gain", "electronics.one_shot_slope",
-        "potentiometer.feedback_gain", "supply.open_circuit_voltage",
-    )
     optional = (
-        "motor.brush_drop_voltage", "gear.output_inertia", "friction.breakaway_ratio",
+        "motor.brush_drop_voltage", "gear.output_inertia", "gear.backlash", "friction.breakaway_ratio",
+        "friction.stribeck_speed", "friction.stribeck_exponent", "friction.load_friction",
+        "friction.load_friction_stribeck", "friction.load_friction_motor", "friction.load_friction_external",
+        "friction.load_friction_motor_stribeck", "friction.load_friction_external_stribeck",
+        "friction.load_friction_motor_quad", "friction.load_friction_external_quad",
         "electronics.frame_period", "electronics.deadband", "electronics.minimum_drive_time",
         "electronics.stretcher_time_constant", "electronics.off_state", "electronics.one_shot_offset",
         "electronics.back_emf_injection", "electronics.supply_coupling", "electronics.pulse_timeout",
         "electronics.pulse_width_min", "electronics.pulse_width_max",
         "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset",
-        "potentiometer.feedback_offset", "potentiometer.noise",
+        "potentiometer.feedback_offset", "potentiometer.noise", "potentiometer.backlash",
+        "potentiometer.linearity_angle", "potentiometer.linearity_error", "potentiometer.quantisation",
         "supply.internal_resistance", "supply.bridge_drop_voltage", "supply.bridge_drop_resistance",
-        "stops.lower_angle", "stops.upper_angle", "stops.restitution",
+        "supply.current_limit", "stops.lower_angle", "stops.upper_angle", "stops.restitution",
+        "thermal.winding_capacity", "thermal.housing_capacity", "thermal.winding_to_housing",
+        "thermal.housing_to_ambient", "thermal.ambient", "thermal.magnet_coefficient",
     )
-    layout = ("output_angle", "output_speed")
     signals = (
         "command_voltage", "command_angle", "pulse_width", "error_time", "drive", "armature_voltage",
         "armature_current", "motor_angle", "motor_speed", "motor_torque", "output_angle", "output_speed",
-        "load_torque", "feedback_voltage", "bus_voltage", "supply_current",
+        "load_torque", "feedback_voltage", "bus_voltage", "supply_current", "winding_temperature",
+        "housing_temperature",
     )
+
+    @property
+    def available(self) -> tuple[str, ...]:
+        """Names of the output signals that can be computed for this servo, `time` apart."""
+        names = super().available
+        return names if self.heats else tuple(name for name in names if name not in _HEAT)
+
+    @property
+    def heats(self) -> bool:
+        """Whether the servo gives what its temperatures depend on."""
+        return self.servo.get("thermal.winding_capacity") is not None
+
+    @property
+    def states(self) -> tuple[Place, ...]:
+        """Which signals are states of this servo, and where the engine keeps them."""
+        N = self.value("gear.gear_reduction")
+        places = [Place("output_angle", 0, 1.0), Place("output_speed", 1, 1.0)]
+        if "armature_current" in self.layout:
+            places.append(Place("armature_current", 2, 1.0))
+        if self.heats:
+            places += [Place("winding_temperature", 3, 1.0), Place("housing_temperature", 4, 1.0)]
+        if self.servo.get("gear.backlash") is not None:
+            places += [Place("motor_angle", 5, N), Place("motor_speed", 6, N)]
+        return tuple(places)
 
     @property
     def frame_period(self) -> float:
@@ -89,21 +111,16 @@ class PulseServo(Model):
         off: Any = self.servo.get("electronics.off_state")
         return np.where(off == "coast", 1.0, 0.0) if isinstance(off, np.ndarray) else float(off == "coast")
 
-    def pack(self, load: Load) -> Plant:
-        """Return the plant at the output shaft, with the bridge before it."""
-        R_a, R_b = self.value("motor.armature_resistance"), self.value_or("supply.internal_resistance", 0.0)
-        r_c = self.value_or("supply.bridge_drop_resistance", 0.0)
-        V_oc, V_ce0 = self.value("supply.open_circuit_voltage"), self.value_or("supply.bridge_drop_voltage", 0.0)
-        V_br = self.value_or("motor.brush_drop_voltage", 0.0)
-        coasts = self._coasts()
+    def _plant(self, load: Load, inductance: float) -> Plant:
         return make_plant(
-            self, load, reduction=self.value("gear.gear_reduction"),
+            self, load, reduction=self.value("gear.gear_reduction"), inductance=inductance,
             friction=(self.value("friction.coulomb_torque_forward"), self.value("friction.coulomb_torque_backward")),
             breakaway=self.value_or("friction.breakaway_ratio", 1.0),
             p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0),
             stops=(self.value_or("stops.lower_angle", -math.inf), self.value_or("stops.upper_angle", math.inf)),
             restitution=self.value_or("stops.restitution", 0.0),
-            bridge=(V_oc, V_ce0 + V_br, R_a + r_c + R_b, V_br + coasts * (V_oc + V_ce0), R_a + coasts * R_b))
+            **source_numbers(self, self._coasts()), **gear_numbers(self, load), **thermal_numbers(self),
+            **sensor_numbers(self))
 
     def chip(self, signal: Signal | None = None) -> Chip:
         """Return the numbers of the frame logic; the frame period is that of the command where it gives one."""
@@ -121,7 +138,13 @@ class PulseServo(Model):
             timeout=_edges_first(self.value_or("electronics.pulse_timeout", math.inf), period), frame_period=period,
             R_a=self.value("motor.armature_resistance"), R_b=self.value_or("supply.internal_resistance", 0.0),
             V_br=self.value_or("motor.brush_drop_voltage", 0.0), V_oc=self.value("supply.open_circuit_voltage"),
-            coast=self._coasts())
+            coast=self._coasts(), step=self.value_or("potentiometer.quantisation", 0.0),
+            half_slack=0.5 * self.value_or("potentiometer.backlash", 0.0))
+
+    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return angles [rad] and errors [V] of the potentiometer's linearity table; empty without one."""
+        angles, errors = (self.servo.get(f"potentiometer.linearity_{name}") for name in ("angle", "error"))
+        return (angles, errors) if isinstance(angles, tuple) and isinstance(errors, tuple) else ((), ())
 
     def edges(self, signal: Signal) -> tuple[float, ...] | None:
         """Return when the frames of a command start [s]; None where they come regularly."""
@@ -168,8 +191,40 @@ class PulseServo(Model):
 
     def start_angle(self, drive: float) -> float:
         """Return the angle without error, within the stops [rad]."""
-        return clipped(self._angle_of(drive), self.value_or("stops.lower_angle", -math.inf),
+        angles, errors = self.curve()
+        angle = self._angle_of(drive)
+        if angles:
+            p, b_o = self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)
+            angle = potentiometer.angle_from_sensed_voltage(
+                potentiometer.feedback_voltage(angle, p, b_o), p, b_o, angles, errors)
+        return clipped(angle, self.value_or("stops.lower_angle", -math.inf),
                        self.value_or("stops.upper_angle", math.inf))
+
+
+@final
+class PulseServo(_Pulsed):
+    """One-shot, comparator with deadband, pulse stretcher and switched bridge, with friction that truly sticks.
+
+    Every frame the width of the command's pulse is compared with that of a one-shot, which the potentiometer sets. The
+    difference, stretched, is how long the bridge drives; then it brakes or coasts until the next decision. Armature
+    inductance is neglected. Frames come from the command where it gives their period or their edges, else from
+    `electronics.frame_period`.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> result = st.simulate(PulseServo(st.load_servo("hitec-hs-755hb")),
+    ...                      st.signals.step(0.0, 60.0, at=0.1, unit="deg"), duration=1.0)
+    >>> bool(55.0 < 57.29578 * result["output_angle"][-1] < 62.0)
+    True
+    """
+
+    requires = _REQUIRES
+    layout = (*_SHAFT, *_HIDDEN)
+
+    def pack(self, load: Load) -> Plant:
+        """Return the plant at the output shaft, with the bridge before it."""
+        return self._plant(load, 0.0)
 
     def averaged(self, frame_period: float | None = None) -> BoundedServo:
         """Return the bounded servo that has the mean voltage of this one's pulses.
@@ -217,3 +272,27 @@ class PulseServo(Model):
             "electronics.bridge_gain": float(gain), "electronics.comparator_gain": 1.0,
             "electronics.pulse_to_voltage_gain": s_r, "electronics.command_offset": s_r * (t_0 - T_0),
             "electronics.voltage_deadband": s_r * self.value_or("electronics.deadband", 0.0)}))
+
+
+@final
+class PulseServoInductive(_Pulsed):
+    """The pulse servo with armature inductance: the current is a state and needs time to rise, turn and fade.
+
+    Between drives it freewheels through the diodes of a coasting bridge, back into the supply, or circulates in a
+    braking one. A drive against the motion (plugging) draws up to twice the stall current.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> servo = st.load_servo("hitec-hs-755hb").replace({"motor.armature_inductance": 5e-4})
+    >>> result = st.simulate(PulseServoInductive(servo), st.signals.step(0.0, 60.0, at=0.1, unit="deg"), duration=0.5)
+    >>> bool(1.0 < result.peak("armature_current") < 2.0)
+    True
+    """
+
+    requires = (*_REQUIRES, "motor.armature_inductance")
+    layout = (*_SHAFT, "armature_current", *_HIDDEN)
+
+    def pack(self, load: Load) -> Plant:
+        """Return the plant at the output shaft, with the bridge before it."""
+        return self._plant(load, self.value("motor.armature_inductance"))

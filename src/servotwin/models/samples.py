@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -19,8 +20,14 @@ class Samples:
     time : ndarray
         [s]
     angle, speed, current : ndarray
-        State variables [rad], [rad/s], [A]; the current is used only where it is a state.
-    zone, contact : ndarray of int
+        Of the output, and of the armature [rad], [rad/s], [A]; the current only where it is a state.
+    winding, housing : ndarray
+        Temperatures [K], where they are states.
+    motor_angle, motor_speed : ndarray
+        At the output shaft [rad], [rad/s]; those of the output but inside the play of the gear.
+    wiper : ndarray
+        Angle of the potentiometer [rad].
+    zone, contact, mesh, motor : ndarray of int
         Mode.
     drive, error : ndarray
         Of a pulse servo: how the bridge drives (−1, 0, +1), and the latest error decided on [s].
@@ -30,13 +37,21 @@ class Samples:
     angle: Array
     speed: Array
     current: Array
-    zone: NDArray[np.int64]
-    contact: NDArray[np.int64]
+    winding: Array
+    housing: Array
+    motor_angle: Array
+    motor_speed: Array
+    wiper: Array
+    zone: Whole
+    contact: Whole
+    mesh: Whole
+    motor: Whole
     drive: Array
     error: Array
 
     @classmethod
-    def make(cls, time: Array, states: Array, zone: Array, contact: Array, drive: Array, error: Array) -> Samples:
-        """Build from an array of states, shape (3, n)."""
-        return cls(time, states[0], states[1], states[2], zone.astype(np.int64), contact.astype(np.int64),
-                   drive, error)
+    def make(cls, time: Array, states: Array, wiper: Array, mode: Array, drive: Array, error: Array) -> Samples:
+        """Build from arrays of states, shape (7, n), and of modes, shape (4, n)."""
+        q, w, i, T_w, T_h, q_m, w_m = states
+        zone, contact, mesh, motor = mode.astype(np.int64)
+        return cls(time, q, w, i, T_w, T_h, q_m, w_m, wiper, zone, contact, mesh, motor, drive, error)

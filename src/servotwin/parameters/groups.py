@@ -33,7 +33,7 @@ _RULES: dict[str, Callable[[Any], Any]] = {  # of a number, or of each number of
 
 
 class Relation(NamedTuple):
-    """What has to hold between fields of a group; of columns, lane by lane."""
+    """What has to hold between fields of a group; of columns, lane by lane, or for all lanes alike."""
 
     what: str
     holds: bool | NDArray[np.bool_]
@@ -45,7 +45,9 @@ class Relation(NamedTuple):
         """Raise ParameterError if it does not hold; of columns, for the first such lane."""
         if np.all(self.holds):
             return
-        lane = int(np.argmin(self.holds)) if isinstance(self.holds, np.ndarray) else None
+        lane = None
+        if any(isinstance(x, np.ndarray) for x in (self.holds, self.got)):
+            lane = int(np.argmin(self.holds))  # 0 where what does not hold is the same in all lanes
         got, bound = (_of_lane(x, lane) for x in (self.got, self.bound))
         raise ParameterError(self.what if lane is None else f"{self.what} of lane {lane}", got=got,
                              allowed=self.allowed if bound is None else f"{self.allowed} = {bound!r}")
@@ -107,6 +109,13 @@ class Group:
         """Return what has to hold between several fields."""
         return iter(())
 
+    def _only_with(self, name: str, partners: tuple[str, ...]) -> Iterator[Relation]:
+        """Yield that a field may be given only where all its partners are."""
+        value = getattr(self, name)
+        if value is not None and any(getattr(self, partner) is None for partner in partners):
+            names = ", ".join(f"{self.title}.{partner}" for partner in partners)
+            yield Relation(f"{self.title}.{name}", False, value, f"only together with {names}")
+
     def _less(self, low: str, high: str) -> Iterator[Relation]:
         a, b = getattr(self, low), getattr(self, high)
         if a is not None and b is not None:
@@ -140,7 +149,9 @@ def check_columns(group: str, values: Mapping[str, Any]) -> None:
     checked: Group = object.__new__(GROUPS[group])
     for f in fields(GROUPS[group]):
         value = values.get(f.name)
-        if isinstance(value, np.ndarray) and value.dtype.kind == "f":
+        if f.metadata["rule"] == "table":  # all lanes share it
+            value = value if value is None else checked._checked(f.name, value, f.metadata)
+        elif isinstance(value, np.ndarray) and value.dtype.kind == "f":
             check_column(f"{group}.{f.name}", value, f.metadata["rule"], si_unit(f.metadata["dimension"]))
         elif isinstance(value, np.ndarray):
             options = f.metadata["rule"]
@@ -204,9 +215,7 @@ class Friction(Group):
         "K_eq", "inverse torque", NOT_NEGATIVE, "quadratic in load torque")
 
     def _relations(self) -> Iterator[Relation]:
-        if self.stribeck_exponent is not None and self.stribeck_speed is None:
-            yield Relation("friction.stribeck_exponent", False, self.stribeck_exponent,
-                           "only together with friction.stribeck_speed")
+        yield from self._only_with("stribeck_exponent", ("stribeck_speed",))
         # Models M3 and M4 know one share for all torque through the gear, M5 and M6 one for each side of it.
         one = [name for name in _ONE_SHARE if getattr(self, name) is not None]
         two = [name for name in _TWO_SHARES if getattr(self, name) is not None]
@@ -301,6 +310,9 @@ class Stops(Group):
         yield from self._less("lower_angle", "upper_angle")
 
 
+_MASSES = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Thermal(Group):
     """Two thermal masses, winding and housing."""
@@ -312,6 +324,12 @@ class Thermal(Group):
     housing_to_ambient: float | None = parameter("", "thermal resistance", POSITIVE, "from housing to the air")
     ambient: float | None = parameter("", "temperature", POSITIVE, "temperature of the air")
     magnet_coefficient: float | None = parameter("", "inverse temperature", ANY, "of k_a and k_b")
+
+    def _relations(self) -> Iterator[Relation]:
+        # Heat is on with all four numbers of the two masses, and off with none.
+        for name in _MASSES:
+            yield from self._only_with(name, tuple(partner for partner in _MASSES if partner != name))
+        yield from self._only_with("magnet_coefficient", _MASSES)
 
 
 GROUPS: dict[str, type[Group]] = {

@@ -1,10 +1,13 @@
-"""The potentiometer on the output shaft: angle to voltage and back."""
+"""The potentiometer on the output shaft: angle to voltage and back, ideal or with the errors of a real one."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from servotwin.physics._typing import Real
+
+_HALVINGS = 100  # from any table of volts to the last bit of an angle
 
 
 def feedback_voltage(output_angle: Real, feedback_gain: Real, feedback_offset: Real = 0.0) -> Real:
@@ -92,3 +95,96 @@ def quantised(voltage: Real, quantisation: Real) -> Real:
     1.25
     """
     return quantisation * np.floor(voltage / quantisation + 0.5)
+
+
+def linearity_error(output_angle: Real, angles: ArrayLike, errors: ArrayLike) -> Real:
+    """Return what a potentiometer is off a straight line.
+
+    Parameters
+    ----------
+    output_angle : float or array
+        q, or the angle of the wiper where it has play [rad].
+    angles : array_like, shape (n,)
+        Increasing angles of the table [rad].
+    errors : array_like, shape (n,)
+        Voltage added at these angles [V].
+
+    Returns
+    -------
+    float or array
+        ε(q), linear between two angles of the table and constant beyond its ends [V].
+
+    Examples
+    --------
+    >>> [float(linearity_error(q, [0.0, 1.0], [0.0, 0.02])) for q in (-1.0, 0.5, 2.0)]
+    [0.0, 0.01, 0.02]
+    """
+    epsilon: Real = np.interp(output_angle, np.asarray(angles, dtype=np.float64), np.asarray(errors, dtype=np.float64))
+    return epsilon
+
+
+def sensed_voltage(wiper_angle: Real, feedback_gain: Real, feedback_offset: Real = 0.0, angles: ArrayLike = (0.0,),
+                   errors: ArrayLike = (0.0,), quantisation: Real | None = None) -> Real:
+    """Return the voltage of a real potentiometer.
+
+    Parameters
+    ----------
+    wiper_angle : float or array
+        q_w, which follows the output with the play of `servotwin.physics.backlash.play` [rad].
+    feedback_gain : float or array
+        p [V/rad].
+    feedback_offset : float or array
+        b_o, the voltage at q = 0 [V].
+    angles, errors : array_like, shape (n,)
+        Table of `linearity_error`; a straight line without it [rad, V].
+    quantisation : float or array, optional
+        Volt per count of a converter behind it [V].
+
+    Returns
+    -------
+    float or array
+        v_o = Quant(p q_w + b_o + ε(q_w)) [V].
+
+    Examples
+    --------
+    >>> round(float(sensed_voltage(1.0, 0.42, 0.588, [0.0, 2.0], [0.0, 0.02], 0.0025)), 9)
+    1.0175
+    """
+    v_o = feedback_voltage(wiper_angle, feedback_gain, feedback_offset) + linearity_error(wiper_angle, angles, errors)
+    return v_o if quantisation is None else quantised(v_o, quantisation)
+
+
+def angle_from_sensed_voltage(sensed_voltage: Real, feedback_gain: Real, feedback_offset: Real = 0.0,
+                              angles: ArrayLike = (0.0,), errors: ArrayLike = (0.0,)) -> Real:
+    """Return the angle at which a real potentiometer gives this voltage, quantisation apart.
+
+    Parameters
+    ----------
+    sensed_voltage : float or array
+        v_o [V].
+    feedback_gain : float or array
+        p, positive [V/rad].
+    feedback_offset : float or array
+        b_o, the voltage at q = 0 [V].
+    angles, errors : array_like, shape (n,)
+        Table of `linearity_error`; a straight line without it [rad, V].
+
+    Returns
+    -------
+    float or array
+        q with p q + b_o + ε(q) = v_o, by bisection to the last bit. Where the errors fall faster than p rises there may
+        be several such angles; it is then one at which the voltage rises [rad].
+
+    Examples
+    --------
+    >>> round(float(angle_from_sensed_voltage(1.018, 0.42, 0.588, [0.0, 2.0], [0.0, 0.02])), 9)
+    1.0
+    """
+    ideal = angle_from_voltage(sensed_voltage, feedback_gain, feedback_offset)
+    low, high = (np.asarray(ideal - bound / feedback_gain) for bound in (np.max(errors), np.min(errors)))
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        reached = middle + linearity_error(middle, angles, errors) / feedback_gain <= ideal
+        low, high = np.where(reached, middle, low), np.where(reached, high, middle)
+    q: Real = (0.5 * (low + high))[()]
+    return q

@@ -11,6 +11,7 @@ from servotwin.plotting.formula import Formula, formula_svg
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
 from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
 from servotwin.plotting.style import COLOURS, LINES, axes_grid, finished
+from servotwin.plotting.tornado import metric_shown, readable, tornado
 
 __all__ = [
     "COLOURS",
@@ -27,9 +28,12 @@ __all__ = [
     "curves",
     "finished",
     "formula_svg",
+    "metric_shown",
     "pulses",
+    "readable",
     "save",
     "shown",
     "time_response",
     "to_bytes",
+    "tornado",
 ]

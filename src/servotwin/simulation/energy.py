@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.models.circuit import circuit_of
-from servotwin.models.kernels import hybrid, motion
-from servotwin.models.outputs import torques_of
+from servotwin.models.kernels import motion
+from servotwin.models.outputs import torques_of, warm_plant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
     from servotwin.models import Model
+    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
     from servotwin.physics.pieces import Pieces
     from servotwin.simulation.trajectory import Trajectory
@@ -39,7 +40,7 @@ class Energy:
     friction : float
         Heat in motor and gear, viscous and dry.
     stops : float
-        Lost in impacts on the end stops.
+        Lost in impacts, on the end stops and at the ends of the gear's play.
     load : float
         Given to the load: its damping, dry friction and external torque (its inertia counts as stored).
     stored : float
@@ -62,24 +63,23 @@ class Energy:
 
 def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -> Energy:
     """Return the energy balance of a whole run."""
-    plant = model.pack(load)
-
     def powers(samples: Samples) -> NDArray[np.float64]:
+        plant = warm_plant(model, samples, load)
         circuit = circuit_of(model, plant, samples, drive)
-        i, w = circuit.armature_current, samples.speed
+        i, w, w_m = circuit.armature_current, samples.speed, samples.motor_speed
         torques = torques_of(model, samples, drive, load)
-        own_viscous = (plant.b - load.viscous_friction) * w
+        own_viscous = (plant.b - load.viscous_friction) * w_m
         to_load = (load.viscous_friction * w + torques.load_friction + torques.external) * w
         return np.array([circuit.supply_power, plant.R * i * i, circuit.bridge_power, circuit.brush_power,
-                         (plant.K_b - plant.K) * i * w, (own_viscous + torques.servo_friction) * w, to_load])
+                         (plant.K_b - plant.K) * i * w_m, (own_viscous + torques.servo_friction) * w_m, to_load])
 
     supply, winding, bridge, brush, conversion, friction, to_load = trajectory.integral(powers).tolist()
-    stored, stops = _kinetic(plant, trajectory)
+    stored, stops = _kinetic(model.pack(load), trajectory)
     return Energy(supply, winding, bridge, brush, conversion, friction, stops, to_load, stored,
                   supply - winding - bridge - brush - conversion - friction - stops - to_load - stored)
 
 
-def _kinetic(plant: hybrid.Plant, trajectory: Trajectory) -> tuple[float, float]:
+def _kinetic(plant: Plant, trajectory: Trajectory) -> tuple[float, float]:
     """Return the energy stored over the run, and what impacts took."""
     lost = 0.0
     segments = trajectory.segments
@@ -87,8 +87,10 @@ def _kinetic(plant: hybrid.Plant, trajectory: Trajectory) -> tuple[float, float]
         return 0.0, 0.0
 
     def stored(k: int, at: float) -> float:
-        _, w, i = motion.state(segments[k].motion, at - segments[k].anchor)
-        return 0.5 * plant.J * w * w + 0.5 * plant.L * i * i
+        m = motion.prepared(segments[k].motion)
+        _, w, i, _, _, _, w_m = motion.state(m, at - segments[k].anchor)
+        kinetic = 0.5 * plant.J_out * w * w + 0.5 * (plant.J - plant.J_out) * w_m * w_m
+        return kinetic + 0.5 * plant.L * i * i
 
     for k in range(1, len(segments)):
         if segments[k].anchor == segments[k].start:

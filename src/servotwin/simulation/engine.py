@@ -10,12 +10,21 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from servotwin.errors import SimulationError
+from servotwin.models.base import Place
 from servotwin.models.kernels import frame, hybrid, walk
 from servotwin.models.kernels.frame import Chip, Frame
-from servotwin.models.kernels.hybrid import Mode, Plant
-from servotwin.models.kernels.motion import IMPOSSIBLE, STEP, Motion
-from servotwin.models.kernels.rodas import Vector
-from servotwin.models.kernels.walk import FIRST_STEP, MOST_IDLE, Point
+from servotwin.models.kernels.motion import IMPOSSIBLE, Motion, is_step
+from servotwin.models.kernels.plant import (
+    CONDUCTING,
+    CORE,
+    LIMITED_BACKWARD,
+    LIMITED_FORWARD,
+    NO_CURRENT,
+    Mode,
+    Plant,
+    at_rest,
+)
+from servotwin.models.kernels.walk import MOST_IDLE, Point
 from servotwin.physics.pieces import Piece, Pieces, piece_value
 from servotwin.simulation.status import Status
 
@@ -46,6 +55,8 @@ class Plan:
         When its frames start [s]; None: regularly.
     seed : int
         Of its noise.
+    curve : tuple
+        Angles [rad] and errors [V] of its potentiometer's linearity table.
     """
 
     plant: Plant
@@ -54,6 +65,7 @@ class Plan:
     chip: Chip | None = None
     edges: tuple[float, ...] | None = None
     seed: int = 0
+    curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
     @property
     def period(self) -> float:
@@ -69,12 +81,10 @@ class State:
     ----------
     time : float
         [s]
-    names : tuple of str
-        Signal names of `values`.
-    values : tuple of float
-        Angle [rad], speed [rad/s] and, with inductance, current [A].
+    places : tuple of Place
+        Which signals are states, and where the engine keeps them.
     point : Point
-        Mode of the present motion, where it began, and the step that the integrator would try next.
+        All numbers of the state; mode of the present motion, where it began, and the step to try next.
     inputs : tuple of Piece
         The pieces of voltage and external torque in force since then.
     plant : Plant
@@ -84,28 +94,42 @@ class State:
     """
 
     time: float
-    names: tuple[str, ...]
-    values: Vector
-    point: Point | None = None
+    places: tuple[Place, ...]
+    point: Point
     inputs: tuple[Piece, Piece] | None = None
     plant: Plant | None = None
     frame: Frame = frame.AT_START
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Signal names of `values`."""
+        return tuple(place.name for place in self.places)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Angle [rad], speed [rad/s] and what else the servo remembers (SI)."""
+        return tuple(place.factor * self.point.y[place.at] for place in self.places)
+
     def __getitem__(self, name: str) -> float:
         """Return one value by its signal name."""
-        if name not in self.names:
-            raise KeyError(f"{name!r} is no state; there are: {', '.join(self.names)}")
-        return self.values[self.names.index(name)]
+        for place in self.places:
+            if place.name == name:
+                return place.factor * self.point.y[place.at]
+        raise KeyError(f"{name!r} is no state; there are: {', '.join(self.names)}")
 
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of one motion between two times [s], and the latest error [s] that the chip has decided on."""
+    """A stretch of one motion between two times [s], and what holds with it.
+
+    `error` is the latest that the chip has decided on [s], `wiper` the angle of the potentiometer at the start [rad].
+    """
 
     start: float
     end: float
     motion: Motion
     error: float
+    wiper: float
 
     @property
     def anchor(self) -> float:
@@ -136,8 +160,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
         If the run cannot go on; it carries status, time and cause.
     """
     plant = plan.plant
-    point = state.point if state.point is not None else Point(
-        state.time, state.values, Mode(0, 0), state.time, state.values, FIRST_STEP)
+    point = state.point
     inputs = state.inputs if plant == state.plant else None
     chip_frame = state.frame
     motion: Motion | None = None
@@ -156,11 +179,12 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
             limit = min(u_end, tau_end)
             if (u, tau) != inputs:
                 inputs, motion = (u, tau), None
-                point = walk.anchored(plant, u, tau, before, point.y, point.step)
-            if motion is None or motion.kind == STEP:
+                point = walk.anchored(plant, u, tau, before, point)
+            if motion is None or is_step(motion):
                 motion = walk.motion_of(plant, point, u, tau, limit)
             if motion.kind == IMPOSSIBLE:
                 raise _failure(Status.STEP_TOO_SMALL, before)
+            wiper = point.wiper
             point, kind, status = walk.follow(motion, point, min(until, limit))
         except ArithmeticError:  # numbers beyond what a float holds
             raise _failure(Status.DIVERGED, before) from None
@@ -171,13 +195,12 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
             raise _failure(Status.CHATTER, before)
         if record is not None:
             if point.time > before or not record.segments:
-                record.segments.append(Segment(before, point.time, motion, chip_frame.error))
+                record.segments.append(Segment(before, point.time, motion, chip_frame.error, wiper))
             if kind >= 0:
                 record.events.append(Event(point.time, _event_name(kind, point.mode), point.y[0]))
         if kind >= 0:
             motion = None
-    return State(time=point.time, names=state.names, values=point.y, point=point, inputs=inputs, plant=plant,
-                 frame=chip_frame)
+    return State(time=point.time, places=state.places, point=point, inputs=inputs, plant=plant, frame=chip_frame)
 
 
 def _failure(status: Status, time: float) -> SimulationError:
@@ -195,7 +218,7 @@ def _switched(plan: Plan, chip: Chip, now: Frame, point: Point, record: Record |
         t_in = piece_value(plan.command.at(time)[0], time)
         if record is not None and not frame.accepted(chip, t_in):
             record.events.append(Event(time, "pulse refused", point.y[0]))
-        now = walk.measured(plan.plant, chip, now, time, t_in, point.y, plan.seed)
+        now = walk.measured(plan.plant, chip, plan.curve, now, point, t_in, plan.seed)
         if now.number == frame.CROWDED:
             raise _failure(Status.CROWDED, time)
     return now
@@ -205,10 +228,12 @@ _DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}
 
 
 def _event_name(kind: int, after: Mode) -> str:
-    if kind == hybrid.SPEED and hybrid.at_rest(after.contact):
+    if kind == hybrid.SPEED and at_rest(after.contact):
         return "stick"
-    if kind == hybrid.SPEED and after.contact != hybrid.CORE:
+    if kind == hybrid.SPEED and after.contact != CORE:
         return "reversal"
-    if after.zone >= hybrid.CONDUCTING and kind in (hybrid.ZONE_UP, hybrid.ZONE_DOWN):
-        return "current stops" if after.zone == hybrid.NO_CURRENT else "current starts"
+    if after.zone >= CONDUCTING and kind in (hybrid.ZONE_UP, hybrid.ZONE_DOWN):
+        if after.zone in (LIMITED_BACKWARD, LIMITED_FORWARD):
+            return "current limited"
+        return "current stops" if after.zone == NO_CURRENT else "current starts"
     return hybrid.EVENT_NAMES[kind]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import CommandError, InputError, LoadError, ParameterError, UnknownNameError
 from servotwin.loads import Load, as_load
-from servotwin.models import BoundedServo, Model, PulseServo
+from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive
 from servotwin.parameters import GROUPS, Servo
 from servotwin.parameters.groups import check_columns
 from servotwin.signals import Signal
@@ -21,7 +21,7 @@ from servotwin.units import is_finite
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-LAWS: dict[type[Model], str] = {PulseServo: "pulse", BoundedServo: "bounded"}
+LAWS: dict[type[Model], str] = {PulseServo: "pulse", PulseServoInductive: "pulse", BoundedServo: "bounded"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +133,9 @@ def _check_name(model: Model, name: str) -> None:
 
 def _check_states(model: Model, start: Mapping[str, Any]) -> None:
     for name, value in start.items():
-        if name not in model.layout:
-            raise UnknownNameError(f"state of {type(model).__name__}", name, model.layout)
+        states = [place.name for place in model.states]
+        if name not in states:
+            raise UnknownNameError(f"state of {type(model).__name__}", name, states)
         good = np.isfinite(value)
         if not np.all(good):
             lane = int(np.argmin(good)) if np.ndim(value) else None

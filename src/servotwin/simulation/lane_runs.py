@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from servotwin.models.kernels import block_rows
 from servotwin.models.kernels.block_rows import Lanes, Outputs
 from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.hybrid import Plant
+from servotwin.models.kernels.plant import Plant
 from servotwin.simulation.compile import Recipe, kernels
-from servotwin.simulation.lanes import FIELDS, Floats, Raw, Work, empty_raw
+from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
 
 _BLOCKS = {
     dtype: Recipe(f"blocks_{dtype}", ("servotwin.models.kernels.blocks:run",), vector=True, single=dtype == "float32")
     for dtype in ("float64", "float32")
 }
 _WALKS = Recipe("walks", ("servotwin.models.kernels.walks:walk_lanes",))
-_FLOATS = ("angle", "speed", "error")
+_ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a walk leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
 
@@ -44,7 +44,7 @@ def run(work: Work) -> Raw:
 
 
 def _run_blocks(work: Work, lanes: Lanes, braked: bool, times: Floats, outputs: Outputs) -> None:
-    if len(lanes.angle):
+    if len(lanes.torque):
         room = np.zeros(block_rows.NUMBERS, work.dtype)
         kernels(_BLOCKS[work.dtype]).run(lanes, braked, float(work.duration), times, outputs, room,
                                          np.zeros(block_rows.TIMES), np.zeros(block_rows.INTEGERS, np.int64))
@@ -66,19 +66,21 @@ def _run_some(work: Work, lanes: Lanes, braked: bool, which: NDArray[np.int64], 
 
 def run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw) -> None:
     """Run some lanes one after the other, in float64."""
-    at_once = max(1, _ROOM // (5 * max(len(times), 1)))
+    at_once = max(1, _ROOM // (len(_ALL) * max(len(times), 1)))
     for start in range(0, len(which), at_once):
         part = which[start:start + at_once]
-        room, status, ended = np.zeros((len(part), 5, len(times))), np.zeros(len(part), np.int64), np.zeros(len(part))
+        room = np.zeros((len(part), len(_ALL), len(times)))
+        status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
         kernels(_WALKS).walk_lanes(
-            work.law == "pulse", lanes, _rows(work.torque.rows), _indices(work.torque.first),
-            _indices(work.torque.count), part, float(work.duration), times, room, status, ended)
+            work.law == "pulse", lanes, np.array(work.curve, np.float64), _rows(work.torque.rows),
+            _indices(work.torque.first), _indices(work.torque.count), part, float(work.duration), times, room,
+            status, ended)
         raw.status[part], raw.ended[part] = status, ended
         failed = (status != 0)[:, None] & (times >= ended[:, None])
-        for k, name in enumerate(FIELDS):
+        for k, name in enumerate(_ALL):
             if name in raw.fields:
                 with np.errstate(over="ignore"):
-                    raw.fields[name][part] = np.where(failed, np.nan if name in _FLOATS else 0, room[:, k])
+                    raw.fields[name][part] = np.where(failed, 0 if name in SMALL_FIELDS else np.nan, room[:, k])
 
 
 def side_by_side(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -90,8 +92,12 @@ def side_by_side(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[n
         kept = [((x == 0.0) | (abs(x.astype(np.float32)) > 0.0)).all(axis=0) for x in (lanes.plants, lanes.chips)]
     else:
         kept = [np.ones(work.lanes, np.bool_)]
-    plain = (plant.L == 0.0) & (plant.kappa == 0.0) & (plant.stiffness == 0.0) & (plant.gravity == 0.0)
-    side = np.logical_and.reduce([plain, plant.K_b > 0.0, work.torque.count == 0, *kept])
+    chip = Chip(*lanes.chips)
+    absent = (plant.L, plant.kappa, plant.stiffness, plant.gravity, plant.varies, plant.half_play, plant.half_slack,
+              plant.C_w, chip.step)
+    plain = [x == 0.0 for x in absent]
+    side = np.logical_and.reduce([*plain, plant.K_b > 0.0, np.isinf(plant.I_max), work.torque.count == 0, *kept])
+    side &= not work.curve[0]
     return np.asarray(side), np.asarray((plant.D_off == 0.0) & (plant.D_drive < plant.V))
 
 
@@ -100,8 +106,8 @@ def lanes_of(work: Work) -> Lanes:
     own = np.asarray(work.edges.rows, np.float64).reshape(-1)
     return Lanes(
         _columns(work.plant, work.lanes), _columns(work.chip or Chip(*([0.0] * len(Chip._fields))), work.lanes),
-        _column(work.constant_torque, work.lanes), _column(work.angle, work.lanes), _column(work.speed, work.lanes),
-        _indices(work.seeds), _rows(work.command.rows), _indices(work.command.first), _indices(work.command.count),
+        _own(work.start, np.float64), _column(work.constant_torque, work.lanes), _indices(work.seeds),
+        _rows(work.command.rows), _indices(work.command.first), _indices(work.command.count),
         _own(own, np.float64), _indices(work.edges.first), _indices(work.edges.count))
 
 
@@ -133,6 +139,6 @@ def _own(values: Any, kind: Any) -> NDArray[Any]:
 
 def outputs_of(work: Work, raw: Raw, given_up: NDArray[np.int8]) -> Outputs:
     """Return the arrays into which the kernels write."""
-    none = {name: np.zeros((0, 0), np.int8 if name in ("contact", "drive") else work.dtype) for name in FIELDS}
+    none = {name: np.zeros((0, 0), np.int8 if name in SMALL_FIELDS else work.dtype) for name in FIELDS}
     angle, speed, contact, drive, error = ({**none, **raw.fields}[name] for name in FIELDS)
     return Outputs(angle, speed, contact, drive, error, given_up)

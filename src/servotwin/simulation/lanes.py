@@ -10,13 +10,15 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from servotwin.models.kernels.frame import Chip
-    from servotwin.models.kernels.hybrid import Plant
+    from servotwin.models.kernels.plant import Plant
 
 Floats = NDArray[np.float64]
 Numbers = TypeVar("Numbers", bound=tuple[object, ...])
 
 FIELDS = ("angle", "speed", "contact", "drive", "error")
-_SMALL = ("contact", "drive")  # fields that are kept as int8
+MORE_FIELDS = ("current", "winding", "housing", "motor_angle", "motor_speed", "wiper", "mesh",
+               "motor")  # of the general walk alone
+SMALL_FIELDS = ("contact", "drive", "mesh", "motor")  # fields that are kept as int8
 
 
 @dataclass(frozen=True)
@@ -83,8 +85,8 @@ class Work:
         Added to it [N m]; positive pushes towards −q.
     edges : Tables
         Frame edges [s]; count −1: regular frames of `chip.frame_period`.
-    angle, speed : ndarray, shape (B,)
-        At t = 0 [rad, rad/s].
+    start : ndarray, shape (7, B)
+        The state at t = 0, as in `kernels.plant.Vector`.
     seeds : ndarray of int64, shape (B,)
         Of the noise.
     duration : float
@@ -92,10 +94,12 @@ class Work:
     times : ndarray, shape (T,)
         Output times [s], not decreasing, within [0, duration].
     fields : tuple of str
-        Of "angle" [rad], "speed" [rad/s], "contact" (`hybrid.FREE` … `hybrid.ON_UPPER`), "drive" (−1, 0, +1) and
-        "error" (of the latest decision [s]); only these are computed and kept.
+        Of "angle" [rad], "speed" [rad/s], "contact" (`kernels.plant.FREE` … `ON_UPPER`), "drive" (−1, 0, +1) and
+        "error" (of the latest decision [s]), or of `MORE_FIELDS`; only these are computed and kept.
     dtype : str
         "float64" or "float32".
+    curve : tuple
+        Angles [rad] and errors [V] of the potentiometer's linearity table, the same for all lanes.
     """
 
     law: str
@@ -105,18 +109,18 @@ class Work:
     torque: Tables
     constant_torque: float | Floats
     edges: Tables
-    angle: Floats
-    speed: Floats
+    start: Floats
     seeds: NDArray[np.int64]
     duration: float
     times: Floats
     fields: tuple[str, ...]
     dtype: str
+    curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
     @property
     def lanes(self) -> int:
         """Number of lanes."""
-        return len(self.angle)
+        return int(self.start.shape[1])
 
     def part(self, start: int, stop: int) -> Work:
         """Return the work of some lanes."""
@@ -126,7 +130,7 @@ class Work:
             self, plant=_sliced(self.plant, lanes), chip=None if self.chip is None else _sliced(self.chip, lanes),
             command=self.command.part(start, stop), torque=self.torque.part(start, stop),
             constant_torque=torque[lanes] if isinstance(torque, np.ndarray) and torque.ndim else torque,
-            edges=self.edges.part(start, stop), angle=self.angle[lanes], speed=self.speed[lanes],
+            edges=self.edges.part(start, stop), start=self.start[:, lanes],
             seeds=self.seeds[lanes])
 
 
@@ -158,7 +162,7 @@ class Raw:
 def empty_raw(work: Work) -> Raw:
     """Return the arrays that the kernels fill."""
     shape = (work.lanes, len(work.times))
-    kinds = {name: np.dtype(np.int8) if name in _SMALL else np.dtype(work.dtype) for name in work.fields}
+    kinds = {name: np.dtype(np.int8) if name in SMALL_FIELDS else np.dtype(work.dtype) for name in work.fields}
     return Raw({name: np.zeros(shape, kind) for name, kind in kinds.items()}, np.zeros(work.lanes, np.int8),
                np.full(work.lanes, work.duration))
 

@@ -6,9 +6,9 @@ import math
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import closing
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -20,6 +20,7 @@ from servotwin.simulation.batch import Batch, Failure
 from servotwin.simulation.lane_inputs import Lanes, lanes_of
 from servotwin.simulation.lanes import Raw, Work, run_lanes
 from servotwin.simulation.packing import Asked, Chunk, Commands, groups
+from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.simulator import _times
 from servotwin.simulation.status import Status
 from servotwin.units import is_finite
@@ -38,7 +39,6 @@ _LEAST_LANES = 256  # fewer do not pay for the way to a worker
 _CHUNK_BYTES = 16e6  # of a chunk's raw fields
 _CHUNK_FRAMES = 2e7  # of a chunk's lanes together: seconds, and an interrupt waits no longer
 
-Progress = bool | Callable[[int, int], object]
 Indices = NDArray[np.int64]
 
 
@@ -119,7 +119,7 @@ def simulate_many(
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
     own = _threads(os.getpid()) if executor is None else executor
-    with _shown(progress, lanes.count) as show, closing(_run(packs, asked, own)) as running:
+    with shown(progress, lanes.count, "simulate_many") as show, closing(_run(packs, asked, own)) as running:
         for which, raw, values in running:
             place: Any = which
             if which[-1] - which[0] == len(which) - 1:
@@ -310,19 +310,3 @@ def _chunks(packs: list[_Pack], asked: Asked) -> Iterator[tuple[Chunk, Work]]:
 def _threads(process: int) -> ThreadPoolExecutor:
     """Return the threads of this process, kept from call to call; a forked child has none of its parent's."""
     return ThreadPoolExecutor(_workers(None), thread_name_prefix="servotwin")
-
-
-@contextmanager
-def _shown(progress: Progress, total: int) -> Iterator[Callable[[int], None]]:
-    """Give a function that is told how many lanes are done."""
-    if callable(progress):
-        yield lambda done: (progress(done, total), None)[1]
-    elif not progress:
-        yield lambda done: None
-    else:
-        from rich.console import Console
-        from rich.progress import Progress as Bar
-
-        with Bar(console=Console(file=sys.stderr), transient=True) as bar:
-            task = bar.add_task("simulate_many", total=total)
-            yield lambda done: bar.update(task, completed=done)

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
+from servotwin.models.kernels.plant import Plant
 from servotwin.models.outputs import FIELDS as FIELDS_OF
 from servotwin.simulation.lane_inputs import LAWS, Lanes
 from servotwin.simulation.lane_loads import LOAD_NAMES, column_load, recorded_torque, structure
-from servotwin.simulation.lanes import FIELDS, Raw, Tables, Work, no_tables, regular_edges
+from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Raw, Tables, Work, no_tables, regular_edges
+from servotwin.simulation.start import check_start, start_vector
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+_LOWER, _UPPER, _PLAY = (Plant._fields.index(name) for name in ("lower", "upper", "half_play"))
 _MOST_FRAMES = 1e8  # of a lane: they take half a minute, in which nothing stops a kernel
 
 
@@ -154,14 +157,19 @@ class Chunk:
         return cast("LanePieces", self.model.command(cast("Any", self.commands.signal(self.which))))
 
     @cached_property
-    def start(self) -> tuple[Array, Array]:
-        """Angle and speed at t = 0 [rad, rad/s], shape (n,)."""
+    def plant(self) -> Any:
+        """The numbers of the plants, each a number or a column."""
+        with np.errstate(all="ignore"):
+            return self.model.pack(self.load)
+
+    @cached_property
+    def start(self) -> Array:
+        """The states at t = 0, shape (7, n)."""
         before = cast("LanePieces", self.model.command(cast("Any", self.commands.before(self.which))))
-        values = [self.model.start_angle(cast("Any", before.initial)), 0.0]
-        for name, column in self.lanes.initial.items():
-            values[self.model.layout.index(name)] = cast("Any", column[self.which if len(column) > 1 else [0], None])
-        return cast("tuple[Array, Array]", tuple(
-            np.ascontiguousarray(np.broadcast_to(x, (len(self.which), 1))[:, 0]) for x in values))
+        initial = {name: column[self.which if len(column) > 1 else [0], None]
+                   for name, column in self.lanes.initial.items()}
+        y = start_vector(self.model.states, self.plant, self.model.start_angle(cast("Any", before.initial)), initial)
+        return np.array([np.broadcast_to(x, (len(self.which), 1))[:, 0] for x in y], dtype=np.float64)
 
     def check(self, duration: float) -> None:
         """Raise where a command, an initial value or a load is not possible; names the lane."""
@@ -179,16 +187,19 @@ class Chunk:
             k = int(np.argmax(frames > _MOST_FRAMES))
             raise InputError(f"duration / frame period of lane {self.which[k]}", got=f"{frames[k]:.3g} frames",
                              allowed=f"at most {_MOST_FRAMES:.0e} in one run")
-        name = self.model.layout[0]
-        if name not in self.lanes.initial:
-            return  # it starts between the stops
-        angle, plant = self.start[0], self.model.pack(self.load)
-        lower, upper = (np.broadcast_to(_flat(x), angle.shape) for x in (plant.lower, plant.upper))
-        outside = ~((angle >= lower) & (angle <= upper))
-        if outside.any():
-            k = int(np.argmax(outside))
-            raise InputError(f"initial {name} of lane {self.which[k]}", got=float(angle[k]),
-                             allowed=f"{lower[k]:.6g} to {upper[k]:.6g} rad, between the stops")
+        if not self.lanes.initial:
+            return  # it starts between the stops, and the motor in the middle of its play
+        plant = [np.broadcast_to(_flat(x), self.which.shape) for x in self.plant]
+        start = self.start
+        with np.errstate(invalid="ignore"):
+            inside = (start[0] >= plant[_LOWER]) & (start[0] <= plant[_UPPER]) & (plant[_PLAY] == 0.0)
+        for k in np.flatnonzero(~inside).tolist():
+            one = type(self.plant)(*(float(x[k]) for x in plant))
+            try:
+                check_start(self.model.states, one, start[:, k].tolist())
+            except InputError as error:
+                raise InputError(f"{error.what} of lane {self.which[k]}", got=error.got,
+                                 allowed=error.allowed) from None
 
     @cached_property
     def chip(self) -> Any:
@@ -207,9 +218,7 @@ class Chunk:
     def work(self, asked: Asked, fields: tuple[str, ...]) -> Work:
         """Return what the kernels need."""
         with np.errstate(all="ignore"):
-            plant = self.model.pack(self.load)
-            chip = self.chip
-            angle, speed = self.start
+            plant, chip = self.plant, self.chip
             command = Tables(*self.drive.tables())
         torque = no_tables(len(self.which))
         if any(load.recorded for load in self._of_loads[0]):
@@ -219,8 +228,8 @@ class Chunk:
         return Work(law=LAWS[type(self.model)], plant=type(plant)(*map(_flat, plant)),
                     chip=None if chip is None else type(chip)(*map(_flat, chip)), command=command, torque=torque,
                     constant_torque=_flat(self.load.torque), edges=self.commands.frame_edges(self.which),
-                    angle=angle, speed=speed, seeds=self.lanes.seeds[self.which], duration=asked.duration,
-                    times=asked.times, fields=fields, dtype=asked.dtype)
+                    start=self.start, seeds=self.lanes.seeds[self.which], duration=asked.duration,
+                    times=asked.times, fields=fields, dtype=asked.dtype, curve=self.model.curve())
 
     def fields(self, asked: Asked) -> tuple[str, ...]:
         """Return the raw fields that the outputs read: those that they look at when they are computed for one lane."""
@@ -229,13 +238,13 @@ class Chunk:
         with np.errstate(all="ignore"):
             for name in asked.outputs:
                 one.model.output(name, cast("Samples", probe), cast("Any", one.drive), one.load)
-        return tuple(field for field in FIELDS if field in probe.seen) or FIELDS[:1]
+        return tuple(field for field in (*FIELDS, *MORE_FIELDS) if field in probe.seen) or FIELDS[:1]
 
     def outputs(self, asked: Asked, raw: Raw) -> dict[str, Array]:
         """Return the outputs (SI), each broadcastable to (n, T)."""
         fields: Mapping[str, Any] = {name: values if values.dtype.kind == "i" else values.astype(np.float64, copy=False)
                                      for name, values in raw.fields.items()}
-        samples = cast("Samples", SimpleNamespace(time=asked.times, current=math.nan, **fields))
+        samples = cast("Samples", SimpleNamespace(time=asked.times, **fields))
         gone = None
         if raw.status.any():
             gone = (raw.status != 0)[:, None] & (asked.times > raw.ended[:, None])
@@ -251,17 +260,15 @@ class Chunk:
 class _Probe:
     """Samples of one lane that remember which fields were read."""
 
-    current = math.nan  # no model here has it as a state
-
     def __init__(self, time: Array) -> None:
         self.time = time
         self.seen: set[str] = set()
 
     def __getattr__(self, name: str) -> NDArray[Any]:
-        if name not in FIELDS:
+        if name not in FIELDS and name not in MORE_FIELDS:
             raise AttributeError(name)
         self.seen.add(name)
-        return np.zeros((1, len(self.time)), dtype=np.int8 if name in ("contact", "drive") else np.float64)
+        return np.zeros((1, len(self.time)), dtype=np.int8 if name in SMALL_FIELDS else np.float64)
 
 
 def _flat(value: Any) -> Any:

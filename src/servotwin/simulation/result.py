@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.errors import MissingExtraError, SimulationError
-from servotwin.models.kernels.motion import STEP
+from servotwin.models.kernels.motion import is_step
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
 from servotwin.simulation import files
@@ -125,7 +125,7 @@ class Result:
     @cached_property
     def stats(self) -> Stats:
         """How the solution was found."""
-        closed = [segment.motion.kind != STEP for segment in self.trajectory.segments]
+        closed = [not is_step(segment.motion) for segment in self.trajectory.segments]
         method = "closed form" if all(closed) else "integrated" if not any(closed) else "closed form and integrated"
         return Stats(method, len(closed), len(self.events))
 

@@ -12,11 +12,14 @@ import numpy as np
 from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
 from servotwin.loads import as_load
 from servotwin.models import Model
+from servotwin.models.kernels import walk
+from servotwin.models.kernels.plant import INSIDE, RIGID
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
 from servotwin.simulation.engine import Plan, Record, State
 from servotwin.simulation.result import Result
+from servotwin.simulation.start import check_start, start_vector
 from servotwin.simulation.status import Status
 from servotwin.simulation.trajectory import Trajectory
 from servotwin.units import is_finite
@@ -84,20 +87,19 @@ class Simulator:
         drive = self.drive(command)
         before = drive.table[0]._replace(value=command.initial, slope=0.0, amplitude=0.0)
         start = self.model.command(replace(command, pieces=Pieces((before,))))
-        values = [self.model.start_angle(start.table[0].value), 0.0, 0.0]
+        angle = float(self.model.start_angle(start.table[0].value))
         if initial is not None and not isinstance(initial, Mapping):
             raise InputError("initial", got=initial, allowed="a mapping of state names to numbers (SI)")
         for name, value in (initial or {}).items():
-            if name not in self.model.layout:
-                raise UnknownNameError(f"state of {type(self.model).__name__}", name, self.model.layout)
+            if name not in (place.name for place in self.model.states):
+                raise UnknownNameError(f"state of {type(self.model).__name__}", name,
+                                       [place.name for place in self.model.states])
             if not is_finite(value):
                 raise InputError(f"initial {name}", got=value, allowed="a finite number (SI)")
-            values[self.model.layout.index(name)] = float(value)
-        if not self._plant.lower <= values[0] <= self._plant.upper:
-            raise InputError(f"initial {self.model.layout[0]}", got=values[0],
-                             allowed=f"{self._plant.lower:.6g} to {self._plant.upper:.6g} rad, between the stops")
-        y = (values[0], values[1], values[2])
-        return State(time=0.0, names=self.model.layout, values=y)
+        y = start_vector(self.model.states, self._plant, angle, initial or {})
+        check_start(self.model.states, self._plant, y)
+        mesh = INSIDE if self._plant.half_play > 0.0 else RIGID
+        return State(time=0.0, places=self.model.states, point=walk.started(y, mesh))
 
     def advance(self, state: State, until: float, command: Signal, *, external_torque: float = 0.0) -> State:
         """Return the state at `until` [s] under a command.
@@ -126,9 +128,10 @@ class Simulator:
              record: Record | None) -> State:
         if not isinstance(state, State):
             raise InputError("advance(state)", got=state, allowed="a state of this simulator")
-        if state.names != self.model.layout:
+        if state.places != self.model.states:
+            own = ", ".join(place.name for place in self.model.states)
             raise InputError("advance(state)", got=f"a state of {', '.join(state.names)}",
-                             allowed=f"one of {', '.join(self.model.layout)}, as {type(self.model).__name__} has")
+                             allowed=f"one of {own}, as {type(self.model).__name__} has")
         if not (is_finite(until) and until >= state.time):
             raise InputError("advance(until)", got=until, allowed=f"a finite time from {state.time:g} s on")
         if not is_finite(external_torque):
@@ -136,7 +139,7 @@ class Simulator:
         self.load.check_span(state.time, until)
         torque = self._torque.scaled(1.0, external_torque) if external_torque else self._torque
         plan = Plan(self._plant, self.drive(command), torque, self.model.chip(command), self.model.edges(command),
-                    self.seed)
+                    self.seed, self.model.curve())
         return engine.run(plan, state, float(until), record)
 
 

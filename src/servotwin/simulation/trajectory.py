@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.kernels import motion
 from servotwin.models.samples import Samples
+from servotwin.physics.backlash import play
 from servotwin.simulation.engine import Segment
 
 Array = NDArray[np.float64]
@@ -33,17 +34,18 @@ class Trajectory:
         t = np.asarray(time, dtype=np.float64)
         if not self.segments:
             nothing = np.full(t.size, math.nan)
-            return Samples.make(t, np.tile(nothing, (3, 1)), *np.zeros((4, t.size)))
+            return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((4, t.size)), *np.zeros((2, t.size)))
         index = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
         return self._states(t, index)
 
     def inside(self, index: int, time: Array) -> Samples:
         """Return the state at `time` [s] by the motion of one segment, its end included."""
-        return self._states(time, np.full(time.size, index))
+        segment = self.segments[index]  # by rounding, a time may lie just outside
+        return self._states(np.clip(time, segment.start, segment.end), np.full(time.size, index))
 
     def _states(self, t: Array, index: NDArray[np.intp]) -> Samples:
-        y = np.full((3, t.size), math.nan)
-        zone, contact, drive, error = np.zeros((4, t.size))
+        y = np.full((7, t.size), math.nan)
+        mode, wiper, drive, error = np.zeros((4, t.size)), *np.zeros((3, t.size))
         for k in np.unique(index):
             segment = self.segments[k]
             where = np.flatnonzero((index == k) & (t <= segment.end) & (t >= segment.start))
@@ -51,9 +53,10 @@ class Trajectory:
                 continue
             s = t[where] - segment.anchor
             y[:, where] = _states(segment.motion, s)
-            zone[where], contact[where] = segment.motion.mode
+            mode[:, where] = np.array(segment.motion.mode)[:, None]
             drive[where], error[where] = segment.drive, segment.error
-        return Samples.make(t, y, zone, contact, drive, error)
+            wiper[where] = play(segment.wiper, y[0, where], 2.0 * segment.motion.plant.half_slack)
+        return Samples.make(t, y, wiper, mode, drive, error)
 
     def intervals(self, index: int) -> Array:
         """Return the ends of short intervals of one segment, in each of which all signals are smooth and gentle."""
@@ -88,6 +91,6 @@ class Trajectory:
 
 
 def _states(m: motion.Motion, s: Array) -> Array:
-    """Return the states (q, w, i) of a motion at times s after its anchor, shape (3, n)."""
+    """Return the states of a motion at times s after its anchor, shape (7, n)."""
     m = motion.prepared(m)
     return np.array([motion.state(m, x) for x in s.tolist()]).T

@@ -167,16 +167,20 @@ def _count_offsets(volts: list[float], counts: list[float], gain: float) -> benc
 def _printed(study: Study) -> tuple[Finding, ...]:
     per_millivolt = 1e-3 / study.fits["V_o(t_a)"].line.slope
     angle = 1e-3 / study.fits["V_o(q)"].line.slope
+    common = study.vibration.circuits["common"].still
     return (
         Finding("Fig. 12: the supply", "The circuit labels the output of an LM2940-CT5 “+6 V”; by its name this is the "
                 "5 V version. The voltage at the motor is stated nowhere else.",
                 f"{number(study.supply)} V is used (the label)"),
         Finding("Conclusion: vibration", "The servo vibrated until motor and electronics had separate supplies. (38) "
-                "has no path from supply to feedback. The pulse servo has one, a supply coupling, for which there is "
-                "no value; it acts only where the bridge still drives as the chip measures, far from the target. So "
-                "nothing in this report vibrates.",
+                "has no path from the supply to the motion. The pulse servo has one in its chip, a supply coupling, "
+                "for which there is no value; it acts only where the bridge still drives as the chip measures, far "
+                "from the target, and does not vibrate. The path through the command does: <a href=\"#vibration\">the "
+                "experiment</a>.",
                 f"the drive lasts until the next pulse only beyond an error of {fixed(_lasting_error(study), 1)}°; "
-                f"scale: 1 mV at the potentiometer is {fixed(per_millivolt, 2)} µs or {fixed(angle, 3)}°"),
+                f"scale: 1 mV at the potentiometer is {fixed(per_millivolt, 2)} µs or {fixed(angle, 3)}°; "
+                f"command on the same soft supply: {fixed(math.degrees(common.swing), 1)}° at "
+                f"{fixed(common.frequency, 0)} Hz"),
         Finding("A word", "ADC_i and ADC_o are called values of a “digital-analog” converter. They are counts of "
                 "analog-digital converters.", "no number: a slip"),
         Finding("No parameter values", "The paper publishes no value of k<sub>a</sub>, k<sub>b</sub>, R<sub>a</sub>, "

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from servotwin import __version__
-from servotwin.cli.paper import linear, tables
+from servotwin.cli.paper import linear, tables, vibration_page
 from servotwin.cli.paper.findings import corrections, disagreements
 from servotwin.cli.paper.study import LABELS, LOAD_INERTIA, SERVO, BenchStudy, Study
 from servotwin.cli.paper.words import escape, fixed, number, picture, plain
@@ -53,6 +53,7 @@ figure.wide img.drawing{max-width:100%}a{color:inherit;text-decoration:none}}
 _SECTIONS = (
     ("summary", "Summary"), ("values", "What the paper does not give"), ("step", "The step from 0 to 180°"),
     ("bench", "The bench"), ("measured", "Measured beside simulated"), ("fits", "Straight lines through Table II"),
+    ("vibration", "The vibration of the first implementation"),
     ("models", "Block diagrams and transfer functions"), ("corrections", "Corrections to the paper"),
     ("disagreements", "Disagreements and gaps in its data"), ("parameters", "Parameters and where they come from"),
     ("files", "Files beside this report"),
@@ -64,7 +65,8 @@ def page(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) ->
     parts = {
         "summary": _summary(study), "values": _values(study), "step": _step(study, pictures, svg),
         "bench": _bench(study, pictures, svg), "measured": _measured(study, pictures, svg),
-        "fits": _fits(study), "models": _models(study, pictures, svg),
+        "fits": _fits(study), "vibration": vibration_page.section(study, lambda names: _figures(names, pictures, svg)),
+        "models": _models(study, pictures, svg),
         "corrections": tables.findings_table(corrections(study), "What the equations need"),
         "disagreements": tables.findings_table(disagreements(study), "What the data say"),
         "parameters": _parameters(study), "files": _files(pictures),
@@ -91,6 +93,7 @@ Simulations and Experimental Results”, <cite>Canadian Journal on Automation, C
 def _summary(study: Study) -> str:
     peak = study.peak_voltage["averaged"]
     bounded, pulse = study.on_bench["bounded"], study.on_bench["pulse"]
+    common, apart = (study.vibration.circuits[name].still for name in ("common", "separate"))
     cards = []
     for name, one in study.on_bench.items():
         cards.append((f"{fixed(math.degrees(one.worst('output_angle')), 2)}°, "
@@ -110,6 +113,10 @@ def _summary(study: Study) -> str:
         (f"{bounded.rows[0].reading.pulse_rate:.3f} Hz",
          "pulse rate of the bench, 1024 steps of 16 µs; the paper prints 61"),
     ]
+    cards.append((f"{fixed(math.degrees(common.swing), 1)}° at {fixed(common.frequency, 0)} Hz against "
+                  f"{fixed(math.degrees(apart.swing), 2)}°",
+                  "swing of the shaft at a constant command, with servo and control circuit on one soft supply and "
+                  "with separate ones"))
     listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
     share = max(abs(s.rest) + abs(s.standing) for one in (bounded, pulse) for s in one.angle_shares)
     return f"""<ul class="numbers">{listed}</ul>

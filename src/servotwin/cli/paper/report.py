@@ -120,11 +120,12 @@ def _remove_empty(folders: Sequence[Path]) -> None:
 
 def _write_all(folder: Path, tell: Callable[[str, float], None]) -> dict[str, float]:
     from servotwin import plotting
-    from servotwin.cli.paper import figures
+    from servotwin.cli.paper import figures, vibration_page
     from servotwin.cli.paper.page import page
 
     study = run_study(tell)
-    pictures = figures.pictures(study, lambda done: tell("drawing", 0.25 + 0.3 * done))
+    pictures = (*figures.pictures(study, lambda done: tell("drawing", 0.25 + 0.3 * done)),
+                *vibration_page.pictures(study))
     (folder / "figures").mkdir()
     (folder / "data").mkdir()
     svg: dict[str, bytes] = {}

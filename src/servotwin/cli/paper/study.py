@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from servotwin import bench, signals
+from servotwin.cli.paper.vibration import VibrationStudy, run_vibration
 from servotwin.loads import Inertia
 from servotwin.models import AveragedServo, BoundedServo, PulseServo
 from servotwin.parameters import load_dataset, load_servo
@@ -87,6 +88,8 @@ class Study:
         By model.
     offsets : Interval
         Zero offsets of the converter that give all five pulse widths [counts].
+    vibration : VibrationStudy
+        Servo and control circuit on one supply, and apart.
     """
 
     servo: Servo
@@ -99,6 +102,7 @@ class Study:
     measured_shares: tuple[Shares, ...]
     on_bench: Mapping[str, BenchStudy]
     offsets: Interval
+    vibration: VibrationStudy
 
     @property
     def supply(self) -> float:
@@ -153,12 +157,14 @@ def run_study(progress: Progress) -> Study:
     fits = bench.table_fits(table)
     progress("measuring on the simulated bench", 0.15)
     at_bench = bench.bench_servo(servo)
+    on_bench = {name: _bench(model(at_bench), table, fits) for name, model in MODELS.items()}
+    progress("letting it vibrate on a common supply", 0.20)
     return Study(
         servo=servo, table=table, ranges=ranges, steps=steps,
         metrics={name: step.step_metrics() for name, step in steps.items()},
         peak_voltage={name: step.peak("armature_voltage") for name, step in steps.items()},
         fits=fits, measured_shares=bench.measured_shares(fits),
-        on_bench={name: _bench(model(at_bench), table, fits) for name, model in MODELS.items()},
+        on_bench=on_bench, vibration=run_vibration(at_bench, on_bench["pulse"].rows),
         offsets=bench.zero_offset_interval(table["V_i_V"].tolist(), [1e-6 * t for t in table["t_a_us"].tolist()]))
 
 
@@ -201,6 +207,10 @@ def headline_numbers(study: Study) -> dict[str, float]:
         numbers[f"{name}_peak_armature_voltage_V"] = study.peak_voltage[name]
     numbers["averaged_peak_voltage_over_supply"] = study.peak_voltage["averaged"] / study.supply
     numbers["bench_pulse_rate_Hz"] = study.on_bench["bounded"].rows[0].reading.pulse_rate
+    for circuit in ("common", "separate"):
+        still = study.vibration.circuits[circuit].still
+        numbers[f"{circuit}_supply_swing_deg"] = math.degrees(still.swing)
+        numbers[f"{circuit}_supply_swings_per_s"] = still.frequency
     numbers["converter_offset_lower_counts"], numbers["converter_offset_upper_counts"] = study.offsets
     return {name: round(value, 9) for name, value in numbers.items()}  # 4e-13 µs is rounding and no difference
 

@@ -86,7 +86,7 @@ def measure_voltages(size: int, s: Numbers) -> None:
         R = s[at.R_OFF + j] if off else s[at.R_DRIVE + j]
         x = drive * chip.V_oc - back_emf
         i = (x - math.copysign(D, x)) / R if abs(x) > D else 0.0
-        v_m, V_bus = frame.terminal_voltage(chip, drive, back_emf, i)
+        v_m, V_bus = _terminal_voltage(chip, drive, back_emf, i)
         s[at.V_M + j] = v_m
         s[at.V_BUS + j] = V_bus
 
@@ -107,7 +107,7 @@ def _plan_lane(chip: Chip, v_m: float, V_bus: float, draw: float, s: Numbers, j:
     """Measure, decide, and divide the window into its phases."""
     width, window, remaining = s[at.WIDTH + j], s[at.WINDOW + j], s[at.REMAINING + j]
     drive = s[at.DRIVE + j]
-    new = frame.decide(chip, 0.0, width, s[at.Q + j], v_m, V_bus, draw)
+    new = frame.decide(chip, 0.0, width, chip.p * s[at.Q + j] + chip.b_o, v_m, V_bus, draw)
     valid = frame.accepted(chip, width) and s[at.EDGE + j] != 0.0
     clock = chip.timeout if valid else s[at.CLOCK + j]
     decision = new.time if valid else math.inf
@@ -143,3 +143,13 @@ def wanted(size: int, t: Numbers) -> int:
     for j in range(size):
         wanted += 1 if t[at.OUTPUT + j] < t[at.NEXT + j] else 0
     return wanted
+
+
+def _terminal_voltage(chip: Chip, drive: float, back_emf: float, i: float) -> tuple[float, float]:
+    """Return v_m at the motor's terminals and V_bus of the supply, for the current i."""
+    if i != 0.0:
+        v_m = back_emf + chip.R_a * i + math.copysign(chip.V_br, i)
+        if drive != 0.0:
+            return v_m, chip.V_oc - chip.R_b * drive * i
+        return v_m, chip.V_oc + (chip.R_b * abs(i) if chip.coast > 0.0 else 0.0)
+    return (back_emf if drive != 0.0 or chip.coast > 0.0 else 0.0), chip.V_oc

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.models.kernels import legs
 from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.hybrid import Plant
 from servotwin.models.kernels.legs import Shaft
+from servotwin.models.kernels.plant import Plant
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,11 +56,10 @@ INTEGERS = 6 * BLOCK
 class Lanes(NamedTuple):
     """What comes in, for all lanes of a chunk; each array has a column or an entry for each lane."""
 
-    plants: Numbers  # (28, B), fields of Plant
-    chips: Numbers  # (20, B), fields of Chip
+    plants: Numbers  # (49, B), fields of Plant
+    chips: Numbers  # (22, B), fields of Chip
+    start: Numbers  # (7, B), numbers of the state at t = 0
     torque: Numbers
-    angle: Numbers
-    speed: Numbers
     seeds: Indices
     pieces: Numbers  # (n, 7)
     piece_first: Indices
@@ -95,8 +94,8 @@ def fill_shafts(plants: Numbers, torque: Numbers, start: int, size: int, s: Numb
 
 def fill(lanes: Lanes, lane: int, j: int, s: Numbers, t: Numbers, n: Indices) -> None:
     """Put a lane's state and the places of its command into column j of the block."""
-    s[Q + j] = lanes.angle[lane]
-    s[W + j] = lanes.speed[lane]
+    s[Q + j] = lanes.start[0, lane]
+    s[W + j] = lanes.start[1, lane]
     s[DRIVE + j] = s[LEFT + j] = s[ERROR + j] = s[LOST + j] = s[DRAW + j] = s[NEW_ERROR + j] = 0.0
     s[CLOCK + j] = math.inf
     t[PERIOD + j] = lanes.chips[14, lane]
@@ -118,7 +117,9 @@ def plant_at(c: Numbers, j: int) -> Plant:
     """Return the plant in column j."""
     return Plant(c[0, j], c[1, j], c[2, j], c[3, j], c[4, j], c[5, j], c[6, j], c[7, j], c[8, j], c[9, j], c[10, j],
                  c[11, j], c[12, j], c[13, j], c[14, j], c[15, j], c[16, j], c[17, j], c[18, j], c[19, j], c[20, j],
-                 c[21, j], c[22, j], c[23, j], c[24, j], c[25, j], c[26, j], c[27, j])
+                 c[21, j], c[22, j], c[23, j], c[24, j], c[25, j], c[26, j], c[27, j], c[28, j], c[29, j], c[30, j],
+                 c[31, j], c[32, j], c[33, j], c[34, j], c[35, j], c[36, j], c[37, j], c[38, j], c[39, j], c[40, j],
+                 c[41, j], c[42, j], c[43, j], c[44, j], c[45, j], c[46, j], c[47, j], c[48, j])
 
 
 def _put_shaft(shaft: Shaft, s: Numbers, j: int) -> None:
@@ -176,7 +177,7 @@ def chip_at(s: Numbers, j: int) -> Chip:
         s[c], s[c + BLOCK], s[c + 2 * BLOCK], s[c + 3 * BLOCK], s[c + 4 * BLOCK], s[c + 5 * BLOCK],
         s[c + 6 * BLOCK], s[c + 7 * BLOCK], s[c + 8 * BLOCK], s[c + 9 * BLOCK], s[c + 10 * BLOCK],
         s[c + 11 * BLOCK], s[c + 12 * BLOCK], s[c + 13 * BLOCK], s[c + 14 * BLOCK], s[c + 15 * BLOCK],
-        s[c + 16 * BLOCK], s[c + 17 * BLOCK], s[c + 18 * BLOCK], s[c + 19 * BLOCK])
+        s[c + 16 * BLOCK], s[c + 17 * BLOCK], s[c + 18 * BLOCK], s[c + 19 * BLOCK], 0.0, 0.0)
 
 
 def plain_chip_at(s: Numbers, j: int) -> Chip:
@@ -184,4 +185,4 @@ def plain_chip_at(s: Numbers, j: int) -> Chip:
     c = CHIP + j
     return Chip(s[c], s[c + BLOCK], s[c + 2 * BLOCK], s[c + 3 * BLOCK], 0.0, 0.0, 0.0, s[c + 7 * BLOCK],
                 s[c + 8 * BLOCK], s[c + 9 * BLOCK], 0.0, s[c + 11 * BLOCK], s[c + 12 * BLOCK], s[c + 13 * BLOCK],
-                0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+                0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 from servotwin.models.kernels import block_phases, block_plan, legs
 from servotwin.models.kernels import block_rows as at
-from servotwin.models.kernels.hybrid import BACKWARD, FORWARD, FREE, STUCK
 from servotwin.models.kernels.legs import Shaft
 from servotwin.models.kernels.noise import gaussian
+from servotwin.models.kernels.plant import BACKWARD, FORWARD, FREE, STUCK
 
 if TYPE_CHECKING:
     from servotwin.models.kernels.block_rows import Indices, Lanes, Numbers, Outputs
@@ -27,7 +27,7 @@ def run(lanes: Lanes, braked: bool, duration: float, times: Numbers, outputs: Ou
     `s`, `t` and `n` are room for at.NUMBERS, at.TIMES and at.INTEGERS numbers.
     """
     start = 0
-    total = lanes.angle.size
+    total = lanes.torque.size
     while start < total:
         size = min(at.BLOCK, total - start)
         run_block(lanes, start, size, braked, duration, times, outputs, s, t, n)

@@ -9,20 +9,21 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.kernels import first_order, hybrid
-from servotwin.models.kernels.motion import FIRST_ORDER, REST, Motion, acceleration, monotone_until, prepared, state
-from servotwin.models.kernels.rodas import Vector, not_constant
+from servotwin.models.kernels import armature, first_order, hybrid
+from servotwin.models.kernels.motion import FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
+from servotwin.models.kernels.plant import FREE, RIGID, Vector
+from servotwin.models.kernels.rodas import not_constant
 from servotwin.physics.pieces import piece_rate, piece_value
 
 _BELOW = -1e-13  # a guard counts as crossed below this (V, rad, rad/s, N m): rounding is not an event
-_KINDS = 9
 
 
 def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int]:
     """Return the time since the anchor and the kind of the first event in (s0, s1]; (inf, -1) where none is."""
     if kinds == 0 or (motion.kind == REST and not not_constant(motion.u) and not not_constant(motion.tau)):
         return math.inf, -1
-    if motion.kind == FIRST_ORDER and motion.plant.V > 0.0 and motion.mode.contact != hybrid.FREE:
+    alone = motion.mode.contact != FREE and motion.mode.mesh == RIGID
+    if motion.kind == FIRST_ORDER and motion.plant.V > 0.0 and alone:
         return _outright(motion, kinds, s0, s1)
     left, at_left = s0, state(motion, s0)
     while left < s1:
@@ -68,17 +69,23 @@ def _boundary_speed(motion: Motion, kind: int) -> float:
     if kind == hybrid.SPEED:
         return 0.0
     u = motion.u.value
-    low, high = hybrid.zone_limits(motion.plant, motion.mode.zone, u)
+    low, high = armature.zone_limits(motion.plant, motion.mode.zone, u)
     return (u - (high if kind == hybrid.ZONE_UP else low)) / motion.plant.K_b
 
 
 def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b: Vector) -> tuple[float, int]:
     """Return when the first of several guards falls below zero in [a, b], and which; (inf, -1) where none does."""
     first, found = math.inf, -1
-    for kind in range(_KINDS):
+    for kind in range(hybrid.MOTOR_RELEASE_BACKWARD + 1):
+        if kinds >> kind == 0:
+            break
         if not kinds >> kind & 1:
             continue
-        s = _crossing(motion, kind, a, _guard(motion, kind, a, at_a), b, _guard(motion, kind, b, at_b))
+        begin, end = _guard(motion, kind, a, at_a), _guard(motion, kind, b, at_b)
+        if end[0] >= _BELOW and not begin[1] < 0.0 < end[1]:
+            continue  # it does not fall below zero, nor dip there
+        motion = prepared(motion)
+        s = _crossing(motion, kind, a, begin, b, end)
         if s < first:
             first, found = s, kind
     return first, found
@@ -87,10 +94,9 @@ def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b
 def _guard(motion: Motion, kind: int, s: float, y: Vector) -> tuple[float, float]:
     """Return a guard and its rate at s, where the state is y."""
     t = motion.t0 + s
-    dw, di = acceleration(motion, s, y)
     u, tau = motion.u, motion.tau
     return hybrid.guard(motion.plant, motion.mode, kind, piece_value(u, t), piece_rate(u, t), piece_value(tau, t),
-                        piece_rate(tau, t), y[0], y[1], y[2], dw, di)
+                        piece_rate(tau, t), y, rates(motion, s, y))
 
 
 def _at(motion: Motion, kind: int, s: float, rate: bool) -> tuple[float, float]:
@@ -101,10 +107,10 @@ def _at(motion: Motion, kind: int, s: float, rate: bool) -> tuple[float, float]:
 
 def _crossing(motion: Motion, kind: int, a: float, at_a: tuple[float, float], b: float,
               at_b: tuple[float, float]) -> float:
-    """Return where a guard with at most one turning point in [a, b] falls below zero; inf where it does not."""
-    if at_b[0] >= _BELOW and not at_a[1] < 0.0 < at_b[1]:
-        return math.inf
-    motion = prepared(motion)
+    """Return where a guard with at most one turning point in [a, b] falls below zero; inf where it does not.
+
+    The motion is `prepared`; the guard ends below zero, or falls at a and rises at b.
+    """
     if at_b[0] >= _BELOW:
         # It may dip below zero and come back: look at the lowest point.
         b = _root(motion, kind, a, b, at_a[1], at_b[1], True)

@@ -41,6 +41,8 @@ class Chip(NamedTuple):
     V_br: float
     V_oc: float
     coast: float  # 1: the bridge opens between drives; 0: it brakes
+    step: float  # V from one step of the potentiometer to the next; 0: none
+    half_slack: float  # rad, of the play between output and potentiometer
 
 
 class Decision(NamedTuple):
@@ -83,19 +85,34 @@ def drive_time(u: float, K: float, t_min: float, tau_s: float) -> float:
     return t_min + K * u
 
 
-def terminal_voltage(chip: Chip, drive: float, back_emf: float, i: float) -> tuple[float, float]:
-    """Return v_m at the motor's terminals and V_bus of the supply, for the current i."""
-    if i != 0.0:
-        v_m = back_emf + chip.R_a * i + math.copysign(chip.V_br, i)
-        if drive != 0.0:
-            return v_m, chip.V_oc - chip.R_b * drive * i
-        return v_m, chip.V_oc + (chip.R_b * abs(i) if chip.coast > 0.0 else 0.0)
-    return (back_emf if drive != 0.0 or chip.coast > 0.0 else 0.0), chip.V_oc
+def feedback_voltage(chip: Chip, curve: Sequence[Sequence[float]] | NDArray[np.float64], q: float) -> float:
+    """Return v_o [V] of the potentiometer with its wiper at q; `curve` has angles and errors of its linearity."""
+    v_o = chip.p * q + chip.b_o
+    if len(curve[0]) > 0:
+        v_o += _interpolated(curve, q)
+    if chip.step > 0.0:
+        v_o = chip.step * math.floor(v_o / chip.step + 0.5)
+    return v_o
 
 
-def decide(chip: Chip, time: float, t_in: float, q: float, v_m: float, V_bus: float, draw: float) -> Decision:
+def _interpolated(curve: Sequence[Sequence[float]] | NDArray[np.float64], q: float) -> float:
+    angles, errors = curve[0], curve[1]
+    if q <= angles[0]:
+        return errors[0]
+    for k in range(1, len(angles)):
+        if q < angles[k]:
+            return errors[k - 1] + (errors[k] - errors[k - 1]) * ((q - angles[k - 1]) / (angles[k] - angles[k - 1]))
+    return errors[len(errors) - 1]
+
+
+def wiper_at(half_slack: float, wiper: float, q: float) -> float:
+    """Return where a potentiometer with play stands after the shaft has gone one way to q."""
+    return min(max(wiper, q - half_slack), q + half_slack)
+
+
+def decide(chip: Chip, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, draw: float) -> Decision:
     """Return what the frame that starts at `time` decides; `draw` is its Gaussian draw."""
-    v_eff = chip.p * q + chip.b_o + chip.noise * draw + chip.beta * v_m + chip.c_s * (V_bus - chip.V_oc)
+    v_eff = v_o + chip.noise * draw + chip.beta * v_m + chip.c_s * (V_bus - chip.V_oc)
     T_os = one_shot(chip.T_0, chip.slope, v_eff)
     e = t_in - T_os
     t_on = drive_time(abs(e) - chip.half_deadband, chip.K, chip.t_min, chip.tau_s)
@@ -108,14 +125,13 @@ def accepted(chip: Chip, t_in: float) -> bool:
     return chip.shortest <= t_in <= chip.longest
 
 
-def edge(chip: Chip, frame: Frame, time: float, t_in: float, q: float, back_emf: float, i: float, seed: int) -> Frame:
+def edge(chip: Chip, frame: Frame, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, seed: int) -> Frame:
     """Return the frame state after the rising edge of a pulse of the width t_in."""
     if not accepted(chip, t_in):
         return Frame(frame.number + 1, frame.drive, frame.drive_end, frame.clock, frame.error, frame.pending,
                      frame.later)
     draw = gaussian(seed, frame.number) if chip.noise > 0.0 else 0.0
-    v_m, V_bus = terminal_voltage(chip, frame.drive, back_emf, i)
-    new = decide(chip, time, t_in, q, v_m, V_bus, draw)
+    new = decide(chip, time, t_in, v_o, v_m, V_bus, draw)
     number, pending, later = frame.number + 1, frame.pending, frame.later
     if new.time <= pending.time:  # where another waits, it would be replaced as soon as it comes
         pending, later = new, NOTHING

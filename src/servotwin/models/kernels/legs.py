@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from servotwin.models.kernels.contact import holding_bounds
 from servotwin.models.kernels.elementary import decay, fma, log1p_and_rest
-from servotwin.models.kernels.hybrid import Plant, holding_bounds
+from servotwin.models.kernels.plant import Plant
 
 MOST_LEGS = 100  # in one phase; a servo that needs more is left to the general engine
 
@@ -75,7 +76,7 @@ def _inverse(x: float) -> float:
 
 def _start(plant: Plant, torque: float) -> float:
     """Return which way a shaft at rest starts under a torque [N m]: −1, 0, +1."""
-    backward, forward = holding_bounds(plant)
+    backward, forward = holding_bounds(plant, 0.0, 0.0)
     if torque > forward:
         return 1.0
     if torque < -backward:

@@ -1,6 +1,6 @@
 """How the state moves within one mode: in closed form wherever the mode is linear, else one integrator step.
 
-A motion starts at its anchor t0 and gives the state (q, w, i) at any later time t0 + s until its `length` is over.
+A motion starts at its anchor t0 and gives the state at any later time t0 + s until its `length` is over.
 """
 
 from __future__ import annotations
@@ -8,20 +8,22 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.kernels import first_order, hybrid, rodas, second_order
+from servotwin.models.kernels import armature, contact, dormand_prince, first_order, hybrid, rodas, second_order
 from servotwin.models.kernels.coefficients import linear_coefficients, speed_coefficients
-from servotwin.models.kernels.hybrid import Mode, Plant
-from servotwin.models.kernels.rodas import Vector
+from servotwin.models.kernels.plant import CONDUCTING, CORE, INSIDE, NOWHERE, RIGID, Mode, Plant, Vector, at_rest
+from servotwin.models.kernels.rodas import Triple
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
-REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, STEP, IMPOSSIBLE = range(6)
+REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, STEP, LONG_STEP, IMPOSSIBLE = range(8)
 
 _TURN = 2.0 * math.pi
-_TOLERANCE = 3e-10  # error of one integrator step, relative to 1 + |state|
+_TOLERANCE = 3e-10  # error of one implicit step, relative to 1 + |state|
+_FINE_TOLERANCE = 1e-12  # of an explicit one
 _ORIGIN = (0.0, 0.0, 0.0)
 _NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
 _NO_DENSE = (_ORIGIN, _ORIGIN, _ORIGIN)
+_NO_LONG_DENSE = (NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE)
 _NO_COEFFICIENTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -36,47 +38,60 @@ class Motion(NamedTuple):
     t0: float
     start: Vector
     length: float
-    coefficients: tuple[float, ...]  # of second_order; first_order uses (λ, f) at the front
+    coefficients: tuple[float, ...]  # of second_order; first_order uses (λ, f) at the front, HELD (R/L, final current)
     against: tuple[float, float]  # WITH_CURRENT: value and slope of all torque that does not depend on speed
-    end: Vector  # STEP only, as all that follows
-    stages: tuple[Vector, ...]
-    dense: tuple[Vector, Vector, Vector]
-    has_dense: bool
+    end: Vector  # of a step, as all that follows
     next_step: float  # length to try next [s]
+    has_dense: bool
+    stages: tuple[Triple, ...]
+    dense: tuple[Triple, Triple, Triple]
+    long_dense: tuple[Vector, ...]
 
 
 def nothing(plant: Plant, u: Piece, tau: Piece) -> Motion:
     """Return a motion that is none yet."""
-    return _closed(IMPOSSIBLE, plant, Mode(0, 0), u, tau, -1.0, _ORIGIN, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+    return _closed(IMPOSSIBLE, plant, Mode(0, 0, 0, 0), u, tau, -1.0, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+
+
+def is_step(motion: Motion) -> bool:
+    """Tell whether a motion is one step of an integrator."""
+    return motion.kind == STEP or motion.kind == LONG_STEP
 
 
 def begin(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float) -> Motion:
     """Return the motion from y at t0 [s]: exact, or one accepted step of at most `limit` [s]."""
-    if hybrid.at_rest(mode.contact) and plant.L == 0.0:
-        return _closed(REST, plant, mode, u, tau, t0, (y[0], 0.0, 0.0), _NO_COEFFICIENTS, (0.0, 0.0), step)
-    follows = hybrid.in_linear_zone(mode.zone)
-    if (hybrid.at_rest(mode.contact) or plant.gravity != 0.0 or mode.contact == hybrid.CORE
-            or (follows and u.sweep != 0.0)
-            or (plant.L > 0.0 and (plant.p != 0.0 or plant.stiffness != 0.0))):  # of third order
+    still = at_rest(mode.contact) and (mode.mesh != INSIDE or at_rest(mode.motor))
+    varies = plant.C_w > 0.0 or (not still and (plant.varies > 0.0 or mode.mesh == INSIDE))
+    if still and plant.C_w == 0.0 and (plant.L == 0.0 or armature.constant_current(mode.zone)):
+        return _closed(REST, plant, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+    if varies or (plant.V > 0.0 and (plant.gravity != 0.0 or (plant.L > 0.0 and plant.stiffness != 0.0))):
+        return _long_step(plant, mode, u, tau, t0, y, step, limit)
+    if still and mode.zone >= CONDUCTING:
+        v, R = armature.loop(plant, mode.zone, u.value)
+        fading = (R / plant.L, v / R, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return _closed(HELD, plant, mode, u, tau, t0, y, fading, (0.0, 0.0), step)
+    follows = armature.in_linear_zone(mode.zone)
+    if (still or plant.gravity != 0.0 or mode.contact == CORE or (follows and u.sweep != 0.0)
+            or (plant.V == 0.0 and plant.L > 0.0 and (plant.p != 0.0 or plant.stiffness != 0.0))):  # of third order
         return _integrated(plant, mode, u, tau, t0, y, step, limit)
     wave = (u.value + u.slope * (t0 - u.start), u.slope, 0.0, 0.0, 0.0)
     if follows:
         wave = (wave[0], u.slope, u.amplitude, u.frequency, u.phase + u.frequency * (t0 - u.start))
     torque = (tau.value + tau.slope * (t0 - tau.start), tau.slope)
-    if plant.L > 0.0:
-        against = (torque[0] + hybrid.friction_torque(plant, mode.contact, y[1]), torque[1])
+    if plant.L > 0.0 and not armature.constant_current(mode.zone):
+        against = (torque[0] + contact.friction_torque(plant, mode.contact, y[1], 0.0, 0.0), torque[1])
         coefficients = speed_coefficients(plant, mode, wave, against, y[1], y[2])
         return _closed(WITH_CURRENT, plant, mode, u, tau, t0, y, coefficients, against, step)
     coefficients = linear_coefficients(plant, mode, wave, torque, y[0], y[1])
     _, c, _, f1, fs, _, _, _, _ = coefficients
     kind = FIRST_ORDER if c == 0.0 and f1 == 0.0 and fs == 0.0 else SECOND_ORDER
-    return _closed(kind, plant, mode, u, tau, t0, (y[0], y[1], 0.0), coefficients, (0.0, 0.0), step)
+    return _closed(kind, plant, mode, u, tau, t0, y, coefficients, (0.0, 0.0), step)
 
 
 def _closed(kind: int, plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
             coefficients: tuple[float, ...], against: tuple[float, float], step: float) -> Motion:
-    return Motion(kind, plant, mode, u, tau, t0, y, math.inf, coefficients, against, y, _NO_STAGES, _NO_DENSE, False,
-                  step)
+    return Motion(kind, plant, mode, u, tau, t0, y, math.inf, coefficients, against, y, step, False, _NO_STAGES,
+                  _NO_DENSE, _NO_LONG_DENSE)
 
 
 def _integrated(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
@@ -92,8 +107,28 @@ def _integrated(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Ve
             size = 1e6
         factor = min(5.0, max(0.1, 0.85 * size**-0.2)) if size > 0.0 else 5.0
         if size <= 1.0:
-            return Motion(STEP, plant, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, stages, _NO_DENSE,
-                          False, h * factor)
+            return Motion(STEP, plant, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, h * factor, False,
+                          stages, _NO_DENSE, _NO_LONG_DENSE)
+        h *= factor
+        if t0 + h == t0:
+            break
+    return _closed(IMPOSSIBLE, plant, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+
+
+def _long_step(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
+               limit: float) -> Motion:
+    h = min(step, limit)
+    h = min(h, period(u, tau, t0, t0 + h) / 3.0)
+    for _ in range(60):
+        y1, error = dormand_prince.step(plant, mode, u, tau, t0, y, h)
+        size = error / _FINE_TOLERANCE
+        if not size < 1e12:
+            size = 1e12
+        factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
+        if size <= 1.0:
+            following = max(step, h * factor) if h == limit else h * factor  # a step that was cut short tells little
+            return Motion(LONG_STEP, plant, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, following,
+                          False, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
         h *= factor
         if t0 + h == t0:
             break
@@ -102,58 +137,87 @@ def _integrated(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Ve
 
 def prepared(motion: Motion) -> Motion:
     """Return the motion ready to be evaluated between the ends of a step."""
-    if motion.kind != STEP or motion.has_dense:
+    if motion.has_dense or not is_step(motion):
         return motion
+    dense, long_dense = motion.dense, motion.long_dense
+    if motion.kind == STEP:
+        dense = rodas.dense_coefficients(motion.stages)
+    else:
+        long_dense = dormand_prince.dense(motion.plant, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
+                                          motion.length)
     return Motion(motion.kind, motion.plant, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
-                  motion.length, motion.coefficients, motion.against, motion.end, motion.stages,
-                  rodas.dense_coefficients(motion.stages), True, motion.next_step)
+                  motion.length, motion.coefficients, motion.against, motion.end, motion.next_step, True,
+                  motion.stages, dense, long_dense)
 
 
 def state(motion: Motion, s: float) -> Vector:
-    """Return (q, w, i) at s after the anchor; a step that is looked at in between has to be `prepared`."""
-    kind = motion.kind
+    """Return the state at s after the anchor; a step that is looked at in between has to be `prepared`."""
+    kind, start = motion.kind, motion.start
     if kind == REST:
-        return motion.start
+        return start
     if kind == FIRST_ORDER:
         c = motion.coefficients
         q, w = first_order.propagate(2.0 * c[0], c[2], c[7], c[8], s)
-        return q, w, 0.0
+        return _moved(motion, q, w, start[2])
     if kind == SECOND_ORDER:
         q, w = second_order.propagate(motion.coefficients, s)
-        return q, w, 0.0
+        return _moved(motion, q, w, start[2])
     if kind == WITH_CURRENT:
         w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
         plant, against = motion.plant, motion.against
-        return motion.start[0] + way, w, (plant.J * dw + plant.b * w + against[0] + against[1] * s) / plant.K
-    if s >= motion.length * (1.0 - 1e-15):  # the end, reached as a difference of two times
+        i = (plant.J * dw + plant.b * w + against[0] + against[1] * s) / plant.K
+        return _moved(motion, start[0] + way, w, i)
+    if kind == HELD:
+        rate, final = motion.coefficients[0], motion.coefficients[1]
+        return _moved(motion, start[0], start[1], start[2] + (start[2] - final) * math.expm1(-rate * s))
+    if motion.t0 + s >= motion.t0 + motion.length:  # the end, reached as a difference of two times
         return motion.end
     if s == 0.0:
-        return motion.start
-    dense = motion.dense if motion.has_dense else rodas.dense_coefficients(motion.stages)
-    return rodas.interpolate(motion.start, motion.end, dense, s / motion.length)
+        return start
+    x = s / motion.length
+    if kind == STEP:
+        return rodas.interpolate(start, motion.end, motion.dense, x)
+    return dormand_prince.interpolate(start, motion.long_dense, x)
 
 
-def acceleration(motion: Motion, s: float, y: Vector) -> tuple[float, float]:
-    """Return ẇ and di/dt at s, where the state is y."""
+def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:
+    """Return the state of one body, at rest inside the play the motor's own."""
+    _, _, _, T_w, T_h, q_m, w_m = motion.start
+    mesh = motion.mode.mesh
+    if mesh == INSIDE:
+        return q, w, i, T_w, T_h, q_m, w_m
+    if mesh == RIGID:
+        return q, w, i, T_w, T_h, q, w
+    return contact.with_motor(motion.plant, mesh, (q, w, i, T_w, T_h, q_m, w_m))
+
+
+def rates(motion: Motion, s: float, y: Vector) -> Vector:
+    """Return the rates of the state at s, where it is y."""
     kind = motion.kind
+    _, w, _, _, _, _, w_m = y
     if kind == REST:
-        return 0.0, 0.0
+        return NOWHERE
     if kind == FIRST_ORDER or kind == SECOND_ORDER:
-        return second_order.acceleration(motion.coefficients, s, y[0], y[1]), 0.0
+        dw = second_order.acceleration(motion.coefficients, s, y[0], w)
+        return w, dw, 0.0, 0.0, 0.0, w_m, dw
     plant = motion.plant
     if kind == WITH_CURRENT:
         w, dw = second_order.propagate(motion.coefficients, s)
         ddw = second_order.acceleration(motion.coefficients, s, w, dw)
-        return dw, (plant.J * ddw + plant.b * dw + motion.against[1]) / plant.K
+        return w, dw, (plant.J * ddw + plant.b * dw + motion.against[1]) / plant.K, 0.0, 0.0, w_m, dw
+    if kind == HELD:
+        return 0.0, 0.0, motion.coefficients[0] * (motion.coefficients[1] - y[2]), 0.0, 0.0, 0.0, 0.0
     t = motion.t0 + s
-    return hybrid.rates(plant, motion.mode, piece_value(motion.u, t), piece_value(motion.tau, t), y[0], y[1], y[2])
+    return hybrid.rates(plant, motion.mode, piece_value(motion.u, t), piece_value(motion.tau, t), y)
 
 
 def scales(motion: Motion) -> tuple[float, float]:
     """Return the time in which the free motion changes, and the time after which it has settled [s]."""
     if motion.kind == REST:
         return math.inf, 0.0
-    if motion.kind == STEP:  # the error control keeps it short beside what happens in it
+    if motion.kind == HELD:
+        return 1.0 / motion.coefficients[0], 40.0 / motion.coefficients[0]
+    if is_step(motion):  # the error control keeps it short beside what happens in it
         return motion.length, math.inf
     a, c = motion.coefficients[0], motion.coefficients[1]
     rate = 2.0 * a + math.sqrt(abs(c))
@@ -185,7 +249,7 @@ def _frequency(piece: Piece, t0: float, t1: float) -> float:
 def monotone_until(motion: Motion, s: float, s1: float) -> float:
     """Return the end of an interval from s on, at most s1, in which the speed is monotone and inputs are simple."""
     kind = motion.kind
-    if kind == STEP or s1 - s <= 0.0:
+    if kind == HELD or is_step(motion) or s1 - s <= 0.0:
         return s1
     if kind == REST or periodic(motion.u, motion.tau):
         if not periodic(motion.u, motion.tau) or not s1 < math.inf:

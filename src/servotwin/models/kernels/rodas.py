@@ -10,10 +10,10 @@ Julia Differential Equations package", BIT Numerical Mathematics 63, 27 (2023).
 from __future__ import annotations
 
 from servotwin.models.kernels import hybrid
-from servotwin.models.kernels.hybrid import Mode, Plant
+from servotwin.models.kernels.plant import Mode, Plant, Vector
 from servotwin.physics.pieces import Piece, piece_value
 
-Vector = tuple[float, float, float]
+Triple = tuple[float, float, float]  # angle, speed, current
 
 GAMMA = 0.21193756319429014
 # Per stage: fraction of the step and weight of the time derivative.
@@ -51,8 +51,10 @@ DENSE = (
 
 
 def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...], t: float, y: Vector,
-         h: float) -> tuple[Vector, Vector, tuple[Vector, ...]]:
+         h: float) -> tuple[Vector, Triple, tuple[Triple, ...]]:
     """Return the state after a step of `h` [s], its error estimate, and the stages for the dense output.
+
+    The gear has to be rigid, and temperatures stay.
 
     Parameters
     ----------
@@ -61,9 +63,9 @@ def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...],
     jac : tuple
         ∂F/∂(q, w, i), ∂E/∂(q, w, i), ∂F/∂t, ∂E/∂t at the start.
     t, y, h
-        Start [s], state (q, w, i) there, length [s].
+        Start [s], state there, length [s].
     """
-    q, w, i = y
+    q, w, i, T_w, T_h, _, _ = y
     Fq, Fw, Fi, Eq, Ew, Ei, Ft, Et = jac
     # (1/(γ h) − J) k = r, by elimination of the angle and of the current
     g = 1.0 / (GAMMA * h)
@@ -73,7 +75,7 @@ def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...],
     inv_h = 1.0 / h
     follows_u, follows_tau = not_constant(u), not_constant(tau)
     u_now, tau_now = u.value, tau.value
-    qs, ws, cs = y
+    qs, ws, cs = q, w, i
     ks = [(0.0, 0.0, 0.0)] * 8
     at = 0
     for j in range(8):
@@ -93,7 +95,7 @@ def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...],
             u_now = piece_value(u, t + FRACTIONS[j] * h)
         if follows_tau:
             tau_now = piece_value(tau, t + FRACTIONS[j] * h)
-        F, E = hybrid.rates(plant, mode, u_now, tau_now, qs, ws, cs)
+        _, F, E, _, _, _, _ = hybrid.rates(plant, mode, u_now, tau_now, (qs, ws, cs, T_w, T_h, qs, ws))
         hd = h * WEIGHTS[j]
         rq = rq * inv_h + ws
         rw = rw * inv_h + F + hd * Ft
@@ -101,7 +103,8 @@ def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...],
         kw = (rw + Fq * rq / g + Fi * (ri + Eq * rq / g) / e) * pivot
         ks[j] = ((rq + kw) / g, kw, (ri + Eq * (rq + kw) / g + Ew * kw) / e)
     error = ks[7]
-    return ((qs + error[0], ws + error[1], cs + error[2]), error,
+    q, w = qs + error[0], ws + error[1]
+    return ((q, w, cs + error[2], T_w, T_h, q, w), error,
             (ks[0], ks[1], ks[2], ks[3], ks[4], ks[5], ks[6], ks[7]))
 
 
@@ -110,12 +113,12 @@ def not_constant(piece: Piece) -> bool:
     return piece.slope != 0.0 or piece.amplitude != 0.0
 
 
-def dense_coefficients(ks: tuple[Vector, ...]) -> tuple[Vector, Vector, Vector]:
+def dense_coefficients(ks: tuple[Triple, ...]) -> tuple[Triple, Triple, Triple]:
     """Return the three vectors of the dense output from the stages of a step."""
     return _weighted(0, ks), _weighted(8, ks), _weighted(16, ks)
 
 
-def _weighted(row: int, ks: tuple[Vector, ...]) -> Vector:
+def _weighted(row: int, ks: tuple[Triple, ...]) -> Triple:
     q = w = i = 0.0
     for j in range(8):
         h = DENSE[row + j]
@@ -126,12 +129,11 @@ def _weighted(row: int, ks: tuple[Vector, ...]) -> Vector:
     return q, w, i
 
 
-def interpolate(y0: Vector, y1: Vector, dense: tuple[Vector, Vector, Vector], x: float) -> Vector:
+def interpolate(y0: Vector, y1: Vector, dense: tuple[Triple, Triple, Triple], x: float) -> Vector:
     """Return the state at the fraction x of the step from y0 to y1."""
     z = 1.0 - x
     d1, d2, d3 = dense
-    return (
-        z * y0[0] + x * (y1[0] + z * (d1[0] + x * (d2[0] + x * d3[0]))),
-        z * y0[1] + x * (y1[1] + z * (d1[1] + x * (d2[1] + x * d3[1]))),
-        z * y0[2] + x * (y1[2] + z * (d1[2] + x * (d2[2] + x * d3[2]))),
-    )
+    q = z * y0[0] + x * (y1[0] + z * (d1[0] + x * (d2[0] + x * d3[0])))
+    w = z * y0[1] + x * (y1[1] + z * (d1[1] + x * (d2[1] + x * d3[1])))
+    i = z * y0[2] + x * (y1[2] + z * (d1[2] + x * (d2[2] + x * d3[2])))
+    return q, w, i, y0[3], y0[4], q, w

@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.models.kernels import events, frame, hybrid, motion
+from servotwin.models.kernels import armature, events, frame, hybrid, motion
 from servotwin.models.kernels.frame import Chip, Frame
-from servotwin.models.kernels.hybrid import Mode, Plant
 from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.rodas import Vector
+from servotwin.models.kernels.plant import Mode, Plant, Vector
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -32,20 +33,25 @@ class Point(NamedTuple):
     """Where a servo stands, and where its present motion began."""
 
     time: float
-    y: Vector  # angle, speed, current
+    y: Vector
     mode: Mode
     anchor_time: float
     anchor: Vector
     step: float  # length that the integrator would try next
+    wiper: float  # angle of the potentiometer, which may lag behind the shaft
 
 
-def anchored(plant: Plant, u: Piece, tau: Piece, time: float, y: Vector, step: float) -> Point:
+def started(y: Vector, mesh: int) -> Point:
+    """Return the point of a servo at t = 0, in no mode yet."""
+    return Point(0.0, y, Mode(0, 0, mesh, 0), -1.0, y, FIRST_STEP, y[0])
+
+
+def anchored(plant: Plant, u: Piece, tau: Piece, time: float, point: Point) -> Point:
     """Return a point whose motion begins now, under inputs that are new."""
-    q, w, i = y
-    v = piece_value(u, time)
-    zone = hybrid.zone_of(plant, v, piece_rate(u, time), q, w)
-    contact = hybrid.contact_of(plant, zone, v, piece_value(tau, time), q, w, i, in_one_piece(plant, u))
-    return Point(time, y, Mode(zone, contact), time, y, step)
+    y, v = point.y, piece_value(u, time)
+    zone = armature.zone_of(hybrid.warm(plant, y), v, piece_rate(u, time), y[0], y[6], y[2])
+    mode = hybrid.settled(plant, zone, v, piece_value(tau, time), y, point.mode.mesh, in_one_piece(plant, u))
+    return Point(time, y, mode, time, y, point.step, point.wiper)
 
 
 def in_one_piece(plant: Plant, u: Piece) -> bool:
@@ -70,24 +76,31 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
         fine, settled = motion.scales(m)
         if min(end - t0, settled) > _MOST_OSCILLATIONS * fine:
             return point, -1, TOO_FAST
+    if motion.is_step(m) and (point.time > t0 or end < step_end):
+        m = motion.prepared(m)
     v = piece_value(m.u, point.time)
     kinds = hybrid.guards(m.plant, m.mode, v, in_one_piece(m.plant, m.u))
-    s, kind = events.first_event(m, kinds, point.time - t0, end - t0)
+    if motion.is_step(m):  # looked at as a whole, however a run is split
+        s, kind = events.first_event(m, kinds, 0.0, m.length)
+        kind = kind if s <= end - t0 else -1
+    else:
+        s, kind = events.first_event(m, kinds, point.time - t0, end - t0)
     if kind < 0:
         y = motion.state(m, end - t0)
-        if m.kind == motion.STEP and end == step_end:
-            return Point(end, y, m.mode, end, y, m.next_step), -1, _status(y)
-        return Point(end, y, m.mode, t0, point.anchor, point.step), -1, _status(y)
+        wiper = frame.wiper_at(m.plant.half_slack, point.wiper, y[0])
+        if motion.is_step(m) and end == step_end:
+            return Point(end, y, m.mode, end, y, m.next_step, wiper), -1, _status(y)
+        return Point(end, y, m.mode, t0, point.anchor, point.step, wiper), -1, _status(y)
     t = min(max(t0 + s, point.time), end)
-    q, w, i = motion.state(m, s)
-    after, q, w = hybrid.cross(m.plant, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), q, w, i)
-    y = (q, w, i)
-    return Point(t, y, after, t, y, point.step), kind, _status(y)
+    before = motion.state(motion.prepared(m), s)
+    wiper = frame.wiper_at(m.plant.half_slack, point.wiper, before[0])
+    after, y = hybrid.cross(m.plant, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), before)
+    return Point(t, y, after, t, y, point.step, wiper), kind, _status(y)
 
 
 def _status(y: Vector) -> int:
-    q, w, i = y
-    return COMPLETED if math.isfinite(q) and math.isfinite(w) and math.isfinite(i) else DIVERGED
+    total = y[0] + y[1] + y[2] + y[3] + y[4] + y[5] + y[6]
+    return COMPLETED if math.isfinite(total) else DIVERGED
 
 
 def source(plant: Plant, chip_frame: Frame) -> Piece:
@@ -95,24 +108,33 @@ def source(plant: Plant, chip_frame: Frame) -> Piece:
     return Piece(0.0, chip_frame.drive * plant.V, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def measured(plant: Plant, chip: Chip, chip_frame: Frame, time: float, t_in: float, y: Vector, seed: int) -> Frame:
-    """Return the frame state after the edge of a pulse of the width t_in that meets the shaft at y."""
-    q, w, _ = y
-    u = chip_frame.drive * plant.V
-    i = hybrid.current(plant, hybrid.zone_of(plant, u, 0.0, q, w), u, q, w)
-    return frame.edge(chip, chip_frame, time, t_in, q, plant.K_b * w, i, seed)
+def measured(plant: Plant, chip: Chip, curve: Sequence[Sequence[float]] | NDArray[np.float64], chip_frame: Frame,
+             point: Point, t_in: float, seed: int) -> Frame:
+    """Return the frame state after the edge of a pulse of the width t_in that meets the servo at a point."""
+    y, u = point.y, chip_frame.drive * plant.V
+    plant = hybrid.warm(plant, y)
+    w, i, coasts = y[6], y[2], chip.coast > 0.0
+    zone = armature.zone_of(plant, u, 0.0, y[0], w, i)
+    if plant.L == 0.0:
+        i = armature.current(plant, zone, u, y[0], w)
+    V_bus = armature.bus_voltage(plant, zone, u, w, i, coasts)
+    v_m = armature.terminal_voltage(plant, chip.V_br, u, w, i, V_bus, coasts)
+    v_o = frame.feedback_voltage(chip, curve, point.wiper)
+    return frame.edge(chip, chip_frame, point.time, t_in, v_o, v_m, V_bus, seed)
 
 
-def walk(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], torque: NDArray[np.float64],
-         constant_torque: float, period: float, edges: NDArray[np.float64], q: float, w: float, seed: int,
-         duration: float, times: NDArray[np.float64], outputs: NDArray[np.float64]) -> tuple[int, float]:
+def walk(pulsed: bool, plant: Plant, chip: Chip, curve: NDArray[np.float64], command: NDArray[np.float64],
+         torque: NDArray[np.float64], constant_torque: float, period: float, edges: NDArray[np.float64], start: Point,
+         seed: int, duration: float, times: NDArray[np.float64], outputs: NDArray[np.float64]) -> tuple[int, float]:
     """Run one servo from t = 0 to `duration` [s]; return a status and when it ended [s].
 
     `command` and `torque` are tables of pieces, one a row (no row: no torque). Frames start at `edges` [s], or every
-    `period` where that is not 0. What stands at `times` goes into `outputs`, shape (5, n): angle, speed, contact,
-    drive and error; it is left as it was after a failure.
+    `period` where that is not 0. What stands at `times` goes into `outputs`, shape (13, n): angle, speed, contact,
+    drive, error, and what only few servos have: current, temperatures of winding and housing, angle and speed of the
+    motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there. It is left
+    as it was after a failure.
     """
-    y = (q, w, 0.0)
+    point = start
     now = frame.AT_START
     k_command = k_torque = done = idle = 0
     u, tau = _row(command, 0, 0.0), _row(torque, -1, constant_torque)
@@ -120,7 +142,6 @@ def walk(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], t
     if pulsed:
         u = source(plant, now)
     m = motion.nothing(plant, u, tau)
-    point = Point(0.0, y, m.mode, -1.0, y, FIRST_STEP)
     while point.time < duration:
         t = point.time
         new = point.anchor_time < 0.0
@@ -139,7 +160,7 @@ def walk(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], t
                 while t >= _end(command, k_command):
                     k_command += 1
                 t_in = piece_value(_row(command, k_command, 0.0), t)
-                now = measured(plant, chip, now, t, t_in, point.y, seed)
+                now = measured(plant, chip, curve, now, point, t_in, seed)
                 if now.number == frame.CROWDED:
                     return CROWDED, t
             u_end = min(frame.next_switch(now), frame.edge_time(period, edges, now.number))
@@ -147,11 +168,12 @@ def walk(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], t
                 u, new = source(plant, now), True
         limit = min(u_end, tau_end)
         if new:
-            point = anchored(plant, u, tau, t, point.y, point.step)
-        if new or m.kind == motion.STEP or m.t0 != point.anchor_time or m.mode != point.mode:
+            point = anchored(plant, u, tau, t, point)
+        if new or motion.is_step(m) or m.t0 != point.anchor_time or m.mode != point.mode:
             m = motion_of(plant, point, u, tau, limit)
         if m.kind == motion.IMPOSSIBLE:
             return STEP_TOO_SMALL, t
+        wiper = point.wiper
         point, _, status = follow(m, point, min(limit, duration))
         if status != COMPLETED:
             return status, t
@@ -159,11 +181,14 @@ def walk(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], t
         if idle > MOST_IDLE:
             return CHATTER, t
         while done < times.size and (times[done] < point.time or (point.time >= duration and times[done] <= duration)):
-            if m.kind == motion.STEP:
-                m = motion.prepared(m)
+            m = motion.prepared(m)
             y = motion.state(m, times[done] - m.t0)
             outputs[0, done], outputs[1, done], outputs[2, done] = y[0], y[1], m.mode.contact
             outputs[3, done], outputs[4, done] = now.drive, now.error
+            for k in range(5):
+                outputs[5 + k, done] = y[2 + k]
+            outputs[10, done] = frame.wiper_at(plant.half_slack, wiper, y[0])
+            outputs[11, done], outputs[12, done] = m.mode.mesh, m.mode.motor
             done += 1
     return COMPLETED, duration
 

@@ -1,0 +1,144 @@
+"""The tornado of a sweep: how far each parameter alone moves a metric."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from servotwin import units
+from servotwin.errors import InputError
+from servotwin.models.outputs import SIGNALS
+from servotwin.plotting.responses import SHOWN, Shown
+from servotwin.plotting.style import COLOURS, axes_grid, context, finished
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from servotwin.simulation.sweep import Bar, Tornado
+
+_METRICS = {
+    "overshoot": Shown("overshoot", "", "%", "%", "number"),
+    "rise_time": Shown("rise time", "", "ms", "ms", "time"),
+    "settling_time": Shown("settling time", "", "ms", "ms", "time"),
+    "steady_error": Shown("steady error", "", "°", "deg", "angle"),
+    "slew_rate": Shown("slew rate", "", "°/s", "deg/s", "speed"),
+    "peak_current": Shown("peak current", "", "A", "A", "current"),
+    "rms_error": Shown("rms error", "", "°", "deg", "angle"),
+    "peak_error": Shown("peak error", "", "°", "deg", "angle"),
+}
+_WIDTH, _ROW = 6.6, 0.42  # inch
+_SIDES = (("low end (5 %)", COLOURS["blue"], ""), ("high end (95 %)", COLOURS["orange"], "////"))
+_FOREIGN = ("kgf cm", "ozf in", "V/krpm", "min", "%", "%/K", "s/deg", "N m/deg", "V/deg", "rpm", "deg/s")
+_PRINTED = {"ohm": "Ω", "mohm": "mΩ", "us": "µs", "uH": "µH", "us/V": "µs/V", "deg": "°", "1": "",
+            "mV/us": "mV/µs"}
+
+
+def metric_shown(name: str) -> Shown:
+    """Return how a metric of a sweep is shown: in words, and in which unit.
+
+    Examples
+    --------
+    >>> metric_shown("overshoot").label, metric_shown("end_output_angle").words
+    ('%', 'final output angle')
+    """
+    if name in _METRICS:
+        return _METRICS[name]
+    signal = name.removeprefix("end_")
+    if signal in SHOWN:
+        return SHOWN[signal]._replace(words=f"final {SHOWN[signal].words}")
+    unit = SIGNALS[signal].unit
+    dimension = next(name for name, known in units.DIMENSIONS.items() if unit in known)
+    return Shown(f"final {signal.replace('_', ' ')}", "", unit if unit != "1" else "", unit, dimension)
+
+
+def readable(value: float | str, dimension: str) -> str:
+    """Return a value (SI) with the unit in which its number is neither long nor small; a word as it is.
+
+    Examples
+    --------
+    >>> readable(8e-6, "time"), readable(3.04101, "resistance"), readable("coast", "word")
+    ('8 µs', '3.041 Ω', 'coast')
+    """
+    if isinstance(value, str):
+        return value
+    known = [unit for unit in units.DIMENSIONS[dimension] if unit not in _FOREIGN]
+    if "deg" in known:
+        known = ["deg"]
+    numbers = {unit: units.from_si(value, unit, dimension) for unit in known}
+    unit = min(known, key=lambda unit: abs(math.log10(abs(numbers[unit])) - 1.0) if value else 0.0)
+    text = _PRINTED.get(unit, unit.replace("m2", "m²"))
+    return f"{numbers[unit]:.4g}{'' if text in ('', '°') else ' '}{text}"
+
+
+def tornado(found: Tornado, *, most: int = 12) -> Figure:
+    """Return a figure with two bars for each parameter: the metric at its low end and at its high end.
+
+    Parameters
+    ----------
+    found : Tornado
+        Of `Study.tornado`.
+    most : int
+        How many parameters are drawn, the most important ones.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to draw.
+
+    Examples
+    --------
+    >>> from servotwin.simulation.sweep import Bar, Tornado
+    >>> bars = (Bar("motor.torque_constant", 3.3e-3, 4.1e-3, 0.19, 0.18, reach=0.01, share=0.9),)
+    >>> tornado(Tornado("rise_time", 0.185, bars)).axes[0].get_xlabel()
+    'rise time (ms)'
+    """
+    bars = found.bars[:most] if most > 0 else ()
+    if not bars:
+        raise InputError("bars of a tornado", got="none", allowed="at least one parameter")
+    shown = metric_shown(found.metric)
+    figure, (ax,) = axes_grid(1, width=_WIDTH, height=1.15 + _ROW * len(bars))
+    with context():
+        for row, bar in enumerate(bars):
+            _draw(ax, row, bar, found.nominal, shown)
+        if math.isfinite(found.nominal):
+            ax.axvline(_in(shown, found.nominal), color=COLOURS["black"], linewidth=1.0)
+        ax.set_yticks(range(len(bars)), [bar.name for bar in bars])
+        ax.set_ylim(len(bars) - 0.45, -0.55)
+        ax.margins(x=0.2)
+        ax.grid(visible=False, axis="y")
+        ax.set_xlabel(f"{shown.words} ({shown.label})" if shown.label else shown.words)
+        for label, colour, hatch in _SIDES:
+            ax.barh([0], [0.0], color=colour, hatch=hatch, edgecolor="white", label=label, linewidth=0.0,
+                    left=_in(shown, found.nominal) if math.isfinite(found.nominal) else 0.0)
+        ax.legend(loc="lower center", bbox_to_anchor=(0.45, 1.0), ncols=2)
+        ax.annotate("share of\nvariance", xy=(1.0, 1.0), xycoords="axes fraction", xytext=(4.0, 3.0),
+                    textcoords="offset points", ha="left", va="bottom", fontsize=7.5, color=COLOURS["grey"])
+    return finished(figure)
+
+
+
+def _draw(ax: Axes, row: int, bar: Bar, nominal: float, shown: Shown) -> None:
+    from servotwin.simulation.sweep import dimension_of
+
+    for side, value, at, (_, colour, hatch) in ((-1, bar.low, bar.at_low, _SIDES[0]),
+                                                (1, bar.high, bar.at_high, _SIDES[1])):
+        y = row + 0.19 * side
+        words = readable(value, dimension_of(bar.name))
+        if not (math.isfinite(at) and math.isfinite(nominal)):
+            ax.annotate(f"{words}: no value", xy=(0.5, y), xycoords=("axes fraction", "data"), fontsize=7.0,
+                        ha="center", va="center", color=COLOURS["grey"])
+            continue
+        left, right = _in(shown, nominal), _in(shown, at)
+        ax.barh(y, right - left, height=0.36, left=left, color=colour, hatch=hatch, edgecolor="white", linewidth=0.0)
+        ends_right = right >= left if right != left else side > 0
+        ax.annotate(words, xy=(right, y), xytext=(3.0 if ends_right else -3.0, 0.0), textcoords="offset points",
+                    ha="left" if ends_right else "right", va="center", fontsize=7.0)
+    if math.isfinite(bar.share):
+        ax.annotate(f"{100.0 * bar.share:.0f} %", xy=(1.0, row), xycoords=("axes fraction", "data"),
+                    xytext=(4.0, 0.0), textcoords="offset points", ha="left", va="center", fontsize=8.0,
+                    annotation_clip=False)
+
+
+def _in(shown: Shown, value: float) -> float:
+    return units.from_si(value, shown.unit, shown.dimension)

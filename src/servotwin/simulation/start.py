@@ -1,0 +1,55 @@
+"""Where a servo starts: its state at t = 0 from an angle and from what else is given, one servo or many lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from servotwin.errors import InputError
+from servotwin.models.base import Place
+from servotwin.models.kernels.plant import Plant
+
+_SLACK = 1e-12  # rad
+
+
+def start_vector(places: Sequence[Place], plant: Plant, angle: Any, initial: Mapping[str, Any]) -> Any:
+    """Return the numbers of `kernels.plant.Vector`, at rest and at ambient temperature but for `initial`.
+
+    Parameters
+    ----------
+    places : sequence of Place
+        What the model has as states.
+    plant : Plant
+    angle : float or ndarray
+        Where the command of just before asks for [rad].
+    initial : mapping of str to float or ndarray
+        By signal name (SI).
+
+    Returns
+    -------
+    tuple
+        Seven numbers or columns; the motor in the middle of its play unless `initial` says otherwise.
+    """
+    y: list[Any] = [angle, 0.0, 0.0, plant.T_amb, plant.T_amb, None, 0.0]
+    moved = {place.at: initial[place.name] / place.factor for place in places if place.name in initial}
+    for index, value in moved.items():
+        y[index] = value
+    if y[5] is None:
+        y[5] = y[0]
+    if not np.any(plant.half_play):
+        y[6] = y[1]
+    return tuple(y)
+
+
+def check_start(places: Sequence[Place], plant: Plant, y: Sequence[float]) -> None:
+    """Raise InputError if a start [rad] is beyond a stop, or the motor outside its play."""
+    if not plant.lower <= y[0] <= plant.upper:
+        raise InputError(f"initial {places[0].name}", got=y[0],
+                         allowed=f"{plant.lower:.6g} to {plant.upper:.6g} rad, between the stops")
+    if abs(y[5] - y[0]) > plant.half_play + _SLACK:
+        N = next(place.factor for place in places if place.at == 5)
+        raise InputError("initial motor_angle", got=N * y[5],
+                         allowed=f"{N * (y[0] - plant.half_play):.6g} to {N * (y[0] + plant.half_play):.6g} rad, "
+                         "within the play of the gear")
