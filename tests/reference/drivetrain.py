@@ -162,17 +162,28 @@ class _Run:
 
     # --- events ----------------------------------------------------------------------------------------------------
 
-    def find(self, state: Callable[[float], Array], t_0: float, t_1: float) -> Found | None:
-        """First guard that turns negative within a step."""
+    def find(self, state: Callable[[float], Array], t_0: float, t_1: float, first: bool) -> Found | None:
+        """First guard that turns negative within a step; what follows an event at once is looked for from near it."""
+        early = [10.0**-k for k in range(6, 1, -1)] if first else []
+        fractions = early + [k / self.samples for k in range(1, self.samples)]
         low = t_0
-        for k in range(1, self.samples + 1):
-            high = t_1 if k == self.samples else t_0 + (t_1 - t_0) * k / self.samples
-            found = [(self.cross(state, n, low, high), *g[:2]) for n, g in enumerate(self.guards(state(high).tolist()))
-                     if g[2] < -TOL]
-            if found:
-                return Found(*min(found, key=lambda x: x[0]))
+        for high in [*(t_0 + (t_1 - t_0) * x for x in fractions), t_1]:
+            found = self.earliest(state, low, high)
+            while found:  # where a speed comes to 0 an angle is at its extreme, perhaps beyond a stop
+                sooner = self.earliest(state, low, found.t, found)
+                if not sooner or sooner.t >= found.t:
+                    return found
+                found = sooner
             low = high
         return None
+
+    def earliest(self, state: Callable[[float], Array], low: float, high: float, but: Found | None = None,
+                 ) -> Found | None:
+        """Of the guards that are negative at `high` the one that turned so first; `but` is known already."""
+        found = [Found(self.cross(state, n, low, high), servo, name)
+                 for n, (servo, name, x) in enumerate(self.guards(state(high).tolist()))
+                 if x < -TOL and (but is None or (servo, name) != (but.servo, but.name))]
+        return min(found, key=lambda x: x.t) if found else None
 
     def cross(self, state: Callable[[float], Array], n: int, low: float, high: float) -> float:
         """Time just after a guard has turned negative, however it does."""
@@ -255,11 +266,12 @@ class _Run:
             solver = DOP853(self.rates, self.t, np.array(self.y), until, max_step=self.max_step, rtol=self.rtol,
                             atol=self.atol)
             while solver.status == "running":
+                first = solver.t == self.t
                 solver.step()
                 if solver.status == "failed":
                     raise RuntimeError(f"no step at t = {solver.t}")
                 dense = solver.dense_output()
-                found = self.find(dense, solver.t_old, solver.t)
+                found = self.find(dense, solver.t_old, solver.t, first)
                 self.record(found.t if found else solver.t, dense)
                 if found:
                     self.arrive(found.t, dense(found.t).tolist())

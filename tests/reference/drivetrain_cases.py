@@ -260,14 +260,14 @@ def _effects(d: _Dice, v: Values, terms: Set[str], low: float, high: float, star
     if "quantisation" in terms:
         v["potentiometer.quantisation"] = d.between(1e-3, 4e-3)
     if "stops" in terms:
-        reach = d.between(0.3, 0.8)  # most moves would go farther
+        reach = d.between(0.15, 0.6)  # most moves would go farther
         v.update({"stops.lower_angle": start - max(reach * (start - low), 0.03) - 0.02,
                   "stops.upper_angle": start + max(reach * (high - start), 0.03) + 0.02})
         if d.chance(0.7):
             v["stops.restitution"] = d.between(0.1, 0.7)
     if "heat" in terms:
         power = 0.3 * v["supply.open_circuit_voltage"] ** 2 / R
-        v.update({"thermal.winding_capacity": power * d.between(0.001, 0.005),
+        v.update({"thermal.winding_capacity": power * d.between(0.0008, 0.003),
                   "thermal.housing_capacity": power * d.between(0.003, 0.02),
                   "thermal.winding_to_housing": d.between(1.0, 10.0),
                   "thermal.housing_to_ambient": d.between(3.0, 30.0), "thermal.ambient": d.between(285.0, 310.0),

@@ -7,7 +7,7 @@ one body. A guard is positive as long as the mode holds.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from .drivetrain_laws import Plant, Signs, sgn
@@ -25,7 +25,7 @@ class Mode:
     flank: int = 0
     d: int = 0
     d_m: int = 0
-    signs: Signs = Signs()
+    signs: Signs = field(default_factory=Signs)
 
 
 class Motion(NamedTuple):
@@ -70,7 +70,7 @@ def start(total: float, holds: tuple[float, float], barred: tuple[bool, bool] = 
 
 
 def split(P: Plant, y: Sequence[float], d: int, tau_m: float) -> float:
-    """Acceleration of the motor minus that of the output, each moved on its own; at rest (d = 0) by its own friction."""
+    """Acceleration of the motor minus that of the output, each on its own, which at rest (d = 0) friction may hold."""
     w = y[W]
     tau_e = -P.external(y[Q]) - P.B_L * w
     own = d or start(tau_m, P.holds(tau_m, 0.0, 0.0))

@@ -78,7 +78,8 @@ def test_without_the_new_terms_it_is_the_older_reference(seed: int) -> None:
         torques=(P.torque,), lower=P.lower, upper=P.upper, restitution=P.restitution)
     times = np.linspace(0.0, case.duration, 101)
     run = simulate_case(case, times)
-    older = solve_pulse(shaft, chip, case.command.width, case.duration, times, start=case.command.before)
+    older = solve_pulse(shaft, chip, case.command.width, case.duration, times, start=case.command.before,
+                        y0=(case.initial.get("output_angle"), 0.0))
     np.testing.assert_allclose(run.output_angle, older.q, rtol=0.0, atol=1e-11)
     clear = ~older.near_event(times)
     np.testing.assert_allclose(run.output_speed[clear], older.w[clear], rtol=0.0, atol=1e-9)
@@ -96,6 +97,29 @@ def test_a_small_inductance_tends_to_none() -> None:
            for L in (4e-5, 2e-5)]
     assert 0.0 < gap[0] < 1e-3
     assert abs(math.log2(gap[0] / gap[1]) - 1.0) < 0.15
+
+
+def test_bounces_between_stop_and_flank_are_all_seen() -> None:
+    """Nanoseconds apart, beside pieces of milliseconds: two scans of different density find the same events."""
+    case = replace(random_case(1022, TERMS - {"m3", "m4", "m6", "coast"}), duration=0.25)
+    runs = [simulate_case(case, np.linspace(0.0, 0.25, 26), samples=n, max_step=h) for n, h in ((8, 2e-3), (12, 3e-4))]
+    np.testing.assert_allclose(runs[0].output_angle, runs[1].output_angle, rtol=0.0, atol=1e-9)
+    stops = [[t for t, k in run.events if k == "stop"] for run in runs]
+    np.testing.assert_allclose(stops[0], stops[1], rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("limit", [math.inf, 1.5])
+def test_the_energy_of_three_servos_on_one_bus_balances(limit: float) -> None:
+    terms = [frozenset({"inductance", "m5", *more}) for more in ((), ("coast", "stops"), ("backlash", "coast"))]
+    cases = [replace(random_case(70 + n, t), duration=0.1) for n, t in enumerate(terms)]
+    runs = simulate_bus(cases, Source(6.0, 0.3, limit), np.linspace(0.0, 0.1, 501))
+    drawn = [run.drive * run.armature_current - (run.drive == 0) * coasts * np.abs(run.armature_current)
+             for run, coasts in zip(runs, (False, True, True), strict=True)]
+    line = np.sum(drawn, axis=0)
+    free = (line < limit - 1e-9) & ((line >= 0.0) | (limit == math.inf))
+    assert np.count_nonzero(free & (line > 0.1)) > 20
+    np.testing.assert_allclose(runs[0].bus_voltage[free], 6.0 - 0.3 * line[free], rtol=0.0, atol=1e-12)
+    assert max(abs(residual(run)) for run in runs) < 1e-9
 
 
 # --- armature and supply ----------------------------------------------------------------------------------------------
@@ -341,10 +365,10 @@ def test_terms_show() -> None:
     """Stops are hit, limits bind, flanks are changed and windings heat in most of the cases that have them."""
     wanted = {"stops": "stop", "limit": "supply", "backlash": "flank"}
     for term, event in wanted.items():
-        runs = [simulate_case(replace(random_case(seed, frozenset({term})), duration=0.2), []) for seed in range(10)]
+        runs = [simulate_case(random_case(seed, frozenset({term})), []) for seed in range(10)]
         assert sum(event in {k for _, k in run.events} for run in runs) >= 6, term
     rises = []
     for case in (random_case(seed, frozenset({"heat"})) for seed in range(10)):
         temperature = simulate_case(case, np.linspace(0.0, case.duration, 21)).winding_temperature
         rises.append(float(np.max(temperature) - temperature[0]))
-    assert 15.0 < float(np.median(rises)) < 90.0
+    assert 10.0 < float(np.median(rises)) < 90.0

@@ -16,7 +16,8 @@ from servotwin.simulation.sweep.words import distribution_of
 
 P = np.linspace(0.001, 0.999, 41)
 NUMBERS = [d.Uniform(-1.0, 3.0), d.Normal(2.0, 0.3), d.LogNormal(3.0, 0.2), d.Triangular(1.0, 1.5, 4.0),
-           d.Triangular(1.0, 1.0, 4.0), d.Triangular(1.0, 4.0, 4.0), d.Affine(d.Normal(0.0, 1.0), offset=2.0, scale=-3.0),
+           d.Triangular(1.0, 1.0, 4.0), d.Triangular(1.0, 4.0, 4.0),
+           d.Affine(d.Normal(0.0, 1.0), offset=2.0, scale=-3.0),
            d.Truncated(d.Normal(0.0, 1.0), 0.0, math.inf), d.Truncated(d.Uniform(-1.0, 1.0), -0.5, 0.25)]
 
 
@@ -184,3 +185,8 @@ def test_bad_tables_of_draws(model, draws, said):
     with pytest.raises(InputError) as caught:
         checked_table(draws, model, Load())
     assert said in str(caught.value)
+
+
+def test_what_is_infinite_can_be_written_down():
+    assert d.Truncated(d.Normal(0.0, 1.0), 0.0, math.inf).described() == {
+        "kind": "Truncated", "distribution": {"kind": "Normal", "mean": 0.0, "std": 1.0}, "lower": 0.0, "upper": None}

@@ -15,7 +15,7 @@ from servotwin.parameters import write_file
 _COLUMNS = {
     "s": ("s", "s", "time"), "V": ("V", "V", "voltage"), "A": ("A", "A", "current"),
     "rad": ("deg", "deg", "angle"), "rad/s": ("deg_per_s", "deg/s", "speed"), "N m": ("Nm", "N m", "torque"),
-    "1": ("", "1", "number"),
+    "K": ("K", "K", "temperature"), "1": ("", "1", "number"),
 }
 _OWN = dict.fromkeys(("pulse_width", "error_time"), ("us", "us", "time"))
 

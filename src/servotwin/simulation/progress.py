@@ -51,4 +51,5 @@ def shown(progress: Progress, total: int, what: str) -> Iterator[Callable[[int],
     try:
         yield show
     finally:
-        bar.stop()
+        if bar.live.is_started:
+            bar.stop()

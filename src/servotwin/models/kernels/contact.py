@@ -29,6 +29,7 @@ from servotwin.models.kernels.plant import (
 
 _SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
 _REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
+_LAST_IMPACT = 1e-12  # rad/s: an impact of motor and output this slow is the last one of many
 _REST_HEIGHT = 4e-15  # relative to the angle: a rebound this low is rounding
 
 
@@ -168,6 +169,8 @@ def met(plant: Plant, forward: bool, y: Vector) -> Vector:
     """Return the state after motor and output have met at an end of the play: one speed, momentum kept."""
     share = plant.J_out / plant.J
     w = (1.0 - share) * y[6] + share * y[1]
+    if abs(w) < _LAST_IMPACT:
+        w = 0.0
     return with_motor(plant, ON_FORWARD if forward else ON_BACKWARD, (y[0], w, y[2], y[3], y[4], y[5], w))
 
 

@@ -15,9 +15,9 @@ from servotwin.models.kernels import hybrid
 from servotwin.models.kernels.plant import NOWHERE, Mode, Plant, Vector
 from servotwin.physics.pieces import Piece, piece_value
 
-_STAGES = 12
+STAGES = 12
 # Per stage: fraction of the step, and where the stages before it that enter begin; of these, number and weight.
-_FRACTIONS = (
+FRACTIONS = (
     0.0, 0.05260015195876773, 0.0789002279381516, 0.1183503419072274, 0.2816496580927726, 0.3333333333333333, 0.25,
     0.3076923076923077, 0.6512820512820513, 0.6, 0.8571428571428571, 1.0, 1.0, 0.1, 0.2, 0.7777777777777778,
 )
@@ -72,23 +72,26 @@ _DENSE = (
 
 def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h: float) -> tuple[Vector, float]:
     """Return the state after a step of `h` [s], and its error relative to 1 + |state|."""
-    ks = [NOWHERE] * _STAGES
-    for j in range(_STAGES):
-        ks[j] = _rates(plant, mode, u, tau, t + _FRACTIONS[j] * h, _moved(y, ks, j, h))
-    after = _moved(y, ks, _STAGES, h)
+    ks = [NOWHERE] * STAGES
+    for j in range(STAGES):
+        ks[j] = _rates(plant, mode, u, tau, t + FRACTIONS[j] * h, moved(y, ks, j, h))
+    after = moved(y, ks, STAGES, h)
+    return after, error_of(y, after, ks, h)
+
+
+def error_of(y: Vector, after: Vector, ks: list[Vector], h: float) -> float:
+    """Return the error of a step relative to 1 + |state|."""
     sum_5 = sum_3 = 0.0
     for n in range(7):
         e5 = e3 = 0.0
-        for j in range(_STAGES):
+        for j in range(STAGES):
             k = ks[j][n]
             e5 += _ERROR_5[j] * k
             e3 += _ERROR_3[j] * k
         scale = 1.0 + max(abs(y[n]), abs(after[n]))
         sum_5 += (e5 / scale) ** 2
         sum_3 += (e3 / scale) ** 2
-    if sum_5 == 0.0:
-        return after, 0.0
-    return after, h * sum_5 / math.sqrt(sum_5 + 0.01 * sum_3)
+    return h * sum_5 / math.sqrt(sum_5 + 0.01 * sum_3) if sum_5 != 0.0 else 0.0
 
 
 def dense(plant: Plant, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h: float) -> tuple[Vector, ...]:
@@ -96,11 +99,16 @@ def dense(plant: Plant, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h
     ks = [NOWHERE] * 16
     after = y
     for j in range(16):
-        at = _moved(y, ks, j, h)
-        if j == _STAGES:
+        at = moved(y, ks, j, h)
+        if j == STAGES:
             after = at
-        ks[j] = _rates(plant, mode, u, tau, t + _FRACTIONS[j] * h, at)
-    way, left, right = _difference(y, after), ks[0], ks[_STAGES]
+        ks[j] = _rates(plant, mode, u, tau, t + FRACTIONS[j] * h, at)
+    return dense_of(y, after, ks, h)
+
+
+def dense_of(y: Vector, after: Vector, ks: list[Vector], h: float) -> tuple[Vector, ...]:
+    """Return the same from the rates of all sixteen stages."""
+    way, left, right = _difference(y, after), ks[0], ks[STAGES]
     first = _sum(way, left, -1.0, h, left, 0.0)
     second = _sum(way, left, 2.0, -h, right, -h)
     return (way, first, second, _row(ks, 0, h), _row(ks, 16, h), _row(ks, 32, h), _row(ks, 48, h))
@@ -125,7 +133,7 @@ def _rates(plant: Plant, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector) 
     return hybrid.rates(plant, mode, piece_value(u, t), piece_value(tau, t), y)
 
 
-def _moved(y: Vector, ks: list[Vector], stage: int, h: float) -> Vector:
+def moved(y: Vector, ks: list[Vector], stage: int, h: float) -> Vector:
     """Return the state from which a stage takes its rates."""
     a = b = c = d = e = f = g = 0.0
     for n in range(_FIRST[stage], _FIRST[stage + 1]):

@@ -205,8 +205,7 @@ def cross(plant: Plant, mode: Mode, kind: int, u: float, tau: float, y: Vector) 
     if kind == ZONE_UP or kind == ZONE_DOWN:
         if armature.by_current(plant, zone):
             y = _with_current_at_edge(plant, zone, kind, u, y)
-            if armature.sign_of(zone) != 0.0 and y[2] == 0.0:
-                return Mode(armature.zone_of(plant, u, 0.0, y[0], y[6], 0.0), shaft, mesh, motor), y
+            return Mode(armature.zone_of(plant, u, 0.0, y[0], y[6], y[2]), shaft, mesh, motor), y
         return Mode(armature.neighbour(plant, zone, kind == ZONE_UP), shaft, mesh, motor), y
     if kind == SPEED and plant.kappa > 0.0:
         return Mode(zone, CORE, mesh, motor), y
@@ -215,6 +214,10 @@ def cross(plant: Plant, mode: Mode, kind: int, u: float, tau: float, y: Vector) 
     if kind == UPPER or kind == LOWER:
         return contact.rebound(plant, mode, kind == UPPER, u, tau, y)
     if kind == RELEASE_FORWARD or kind == RELEASE_BACKWARD:
+        if kind == RELEASE_FORWARD and y[0] >= plant.upper:
+            return Mode(zone, ON_UPPER, mesh, motor), y
+        if kind == RELEASE_BACKWARD and y[0] <= plant.lower:
+            return Mode(zone, ON_LOWER, mesh, motor), y
         shaft = FORWARD if kind == RELEASE_FORWARD else BACKWARD
         dry = contact.holds(plant) if mesh == INSIDE else contact.has_friction(plant)
         return Mode(zone, shaft if dry else FREE, mesh, motor), y

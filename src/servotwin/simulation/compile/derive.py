@@ -25,6 +25,7 @@ _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instr
 _POLYNOMIALS = ("exp", "log", "log1p")
 _DOUBLE = ("servotwin.models.kernels.noise", "servotwin.physics.pieces")  # in float64 throughout
 _PACKAGE = "servotwin."
+_LONG = 12  # a tuple of more numbers is a table
 
 
 @dataclass(frozen=True)
@@ -128,6 +129,8 @@ class _Derivation:
             return f"_f({text})" if self.typed(module) else text
         if isinstance(value, tuple):
             parts = ", ".join(self._constant(module, part) for part in value) + ("," if len(value) == 1 else "")
+            if type(value) is tuple and len(value) > _LONG and isinstance(value[0], float | int):
+                return f"np.array(({parts}))"  # looked up by number: a tuple would be laid out anew each time
             if type(value) is tuple:
                 return f"({parts})"
             return f"{self.value(module, '', type(value))}({parts})"

@@ -1,0 +1,27 @@
+"""What every term of the pulse servo costs: in a batch, alone in plain Python; and that what is off costs nothing.
+
+`run.py` does all parts and draws the picture; `run.py batch single off` only those named. The picture needs the first
+two.
+"""
+
+import sys
+from importlib import import_module
+
+import picture
+
+PARTS = ("batch", "single", "off")
+
+
+def main() -> None:
+    factors = {}
+    for part in sys.argv[1:] or PARTS:
+        if part not in PARTS:
+            sys.exit(f"run.py: {part!r} is not one of {', '.join(PARTS)}")
+        factors[part] = import_module(part).main()
+        print(flush=True)
+    if {"batch", "single"} <= factors.keys():
+        picture.draw(factors["batch"], factors["single"])
+
+
+if __name__ == "__main__":
+    main()

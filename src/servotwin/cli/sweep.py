@@ -1,0 +1,188 @@
+"""`servotwin sweep`: one servo whose parameters vary, one command, one load."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from servotwin.cli.simulate import _model
+from servotwin.cli.terminal import emit_json, patience, show
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.simulation.sweep import Study
+
+_COMMAND, _PLANT, _VARIED, _OUTPUT = "Command (one of)", "Servo and load", "What varies", "Run and output"
+
+
+def sweep(
+    servo: Annotated[str, typer.Argument(help="Id in the catalog, or path of a servo file (.toml).")],
+    step: Annotated[str | None, typer.Option(
+        metavar="BEFORE:AFTER", help="Step, at --at.", rich_help_panel=_COMMAND)] = None,
+    ramp: Annotated[str | None, typer.Option(
+        metavar="BEFORE:AFTER", help="Ramp from --at on, in --over seconds.", rich_help_panel=_COMMAND)] = None,
+    sine: Annotated[str | None, typer.Option(
+        metavar="MEAN:AMPLITUDE:HZ", help="Sine.", rich_help_panel=_COMMAND)] = None,
+    chirp: Annotated[str | None, typer.Option(
+        metavar="MEAN:AMPLITUDE:HZ:HZ", help="Sine whose frequency goes from one to the other during the run.",
+        rich_help_panel=_COMMAND)] = None,
+    prbs: Annotated[str | None, typer.Option(
+        metavar="LOW:HIGH:SECONDS", help="Pseudo-random sequence of two values, with the time of a bit.",
+        rich_help_panel=_COMMAND)] = None,
+    constant: Annotated[str | None, typer.Option(
+        metavar="VALUE", help="The same all the time.", rich_help_panel=_COMMAND)] = None,
+    pulses: Annotated[Path | None, typer.Option(
+        metavar="FILE.csv", help="Pulses one by one: columns time_s (rising edge), pulse_width_us.",
+        rich_help_panel=_COMMAND)] = None,
+    command: Annotated[Path | None, typer.Option(
+        metavar="FILE.csv", help="Samples: time_s and pulse_width_us, command_angle_deg or command_voltage_V.",
+        rich_help_panel=_COMMAND)] = None,
+    unit: Annotated[str | None, typer.Option(
+        metavar="UNIT", help="Unit of the command: deg (default), rad, us, ms, s, V or mV. An angle becomes a pulse "
+        "by each servo's own calibration; us, ms and s are the same pulse for all.", rich_help_panel=_COMMAND)] = None,
+    at: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="When a step or ramp begins (default 0.1).", rich_help_panel=_COMMAND)] = None,
+    over: Annotated[float | None, typer.Option(
+        metavar="SECONDS", help="How long a ramp takes.", rich_help_panel=_COMMAND)] = None,
+    hold: Annotated[str | None, typer.Option(
+        metavar="HOW", help="Between samples of --command: previous (default) or linear.",
+        rich_help_panel=_COMMAND)] = None,
+    column: Annotated[str | None, typer.Option(
+        metavar="NAME", help="Which column of --command, where it has several commands.",
+        rich_help_panel=_COMMAND)] = None,
+    model: Annotated[str, typer.Option(
+        metavar="MODEL", help="pulse, pulse-inductive or bounded.", rich_help_panel=_PLANT)] = "pulse",
+    load: Annotated[list[str] | None, typer.Option(
+        metavar="PART=VALUE", help="What hangs on the shaft, as in servotwin simulate.",
+        rich_help_panel=_PLANT)] = None,
+    change: Annotated[list[str] | None, typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a nominal parameter, repeatable, SI.",
+        rich_help_panel=_PLANT)] = None,
+    vary: Annotated[list[str] | None, typer.Option(
+        metavar="NAME=DISTRIBUTION", help="Draw a parameter of servo or load, repeatable: normal:10%, uniform:10%, "
+        "uniform:4us..8us, normal:3ohm±0.3ohm, lognormal:10%, triangular:4us..6us..8us, choice:brake,coast. A single "
+        "number is a spread about the nominal value.", rich_help_panel=_VARIED)] = None,
+    from_file: Annotated[bool, typer.Option(
+        "--from-file", help="Draw every parameter whose spread the servo file states.",
+        rich_help_panel=_VARIED)] = False,
+    draws: Annotated[Path | None, typer.Option(
+        metavar="FILE", help="Take draws from a table: .csv or .parquet, a column for each dotted name, SI.",
+        rich_help_panel=_VARIED)] = None,
+    lanes: Annotated[int | None, typer.Option(
+        metavar="NUMBER", help="How many servos (default 1000, or all rows of --draws).",
+        rich_help_panel=_VARIED)] = None,
+    sampling: Annotated[str, typer.Option(
+        metavar="HOW", help="latin-hypercube, sobol or random.", rich_help_panel=_VARIED)] = "latin-hypercube",
+    truncate: Annotated[bool, typer.Option(
+        "--truncate", help="Cut distributions off at the physical range.", rich_help_panel=_VARIED)] = False,
+    seed: Annotated[int, typer.Option(
+        metavar="NUMBER", help="Of all that is random.", rich_help_panel=_VARIED)] = 0,
+    duration: Annotated[float, typer.Option(
+        metavar="SECONDS", help="Time to simulate.", rich_help_panel=_OUTPUT)] = 1.5,
+    output_step: Annotated[float, typer.Option(
+        metavar="SECONDS", help="How often the metrics look.", rich_help_panel=_OUTPUT)] = 0.01,
+    metric: Annotated[list[str] | None, typer.Option(
+        metavar="NAME", help="Metric of the tornado (the first one), repeatable: overshoot, rise_time, settling_time, "
+        "steady_error, slew_rate, peak_current, rms_error, peak_error, or end_ and the name of a signal.",
+        rich_help_panel=_OUTPUT)] = None,
+    out: Annotated[Path | None, typer.Option(
+        metavar="FOLDER", help="Write all lanes, chunk by chunk.", rich_help_panel=_OUTPUT)] = None,
+    file_format: Annotated[str, typer.Option(
+        "--format", metavar="FORMAT", help="Of the lanes: csv or parquet.", rich_help_panel=_OUTPUT)] = "csv",
+    resume: Annotated[bool, typer.Option(
+        "--resume", help="Go on with the unfinished study in --out.", rich_help_panel=_OUTPUT)] = False,
+    plot: Annotated[bool, typer.Option(
+        "--plot", help="Draw tornado.png into --out.", rich_help_panel=_OUTPUT)] = False,
+    scheduler: Annotated[str | None, typer.Option(
+        metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.",
+        rich_help_panel=_OUTPUT)] = None,
+    as_json: Annotated[bool, typer.Option(
+        "--json", help="Print the summary as JSON, in SI.", rich_help_panel=_OUTPUT)] = False,
+) -> None:
+    """Draw the parameters of a servo, simulate all, and say what that does to a few metrics."""
+    from servotwin.cli.command_words import CommandWords
+
+    words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
+                         command=command, unit=unit, at=at, over=over, hold=hold, column=column)
+    _check_options(out, resume=resume, plot=plot, varies=bool(vary or from_file or draws))
+    nominal = _model(servo, model, change or [])
+    study = _run(nominal, words, load or [], metric or [], {
+        "duration": duration, "vary": _varied(nominal, vary or [], from_file=from_file), "draws": _draws(draws),
+        "lanes": lanes, "seed": seed, "sampling": sampling, "truncate": truncate, "output_step": output_step,
+        "directory": out, "resume": resume, "file_format": file_format}, scheduler)
+    _report(study, metric or [], out, plot=plot, as_json=as_json)
+
+
+def _check_options(out: Path | None, *, resume: bool, plot: bool, varies: bool) -> None:
+    from servotwin.errors import InputError
+
+    if not varies:
+        raise InputError("nothing varies; use at least one of --vary, --from-file, --draws")
+    for option, given in (("--resume", resume), ("--plot", plot)):
+        if given and out is None:
+            raise InputError(f"{option} needs --out FOLDER")
+
+
+def _varied(model: Model, words: list[str], *, from_file: bool) -> dict[str, Any]:
+    from servotwin.errors import InputError
+    from servotwin.simulation.sweep import stated
+
+    given: dict[str, Any] = {}
+    for word in words:
+        name, equals, text = (word.partition("=")[k].strip() for k in range(3))
+        if not (name and equals and text):
+            raise InputError("--vary", got=word, allowed="NAME=DISTRIBUTION, such as motor.torque_constant=normal:10%")
+        if name in given:
+            raise InputError(f"--vary {name}", got=f"{given[name]} and {text}", allowed="one distribution")
+        given[name] = text
+    return {**(stated(model) if from_file else {}), **given}
+
+
+def _draws(path: Path | None) -> dict[str, Any] | None:
+    from servotwin.simulation.sweep import read_columns
+
+    return None if path is None else dict(read_columns(path))
+
+
+def _run(model: Model, words: Any, load: list[str], metric: list[str], options: dict[str, Any],
+         scheduler: str | None) -> Study:
+    from servotwin.cli.load_words import load_from
+    from servotwin.cli.scheduler import executor_at
+    from servotwin.errors import InputError
+    from servotwin.simulation.sweep import sweep as run
+    from servotwin.simulation.sweep.metrics import checked_metrics
+    from servotwin.units import is_finite
+
+    duration = options["duration"]
+    if not (is_finite(duration) and duration > 0.0):
+        raise InputError("--duration", got=duration, allowed="a positive number of seconds")
+    signal = words.signal(duration)
+    metrics = tuple(dict.fromkeys([*metric, *checked_metrics(None, model, signal, duration)]))
+    with executor_at(scheduler) as executor:
+        try:
+            return run(model, signal, load=load_from(load), metrics=metrics, executor=executor,
+                       progress=sys.stderr is not None and sys.stderr.isatty(), **options)
+        except KeyboardInterrupt:
+            if options["directory"] is not None and sys.stderr is not None:
+                sys.stderr.write(f"servotwin: what is finished is in {options['directory']}; the same command with "
+                                 "--resume goes on\n")
+            raise
+
+
+def _report(study: Study, metric: list[str], out: Path | None, *, plot: bool, as_json: bool) -> None:
+    from servotwin.cli.sweep_words import sections
+
+    chosen = metric[0] if metric else study.metrics[0]
+    files = [] if out is None else [str(out)]
+    if plot and out is not None:
+        from servotwin import plotting
+
+        with patience("drawing"):
+            plotting.save(plotting.tornado(study.tornado(chosen)), out / "tornado.png", overwrite=True)
+    if as_json:
+        emit_json({"definition": dict(study.definition), **study.summary(), "files": files})
+        return
+    show(*sections(study, chosen, files))

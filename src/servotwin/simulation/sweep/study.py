@@ -1,0 +1,168 @@
+"""What a sweep found out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, MissingExtraError, UnknownNameError
+from servotwin.simulation.status import Status
+from servotwin.simulation.sweep.folder import Folder
+from servotwin.simulation.sweep.tornado import Tornado, bar_of, sorted_bars, variance_share
+from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from servotwin.simulation.sweep.plan import Plan
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_MOST_NAMED = 100  # failures in a summary
+
+
+class LaneFailure(NamedTuple):
+    """A lane that ended before its time: its number, when [s], and why."""
+
+    lane: int
+    time: float
+    cause: str
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Study:
+    """The outcome of a sweep.
+
+    Parameters
+    ----------
+    plan : Plan
+        What was run.
+    table : mapping of str to ndarray, shape (lanes,)
+        "lane", every parameter by its dotted name (SI), every metric (SI; nan where a lane has none), "status" (name
+        of a `Status`) and "ended" [s].
+    moved : mapping of str to ndarray
+        Each metric in the lanes of the tornado: the nominal lane, then each end of each parameter.
+    """
+
+    plan: Plan
+    table: Mapping[str, NDArray[Any]]
+    moved: Mapping[str, NDArray[np.float64]]
+
+    def __repr__(self) -> str:
+        return (f"Study({self.plan.job.model!r}, lanes={len(self)}, parameters={self.parameters}, "
+                f"metrics={self.metrics}, failures={len(self.failures)})")
+
+    def __len__(self) -> int:
+        """Return the number of lanes."""
+        return len(self.table["lane"])
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Dotted names of what differs from lane to lane."""
+        return tuple(self.plan.columns)
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """Names of the metrics."""
+        return self.plan.job.metrics
+
+    @property
+    def definition(self) -> Mapping[str, Any]:
+        """All that defines the study, as `study.json` holds it."""
+        return self.plan.definition
+
+    @property
+    def failures(self) -> tuple[LaneFailure, ...]:
+        """The lanes that ended before their time; they have no metrics."""
+        status, ended = self.table["status"], self.table["ended"]
+        return tuple(LaneFailure(int(k), float(ended[k]), Status[str(status[k])].message)
+                     for k in np.flatnonzero(status != Status.COMPLETED.name))
+
+    def quantiles(self, probabilities: Sequence[float] = QUANTILES) -> dict[str, dict[float, float]]:
+        """Return quantiles of each metric by name and probability.
+
+        The quantile of p is the smallest value of a lane that at least the share p of the lanes does not exceed; so it
+        is one that a lane really has (definition 1 of Hyndman and Fan, 1996). Lanes without the metric do not count.
+
+        Raises
+        ------
+        InputError
+            If a probability is not between 0 and 1.
+        """
+        for p in probabilities:
+            if not (is_finite(p) and 0.0 <= p <= 1.0):
+                raise InputError("probability", got=p, allowed="a number from 0 to 1")
+        found = {}
+        for name in self.metrics:
+            values = self.table[name][np.isfinite(self.table[name])]
+            found[name] = {float(p): float(np.quantile(values, p, method="inverted_cdf")) if values.size else math.nan
+                           for p in probabilities}
+        return found
+
+    def tornado(self, metric: str) -> Tornado:
+        """Return how far each parameter alone moves a metric, and its share of the metric's variance.
+
+        Raises
+        ------
+        UnknownNameError
+            If the study has no such metric.
+        """
+        if metric not in self.metrics:
+            raise UnknownNameError("metric of the study", metric, self.metrics)
+        nominal, *rest = self.moved[metric].tolist()
+        bars, first = [], 0
+        for name, values in self.plan.ends.items():
+            own = np.array(rest[first:first + len(values)])
+            first += len(values)
+            bars.append(bar_of(name, values, own, nominal, variance_share(self.table[name], self.table[metric])))
+        return Tornado(metric, nominal, sorted_bars(bars))
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the table as a pandas DataFrame, a row for each lane."""
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingExtraError("pandas", "data") from None
+        return pd.DataFrame(dict(self.table)).set_index("lane")
+
+    def summary(self) -> dict[str, Any]:
+        """Return quantiles, tornados and failures, ready for JSON; what is not finite is None."""
+        quantiles = self.quantiles()
+        found: dict[str, Any] = {
+            "lanes": len(self), "failed": len(self.failures),
+            "failures": [failure._asdict() for failure in self.failures[:_MOST_NAMED]], "metrics": {}}
+        for name in self.metrics:
+            tornado = self.tornado(name)
+            found["metrics"][name] = {
+                "lanes": int(np.isfinite(self.table[name]).sum()), "nominal": _plain(tornado.nominal),
+                "quantiles": {f"{p:g}": _plain(value) for p, value in quantiles[name].items()},
+                "tornado": [{key: _plain(value) for key, value in bar._asdict().items()} for bar in tornado.bars]}
+        return found
+
+    def save(self, directory: str | Path, *, file_format: str = "csv") -> None:
+        """Write the folder that `sweep(directory=...)` writes.
+
+        Raises
+        ------
+        OutputError
+            If the folder is there and not empty, or cannot be written.
+        """
+        folder = Folder(directory, self.definition, file_format=file_format, resume=False)
+        for k, columns in self.chunks():
+            folder.write(k, columns)
+        folder.write_summary(self.summary())
+
+    def chunks(self) -> Iterator[tuple[int, dict[str, NDArray[Any]]]]:
+        """Return the table in chunks, each with its number."""
+        size = self.plan.chunk
+        for k in range(self.plan.chunks):
+            yield k, {name: column[k * size:(k + 1) * size] for name, column in self.table.items()}
+
+
+def _plain(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,107 @@
+"""End stops at speed: neither tunnelled through nor a source of energy, whatever pushes and whatever gives way."""
+
+import itertools
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from servotwin.models.kernels.motion import prepared, state
+from validation.test_drivetrain_armature import LOCKED, N, driven, undriven
+from validation.test_drivetrain_reference import simulate
+
+STOP = 0.1  # rad
+SPEED = 10.0  # rad/s, three times what the free servo reaches
+INERTIA, OUTPUT = 8e-3, 2e-3  # kg m²: all of it, and what is behind the play
+PLAY = {"gear.backlash": 0.02, "gear.output_inertia": OUTPUT}
+COULOMB = {"friction.coulomb_torque_forward": 0.1 / N, "friction.coulomb_torque_backward": 0.1 / N}
+
+
+def around(result, kind):
+    """States just before and just after each event of a kind, as the engine's vectors; it comes alone at its time."""
+    segments = result.trajectory.segments
+    pairs = {b.start: (a, b) for a, b in itertools.pairwise(segments) if b.anchor == b.start}
+    count = Counter(event.time for event in result.events)
+    times = [event.time for event in result.events if event.kind == kind and count[event.time] == 1]
+    return [tuple(state(prepared(s.motion), t - s.anchor) for s in pairs[t]) for t in times if t in pairs]
+
+
+def kinetic(y):
+    return 0.5 * OUTPUT * y[1] ** 2 + 0.5 * (INERTIA - OUTPUT) * y[6] ** 2
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("play", [False, True])
+@pytest.mark.parametrize("inductance", [None, 3e-4])
+@pytest.mark.parametrize(("off", "side"), [("brake", 1), ("coast", -1)])
+def test_a_stop_at_speed(restitution, play, inductance, off, side):
+    values = COULOMB | {f"stops.{'upper' if side > 0 else 'lower'}_angle": side * STOP, "stops.restitution": restitution,
+                        "electronics.off_state": off} | (PLAY if play else {"gear.output_inertia": OUTPUT})
+    case = undriven(values, initial={"output_angle": 0.0, "output_speed": side * SPEED}, duration=0.3).replace(
+        motor__armature_inductance=inductance)
+    if play:
+        case.initial.update(motor_speed=side * SPEED * N, motor_angle=0.0)
+    result = simulate(case, np.linspace(0.0, 0.3, 3001))
+    impacts = around(result, f"{'upper' if side > 0 else 'lower'} stop")
+    assert impacts
+    assert np.max(side * result["output_angle"]) <= STOP + 1e-13
+    assert np.all(np.isfinite(result["output_speed"]))
+    for before, after in impacts:
+        assert before[0] == pytest.approx(side * STOP, abs=1e-13)
+        assert side * before[1] >= 0.0
+        assert after[1] == 0.0 or after[1] == pytest.approx(-restitution * before[1], rel=1e-12)
+        assert kinetic(after) <= kinetic(before) + 1e-15
+        assert after[2] == pytest.approx(before[2], rel=1e-12, abs=1e-15)  # the current goes on
+        alone = play and after[6] != after[1]
+        assert after[6] == pytest.approx(before[6] if alone else after[1], rel=1e-12)
+    energy = result.energy
+    turnover = abs(energy.supply) + energy.winding + abs(energy.load) + energy.friction + abs(energy.stored)
+    assert abs(energy.residual) <= 1e-9 * turnover
+    assert energy.stops >= (1.0 - restitution**2) * 0.5 * OUTPUT * impacts[0][0][1] ** 2 - 1e-15
+
+
+@pytest.mark.parametrize("inductance", [None, 3e-4])
+@pytest.mark.parametrize("restitution", [0.0, 0.6])
+def test_a_drive_holds_the_shaft_on_its_stop(restitution, inductance):
+    """It bounces ever lower, comes to rest in a finite time, and the current grows to that of the stalled motor."""
+    values = COULOMB | {"stops.upper_angle": 0.1, "stops.restitution": restitution, "gear.output_inertia": OUTPUT}
+    result = simulate(driven(values, duration=0.5).replace(motor__armature_inductance=inductance), np.array([0.4, 0.5]))
+    assert result["output_angle"].tolist() == [0.1, 0.1]
+    assert result["output_speed"].tolist() == [0.0, 0.0]
+    np.testing.assert_allclose(result["armature_current"], 6.0 / 3.0, rtol=1e-12)
+
+
+def test_a_ball_on_a_table():
+    """Constant torque, no motor: the heights go as e², and all bounces together last (1 + e)/(1 − e) of the fall."""
+    e, torque, height = 0.5, 0.2, 0.02
+    values = {"motor.torque_constant": 1e-12, "motor.back_emf_constant": 1e-12, "stops.lower_angle": 0.0,
+              "stops.restitution": e, "gear.output_inertia": OUTPUT}
+    fall = math.sqrt(2.0 * height * INERTIA / torque)
+    case = undriven(values, load={"torque": torque}, initial={"output_angle": height}, duration=0.2)
+    result = simulate(case, fall * np.array([1.0 + e, 1.0 + 2.0 * e + e**2, (1.0 + e) / (1.0 - e) + 1e-6]))
+    np.testing.assert_allclose(result["output_angle"], [height * e**2, height * e**4, 0.0], rtol=0.0, atol=1e-12)
+    assert result["output_speed"][-1] == 0.0
+    assert result.energy.stops == pytest.approx(torque * height, rel=1e-9)
+
+
+@pytest.mark.parametrize("friction", [{}, COULOMB], ids=["smooth", "dry"])
+def test_a_torque_that_grows_towards_a_stop_leaves_the_shaft_there(friction):
+    """The current of a drive into the stop rises from zero: what friction held, the stop holds."""
+    values = friction | {"stops.lower_angle": 0.2, "motor.armature_inductance": 3e-4}
+    result = simulate(driven(values, way=-1), np.array([0.1]))
+    assert result["output_angle"][0] == 0.2
+    assert result["armature_current"][0] == pytest.approx(-2.0, rel=1e-9)
+    assert sum(event.kind == "lower stop" for event in result.events) == 0
+
+
+def test_a_locked_motor_lets_the_output_bounce_within_its_play():
+    """The output alone, without friction, goes to and fro between stop and flank; a plastic flank ends it."""
+    case = undriven(LOCKED | PLAY | {"stops.upper_angle": 0.004, "stops.restitution": 1.0},
+                    initial={"output_angle": 0.0, "output_speed": 1.0, "motor_speed": 0.0, "motor_angle": 0.0},
+                    duration=0.05)
+    times = np.array([0.002, 0.004, 0.008, 0.0179])  # stop at 4 ms, the motor's flank at 18 ms
+    result = simulate(case, times)
+    np.testing.assert_allclose(result["output_angle"], [0.002, 0.004, 0.0, -0.0099], rtol=0.0, atol=1e-12)
+    assert result["motor_angle"].tolist() == [0.0] * 4
+    assert [event.kind for event in result.events][:2] == ["upper stop", "gear meets"]
