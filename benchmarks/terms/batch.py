@@ -1,5 +1,6 @@
 """Part 1: what each term costs in a batch; every row simulates the same servos, commands and loads."""
 
+import math
 import sys
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +15,7 @@ import servotwin as st
 
 LANES = 256  # different ones
 SECONDS = 0.3  # a call lasts about this at least: lanes that are quickly done come several times over
-MOST_COPIES = 128
+MOST_COPIES = 256
 CHUNKS = 8  # of every call, so that each row uses all cores
 LOAD = st.loads.Inertia(0.0) + st.loads.Constant(0.0)  # the parts that the lanes' numbers belong to
 
@@ -41,12 +42,19 @@ def call(term: Term, lanes: Population) -> np.ndarray:
     return batch["output_angle"][:, 0]
 
 
+def seconds(term: Term, lanes: Population) -> float:
+    """Return the time of a call, compiled before [s]."""
+    return best(lambda: call(term, lanes), 3)
+
+
 def measured(term: Term, lanes: Population) -> Row:
-    """Measure whole calls, compiled before."""
+    """Measure the lanes as often over as makes a call last."""
     end = call(term, lanes)
-    copies = min(MOST_COPIES, max(1, round(SECONDS / best(lambda: call(term, lanes), 1))))
-    many = lanes.times(copies)
-    return Row(term.name, len(many), best(lambda: call(term, many), 5 if copies > 1 else 2), end)
+    copies, taken = 1, seconds(term, lanes)
+    while taken < SECONDS and copies < MOST_COPIES:
+        copies = min(MOST_COPIES, math.ceil(1.3 * copies * SECONDS / taken))
+        taken = seconds(term, lanes.times(copies))
+    return Row(term.name, copies * len(lanes), taken, end)
 
 
 def rows() -> list[Row]:

@@ -1,4 +1,4 @@
-"""Part 3: what is off costs nothing: the plain pulse servo on the fleet of the scenario `pulse_servo`."""
+"""Part 4: what is off costs nothing: the plain pulse servo on the fleet of the scenario `pulse_servo`."""
 
 import sys
 from pathlib import Path

@@ -1,7 +1,7 @@
-"""What every term of the pulse servo costs: in a batch, alone in plain Python; and that what is off costs nothing.
+"""What every term of the pulse servo costs, in a batch and in plain Python; what a bus costs; and what is off does not.
 
-`run.py` does all parts and draws the picture; `run.py batch single off` only those named. The picture needs the first
-two.
+`run.py` does all parts and draws the picture; `run.py batch bus` only those named. The picture needs `batch` and
+`single`.
 """
 
 import sys
@@ -9,7 +9,7 @@ from importlib import import_module
 
 import picture
 
-PARTS = ("batch", "single", "off")
+PARTS = ("batch", "single", "bus", "off")
 
 
 def main() -> None:

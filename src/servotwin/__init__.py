@@ -10,12 +10,13 @@ __version__ = "0.1.0"
 
 # public name -> module that defines it
 _LAZY = {
-    **dict.fromkeys(("Servo", "catalog_names", "load_dataset", "load_servo", "servo_from_values"), "parameters"),
+    **dict.fromkeys(("Servo", "catalog_names", "load_dataset", "load_servo", "servo_from_values",
+                     "Supply"), "parameters"),
     **dict.fromkeys(
         ("AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "PulseServo",
          "PulseServoInductive"), "models"),
-    **dict.fromkeys(("Batch", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_many"),
-                    "simulation"),
+    **dict.fromkeys(("Batch", "Fleet", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_bus",
+                     "simulate_many"), "simulation"),
     **dict.fromkeys(("Study", "distributions", "sweep"), "simulation.sweep"),
 }
 _MODULES = ("bench", "errors", "linear", "loads", "models", "parameters", "physics", "plotting", "signals",

@@ -12,15 +12,11 @@ import numpy as np
 import pytest
 
 from reference.drivetrain_laws import make_plant
-from reference.drivetrain_cases import random_case
-from reference.drivetrain_steps import LAWS, Rotor, creep
+from reference.drivetrain_steps import LAWS, creep
+from reference.test_drivetrain import law_case, rotor
 from validation.test_drivetrain_armature import N, driven
 from validation.test_drivetrain_reference import simulate
 
-LETTERS = {"K_l": "load_friction", "K_ls": "load_friction_stribeck", "K_m": "load_friction_motor",
-           "K_e": "load_friction_external", "K_ms": "load_friction_motor_stribeck",
-           "K_es": "load_friction_external_stribeck", "K_mq": "load_friction_motor_quad",
-           "K_eq": "load_friction_external_quad"}
 NO_DROPS = {f"{group}__{name}": None for group, name in (
     ("supply", "bridge_drop_voltage"), ("supply", "bridge_drop_resistance"), ("supply", "internal_resistance"),
     ("motor", "brush_drop_voltage"))}
@@ -29,21 +25,8 @@ END = 0.1  # s
 
 def case_of(law, seed, inductance):
     """A braked bridge without drops, so that the armature voltage is the drive times the supply's."""
-    terms = {"pendulum", *{"M1": (), "M2": ("stribeck",)}.get(law, (law.lower(), "stribeck"))}
-    case = random_case(seed, frozenset(terms | ({"inductance"} if inductance else set())))
-    speed = case.values.get("friction.stribeck_speed", 100.0)  # M1 and M3 do not read it
-    plain = {"friction__breakaway_ratio": 1.0} if law in ("M1", "M3") else {}
-    return replace(case.replace(friction__stribeck_speed=speed, **plain, **NO_DROPS), duration=END)
-
-
-def rotor(case):
-    P = make_plant(case.values, case.load)
-    F = {name.removeprefix("friction."): x for name, x in case.values.items() if name.startswith("friction.")}
-    return Rotor(
-        N=P.N, J=P.J, k_a=P.K / P.N, k_b=P.K_b / P.N, R_a=P.R, L_a=P.L, B_m=P.B_m / P.N**2, B_L=P.B_L,
-        F_forward=F["coulomb_torque_forward"], F_backward=F["coulomb_torque_backward"],
-        r=F.get("breakaway_ratio", 1.0), v_s=F["stribeck_speed"], alpha=F.get("stribeck_exponent", 1.0),
-        **{letter: F.get(name, 0.0) for letter, name in LETTERS.items()}, coulomb=P.coulomb, torque=P.external)
+    more = frozenset({"pendulum", "inductance"} if inductance else {"pendulum"})
+    return replace(law_case(law, seed, more).replace(**NO_DROPS), duration=END)
 
 
 def profile(case):
@@ -56,22 +39,11 @@ def profile(case):
     return voltage, simulate(case, times)["output_angle"]
 
 
-def gaps(case, steps):
+def gaps(law, case, steps):
     """Largest gap of the angle [rad] at the switchings, by size of the steps."""
     voltage, angle = profile(case)
-    R, law = rotor(case), case_law(case)
+    R = rotor(make_plant(case.values, case.load), case.values)
     return [float(np.max(np.abs(creep(R, law, voltage, END, h, start=angle[0])[0] - angle[1:]))) for h in steps]
-
-
-def case_law(case):
-    """The law that a case's numbers make."""
-    F = {name.removeprefix("friction.") for name in case.values}
-    if "load_friction_motor_quad" in F:
-        return "M6"
-    if "load_friction_motor" in F:
-        return "M5"
-    static = "load_friction_stribeck" in F or case.values.get("friction.breakaway_ratio", 1.0) > 1.0
-    return ("M4" if static else "M3") if "load_friction" in F else ("M2" if static else "M1")
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -79,18 +51,17 @@ def case_law(case):
 def test_small_steps_come_to_the_same_angle(law, inductance, seed):
     """Starts, stops and reversals under pulses: each may cost a step at a few rad/s, and no more."""
     case = case_of(law, seed, inductance)
-    assert case_law(case) == law
     voltage, angle = profile(case)
     assert len(voltage) >= 2
     assert np.ptp(angle) > 0.01
-    assert gaps(case, [2e-5])[0] < 4.0 * 2e-5
+    assert gaps(law, case, [2e-5])[0] < 4.0 * 2e-5
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_halving_the_steps_closes_the_gap(law):
     """First order at least, through five pulses or so and the stops between them."""
     steps = 4e-4 * 0.5 ** np.arange(4)
-    errors = np.array(gaps(case_of(law, 21, False), steps))
+    errors = np.array(gaps(law, case_of(law, 21, False), steps))
     assert np.all(errors < 4.0 * steps)
     assert errors[-1] < 0.3 * errors[0]
 
@@ -115,6 +86,6 @@ def one_drive(law):
 @pytest.mark.parametrize("law", LAWS)
 def test_while_it_slides_one_way_the_steps_converge_with_order_four(law):
     """To the engine's angle and to no other."""
-    coarse, half, fine = gaps(one_drive(law), [2e-3, 1e-3, 1e-4])
+    coarse, half, fine = gaps(law, one_drive(law), [2e-3, 1e-3, 1e-4])
     assert math.log2(coarse / half) == pytest.approx(4.0, abs=0.15)
     assert fine < 2e-12

@@ -1,4 +1,4 @@
-"""Two thermal masses behind the pulses: closed forms of a stalled motor, steady state, cooling, and what heat changes."""
+"""Two thermal masses behind the pulses: a stalled motor in closed form, steady state, cooling, what heat changes."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 import servotwin as st
 from reference.drivetrain_cases import random_case
-from validation.test_drivetrain_armature import LOCKED, N, SIMPLE, driven, undriven
+from validation.test_drivetrain_armature import LOCKED, SIMPLE, N, driven, undriven
 from validation.test_drivetrain_reference import simulate
 
 C_w, C_h, R_wh, R_ha, AMBIENT = 0.02, 0.06, 2.0, 3.0, 293.15
@@ -85,7 +85,7 @@ def test_it_cools_by_two_exponentials_when_the_drive_ends(inductance):
 @pytest.mark.parametrize("terms", [{"heat"}, {"heat", "coast", "inductance"}, {"heat", "backlash", "limit"}],
                          ids="+".join)
 def test_what_the_copper_loses_is_what_warms(terms):
-    """Insulated to the outside: C_w ΔT_w + C_h ΔT_h is the loss of the winding, that of all pulses and not their mean."""
+    """Insulated to the outside: C_w ΔT_w + C_h ΔT_h is the winding's loss, that of all pulses and not of their mean."""
     for seed in range(2):
         case = random_case(seed, frozenset(terms)).replace(thermal__housing_to_ambient=1e12)
         case = replace(case, duration=0.1)

@@ -2,8 +2,8 @@
 
 Everything comes from the file of constants or the recording itself; nothing is fitted to the curve. What is assumed:
 
-- The bridge brakes in the pauses of its 26 %, so that the motor sees the mean of them: duty times the voltage measured
-  at the bridge. The pulse servo with inductance, driven fully by a supply of that voltage, is such a motor with brushes.
+- The bridge brakes in the pauses, so that the motor sees the mean: duty times the voltage measured at the bridge. The
+  pulse servo with inductance, driven fully by a supply of that voltage, is such a motor with brushes.
 - The torque constant is the back-EMF constant of the bare motor, its rotor the only inertia.
 - Coulomb and viscous torque are the straight line through the two no-load currents (5 V at 12 % and 40 %).
 - The brush drop lies in 0.15 V to 0.22 V, which the notes beside the data give; nothing says where.
@@ -61,10 +61,11 @@ class Recording:
         coulomb = K * low - viscous * w_low
         return SIMPLE | {
             "motor.armature_resistance": R, "motor.armature_inductance": 1e-3 * c["L_mH_in_servo"],
-            "motor.torque_constant": K, "motor.back_emf_constant": K, "motor.rotor_inertia": c["J_rotor_kg_m2"]["value"],
-            "motor.motor_viscous_friction": viscous, "motor.brush_drop_voltage": brush_drop,
-            "gear.gear_reduction": N, "friction.coulomb_torque_forward": coulomb,
-            "friction.coulomb_torque_backward": coulomb, "supply.open_circuit_voltage": self.voltage}
+            "motor.torque_constant": K, "motor.back_emf_constant": K,
+            "motor.rotor_inertia": c["J_rotor_kg_m2"]["value"], "motor.motor_viscous_friction": viscous,
+            "motor.brush_drop_voltage": brush_drop, "gear.gear_reduction": N,
+            "friction.coulomb_torque_forward": coulomb, "friction.coulomb_torque_backward": coulomb,
+            "supply.open_circuit_voltage": self.voltage}
 
 
 @pytest.fixture(scope="module")

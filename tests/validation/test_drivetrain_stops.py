@@ -36,14 +36,15 @@ def kinetic(y):
 @pytest.mark.parametrize("inductance", [None, 3e-4])
 @pytest.mark.parametrize(("off", "side"), [("brake", 1), ("coast", -1)])
 def test_a_stop_at_speed(restitution, play, inductance, off, side):
-    values = COULOMB | {f"stops.{'upper' if side > 0 else 'lower'}_angle": side * STOP, "stops.restitution": restitution,
+    which = "upper" if side > 0 else "lower"
+    values = COULOMB | {f"stops.{which}_angle": side * STOP, "stops.restitution": restitution,
                         "electronics.off_state": off} | (PLAY if play else {"gear.output_inertia": OUTPUT})
     case = undriven(values, initial={"output_angle": 0.0, "output_speed": side * SPEED}, duration=0.3).replace(
         motor__armature_inductance=inductance)
     if play:
         case.initial.update(motor_speed=side * SPEED * N, motor_angle=0.0)
     result = simulate(case, np.linspace(0.0, 0.3, 3001))
-    impacts = around(result, f"{'upper' if side > 0 else 'lower'} stop")
+    impacts = around(result, f"{which} stop")
     assert impacts
     assert np.max(side * result["output_angle"]) <= STOP + 1e-13
     assert np.all(np.isfinite(result["output_speed"]))

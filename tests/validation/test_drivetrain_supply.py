@@ -79,14 +79,14 @@ def test_diodes_return_as_much(inductance, limit):
                                    {"limit", "inductance", "coast"}], ids="+".join)
 def test_a_regulator_keeps_its_limits_in_any_run(terms):
     bound = broken = 0
-    for seed in range(6):
+    for seed in range(12):
         case = random_case(seed, frozenset(terms))
-        result = simulate(case, np.linspace(0.0, case.duration, 2001))
+        result = simulate(case, np.linspace(0.0, case.duration, 1001))
         limit, V_oc = case.values["supply.current_limit"], case.values["supply.open_circuit_voltage"]
         given, bus = result["supply_current"], result["bus_voltage"]
         assert np.all((bus >= 0.0) & (bus <= V_oc))
         assert np.all(bus[given > limit * (1.0 + 1e-12)] == 0.0)
         assert np.all(bus[given < 0.0] == V_oc)
         bound, broken = bound + int(np.sum(given == limit)), broken + int(np.sum(bus == 0.0))
-    assert bound > 100
-    assert broken >= 0
+    assert bound > 1000
+    assert (broken > 0) == ("coast" in terms)  # a brake takes the speed that a reversed drive would meet

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,9 @@ def circuit_of(model: Model, plant: Plant, samples: Samples, drive: Pieces) -> C
 
 def _behind_bridge(model: Model, plant: Plant, samples: Samples) -> Circuit:
     s, driven = samples.drive, samples.drive != 0.0
+    shared = getattr(samples, "bus", None)
+    if shared is not None:
+        plant = on_bus(plant, shared)
     V_br, V_ce0 = (model.value_or(name, 0.0) for name in ("motor.brush_drop_voltage", "supply.bridge_drop_voltage"))
     v_b = plant.K_b * (samples.motor_speed if np.any(plant.half_play) else samples.speed)
     inductive = np.any(plant.L > 0.0)
@@ -71,6 +75,15 @@ def _behind_bridge(model: Model, plant: Plant, samples: Samples) -> Circuit:
         v = np.asarray(bridge.motor_voltage(i, v_b, plant.R, V_br, np.where(driven | coasts, v_b, 0.0)))
     lost = np.where(driven | coasts, (V_ce0 + r_c * np.abs(i)) * np.abs(i), 0.0)
     return Circuit(v, i, bus, of_supply, bus * of_supply, lost, V_br * np.abs(i))
+
+
+def on_bus(plant: Plant, bus: Array) -> Plant:
+    """Return the plant of a servo on a bus whose voltage is known; that of its source is then left out."""
+    coasts = plant.D_off >= plant.V
+    R_off = plant.R_off - np.where(coasts & np.isinf(plant.I_max), plant.R_b, 0.0)
+    V: Any = bus
+    return plant._replace(V=V, D_off=np.where(coasts, plant.D_off - plant.V + V, plant.D_off), R_off=R_off,
+                          R_drive=plant.R_drive - plant.R_b, R_b=0.0, I_max=math.inf)
 
 
 def _from_regulator(plant: Plant, s: Array, v_b: Array, i: Array) -> Array:

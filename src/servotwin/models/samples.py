@@ -31,6 +31,8 @@ class Samples:
         Mode.
     drive, error : ndarray
         Of a pulse servo: how the bridge drives (−1, 0, +1), and the latest error decided on [s].
+    bus : ndarray, optional
+        Voltage of a bus that several servos share [V]; None for a servo that has its source for itself.
     """
 
     time: Array
@@ -48,10 +50,12 @@ class Samples:
     motor: Whole
     drive: Array
     error: Array
+    bus: Array | None = None
 
     @classmethod
-    def make(cls, time: Array, states: Array, wiper: Array, mode: Array, drive: Array, error: Array) -> Samples:
+    def make(cls, time: Array, states: Array, wiper: Array, mode: Array, drive: Array, error: Array,
+             bus: Array | None = None) -> Samples:
         """Build from arrays of states, shape (7, n), and of modes, shape (4, n)."""
         q, w, i, T_w, T_h, q_m, w_m = states
         zone, contact, mesh, motor = mode.astype(np.int64)
-        return cls(time, q, w, i, T_w, T_h, q_m, w_m, wiper, zone, contact, mesh, motor, drive, error)
+        return cls(time, q, w, i, T_w, T_h, q_m, w_m, wiper, zone, contact, mesh, motor, drive, error, bus)

@@ -12,12 +12,14 @@ from servotwin.simulation.status import Status
 
 if TYPE_CHECKING:
     from servotwin.simulation.batch import Batch, Failure
+    from servotwin.simulation.bus import Fleet, simulate_bus
     from servotwin.simulation.many import grid, simulate_many
 
-_LAZY = {"Batch": "batch", "Failure": "batch", "grid": "many", "simulate_many": "many"}
+_LAZY = {"Batch": "batch", "Failure": "batch", "Fleet": "bus", "grid": "many", "simulate_bus": "bus",
+         "simulate_many": "many"}
 
-__all__ = ["Batch", "Energy", "Event", "Failure", "Result", "Simulator", "State", "Stats", "Status", "StepMetrics",
-           "grid", "simulate", "simulate_many"]
+__all__ = ["Batch", "Energy", "Event", "Failure", "Fleet", "Result", "Simulator", "State", "Stats", "Status", "StepMetrics",
+           "grid", "simulate", "simulate_bus", "simulate_many"]
 
 
 def __getattr__(name: str) -> Any:

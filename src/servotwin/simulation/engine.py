@@ -122,7 +122,8 @@ class State:
 class Segment:
     """A stretch of one motion between two times [s], and what holds with it.
 
-    `error` is the latest that the chip has decided on [s], `wiper` the angle of the potentiometer at the start [rad].
+    `error` is the latest that the chip has decided on [s], `wiper` the angle of the potentiometer at the start [rad],
+    `drive` how a bridge drives: −1, 0 or +1.
     """
 
     start: float
@@ -130,17 +131,12 @@ class Segment:
     motion: Motion
     error: float
     wiper: float
+    drive: float
 
     @property
     def anchor(self) -> float:
         """When the motion began [s]; it may be before the segment's start."""
         return self.motion.t0
-
-    @property
-    def drive(self) -> float:
-        """How a bridge drives: −1, 0 or +1."""
-        u = self.motion.u.value
-        return math.copysign(1.0, u) if self.motion.plant.V > 0.0 and u != 0.0 else 0.0
 
 
 @dataclass
@@ -171,7 +167,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
             if plan.chip is None:
                 u, u_end = plan.command.at(before)
             else:
-                chip_frame = _switched(plan, plan.chip, chip_frame, point, record)
+                chip_frame = _after_chip(plan, plan.chip, chip_frame, point, record)
                 u = walk.source(plant, chip_frame)
                 u_end = min(frame.next_switch(chip_frame),
                             frame.edge_time(plan.period, plan.edges or (), chip_frame.number))
@@ -183,51 +179,63 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
             if motion is None or is_step(motion):
                 motion = walk.motion_of(plant, point, u, tau, limit)
             if motion.kind == IMPOSSIBLE:
-                raise _failure(Status.STEP_TOO_SMALL, before)
+                raise failure(Status.STEP_TOO_SMALL, before)
             wiper = point.wiper
             point, kind, status = walk.follow(motion, point, min(until, limit))
         except ArithmeticError:  # numbers beyond what a float holds
-            raise _failure(Status.DIVERGED, before) from None
+            raise failure(Status.DIVERGED, before) from None
         if status != walk.COMPLETED:
-            raise _failure(Status.of_code(status), before)
+            raise failure(Status.of_code(status), before)
         idle = idle + 1 if point.time == before else 0
         if idle > MOST_IDLE:
-            raise _failure(Status.CHATTER, before)
+            raise failure(Status.CHATTER, before)
         if record is not None:
             if point.time > before or not record.segments:
-                record.segments.append(Segment(before, point.time, motion, chip_frame.error, wiper))
+                record.segments.append(Segment(before, point.time, motion, chip_frame.error, wiper,
+                                               chip_frame.drive))
             if kind >= 0:
-                record.events.append(Event(point.time, _event_name(kind, point.mode), point.y[0]))
+                record.events.append(Event(point.time, event_name(kind, point.mode), point.y[0]))
         if kind >= 0:
             motion = None
     return State(time=point.time, places=state.places, point=point, inputs=inputs, plant=plant, frame=chip_frame)
 
 
-def _failure(status: Status, time: float) -> SimulationError:
+def failure(status: Status, time: float) -> SimulationError:
+    """Return the error of a run that ended at `time` [s]."""
+    """Return the error of a run that ended at `time` [s]."""
     return SimulationError(status.name, time, status.message)
 
 
-def _switched(plan: Plan, chip: Chip, now: Frame, point: Point, record: Record | None) -> Frame:
+def _after_chip(plan: Plan, chip: Chip, now: Frame, point: Point, record: Record | None) -> Frame:
     """Return the frame state after all that the chip does at the time of a point."""
-    time, drive = point.time, now.drive
-    if frame.next_switch(now) <= time:
-        now = frame.switched(now, time)
-        if record is not None and now.drive != drive:
-            record.events.append(Event(time, _DRIVES[int(now.drive)], point.y[0]))
+    time = point.time
+    now = switched(now, time, point.y[0], record)
     if frame.edge_time(plan.period, plan.edges or (), now.number) <= time:
         t_in = piece_value(plan.command.at(time)[0], time)
         if record is not None and not frame.accepted(chip, t_in):
             record.events.append(Event(time, "pulse refused", point.y[0]))
         now = walk.measured(plan.plant, chip, plan.curve, now, point, t_in, plan.seed)
         if now.number == frame.CROWDED:
-            raise _failure(Status.CROWDED, time)
+            raise failure(Status.CROWDED, time)
     return now
+
+
+def switched(now: Frame, time: float, angle: float, record: Record | None) -> Frame:
+    """Return the frame state after all that switches at `time` [s], where the shaft is at `angle` [rad]."""
+    if frame.next_switch(now) > time:
+        return now
+    after = frame.switched(now, time)
+    if record is not None and after.drive != now.drive:
+        record.events.append(Event(time, _DRIVES[int(after.drive)], angle))
+    return after
 
 
 _DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}
 
 
-def _event_name(kind: int, after: Mode) -> str:
+def event_name(kind: int, after: Mode) -> str:
+    """Return what to call an event after which this mode holds."""
+    """Return what to call an event after which this mode holds."""
     if kind == hybrid.SPEED and at_rest(after.contact):
         return "stick"
     if kind == hybrid.SPEED and after.contact != CORE:

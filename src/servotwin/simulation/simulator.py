@@ -137,10 +137,13 @@ class Simulator:
         if not is_finite(external_torque):
             raise InputError("external_torque", got=external_torque, allowed="a finite number [N m]")
         self.load.check_span(state.time, until)
+        return engine.run(self.plan(command, external_torque), state, float(until), record)
+
+    def plan(self, command: Signal, external_torque: float = 0.0) -> Plan:
+        """Return what the engine needs for a run under a command, and a constant torque beside the load [N m]."""
         torque = self._torque.scaled(1.0, external_torque) if external_torque else self._torque
-        plan = Plan(self._plant, self.drive(command), torque, self.model.chip(command), self.model.edges(command),
+        return Plan(self._plant, self.drive(command), torque, self.model.chip(command), self.model.edges(command),
                     self.seed, self.model.curve())
-        return engine.run(plan, state, float(until), record)
 
 
 def simulate(model: Model, command: Signal, *, duration: float, load: Load | Part | None = None,

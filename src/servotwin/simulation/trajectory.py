@@ -24,6 +24,7 @@ class Trajectory:
     """Segments without gaps, in order; after the last one the state is not known (nan)."""
 
     segments: tuple[Segment, ...]
+    bus: Callable[[Array], Array] | None = None  # voltage of a shared bus [V] at times [s]
 
     @cached_property
     def _starts(self) -> Array:
@@ -56,7 +57,7 @@ class Trajectory:
             mode[:, where] = np.array(segment.motion.mode)[:, None]
             drive[where], error[where] = segment.drive, segment.error
             wiper[where] = play(segment.wiper, y[0, where], 2.0 * segment.motion.plant.half_slack)
-        return Samples.make(t, y, wiper, mode, drive, error)
+        return Samples.make(t, y, wiper, mode, drive, error, None if self.bus is None else self.bus(t))
 
     def intervals(self, index: int) -> Array:
         """Return the ends of short intervals of one segment, in each of which all signals are smooth and gentle."""

@@ -39,6 +39,7 @@ class Member(NamedTuple):
     mode: Mode
     sign: float  # of the bus voltage in its circuit
     tau: Piece
+    returns: bool  # through diodes, against the bus alone
 
 
 def on_stiff_source(plant: Plant, returning: bool) -> Plant:
@@ -46,13 +47,22 @@ def on_stiff_source(plant: Plant, returning: bool) -> Plant:
     R_drive = plant.R_off - plant.R_b if returning and plant.I_max == math.inf else plant.R_drive - plant.R_b
     if returning and plant.I_max < math.inf:
         R_drive = plant.R_off
-    return plant._replace(R_drive=R_drive, R_b=0.0, I_max=math.inf)
+    D = max(plant.D_drive, 1e-300) if returning else plant.D_drive  # a diode without drop still has a direction
+    return plant._replace(R_drive=R_drive, R_b=0.0, I_max=math.inf, D_drive=D)
+
+
+def member_of(plant: Plant, mode: Mode, drive: float, tau: Piece, y: Vector) -> Member:
+    """Return a servo as a member, driven or (0) returning current through the diodes of a coasting bridge."""
+    sign = drive
+    if sign == 0.0:  # against the current, or against the one that the back-EMF would drive
+        sign = -math.copysign(1.0, y[2]) if y[2] != 0.0 else math.copysign(1.0, y[6])
+    return Member(on_stiff_source(plant, drive == 0.0), mode, sign, tau, drive == 0.0)
 
 
 def _demand(members: Sequence[Member], states: Sequence[Vector]) -> tuple[float, float, float]:
     """Return g, h and I_B of the current Σ s i = g V − h + I_B that the members take at the bus voltage V."""
     g = h = given = 0.0
-    for (plant, mode, sign, _), y in zip(members, states, strict=True):
+    for (plant, mode, sign, _, _), y in zip(members, states, strict=True):
         warm = hybrid.warm(plant, y)
         if plant.L > 0.0:
             given += sign * y[2]
@@ -74,7 +84,7 @@ def bus_voltage(source: Source, state: int, members: Sequence[Member], states: S
     if g > 0.0:
         return (source.I_max + h - given) / g
     above = below = 0.0  # the currents have inertia: their sum has to stay
-    for (plant, mode, sign, _), y in zip(members, states, strict=True):
+    for (plant, mode, sign, _, _), y in zip(members, states, strict=True):
         if mode.zone != NO_CURRENT:
             warm = hybrid.warm(plant, y)
             drop = armature.sign_of(mode.zone) * warm.D_drive
@@ -129,9 +139,7 @@ def zoned(source: Source, members: Sequence[Member], states: Sequence[Vector],
     """
     now, state = list(members), FOLLOWING
     for _ in range(20 + 4 * len(now)):
-        now = [m._replace(mode=m.mode._replace(zone=armature.zone_of(
-            hybrid.warm(m.plant, y), m.sign * V_bus or _NEARLY_NOTHING, 0.0, y[0], y[6], y[2])))
-            for m, y in zip(now, states, strict=True)]
+        now = [m._replace(mode=m.mode._replace(zone=_zone(m, y, V_bus))) for m, y in zip(now, states, strict=True)]
         state = source_state(source, now, states)
         before, V_bus = V_bus, bus_voltage(source, state, now, states)
         if abs(V_bus - before) <= 1e-14 * source.V:
@@ -139,7 +147,24 @@ def zoned(source: Source, members: Sequence[Member], states: Sequence[Vector],
     return now, state, V_bus
 
 
-_NEARLY_NOTHING = 5e-324  # V: a bus without voltage is still connected
+def _zone(member: Member, y: Vector, V_bus: float) -> int:
+    zone = armature.zone_of(hybrid.warm(member.plant, y), behind(member, V_bus), 0.0, y[0], y[6], y[2])
+    along = armature.sign_of(zone) * member.sign > 0.0
+    return NO_CURRENT if member.returns and along else zone
+
+
+def after(state: int, guard: int) -> int:
+    """Return what the source does after one of its guards has fallen below zero."""
+    if state == FOLLOWING:
+        return KEEPING if guard == 1 else LIMITED
+    if state == LIMITED:
+        return BROKEN_DOWN if guard == 1 else FOLLOWING
+    return FOLLOWING if state == KEEPING else LIMITED
+
+
+def behind(member: Member, V_bus: float) -> float:
+    """Return the voltage in a member's circuit [V]; a bus without any is still connected."""
+    return member.sign * (V_bus or 5e-324)
 
 
 def is_linear(member: Member) -> bool:
@@ -152,7 +177,7 @@ def is_linear(member: Member) -> bool:
 def fastest_rate(members: Sequence[Member]) -> float:
     """Return the fastest rate [1/s] of linear members."""
     rate = 0.0
-    for plant, mode, _, _ in members:
+    for plant, mode, _, _, _ in members:
         one = plant.b / plant.J + math.sqrt(plant.stiffness / plant.J)
         if mode.zone != NO_CURRENT:
             one += plant.R_drive / plant.L if plant.L > 0.0 else plant.K * plant.K_b / (plant.R_drive * plant.J)
@@ -181,7 +206,6 @@ def series(source: Source, state: int, members: Sequence[Member], states: Sequen
     angles = [y[0] for y in states]
     currents = [[y[2]] if m.plant.L > 0.0 else [] for m, y in zip(members, states, strict=True)]
     terms = [_linear(m, y, time) for m, y in zip(members, states, strict=True)]
-    V = [0.0]
     for n in range(_MOST_TERMS):
         V_n = _series_voltage(source, state, members, terms, speeds, currents, n)
         size = 0.0
@@ -200,7 +224,6 @@ def series(source: Source, state: int, members: Sequence[Member], states: Sequen
             size = max(size, abs(speeds[j][-1]), abs(currents[j][-1]))
         if n > 2 and size * length ** (n + 1) < 1e-18:
             break
-    del V
     return [Series(tuple(w), tuple(i)) for w, i in zip(speeds, currents, strict=True)]
 
 
@@ -221,7 +244,7 @@ class _Linear(NamedTuple):
 
 
 def _linear(member: Member, y: Vector, time: float) -> _Linear:
-    plant, mode, _, tau = member
+    plant, mode, _, tau, _ = member
     friction = contact.friction_torque(plant, mode.contact, y[1], 0.0, 0.0)
     against = piece_value(tau, time) - plant.stiffness * plant.rest_angle + friction
     conducts = 0.0 if mode.zone == NO_CURRENT else 1.0
@@ -257,7 +280,7 @@ def joint_rates(source: Source, state: int, members: Sequence[Member], time: flo
                 states: Sequence[Vector]) -> list[Vector]:
     """Return the rates of all members."""
     V = bus_voltage(source, state, members, states)
-    return [hybrid.rates(m.plant, m.mode, m.sign * V or _NEARLY_NOTHING, piece_value(m.tau, time), y)
+    return [hybrid.rates(m.plant, m.mode, behind(m, V), piece_value(m.tau, time), y)
             for m, y in zip(members, states, strict=True)]
 
 
@@ -273,8 +296,9 @@ def joint_step(source: Source, state: int, members: Sequence[Member], states: Se
                                strict=True):
                 k[j] = rate
         ends = [dormand_prince.moved(y, k, STAGES, h) for y, k in zip(states, ks, strict=True)]
-        size = max(dormand_prince.error_of(y, end, k, h) for y, end, k in zip(states, ends, ks, strict=True)) / _TOLERANCE
-        size = size if size < 1e12 else 1e12
+        errors = [dormand_prince.error_of(y, end, k, h) for y, end, k in zip(states, ends, ks, strict=True)]
+        size = max(e if e == e else math.inf for e in errors) / _TOLERANCE
+        size = min(size, 1e12)
         factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
         if size <= 1.0:
             break

@@ -15,7 +15,7 @@ from servotwin.models.kernels.rodas import Triple
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
-REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, STEP, LONG_STEP, IMPOSSIBLE = range(8)
+REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, IMPOSSIBLE = range(9)
 
 _TURN = 2.0 * math.pi
 _TOLERANCE = 3e-10  # error of one implicit step, relative to 1 + |state|
@@ -38,8 +38,8 @@ class Motion(NamedTuple):
     t0: float
     start: Vector
     length: float
-    coefficients: tuple[float, ...]  # of second_order; first_order uses (λ, f) at the front, HELD (R/L, final current)
-    against: tuple[float, float]  # WITH_CURRENT: value and slope of all torque that does not depend on speed
+    coefficients: tuple[float, ...]  # of second_order; FIRST_ORDER (λ, f, …), HELD (R/L, final i), SERIES of w and i
+    against: tuple[float, ...]  # WITH_CURRENT: value and slope of all torque that does not depend on speed
     end: Vector  # of a step, as all that follows
     next_step: float  # length to try next [s]
     has_dense: bool
@@ -89,9 +89,23 @@ def begin(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, 
 
 
 def _closed(kind: int, plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
-            coefficients: tuple[float, ...], against: tuple[float, float], step: float) -> Motion:
+            coefficients: tuple[float, ...], against: tuple[float, ...], step: float) -> Motion:
     return Motion(kind, plant, mode, u, tau, t0, y, math.inf, coefficients, against, y, step, False, _NO_STAGES,
                   _NO_DENSE, _NO_LONG_DENSE)
+
+
+def by_series(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
+              speed: tuple[float, ...], current: tuple[float, ...]) -> Motion:
+    """Return a motion whose speed and current are given as powers of time."""
+    return Motion(SERIES, plant, mode, u, tau, t0, y, length, speed, current, y, 0.0, False, _NO_STAGES, _NO_DENSE,
+                  _NO_LONG_DENSE)
+
+
+def by_step(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
+            dense: tuple[Vector, ...], end: Vector) -> Motion:
+    """Return a motion whose dense output is given."""
+    return Motion(LONG_STEP, plant, mode, u, tau, t0, y, length, _NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, True,
+                  _NO_STAGES, _NO_DENSE, dense)
 
 
 def _integrated(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
@@ -170,6 +184,14 @@ def state(motion: Motion, s: float) -> Vector:
     if kind == HELD:
         rate, final = motion.coefficients[0], motion.coefficients[1]
         return _moved(motion, start[0], start[1], start[2] + (start[2] - final) * math.expm1(-rate * s))
+    if kind == SERIES:
+        q = w = i = 0.0
+        for n in range(len(motion.coefficients) - 1, -1, -1):
+            w = w * s + motion.coefficients[n]
+            q = q * s + motion.coefficients[n] / (n + 1)
+        for n in range(len(motion.against) - 1, -1, -1):
+            i = i * s + motion.against[n]
+        return _moved(motion, start[0] + q * s, w, i)
     if motion.t0 + s >= motion.t0 + motion.length:  # the end, reached as a difference of two times
         return motion.end
     if s == 0.0:
@@ -217,7 +239,7 @@ def scales(motion: Motion) -> tuple[float, float]:
         return math.inf, 0.0
     if motion.kind == HELD:
         return 1.0 / motion.coefficients[0], 40.0 / motion.coefficients[0]
-    if is_step(motion):  # the error control keeps it short beside what happens in it
+    if motion.kind == SERIES or is_step(motion):  # the error control keeps it short beside what happens in it
         return motion.length, math.inf
     a, c = motion.coefficients[0], motion.coefficients[1]
     rate = 2.0 * a + math.sqrt(abs(c))

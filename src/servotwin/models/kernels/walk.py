@@ -108,17 +108,21 @@ def source(plant: Plant, chip_frame: Frame) -> Piece:
     return Piece(0.0, chip_frame.drive * plant.V, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def measured(plant: Plant, chip: Chip, curve: Sequence[Sequence[float]] | NDArray[np.float64], chip_frame: Frame,
-             point: Point, t_in: float, seed: int) -> Frame:
-    """Return the frame state after the edge of a pulse of the width t_in that meets the servo at a point."""
-    y, u = point.y, chip_frame.drive * plant.V
+def voltages(plant: Plant, chip: Chip, u: float, y: Vector) -> tuple[float, float]:
+    """Return the voltages at the motor's terminals and of the bus [V], for the voltage u behind the bridge."""
     plant = hybrid.warm(plant, y)
     w, i, coasts = y[6], y[2], chip.coast > 0.0
     zone = armature.zone_of(plant, u, 0.0, y[0], w, i)
     if plant.L == 0.0:
         i = armature.current(plant, zone, u, y[0], w)
     V_bus = armature.bus_voltage(plant, zone, u, w, i, coasts)
-    v_m = armature.terminal_voltage(plant, chip.V_br, u, w, i, V_bus, coasts)
+    return armature.terminal_voltage(plant, chip.V_br, u, w, i, V_bus, coasts), V_bus
+
+
+def measured(plant: Plant, chip: Chip, curve: Sequence[Sequence[float]] | NDArray[np.float64], chip_frame: Frame,
+             point: Point, t_in: float, seed: int) -> Frame:
+    """Return the frame state after the edge of a pulse of the width t_in that meets the servo at a point."""
+    v_m, V_bus = voltages(plant, chip, chip_frame.drive * plant.V, point.y)
     v_o = frame.feedback_voltage(chip, curve, point.wiper)
     return frame.edge(chip, chip_frame, point.time, t_in, v_o, v_m, V_bus, seed)
 

@@ -1,0 +1,233 @@
+"""`simulate_bus`: several servos on one supply, coupled through its voltage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from servotwin.errors import InputError, SimulationError, UnknownNameError
+from servotwin.models import Model, PulseServo, PulseServoInductive
+from servotwin.models.kernels import coupled
+from servotwin.models.kernels.coupled import Member, Source
+from servotwin.models.kernels.frame import Chip
+from servotwin.models.kernels.plant import Mode
+from servotwin.models.samples import Samples
+from servotwin.parameters.groups import Supply
+from servotwin.physics.pieces import Piece
+from servotwin.signals import Signal
+from servotwin.simulation.bus_engine import Bus, Unit
+from servotwin.simulation.bus_group import Group
+from servotwin.simulation.energy import Energy
+from servotwin.simulation.engine import Plan
+from servotwin.simulation.result import Result
+from servotwin.simulation.simulator import Simulator, _times
+from servotwin.simulation.status import Status
+from servotwin.simulation.trajectory import Trajectory
+from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+_OF_SERVO = ("bridge_drop_voltage", "bridge_drop_resistance")
+
+
+@dataclass(frozen=True, eq=False)
+class Fleet:
+    """The outcome of a simulation of several servos on one supply: a mapping of their results.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Output times [s].
+    results : mapping of str to Result
+        Of each servo, by its name.
+    status : Status
+        How the run ended; `cause` says it in words, `ended` when [s].
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
+    >>> command = st.signals.step(0.0, 60.0, at=0.1, unit="deg")
+    >>> fleet = st.simulate_bus({"left": (model, command), "right": (model, command)}, duration=0.3,
+    ...                         supply=st.Supply(open_circuit_voltage=6.0, internal_resistance=0.5))
+    >>> bool(4.0 < fleet.bus_voltage.min() < 5.0), fleet["left"].status.ok
+    (True, True)
+    """
+
+    time: Array
+    results: Mapping[str, Result]
+    status: Status
+    ended: float
+    cause: str
+    bus: Callable[[Array], Array]
+
+    def __getitem__(self, name: str) -> Result:
+        """Return the result of a servo."""
+        if name not in self.results:
+            raise UnknownNameError("servo of the fleet", name, tuple(self.results))
+        return self.results[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.results)
+
+    def __len__(self) -> int:
+        """Return the number of servos."""
+        return len(self.results)
+
+    @cached_property
+    def bus_voltage(self) -> Array:
+        """Voltage of the supply under load [V], shape (n,)."""
+        return self.bus(self.time)
+
+    @cached_property
+    def supply_current(self) -> Array:
+        """Current that the supply gives to all servos [A], shape (n,); negative where some comes back."""
+        return np.asarray(sum(result["supply_current"] for result in self.results.values()))
+
+    @cached_property
+    def energy(self) -> Energy:
+        """Energy balance of all servos together [J]; its `supply` is what the bus has delivered."""
+        parts = [result.energy for result in self.results.values()]
+        return Energy(*(sum(getattr(part, one.name) for part in parts) for one in fields(Energy)))
+
+    def raise_if_failed(self) -> Fleet:
+        """Return the fleet itself, or raise SimulationError if the run ended before its time."""
+        if not self.status.ok:
+            raise SimulationError(self.status.name, self.ended, self.cause)
+        return self
+
+
+def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duration: float,
+                 output_step: float | None = None, output_times: ArrayLike | None = None,
+                 initial: Mapping[str, Mapping[str, float]] | None = None, seed: int = 0) -> Fleet:
+    """Simulate several servos on one supply from t = 0 to `duration`.
+
+    The supply's voltage follows from all their currents at every instant; what it is feeds back into each motor, and
+    through `electronics.supply_coupling` into what each chip measures. A servo alone on the bus moves as with
+    `simulate`.
+
+    Parameters
+    ----------
+    servos : mapping of str to tuple
+        (model, command) or (model, command, load) by a name of your choice; the models are `PulseServo` or
+        `PulseServoInductive`. What their servo files say of the source is replaced by `supply`.
+    supply : Supply
+        Its open_circuit_voltage, internal_resistance and current_limit; the drop of a bridge is the servo's own.
+    duration : float
+        Positive [s].
+    output_step, output_times
+        As in `simulate`.
+    initial : mapping, optional
+        Initial values of each servo by its name, as in `simulate`.
+    seed : int
+        Of all noise; the k-th servo has the seed `seed` + k.
+
+    Returns
+    -------
+    Fleet
+
+    Raises
+    ------
+    InputError
+        On bad input; names the servo.
+    """
+    if not (is_finite(duration) and duration > 0.0):
+        raise InputError("duration", got=duration, allowed="a positive number of seconds")
+    times = _times(duration, output_step, output_times)
+    given = _checked(servos, supply, initial)
+    sims, units = {}, []
+    for k, (name, (model, command, load)) in enumerate(given.items()):
+        sim = Simulator(_on_supply(model, supply), load, int(seed) + k)
+        sim.load.check_span(0.0, duration)
+        state = sim.initial(command, (initial or {}).get(name))
+        plan = sim.plan(command)
+        if plan.chip is None:
+            raise InputError(f"model of {name}", got=model, allowed="a pulse servo")
+        sims[name] = sim
+        units.append(Unit(plan, plan.chip, state.point))
+    source = _source(supply)
+    status, ended, cause = Status.COMPLETED, duration, Status.COMPLETED.message
+    try:
+        Bus(units, Group(source)).run(float(duration))
+    except (SimulationError, ArithmeticError) as error:
+        of_run = isinstance(error, SimulationError)
+        status = Status[error.status] if of_run else Status.DIVERGED
+        ended = error.time if of_run else max(unit.point.time for unit in units)
+        cause = status.message
+    alone = {name: Trajectory(tuple(unit.record.segments)) for name, unit in zip(given, units, strict=True)}
+    bus = _BusVoltage(source, [unit.plan for unit in units], [unit.chip for unit in units], list(alone.values()))
+    results = {
+        name: Result(model=sims[name].model, command=command, load=sims[name].load, drive=sims[name].drive(command),
+                     time=times, trajectory=Trajectory(alone[name].segments, bus), events=tuple(unit.record.events),
+                     status=status, ended=ended, cause=cause)
+        for unit, (name, (_, command, _)) in zip(units, given.items(), strict=True)}
+    return Fleet(times, results, status, ended, cause, bus)
+
+
+def _checked(servos: Mapping[str, Sequence[Any]], supply: Supply,
+             initial: Mapping[str, Mapping[str, float]] | None) -> dict[str, tuple[Model, Signal, Any]]:
+    allowed = "a mapping of names to (model, command) or (model, command, load)"
+    if not isinstance(servos, Mapping) or not servos:
+        raise InputError("servos", got=servos, allowed=allowed)
+    if not isinstance(supply, Supply) or supply.open_circuit_voltage is None:
+        raise InputError("supply", got=supply, allowed="a Supply with open_circuit_voltage, such as "
+                         "Supply(open_circuit_voltage=6.0, internal_resistance=0.5)")
+    for name in _OF_SERVO:
+        if getattr(supply, name) is not None:
+            raise InputError(f"supply.{name} of a bus", got=getattr(supply, name), allowed="it belongs to each servo")
+    for name in initial or {}:
+        if name not in servos:
+            raise UnknownNameError("servo of initial", name, tuple(servos))
+    found: dict[str, tuple[Model, Signal, Any]] = {}
+    for name, parts in servos.items():
+        if not isinstance(parts, Sequence) or isinstance(parts, str) or len(parts) not in (2, 3):
+            raise InputError(f"servo {name!r}", got=parts, allowed="(model, command) or (model, command, load)")
+        if not isinstance(parts[0], PulseServo | PulseServoInductive):
+            raise InputError(f"model of servo {name!r}", got=parts[0], allowed="PulseServo or PulseServoInductive")
+        found[str(name)] = (parts[0], parts[1], parts[2] if len(parts) == 3 else None)
+    return found
+
+
+def _on_supply(model: Model, supply: Supply) -> Model:
+    """Return the model with this supply instead of its own."""
+    return type(model)(model.servo.replace({
+        f"supply.{name}": getattr(supply, name)
+        for name in ("open_circuit_voltage", "internal_resistance", "current_limit")}))
+
+
+def _source(supply: Supply) -> Source:
+    V_oc, R_b, I_max = supply.open_circuit_voltage, supply.internal_resistance, supply.current_limit
+    return Source(V_oc or 0.0, R_b or 0.0, np.inf if I_max is None else I_max)
+
+
+@dataclass(frozen=True, eq=False)
+class _BusVoltage:
+    """The voltage of the bus at any time, from the states of all servos."""
+
+    source: Source
+    plans: Sequence[Plan]
+    chips: Sequence[Chip]
+    trajectories: Sequence[Trajectory]
+
+    def __call__(self, time: Array) -> Array:
+        samples = [trajectory.at(time) for trajectory in self.trajectories]
+        return np.array([self._at(samples, k) for k in range(len(time))])
+
+    def _at(self, samples: Sequence[Samples], k: int) -> float:
+        members, states = [], []
+        for plan, chip, s in zip(self.plans, self.chips, samples, strict=True):
+            y = (s.angle[k], s.speed[k], s.current[k], s.winding[k], s.housing[k], s.motor_angle[k], s.motor_speed[k])
+            drive = float(s.drive[k])
+            if drive == 0.0 and not (chip.coast > 0.0 and (y[2] != 0.0 or y[6] != 0.0)):
+                continue
+            mode = Mode(int(s.zone[k]), int(s.contact[k]), int(s.mesh[k]), int(s.motor[k]))
+            members.append(coupled.member_of(plan.plant, mode, drive, Piece(), y))
+            states.append(y)
+        return coupled.zoned(self.source, members, states, self.source.V)[2]

@@ -1,0 +1,210 @@
+"""Several servos on one source, from event to event of all of them in one queue.
+
+As long as at most one motor is connected to the bus every servo moves on its own, by the laws of one alone. Where
+several are, they form a group that moves together until one of them, its chip or the source does something else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from servotwin.models.kernels import armature, frame, hybrid, motion, walk
+from servotwin.models.kernels.frame import Chip, Frame
+from servotwin.models.kernels.motion import Motion
+from servotwin.models.kernels.plant import Vector
+from servotwin.models.kernels.walk import MOST_IDLE, Point
+from servotwin.physics.pieces import Piece, piece_value
+from servotwin.simulation.bus_group import Connected, Group
+from servotwin.simulation.engine import Event, Plan, Record, Segment, event_name, failure, switched
+from servotwin.simulation.status import Status
+
+
+@dataclass
+class Unit:
+    """A servo on the bus: what it is told, where it stands, and what it does next when left alone."""
+
+    plan: Plan
+    chip: Chip
+    point: Point
+    record: Record = field(default_factory=lambda: Record([], []))
+    frame: Frame = frame.AT_START
+    tau: Piece = field(default_factory=Piece)
+    tau_end: float = -math.inf
+    inputs: tuple[Piece, Piece] | None = None  # of the present motion
+    motion: Motion | None = None
+    arrival: tuple[Point, int] | None = None  # when left alone: its next point, and the event there (−1: none)
+
+    @property
+    def switch(self) -> float:
+        """When drive or load change next, as far as is known [s]."""
+        return min(frame.next_switch(self.frame), self.tau_end)
+
+    @property
+    def limit(self) -> float:
+        """When its chip or its load do something next [s]."""
+        return min(self.switch, frame.edge_time(self.plan.period, self.plan.edges or (), self.frame.number))
+
+    @property
+    def connected(self) -> bool:
+        """Whether the motor is connected to the bus, or may become so by itself."""
+        y = self.point.y
+        return self.frame.drive != 0.0 or (self.chip.coast > 0.0 and (y[2] != 0.0 or y[6] != 0.0))
+
+    def at(self, time: float) -> Point:
+        """Return where it stands at `time` [s], on its present motion."""
+        if self.motion is None or time <= self.point.time:
+            return self.point
+        self.motion = motion.prepared(self.motion)
+        y = motion.state(self.motion, time - self.motion.t0)
+        wiper = frame.wiper_at(self.plan.plant.half_slack, self.point.wiper, y[0])
+        return self.point._replace(time=time, y=y, wiper=wiper)
+
+    def move(self, point: Point, kind: int = -1) -> None:
+        """Go on the present motion to a point, where an event may be."""
+        if self.motion is not None and point.time > self.point.time:
+            self.record.segments.append(
+                Segment(self.point.time, point.time, self.motion, self.frame.error, self.point.wiper, self.frame.drive))
+        if kind >= 0:
+            self.record.events.append(Event(point.time, event_name(kind, point.mode), point.y[0]))
+            self.motion = None
+        self.point, self.arrival = point, None
+
+    def alone(self, until: float) -> None:
+        """Find out what it does next when no other motor is connected to the bus."""
+        plant, time = self.plan.plant, self.point.time
+        u = walk.source(plant, self.frame)
+        if (u, self.tau) != self.inputs:
+            self.inputs, self.motion = _inputs(self), None
+            self.point = walk.anchored(plant, u, self.tau, time, self.point)
+        if self.motion is None or motion.is_step(self.motion):
+            self.motion = walk.motion_of(plant, self.point, u, self.tau, self.limit)
+        if self.motion.kind == motion.IMPOSSIBLE:
+            raise failure(Status.STEP_TOO_SMALL, time)
+        point, kind, status = walk.follow(self.motion, self.point, min(self.limit, until))
+        if status != walk.COMPLETED:
+            raise failure(Status.of_code(status), time)
+        self.arrival = (point, kind)
+
+
+class Bus:
+    """Units on one source, and what they do together."""
+
+    def __init__(self, units: Sequence[Unit], group: Group) -> None:
+        self.units = list(units)
+        self._group = group
+        self._in_group: list[Unit] = []
+        self._before: list[tuple[int, object]] = []  # the group that has just ended by an event of its own
+
+    def run(self, until: float) -> None:
+        """Run all servos from t = 0 to `until` [s].
+
+        Raises
+        ------
+        SimulationError
+            If the run cannot go on.
+        """
+        time, idle = 0.0, 0
+        while time < until:
+            self._act(time)
+            self._go_on(time, until)
+            following = min(self._group.end, *(unit.arrival[0].time if unit.arrival else min(unit.limit, until)
+                                               for unit in self.units))
+            idle = idle + 1 if following == time else 0
+            if idle > MOST_IDLE * len(self.units):
+                raise failure(Status.CHATTER, time)
+            time = following
+            for unit in self.units:
+                if unit.arrival is not None and unit.arrival[0].time <= time:
+                    unit.move(*unit.arrival)
+            if self._group.end <= time:
+                for unit, (point, kind) in zip(self._in_group, self._group.arrivals(), strict=True):
+                    unit.move(point, kind)
+                self._before = [(id(unit), unit.inputs) for unit in self._in_group]
+                self._leave()
+        for unit in self.units:
+            unit.move(unit.at(until))
+
+    def _leave(self) -> None:
+        """Let the members of the group stand where they are, without a motion."""
+        for unit in self._in_group:
+            unit.motion, unit.inputs = None, None
+        self._in_group = []
+        self._group.end = math.inf
+
+    def _act(self, time: float) -> None:
+        """Do what chips and loads do at `time` [s]: first switch, then measure."""
+        due = [unit for unit in self.units if unit.limit <= time]
+        for unit in due:
+            if unit.switch <= time:
+                unit.move(unit.at(time))
+                unit.frame = switched(unit.frame, time, unit.point.y[0], unit.record)
+                if unit.tau_end <= time:
+                    unit.tau, unit.tau_end = unit.plan.torque.at(time)
+        for unit in due:
+            if frame.edge_time(unit.plan.period, unit.plan.edges or (), unit.frame.number) <= time:
+                self._measure(unit, time)
+
+    def _measure(self, unit: Unit, time: float) -> None:
+        plan, chip, here = unit.plan, unit.chip, unit.at(time)
+        t_in = piece_value(plan.command.at(time)[0], time)
+        if not frame.accepted(chip, t_in):
+            unit.record.events.append(Event(time, "pulse refused", here.y[0]))
+        v_m, V_bus = self._voltages(unit, here.y, time)
+        v_o = frame.feedback_voltage(chip, plan.curve, here.wiper)
+        unit.frame = frame.edge(chip, unit.frame, time, t_in, v_o, v_m, V_bus, plan.seed)
+        if unit.frame.number == frame.CROWDED:
+            raise failure(Status.CROWDED, time)
+
+    def _voltages(self, unit: Unit, y: Vector, time: float) -> tuple[float, float]:
+        """Return the voltages at the unit's motor and of the bus [V]."""
+        plant, drive = unit.plan.plant, unit.frame.drive
+        connected = [other for other in self.units if other.connected]
+        if not [other for other in connected if other is not unit]:
+            return walk.voltages(plant, unit.chip, drive * plant.V, y)
+        if len(connected) == 1:
+            other = connected[0]
+            u = other.frame.drive * other.plan.plant.V
+            V_bus = walk.voltages(other.plan.plant, other.chip, u, other.at(time).y)[1]
+        else:
+            V_bus = self._group.voltage_of([_connection(other, time) for other in connected])
+        stiff = hybrid.warm(plant._replace(R_drive=plant.R_drive - plant.R_b, R_b=0.0, I_max=math.inf), y)
+        u = drive * V_bus
+        zone = armature.zone_of(stiff, u, 0.0, y[0], y[6], y[2])
+        i = y[2] if stiff.L > 0.0 else armature.current(stiff, zone, u, y[0], y[6])
+        return armature.terminal_voltage(stiff, unit.chip.V_br, u, y[6], i, V_bus, unit.chip.coast > 0.0), V_bus
+
+    def _go_on(self, time: float, until: float) -> None:
+        """Take up motions where there are none, or no longer the right ones."""
+        connected = [unit for unit in self.units if unit.connected]
+        members = connected if len(connected) > 1 else []
+        kept = [*map(id, members)] == [*map(id, self._in_group)] and all(
+            unit.inputs == _inputs(unit) for unit in members)
+        if not kept:
+            for unit in (*self._in_group, *members):
+                unit.move(unit.at(time))
+            self._leave()
+            if members:
+                self._in_group = members
+                switch = min(unit.switch for unit in members)
+                same = [(id(unit), _inputs(unit)) for unit in members] == self._before
+                points, motions = self._group.begin(
+                    [_connection(unit, time) for unit in members], time, min(switch, until), same)
+                for unit, point, m in zip(members, points, motions, strict=True):
+                    unit.point, unit.motion, unit.arrival = point, m, None
+                    unit.inputs = _inputs(unit)
+        self._before = []
+        for unit in self.units:
+            if unit.arrival is None and unit not in members:
+                unit.alone(until)
+
+
+def _inputs(unit: Unit) -> tuple[Piece, Piece]:
+    """Return by what a unit's motion is determined besides its state."""
+    return walk.source(unit.plan.plant, unit.frame), unit.tau
+
+
+def _connection(unit: Unit, time: float) -> Connected:
+    """Return how a unit is connected to the bus."""
+    return Connected(unit.plan.plant, unit.at(time), unit.frame.drive, unit.tau)

@@ -1,0 +1,189 @@
+"""Servos whose motors are connected to one bus at the same time: their common motion, and what ends it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from servotwin.models.kernels import coupled, frame, hybrid, motion, walk
+from servotwin.models.kernels.coupled import Member, Source
+from servotwin.models.kernels.motion import Motion
+from servotwin.models.kernels.plant import NO_CURRENT, Plant, Vector
+from servotwin.models.kernels.walk import Point
+from servotwin.physics.pieces import Piece, piece_rate, piece_value
+
+_BELOW = -1e-13  # rounding is not an event
+_HALVINGS = 200
+_JUMPS = (hybrid.UPPER, hybrid.LOWER, hybrid.MEET_FORWARD, hybrid.MEET_BACKWARD, hybrid.SPEED)  # signs may turn
+
+
+class Connected(NamedTuple):
+    """A servo on the bus: its plant when alone, where it stands, how its bridge drives, and its load."""
+
+    plant: Plant
+    point: Point
+    drive: float
+    tau: Piece
+
+
+class Group:
+    """The servos whose motors are connected to the bus.
+
+    Parameters
+    ----------
+    source : Source
+
+    Attributes
+    ----------
+    end : float
+        When the common motion ends [s]; inf where there is none.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self.end = math.inf
+        self._source = source
+        self._state = coupled.FOLLOWING
+        self._voltage = source.V
+        self._members: list[Member] = []
+        self._points: list[Point] = []
+        self._motions: list[Motion] = []
+        self._whose = (-1, -1)
+        self._step = walk.FIRST_STEP
+        self._jumped = True
+
+    def voltage_of(self, connected: Sequence[Connected]) -> float:
+        """Return V_bus [V] under all their currents."""
+        return self._zoned(connected)[2]
+
+    def _zoned(self, connected: Sequence[Connected]) -> tuple[list[Member], int, float]:
+        members = [coupled.member_of(one.plant, one.point.mode, one.drive, one.tau, one.point.y) for one in connected]
+        return coupled.zoned(self._source, members, [one.point.y for one in connected], self._voltage)
+
+    def begin(self, connected: Sequence[Connected], time: float, limit: float,
+              same: bool) -> tuple[list[Point], list[Motion]]:
+        """Begin a common motion at `time` [s] that ends at `limit` [s] at the latest; return points and motions.
+
+        `same` members go on after an event of theirs that has already told zones and source.
+        """
+        states = [one.point.y for one in connected]
+        if same and not self._jumped:
+            self._members = [coupled.member_of(one.plant, one.point.mode, one.drive, one.tau, one.point.y)
+                             for one in connected]
+            self._voltage = coupled.bus_voltage(self._source, self._state, self._members, states)
+        else:
+            self._members, self._state, self._voltage = self._zoned(connected)
+        self._members = [self._settled(m, y, time) for m, y in zip(self._members, states, strict=True)]
+        self._points = [one.point._replace(mode=m.mode, anchor_time=time, anchor=one.point.y)
+                        for one, m in zip(connected, self._members, strict=True)]
+        if all(map(coupled.is_linear, self._members)):
+            length = min(limit - time, coupled.longest_series(self._members))
+            self._motions = self._by_series(states, time, length)
+        else:
+            length, self._motions = self._by_step(states, time, limit - time)
+        self._find_end(time, length)
+        return self._points, self._motions
+
+    def _settled(self, member: Member, y: Vector, time: float) -> Member:
+        mode = member.mode
+        u = coupled.behind(member, self._voltage)
+        return member._replace(mode=hybrid.settled(
+            member.plant, mode.zone, u, piece_value(member.tau, time), y, mode.mesh, False))
+
+    def _by_series(self, states: Sequence[Vector], time: float, length: float) -> list[Motion]:
+        series = coupled.series(self._source, self._state, self._members, states, time, length)
+        return [motion.by_series(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length, one.speed,
+                                 one.current)
+                for m, y, one in zip(self._members, states, series, strict=True)]
+
+    def _by_step(self, states: Sequence[Vector], time: float, limit: float) -> tuple[float, list[Motion]]:
+        tried = min(self._step, limit)
+        length, following, dense, ends = coupled.joint_step(
+            self._source, self._state, self._members, states, time, tried)
+        self._step = max(self._step, following) if length == limit else following
+        return length, [
+            motion.by_step(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length, vectors, end)
+            for m, y, vectors, end in zip(self._members, states, dense, ends, strict=True)]
+
+    # --- what ends it ----------------------------------------------------------------------------------------------
+
+    def _find_end(self, time: float, length: float) -> None:
+        """Find the first event of a member or of the source within `length` [s]."""
+        first, whose = length, (-1, -1)
+        ends = [motion.state(m, length) for m in self._motions]
+        V_end = coupled.bus_voltage(self._source, self._state, self._members, ends)
+        for j, member in enumerate(self._members):
+            kinds = hybrid.guards(member.plant, member.mode, member.sign, False)
+            if member.returns and member.mode.zone == NO_CURRENT:  # its diodes block the other way
+                kinds &= ~(1 << (hybrid.ZONE_UP if member.sign > 0.0 else hybrid.ZONE_DOWN))
+            kind = 0
+            while kinds >> kind:
+                if kinds >> kind & 1:
+                    s = self._crossing(j, kind, time, first, V_end if first == length else None)
+                    if s < first or (s == first and whose == (-1, -1) and s < math.inf):
+                        first, whose = s, (j, kind)
+                kind += 1
+        for kind in range(2):
+            s = self._crossing(-1, kind, time, first, V_end if first == length else None)
+            if s < first:
+                first, whose = s, (-1, kind)
+        self.end, self._whose = time + first, whose
+
+    def _crossing(self, j: int, kind: int, time: float, length: float, V_end: float | None) -> float:
+        """Return when a guard falls below zero, at most `length` [s]; inf where it does not."""
+        last = self._guard(j, kind, time, length, V_end)
+        if last >= _BELOW:
+            return math.inf
+        a, b, f_a, f_b = 0.0, length, self._guard(j, kind, time, 0.0, None), last
+        if f_a <= 0.0:  # it starts at zero, to rounding: look whether it rises before it falls
+            for k in range(1, 50):
+                s = length * 0.5**k
+                f_a = self._guard(j, kind, time, s, None)
+                if f_a > 0.0:
+                    a = s
+                    break
+            else:
+                return 0.0
+        for _ in range(_HALVINGS):
+            if b - a <= 2e-16 * (time + b) or f_b == 0.0:
+                break
+            s = b - f_b * (b - a) / (f_b - f_a)  # secant through the bracket, halved where that is slow
+            middle = 0.5 * (a + b)
+            for s in (s, middle):
+                if a < s < b:
+                    f = self._guard(j, kind, time, s, None)
+                    if f > 0.0:
+                        a, f_a = s, f
+                    else:
+                        b, f_b = s, f
+        return b
+
+    def _guard(self, j: int, kind: int, time: float, s: float, V_bus: float | None) -> float:
+        states = [motion.state(m, s) for m in self._motions]
+        V = coupled.bus_voltage(self._source, self._state, self._members, states) if V_bus is None else V_bus
+        if j < 0:
+            total = coupled.drawn(self._source, V, self._members, states)
+            return coupled.source_guards(self._source, self._state, V, total)[kind]
+        member, t = self._members[j], time + s
+        u = coupled.behind(member, V)
+        return hybrid.guard(member.plant, member.mode, kind, u, 0.0, piece_value(member.tau, t),
+                            piece_rate(member.tau, t), states[j], states[j])[0]
+
+    def arrivals(self) -> list[tuple[Point, int]]:
+        """Return where all members stand when the common motion ends, and whose event it was."""
+        time, (whose, kind) = self.end, self._whose
+        found: list[tuple[Point, int]] = []
+        self._jumped = whose >= 0 and kind in _JUMPS
+        if whose == -1 and kind >= 0:
+            self._state = coupled.after(self._state, kind)
+        states = [motion.state(m, time - m.t0) for m in self._motions]
+        V = coupled.bus_voltage(self._source, self._state, self._members, states)
+        for j, (member, point, y) in enumerate(zip(self._members, self._points, states, strict=True)):
+            mode, event = point.mode, -1
+            wiper = frame.wiper_at(member.plant.half_slack, point.wiper, y[0])
+            if j == whose:
+                mode, y = hybrid.cross(member.plant, mode, kind, coupled.behind(member, V), piece_value(member.tau, time), y)
+                event = kind
+            found.append((Point(time, y, mode, time, y, point.step, wiper), event))
+        self._voltage = V
+        return found
