@@ -3,9 +3,11 @@
 import itertools
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from servotwin.models.kernels.motion import prepared, state
 from validation.test_drivetrain_armature import LOCKED, N, driven, undriven
@@ -94,6 +96,40 @@ def test_a_torque_that_grows_towards_a_stop_leaves_the_shaft_there(friction):
     assert result["output_angle"][0] == 0.2
     assert result["armature_current"][0] == pytest.approx(-2.0, rel=1e-9)
     assert sum(event.kind == "lower stop" for event in result.events) == 0
+
+
+@pytest.mark.parametrize("inductance", [None, 3e-4])
+@pytest.mark.parametrize("pull", [0.05, 0.5])
+def test_a_motor_that_pins_the_output_to_its_stop_rests_with_it(pull, inductance):
+    """The load holds the output on the stop; what the motor brings goes into the stop at once, not into small blows.
+
+    With the pull of 0.5 N m the output alone would be the faster of the two at first, if only it could move.
+    """
+    case = driven(PLAY | {"stops.lower_angle": 0.2}, way=-1, load={"torque": pull}, duration=0.02).replace(
+        motor__armature_inductance=inductance)
+    alone = simulate(case.replace(gear__backlash=1.0), np.array([0.02]))  # the motor on its way across the play
+    meets = brentq(lambda t: alone.at("motor_angle", t)[0] / N - 0.2 + 0.5 * PLAY["gear.backlash"], 0.002, 0.02,
+                   xtol=1e-15)
+    soon = replace(case, duration=meets + 1e-7)
+    result = simulate(soon, np.array([soon.duration]))
+    assert result["output_angle"][0] == 0.2
+    assert result["motor_speed"][0] == 0.0
+    assert len(result.events) < 20
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("pull", [0.0, 0.5])
+def test_a_flank_that_hits_an_output_on_its_stop(restitution, pull):
+    """Motor and output go on together, into the stop: both come back at restitution times that, as one body."""
+    open_loop = {"electronics.off_state": "coast"}
+    case = undriven(PLAY | open_loop | {"stops.lower_angle": 0.2, "stops.restitution": restitution},
+                    load={"torque": pull}, duration=0.01,
+                    initial={"output_angle": 0.2, "motor_angle": 0.2 * N, "motor_speed": -2.0 * N})
+    back = 2.0 * restitution * (1.0 - OUTPUT / (6e-3 + OUTPUT))
+    result = simulate(case, np.array([0.005 + 1e-9]))
+    assert result["motor_speed"][0] / N == pytest.approx(back, abs=1e-6)
+    assert result["output_speed"][0] == pytest.approx(back, abs=1e-6)
+    assert result.energy.stops > 0.0
 
 
 def test_a_locked_motor_lets_the_output_bounce_within_its_play():

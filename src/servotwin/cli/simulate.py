@@ -56,14 +56,15 @@ def simulate(
         metavar="NAME", help="Which column of --command, where it has several commands.",
         rich_help_panel=_COMMAND)] = None,
     model: Annotated[str, typer.Option(
-        metavar="MODEL", help="bounded, pulse, averaged, averaged-inductive, geared-motor or dc-motor.",
+        metavar="MODEL", help="bounded, pulse, pulse-inductive, averaged, averaged-inductive, geared-motor or dc-motor.",
         rich_help_panel=_PLANT)] = "bounded",
     load: Annotated[list[str] | None, typer.Option(
         metavar="PART=VALUE", help="What hangs on the shaft, repeatable or with commas, SI: inertia=, viscous=, "
         "torque=, coulomb=, pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
         "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=_PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, repeatable, SI.",
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, or give one that the servo lacks, such as "
+        "supply.current_limit=1; repeatable, SI.",
         rich_help_panel=_PLANT)] = None,
     seed: Annotated[int, typer.Option(
         metavar="NUMBER", help="Seed of a pulse servo's noise.", rich_help_panel=_PLANT)] = 0,

@@ -32,19 +32,17 @@ class Unit:
     frame: Frame = frame.AT_START
     tau: Piece = field(default_factory=Piece)
     tau_end: float = -math.inf
-    inputs: tuple[Piece, Piece] | None = None  # of the present motion
+    inputs: tuple[float, Piece] | None = None  # drive and torque of the present motion
     motion: Motion | None = None
     arrival: tuple[Point, int] | None = None  # when left alone: its next point, and the event there (−1: none)
 
-    @property
-    def switch(self) -> float:
-        """When drive or load change next, as far as is known [s]."""
-        return min(frame.next_switch(self.frame), self.tau_end)
+    switch: float = -math.inf  # when drive or load change next, as far as is known [s]
+    limit: float = -math.inf  # when its chip or its load do something next [s]
 
-    @property
-    def limit(self) -> float:
-        """When its chip or its load do something next [s]."""
-        return min(self.switch, frame.edge_time(self.plan.period, self.plan.edges or (), self.frame.number))
+    def plan_ahead(self) -> None:
+        """Find out when chip and load do something next."""
+        self.switch = min(frame.next_switch(self.frame), self.tau_end)
+        self.limit = min(self.switch, frame.edge_time(self.plan.period, self.plan.edges or (), self.frame.number))
 
     @property
     def connected(self) -> bool:
@@ -59,7 +57,8 @@ class Unit:
         self.motion = motion.prepared(self.motion)
         y = motion.state(self.motion, time - self.motion.t0)
         wiper = frame.wiper_at(self.plan.plant.half_slack, self.point.wiper, y[0])
-        return self.point._replace(time=time, y=y, wiper=wiper)
+        _, _, mode, anchor_time, anchor, step, _ = self.point
+        return Point(time, y, mode, anchor_time, anchor, step, wiper)
 
     def move(self, point: Point, kind: int = -1) -> None:
         """Go on the present motion to a point, where an event may be."""
@@ -71,14 +70,18 @@ class Unit:
             self.motion = None
         self.point, self.arrival = point, None
 
+    def told(self) -> tuple[float, Piece]:
+        """Return by what its motion is determined besides its state: drive and torque."""
+        return self.frame.drive, self.tau
+
     def alone(self, until: float) -> None:
         """Find out what it does next when no other motor is connected to the bus."""
         plant, time = self.plan.plant, self.point.time
-        u = walk.source(plant, self.frame)
-        if (u, self.tau) != self.inputs:
-            self.inputs, self.motion = _inputs(self), None
-            self.point = walk.anchored(plant, u, self.tau, time, self.point)
-        if self.motion is None or motion.is_step(self.motion):
+        if self.motion is None or motion.is_step(self.motion) or self.told() != self.inputs:
+            u = walk.source(plant, self.frame)
+            if self.told() != self.inputs:
+                self.inputs = self.told()
+                self.point = walk.anchored(plant, u, self.tau, time, self.point)
             self.motion = walk.motion_of(plant, self.point, u, self.tau, self.limit)
         if self.motion.kind == motion.IMPOSSIBLE:
             raise failure(Status.STEP_TOO_SMALL, time)
@@ -109,8 +112,9 @@ class Bus:
         while time < until:
             self._act(time)
             self._go_on(time, until)
-            following = min(self._group.end, *(unit.arrival[0].time if unit.arrival else min(unit.limit, until)
-                                               for unit in self.units))
+            following = min(self._group.end, until)
+            for unit in self.units:
+                following = min(following, unit.arrival[0].time if unit.arrival is not None else unit.limit)
             idle = idle + 1 if following == time else 0
             if idle > MOST_IDLE * len(self.units):
                 raise failure(Status.CHATTER, time)
@@ -142,9 +146,11 @@ class Bus:
                 unit.frame = switched(unit.frame, time, unit.point.y[0], unit.record)
                 if unit.tau_end <= time:
                     unit.tau, unit.tau_end = unit.plan.torque.at(time)
+                unit.plan_ahead()
         for unit in due:
             if frame.edge_time(unit.plan.period, unit.plan.edges or (), unit.frame.number) <= time:
                 self._measure(unit, time)
+                unit.plan_ahead()
 
     def _measure(self, unit: Unit, time: float) -> None:
         plan, chip, here = unit.plan, unit.chip, unit.at(time)
@@ -180,7 +186,7 @@ class Bus:
         connected = [unit for unit in self.units if unit.connected]
         members = connected if len(connected) > 1 else []
         kept = [*map(id, members)] == [*map(id, self._in_group)] and all(
-            unit.inputs == _inputs(unit) for unit in members)
+            unit.inputs == unit.told() for unit in members)
         if not kept:
             for unit in (*self._in_group, *members):
                 unit.move(unit.at(time))
@@ -188,21 +194,16 @@ class Bus:
             if members:
                 self._in_group = members
                 switch = min(unit.switch for unit in members)
-                same = [(id(unit), _inputs(unit)) for unit in members] == self._before
+                same = [(id(unit), unit.told()) for unit in members] == self._before
                 points, motions = self._group.begin(
                     [_connection(unit, time) for unit in members], time, min(switch, until), same)
                 for unit, point, m in zip(members, points, motions, strict=True):
                     unit.point, unit.motion, unit.arrival = point, m, None
-                    unit.inputs = _inputs(unit)
+                    unit.inputs = unit.told()
         self._before = []
         for unit in self.units:
             if unit.arrival is None and unit not in members:
                 unit.alone(until)
-
-
-def _inputs(unit: Unit) -> tuple[Piece, Piece]:
-    """Return by what a unit's motion is determined besides its state."""
-    return walk.source(unit.plan.plant, unit.frame), unit.tau
 
 
 def _connection(unit: Unit, time: float) -> Connected:

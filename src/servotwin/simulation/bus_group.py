@@ -9,12 +9,13 @@ from typing import NamedTuple
 from servotwin.models.kernels import coupled, frame, hybrid, motion, walk
 from servotwin.models.kernels.coupled import Member, Source
 from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.plant import NO_CURRENT, Plant, Vector
+from servotwin.models.kernels.plant import NO_CURRENT, Mode, Plant, Vector
 from servotwin.models.kernels.walk import Point
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 _BELOW = -1e-13  # rounding is not an event
 _HALVINGS = 200
+_LOOKS = (0.25, 0.5, 0.75, 1.0)  # parts of a motion at which its guards are looked at
 _JUMPS = (hybrid.UPPER, hybrid.LOWER, hybrid.MEET_FORWARD, hybrid.MEET_BACKWARD, hybrid.SPEED)  # signs may turn
 
 
@@ -48,6 +49,7 @@ class Group:
         self._members: list[Member] = []
         self._points: list[Point] = []
         self._motions: list[Motion] = []
+        self._ends: list[Vector] = []
         self._whose = (-1, -1)
         self._step = walk.FIRST_STEP
         self._jumped = True
@@ -72,9 +74,9 @@ class Group:
                              for one in connected]
             self._voltage = coupled.bus_voltage(self._source, self._state, self._members, states)
         else:
-            self._members, self._state, self._voltage = self._zoned(connected)
-        self._members = [self._settled(m, y, time) for m, y in zip(self._members, states, strict=True)]
-        self._points = [one.point._replace(mode=m.mode, anchor_time=time, anchor=one.point.y)
+            members, self._state, self._voltage = self._zoned(connected)
+            self._members = [self._settled(m, y, time) for m, y in zip(members, states, strict=True)]
+        self._points = [Point(time, one.point.y, m.mode, time, one.point.y, one.point.step, one.point.wiper)
                         for one, m in zip(connected, self._members, strict=True)]
         if all(map(coupled.is_linear, self._members)):
             length = min(limit - time, coupled.longest_series(self._members))
@@ -87,8 +89,8 @@ class Group:
     def _settled(self, member: Member, y: Vector, time: float) -> Member:
         mode = member.mode
         u = coupled.behind(member, self._voltage)
-        return member._replace(mode=hybrid.settled(
-            member.plant, mode.zone, u, piece_value(member.tau, time), y, mode.mesh, False))
+        mode = hybrid.settled(member.plant, mode.zone, u, piece_value(member.tau, time), y, mode.mesh, False)
+        return Member(member.plant, mode, member.sign, member.tau, member.returns)
 
     def _by_series(self, states: Sequence[Vector], time: float, length: float) -> list[Motion]:
         series = coupled.series(self._source, self._state, self._members, states, time, length)
@@ -110,35 +112,43 @@ class Group:
     def _find_end(self, time: float, length: float) -> None:
         """Find the first event of a member or of the source within `length` [s]."""
         first, whose = length, (-1, -1)
-        ends = [motion.state(m, length) for m in self._motions]
-        V_end = coupled.bus_voltage(self._source, self._state, self._members, ends)
-        for j, member in enumerate(self._members):
-            kinds = hybrid.guards(member.plant, member.mode, member.sign, False)
-            if member.returns and member.mode.zone == NO_CURRENT:  # its diodes block the other way
-                kinds &= ~(1 << (hybrid.ZONE_UP if member.sign > 0.0 else hybrid.ZONE_DOWN))
-            kind = 0
-            while kinds >> kind:
-                if kinds >> kind & 1:
-                    s = self._crossing(j, kind, time, first, V_end if first == length else None)
-                    if s < first or (s == first and whose == (-1, -1) and s < math.inf):
-                        first, whose = s, (j, kind)
-                kind += 1
-        for kind in range(2):
-            s = self._crossing(-1, kind, time, first, V_end if first == length else None)
-            if s < first:
-                first, whose = s, (-1, kind)
+        ends = self._ends = [motion.state(m, length) for m in self._motions]
+        for j, (member, m) in enumerate(zip(self._members, self._motions, strict=True)):
+            if m.kind == motion.SERIES and coupled.is_calm(member, m, ends[j], length):
+                continue
+            for kind in self._kinds(member):
+                s = self._crossing(j, kind, time, first)
+                if s < first or (s == first and whose == (-1, -1)):
+                    first, whose = s, (j, kind)
+        if self._source.I_max < math.inf:
+            for kind in range(2):
+                s = self._crossing(-1, kind, time, first)
+                if s < first:
+                    first, whose = s, (-1, kind)
         self.end, self._whose = time + first, whose
 
-    def _crossing(self, j: int, kind: int, time: float, length: float, V_end: float | None) -> float:
+    @staticmethod
+    def _kinds(member: Member) -> list[int]:
+        """Return which guards can end the mode of a member."""
+        kinds = hybrid.guards(member.plant, member.mode, member.sign, False)
+        if member.returns and member.mode.zone == NO_CURRENT:  # its diodes block the other way
+            kinds &= ~(1 << (hybrid.ZONE_UP if member.sign > 0.0 else hybrid.ZONE_DOWN))
+        return [kind for kind in range(hybrid.MOTOR_RELEASE_BACKWARD + 1) if kinds >> kind & 1]
+
+    def _crossing(self, j: int, kind: int, time: float, length: float) -> float:
         """Return when a guard falls below zero, at most `length` [s]; inf where it does not."""
-        last = self._guard(j, kind, time, length, V_end)
-        if last >= _BELOW:
+        for fraction in _LOOKS:
+            b = fraction * length
+            f_b = self._guard(j, kind, time, b)
+            if f_b < _BELOW:
+                break
+        else:
             return math.inf
-        a, b, f_a, f_b = 0.0, length, self._guard(j, kind, time, 0.0, None), last
+        a, f_a = 0.0, self._guard(j, kind, time, 0.0)
         if f_a <= 0.0:  # it starts at zero, to rounding: look whether it rises before it falls
             for k in range(1, 50):
-                s = length * 0.5**k
-                f_a = self._guard(j, kind, time, s, None)
+                s = b * 0.5**k
+                f_a = self._guard(j, kind, time, s)
                 if f_a > 0.0:
                     a = s
                     break
@@ -151,16 +161,16 @@ class Group:
             middle = 0.5 * (a + b)
             for s in (s, middle):
                 if a < s < b:
-                    f = self._guard(j, kind, time, s, None)
+                    f = self._guard(j, kind, time, s)
                     if f > 0.0:
                         a, f_a = s, f
                     else:
                         b, f_b = s, f
         return b
 
-    def _guard(self, j: int, kind: int, time: float, s: float, V_bus: float | None) -> float:
+    def _guard(self, j: int, kind: int, time: float, s: float) -> float:
         states = [motion.state(m, s) for m in self._motions]
-        V = coupled.bus_voltage(self._source, self._state, self._members, states) if V_bus is None else V_bus
+        V = coupled.bus_voltage(self._source, self._state, self._members, states)
         if j < 0:
             total = coupled.drawn(self._source, V, self._members, states)
             return coupled.source_guards(self._source, self._state, V, total)[kind]
@@ -176,13 +186,14 @@ class Group:
         self._jumped = whose >= 0 and kind in _JUMPS
         if whose == -1 and kind >= 0:
             self._state = coupled.after(self._state, kind)
-        states = [motion.state(m, time - m.t0) for m in self._motions]
+        states = self._ends if kind < 0 else [motion.state(m, time - m.t0) for m in self._motions]
         V = coupled.bus_voltage(self._source, self._state, self._members, states)
         for j, (member, point, y) in enumerate(zip(self._members, self._points, states, strict=True)):
             mode, event = point.mode, -1
             wiper = frame.wiper_at(member.plant.half_slack, point.wiper, y[0])
             if j == whose:
                 mode, y = hybrid.cross(member.plant, mode, kind, coupled.behind(member, V), piece_value(member.tau, time), y)
+                mode = Mode(coupled.let_through(member, mode.zone), mode.contact, mode.mesh, mode.motor)
                 event = kind
             found.append((Point(time, y, mode, time, y, point.step, wiper), event))
         self._voltage = V

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_LOWER, _UPPER, _PLAY = (Plant._fields.index(name) for name in ("lower", "upper", "half_play"))
+_LOWER, _UPPER, _PLAY, _HEAT = (Plant._fields.index(name) for name in ("lower", "upper", "half_play", "C_w"))
 _MOST_FRAMES = 1e8  # of a lane: they take half a minute, in which nothing stops a kernel
 
 
@@ -192,7 +192,7 @@ class Chunk:
         plant = [np.broadcast_to(_flat(x), self.which.shape) for x in self.plant]
         start = self.start
         with np.errstate(invalid="ignore"):
-            inside = (start[0] >= plant[_LOWER]) & (start[0] <= plant[_UPPER]) & (plant[_PLAY] == 0.0)
+            inside = (start[0] >= plant[_LOWER]) & (start[0] <= plant[_UPPER]) & (plant[_PLAY] == 0.0) & (plant[_HEAT] == 0.0)
         for k in np.flatnonzero(~inside).tolist():
             one = type(self.plant)(*(float(x[k]) for x in plant))
             try:

@@ -10,8 +10,10 @@ import numpy as np
 from servotwin.errors import InputError
 from servotwin.models.base import Place
 from servotwin.models.kernels.plant import Plant
+from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE
 
 _SLACK = 1e-12  # rad
+COLDEST_WINDING = REFERENCE_TEMPERATURE - 1.0 / COPPER_COEFFICIENT  # K
 
 
 def start_vector(places: Sequence[Place], plant: Plant, angle: Any, initial: Mapping[str, Any]) -> Any:
@@ -48,6 +50,11 @@ def check_start(places: Sequence[Place], plant: Plant, y: Sequence[float]) -> No
     if not plant.lower <= y[0] <= plant.upper:
         raise InputError(f"initial {places[0].name}", got=y[0],
                          allowed=f"{plant.lower:.6g} to {plant.upper:.6g} rad, between the stops")
+    if plant.C_w > 0.0 and not y[3] > COLDEST_WINDING:
+        raise InputError("initial winding_temperature", got=y[3],
+                         allowed=f"more than {COLDEST_WINDING:.2f} K, where copper's law has no resistance left")
+    if plant.C_w > 0.0 and not y[4] > 0.0:
+        raise InputError("initial housing_temperature", got=y[4], allowed="a positive number of kelvin")
     if abs(y[5] - y[0]) > plant.half_play + _SLACK:
         N = next(place.factor for place in places if place.at == 5)
         raise InputError("initial motor_angle", got=N * y[5],

@@ -30,6 +30,7 @@ from servotwin.models.kernels.plant import (
 _SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
 _REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
 _LAST_IMPACT = 1e-12  # rad/s: an impact of motor and output this slow is the last one of many
+_TOO_FAR = 1e12  # rad
 _REST_HEIGHT = 4e-15  # relative to the angle: a rebound this low is rounding
 
 
@@ -42,6 +43,8 @@ def external_torque(plant: Plant, tau: float, q: float) -> float:
     """Return τ_ext [N m] against +q, given its part `tau` that depends on time alone."""
     torque = tau + plant.stiffness * (q - plant.rest_angle)
     if plant.gravity != 0.0:
+        if not abs(q) < _TOO_FAR:  # a trial step may be far too long
+            return math.nan
         torque += plant.gravity * math.sin(q - plant.hanging_angle)
     return torque
 
@@ -129,7 +132,11 @@ def _from_rest(torque: float, backward: float, forward: float, at_upper: bool, a
         return ON_UPPER if at_upper else _sliding(True, dry)
     if torque < -backward:
         return ON_LOWER if at_lower else _sliding(False, dry)
-    return STUCK if dry else FREE
+    if dry:
+        return STUCK
+    if at_upper and torque >= 0.0:
+        return ON_UPPER
+    return ON_LOWER if at_lower and torque <= 0.0 else FREE
 
 
 def motor_acceleration(plant: Plant, motor: int, torque: float, w: float) -> float:

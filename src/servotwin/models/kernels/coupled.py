@@ -13,11 +13,25 @@ from typing import NamedTuple
 
 from servotwin.models.kernels import armature, contact, dormand_prince, hybrid
 from servotwin.models.kernels.dormand_prince import STAGES
-from servotwin.models.kernels.plant import CONDUCTING, INSIDE, NO_CURRENT, NOWHERE, Mode, Plant, Vector, at_rest
+from servotwin.models.kernels.motion import Motion
+from servotwin.models.kernels.plant import (
+    BACKWARD,
+    FORWARD,
+    INSIDE,
+    NO_CURRENT,
+    NOWHERE,
+    RIGID,
+    STUCK,
+    Mode,
+    Plant,
+    Vector,
+    at_rest,
+)
 from servotwin.physics.pieces import Piece, piece_value
 
 _MOST_TERMS = 40
 _LONGEST = 1.5  # of a series, in times of its fastest rate
+_EDGE = 1e-10
 _TOLERANCE = 1e-12  # error of one step, relative to 1 + |state|
 
 # What the source does: it follows its resistance, gives its most, has broken down, or takes nothing back.
@@ -51,12 +65,13 @@ def on_stiff_source(plant: Plant, returning: bool) -> Plant:
     return plant._replace(R_drive=R_drive, R_b=0.0, I_max=math.inf, D_drive=D)
 
 
-def member_of(plant: Plant, mode: Mode, drive: float, tau: Piece, y: Vector) -> Member:
+def member_of(plant: Plant, mode: Mode, drive: float, tau: Piece, y: Vector,
+              stiff: Plant | None = None) -> Member:
     """Return a servo as a member, driven or (0) returning current through the diodes of a coasting bridge."""
     sign = drive
     if sign == 0.0:  # against the current, or against the one that the back-EMF would drive
         sign = -math.copysign(1.0, y[2]) if y[2] != 0.0 else math.copysign(1.0, y[6])
-    return Member(on_stiff_source(plant, drive == 0.0), mode, sign, tau, drive == 0.0)
+    return Member(stiff or on_stiff_source(plant, drive == 0.0), mode, sign, tau, drive == 0.0)
 
 
 def _demand(members: Sequence[Member], states: Sequence[Vector]) -> tuple[float, float, float]:
@@ -107,10 +122,11 @@ def source_state(source: Source, members: Sequence[Member], states: Sequence[Vec
     total = drawn(source, V, members, states)
     if total < 0.0:
         return KEEPING
-    if total < source.I_max:
-        return FOLLOWING
     g, _, _ = _demand(members, states)
-    if g == 0.0 and total > source.I_max * (1.0 + 1e-15):
+    edge = _EDGE if g == 0.0 else 0.0  # the sum of currents with inertia is at the limit but for rounding
+    if total < source.I_max * (1.0 - edge):
+        return FOLLOWING
+    if g == 0.0 and total > source.I_max * (1.0 + edge):
         return BROKEN_DOWN
     V = bus_voltage(source, LIMITED, members, states)
     if V < 0.0:
@@ -139,7 +155,7 @@ def zoned(source: Source, members: Sequence[Member], states: Sequence[Vector],
     """
     now, state = list(members), FOLLOWING
     for _ in range(20 + 4 * len(now)):
-        now = [m._replace(mode=m.mode._replace(zone=_zone(m, y, V_bus))) for m, y in zip(now, states, strict=True)]
+        now = [_in_zone(m, _zone(m, y, V_bus)) for m, y in zip(now, states, strict=True)]
         state = source_state(source, now, states)
         before, V_bus = V_bus, bus_voltage(source, state, now, states)
         if abs(V_bus - before) <= 1e-14 * source.V:
@@ -148,9 +164,18 @@ def zoned(source: Source, members: Sequence[Member], states: Sequence[Vector],
 
 
 def _zone(member: Member, y: Vector, V_bus: float) -> int:
-    zone = armature.zone_of(hybrid.warm(member.plant, y), behind(member, V_bus), 0.0, y[0], y[6], y[2])
-    along = armature.sign_of(zone) * member.sign > 0.0
-    return NO_CURRENT if member.returns and along else zone
+    return let_through(member, armature.zone_of(
+        hybrid.warm(member.plant, y), behind(member, V_bus), 0.0, y[0], y[6], y[2]))
+
+
+def _in_zone(member: Member, zone: int) -> Member:
+    plant, (_, shaft, mesh, motor), sign, tau, returns = member
+    return Member(plant, Mode(zone, shaft, mesh, motor), sign, tau, returns)
+
+
+def let_through(member: Member, zone: int) -> int:
+    """Return the zone of a member: diodes block what the bus would drive."""
+    return NO_CURRENT if member.returns and armature.sign_of(zone) * member.sign > 0.0 else zone
 
 
 def after(state: int, guard: int) -> int:
@@ -202,10 +227,12 @@ class Series(NamedTuple):
 def series(source: Source, state: int, members: Sequence[Member], states: Sequence[Vector], time: float,
            length: float) -> list[Series]:
     """Return the motion of linear members from `time` on, for at most `length` [s]."""
+    terms = [_linear(m, y, time) for m, y in zip(members, states, strict=True)]
+    if all(t.L == 0.0 and t.stiffness == 0.0 and t.slope == 0.0 for t in terms):
+        return _plain_series(source, state, members, terms, states, length)
     speeds = [[0.0 if at_rest(m.mode.contact) else y[1]] for m, y in zip(members, states, strict=True)]
     angles = [y[0] for y in states]
     currents = [[y[2]] if m.plant.L > 0.0 else [] for m, y in zip(members, states, strict=True)]
-    terms = [_linear(m, y, time) for m, y in zip(members, states, strict=True)]
     for n in range(_MOST_TERMS):
         V_n = _series_voltage(source, state, members, terms, speeds, currents, n)
         size = 0.0
@@ -224,6 +251,79 @@ def series(source: Source, state: int, members: Sequence[Member], states: Sequen
             size = max(size, abs(speeds[j][-1]), abs(currents[j][-1]))
         if n > 2 and size * length ** (n + 1) < 1e-18:
             break
+    return [Series(tuple(w), tuple(i)) for w, i in zip(speeds, currents, strict=True)]
+
+
+def is_calm(member: Member, m: Motion, end: Vector, length: float) -> bool:
+    """Tell by speed and current, and by how they change at both ends, that nothing ends a member's mode."""
+    plant, mode = member.plant, member.mode
+    if mode.mesh != RIGID or mode.zone == NO_CURRENT or plant.varies > 0.0:
+        return False
+    sign = armature.sign_of(mode.zone)
+    if sign != 0.0 and not _keeps_its_sign(m.against, end[2], sign, length):
+        return False
+    if mode.contact == STUCK:
+        i0, i1 = m.against[0], end[2]
+        if plant.stiffness != 0.0 or m.tau.slope != 0.0 or m.tau.amplitude != 0.0 or _turns(m.against, length):
+            return False
+        against = contact.external_torque(plant, m.tau.value, end[0])
+        low, high = contact.holding_bounds(plant, 0.0, 0.0)
+        return -low < plant.K * min(i0, i1) - against and plant.K * max(i0, i1) - against < high
+    if mode.contact != FORWARD and mode.contact != BACKWARD:
+        return False
+    if not _keeps_its_sign(m.coefficients, end[1], 1.0 if mode.contact == FORWARD else -1.0, length):
+        return False
+    return plant.lower < end[0] < plant.upper
+
+
+def _keeps_its_sign(series: Sequence[float], end: float, sign: float, length: float) -> bool:
+    leaves = sign * series[0] > 0.0 or (series[0] == 0.0 and sign * series[1] > 0.0)
+    return leaves and sign * end > 0.0 and not _turns(series, length)
+
+
+def _turns(series: Sequence[float], length: float) -> bool:
+    """Tell whether a power series falls at one end and rises at the other."""
+    slope = 0.0
+    for n in range(len(series) - 1, 0, -1):
+        slope = slope * length + n * series[n]
+    return slope * series[1] < 0.0
+
+
+def _plain_series(source: Source, state: int, members: Sequence[Member], terms: Sequence[_Linear],
+                  states: Sequence[Vector], length: float) -> list[Series]:
+    """Return the same for members without inductance, spring and ramp of torque, of which there are most."""
+    rows = [(m.sign, t.K_b, t.conductance, t.moves * t.K / t.J, t.moves * t.b / t.J)
+            for m, t in zip(members, terms, strict=True)]
+    drops, against = [t.drop for t in terms], [t.moves * t.against / t.J for t in terms]
+    now = [0.0 if at_rest(m.mode.contact) else y[1] for m, y in zip(members, states, strict=True)]
+    speeds: list[list[float]] = [[w] for w in now]
+    currents: list[list[float]] = [[] for _ in now]
+    g = sum(row[2] for row in rows)
+    given, per_volt = {FOLLOWING: (source.V, source.R_b), LIMITED: (source.I_max, 1.0),
+                       KEEPING: (source.V, 0.0), BROKEN_DOWN: (0.0, 0.0)}[state]
+    below = g if state == LIMITED else 1.0 + per_volt * g
+    power = length
+    for n in range(1, _MOST_TERMS):
+        h = 0.0
+        for (sign, K_b, G, _, _), w, drop in zip(rows, now, drops, strict=True):
+            h += sign * (drop + K_b * w) * G
+        V = (given + per_volt * h) / below
+        size, following = 0.0, []
+        for (sign, K_b, G, K, b), w, drop, f, speed, current in zip(
+                rows, now, drops, against, speeds, currents, strict=True):
+            i = (sign * V - K_b * w - drop) * G
+            w = (K * i - b * w - f) / n
+            current.append(i)
+            speed.append(w)
+            following.append(w)
+            size = max(size, abs(w), abs(i))
+        if n == 1:
+            drops = against = [0.0] * len(rows)
+            given = 0.0
+        now = following
+        if n > 3 and size * power < 1e-18:
+            break
+        power *= length
     return [Series(tuple(w), tuple(i)) for w, i in zip(speeds, currents, strict=True)]
 
 
