@@ -79,12 +79,6 @@ def _breakable(name: str) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "\N{ZERO WIDTH SPACE}", name)
 
 
-def unread() -> str:
-    """The parameters that no model reads."""
-    read = {name for kind in MODELS.values() for name in (*kind.requires, *kind.optional)}
-    return ", ".join(f"`{name}`" for name in names() if name not in read) + "."
-
-
 def model_list() -> str:
     """The models, their names on the command line and their states."""
     rows = [(f"`{kind.__name__}`", f"`{name}`", (inspect.getdoc(kind) or "").splitlines()[0].rstrip("."),
@@ -168,7 +162,7 @@ def _is_own(module, name: str) -> bool:
     return not name.startswith("_") and getattr(item, "__module__", None) == module.__name__
 
 
-TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "unread": unread, "signals": signals,
+TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "signals": signals,
           "units": units, "catalog": catalog, "top-level": top_level, "api": api}
 
 

@@ -71,7 +71,7 @@ def test_it_is_the_energy_of_the_reference():
 
 
 @pytest.mark.parametrize("terms", [{"stribeck"}, {"m6", "stribeck"}, {"heat"}, {"backlash"}, {"pendulum"},
-                                   {"inductance", "backlash", "heat"}], ids="+".join)
+                                   {"inductance", "backlash", "heat"}], ids=lambda terms: "+".join(sorted(terms)))
 def test_the_angle_is_the_integral_of_the_speed(terms):
     """Between any two samples of an integrated run, within its steps too; of the motor as of the output."""
     case = replace(random_case(7, frozenset(terms)), duration=0.1)

@@ -83,7 +83,7 @@ def test_it_cools_by_two_exponentials_when_the_drive_ends(inductance):
 
 
 @pytest.mark.parametrize("terms", [{"heat"}, {"heat", "coast", "inductance"}, {"heat", "backlash", "limit"}],
-                         ids="+".join)
+                         ids=lambda terms: "+".join(sorted(terms)))
 def test_what_the_copper_loses_is_what_warms(terms):
     """Insulated to the outside: C_w ΔT_w + C_h ΔT_h is the winding's loss, that of all pulses and not of their mean."""
     for seed in range(2):

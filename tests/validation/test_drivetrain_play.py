@@ -24,7 +24,7 @@ LOOSE = {"gear.backlash": PLAY, "gear.output_inertia": OUTPUT}
 
 
 @pytest.mark.parametrize("terms", [{"backlash"}, {"backlash", "inductance", "coast"},
-                                   {"backlash", "stribeck", "m6", "heat"}], ids="+".join)
+                                   {"backlash", "stribeck", "m6", "heat"}], ids=lambda terms: "+".join(sorted(terms)))
 def test_momentum_is_kept_where_the_flanks_meet(terms):
     impacts = 0
     for seed in range(6):

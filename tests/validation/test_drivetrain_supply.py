@@ -76,7 +76,7 @@ def test_diodes_return_as_much(inductance, limit):
 
 
 @pytest.mark.parametrize("terms", [{"limit"}, {"limit", "coast"}, {"limit", "inductance"},
-                                   {"limit", "inductance", "coast"}], ids="+".join)
+                                   {"limit", "inductance", "coast"}], ids=lambda terms: "+".join(sorted(terms)))
 def test_a_regulator_keeps_its_limits_in_any_run(terms):
     bound = broken = 0
     for seed in range(12):

@@ -56,7 +56,8 @@ def simulate(
         metavar="NAME", help="Which column of --command, where it has several commands.",
         rich_help_panel=_COMMAND)] = None,
     model: Annotated[str, typer.Option(
-        metavar="MODEL", help="bounded, pulse, pulse-inductive, averaged, averaged-inductive, geared-motor or dc-motor.",
+        metavar="MODEL",
+        help="bounded, pulse, pulse-inductive, averaged, averaged-inductive, geared-motor or dc-motor.",
         rich_help_panel=_PLANT)] = "bounded",
     load: Annotated[list[str] | None, typer.Option(
         metavar="PART=VALUE", help="What hangs on the shaft, repeatable or with commas, SI: inertia=, viscous=, "

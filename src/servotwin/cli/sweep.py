@@ -59,7 +59,8 @@ def sweep(
         metavar="PART=VALUE", help="What hangs on the shaft, as in servotwin simulate.",
         rich_help_panel=_PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a nominal parameter, or give one that the servo lacks; repeatable, SI.",
+        "--set", metavar="GROUP.NAME=VALUE",
+        help="Change a nominal parameter, or give one that the servo lacks; repeatable, SI.",
         rich_help_panel=_PLANT)] = None,
     vary: Annotated[list[str] | None, typer.Option(
         metavar="NAME=DISTRIBUTION", help="Draw a parameter of servo or load, repeatable: normal:10%, uniform:10%, "

@@ -81,9 +81,9 @@ def on_bus(plant: Plant, bus: Array) -> Plant:
     """Return the plant of a servo on a bus whose voltage is known; that of its source is then left out."""
     coasts = plant.D_off >= plant.V
     R_off = plant.R_off - np.where(coasts & np.isinf(plant.I_max), plant.R_b, 0.0)
-    V: Any = bus
-    return plant._replace(V=V, D_off=np.where(coasts, plant.D_off - plant.V + V, plant.D_off), R_off=R_off,
-                          R_drive=plant.R_drive - plant.R_b, R_b=0.0, I_max=math.inf)
+    changed: dict[str, Any] = {"V": bus, "D_off": np.where(coasts, plant.D_off - plant.V + bus, plant.D_off),
+                               "R_off": R_off, "R_drive": plant.R_drive - plant.R_b, "R_b": 0.0, "I_max": math.inf}
+    return plant._replace(**changed)
 
 
 def _from_regulator(plant: Plant, s: Array, v_b: Array, i: Array) -> Array:

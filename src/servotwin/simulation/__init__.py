@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 _LAZY = {"Batch": "batch", "Failure": "batch", "Fleet": "bus", "grid": "many", "simulate_bus": "bus",
          "simulate_many": "many"}
 
-__all__ = ["Batch", "Energy", "Event", "Failure", "Fleet", "Result", "Simulator", "State", "Stats", "Status", "StepMetrics",
-           "grid", "simulate", "simulate_bus", "simulate_many"]
+__all__ = ["Batch", "Energy", "Event", "Failure", "Fleet", "Result", "Simulator", "State", "Stats", "Status",
+           "StepMetrics", "grid", "simulate", "simulate_bus", "simulate_many"]
 
 
 def __getattr__(name: str) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model, PulseServo, PulseServoInductive
 from servotwin.models.kernels import coupled
-from servotwin.models.kernels.coupled import Member, Source
+from servotwin.models.kernels.coupled import Source
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.plant import Mode
 from servotwin.models.samples import Samples
@@ -38,7 +38,7 @@ _OF_SERVO = ("bridge_drop_voltage", "bridge_drop_resistance")
 
 
 @dataclass(frozen=True, eq=False)
-class Fleet:
+class Fleet(Mapping[str, Result]):
     """The outcome of a simulation of several servos on one supply: a mapping of their results.
 
     Parameters
@@ -156,10 +156,11 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     status, ended, cause = Status.COMPLETED, duration, Status.COMPLETED.message
     try:
         Bus(units, Group(source)).run(float(duration))
-    except (SimulationError, ArithmeticError) as error:
-        of_run = isinstance(error, SimulationError)
-        status = Status[error.status] if of_run else Status.DIVERGED
-        ended = error.time if of_run else max(unit.point.time for unit in units)
+    except SimulationError as error:
+        status, ended = Status[error.status], error.time
+        cause = status.message
+    except ArithmeticError:  # numbers beyond what a float holds
+        status, ended = Status.DIVERGED, max(unit.point.time for unit in units)
         cause = status.message
     alone = {name: Trajectory(tuple(unit.record.segments)) for name, unit in zip(given, units, strict=True)}
     bus = _BusVoltage(source, [unit.plan for unit in units], [unit.chip for unit in units], list(alone.values()))

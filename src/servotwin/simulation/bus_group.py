@@ -94,8 +94,8 @@ class Group:
 
     def _by_series(self, states: Sequence[Vector], time: float, length: float) -> list[Motion]:
         series = coupled.series(self._source, self._state, self._members, states, time, length)
-        return [motion.by_series(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length, one.speed,
-                                 one.current)
+        return [motion.by_series(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length,
+                                 one.speed, one.current)
                 for m, y, one in zip(self._members, states, series, strict=True)]
 
     def _by_step(self, states: Sequence[Vector], time: float, limit: float) -> tuple[float, list[Motion]]:
@@ -157,9 +157,8 @@ class Group:
         for _ in range(_HALVINGS):
             if b - a <= 2e-16 * (time + b) or f_b == 0.0:
                 break
-            s = b - f_b * (b - a) / (f_b - f_a)  # secant through the bracket, halved where that is slow
-            middle = 0.5 * (a + b)
-            for s in (s, middle):
+            secant = b - f_b * (b - a) / (f_b - f_a)
+            for s in (secant, 0.5 * (a + b)):
                 if a < s < b:
                     f = self._guard(j, kind, time, s)
                     if f > 0.0:
@@ -192,7 +191,8 @@ class Group:
             mode, event = point.mode, -1
             wiper = frame.wiper_at(member.plant.half_slack, point.wiper, y[0])
             if j == whose:
-                mode, y = hybrid.cross(member.plant, mode, kind, coupled.behind(member, V), piece_value(member.tau, time), y)
+                mode, y = hybrid.cross(member.plant, mode, kind, coupled.behind(member, V),
+                                       piece_value(member.tau, time), y)
                 mode = Mode(coupled.let_through(member, mode.zone), mode.contact, mode.mesh, mode.motor)
                 event = kind
             found.append((Point(time, y, mode, time, y, point.step, wiper), event))

@@ -5,7 +5,6 @@ It drives the kernels and keeps what they leave behind: states to go on from, se
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 

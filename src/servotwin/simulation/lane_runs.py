@@ -18,7 +18,13 @@ _BLOCKS = {
     dtype: Recipe(f"blocks_{dtype}", ("servotwin.models.kernels.blocks:run",), vector=True, single=dtype == "float32")
     for dtype in ("float64", "float32")
 }
-_WALKS = Recipe("walks", ("servotwin.models.kernels.walks:walk_lanes",))
+_ENTRY = ("servotwin.models.kernels.walks:walk_lanes",)
+_WALKS = Recipe("walks", _ENTRY)  # everything
+_RARE = {"varies": 0.0, "half_play": 0.0, "C_w": 0.0, "half_slack": 0.0, "L": 0.0, "gravity": 0.0, "kappa": 0.0,
+         "I_max": np.inf}
+_PLAIN_WALKS = Recipe(
+    "plain_walks", _ENTRY, absent=(*_RARE.items(), ("sweep", 0.0)),
+    never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a walk leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
@@ -37,9 +43,11 @@ def run(work: Work) -> Raw:
             _run_blocks(work, lanes, kind, times, outputs_of(work, raw, given_up))
         elif which.any():
             _run_some(work, lanes, kind, np.flatnonzero(which), times, raw, given_up)
-    rest = np.flatnonzero(given_up)
-    if len(rest):
-        run_walks(work, lanes, rest, times, raw)
+    rare = has_rare_terms(work, lanes)
+    for recipe, some in ((_PLAIN_WALKS, ~rare), (_WALKS, rare)):
+        rest = np.flatnonzero(some & (given_up != 0))
+        if len(rest):
+            run_walks(recipe, work, lanes, rest, times, raw)
     return raw
 
 
@@ -64,14 +72,14 @@ def _run_some(work: Work, lanes: Lanes, braked: bool, which: NDArray[np.int64], 
     given_up[which] = marks
 
 
-def run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw) -> None:
+def run_walks(recipe: Recipe, work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw) -> None:
     """Run some lanes one after the other, in float64."""
     at_once = max(1, _ROOM // (len(_ALL) * max(len(times), 1)))
     for start in range(0, len(which), at_once):
         part = which[start:start + at_once]
         room = np.zeros((len(part), len(_ALL), len(times)))
         status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
-        kernels(_WALKS).walk_lanes(
+        kernels(recipe).walk_lanes(
             work.law == "pulse", lanes, np.array(work.curve, np.float64), _rows(work.torque.rows),
             _indices(work.torque.first), _indices(work.torque.count), part, float(work.duration), times, room,
             status, ended)
@@ -87,18 +95,24 @@ def side_by_side(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[n
     """Tell which lanes have nothing that takes the general way, and which of these brake without a dead zone."""
     if work.law != "pulse":
         return np.zeros(work.lanes, np.bool_), np.zeros(work.lanes, np.bool_)
-    plant = Plant(*lanes.plants)
+    plant, chip = Plant(*lanes.plants), Chip(*lanes.chips)
     if work.dtype == "float32":  # what is not zero has to stay so
         kept = [((x == 0.0) | (abs(x.astype(np.float32)) > 0.0)).all(axis=0) for x in (lanes.plants, lanes.chips)]
     else:
         kept = [np.ones(work.lanes, np.bool_)]
-    chip = Chip(*lanes.chips)
-    absent = (plant.L, plant.kappa, plant.stiffness, plant.gravity, plant.varies, plant.half_play, plant.half_slack,
-              plant.C_w, chip.step)
-    plain = [x == 0.0 for x in absent]
-    side = np.logical_and.reduce([*plain, plant.K_b > 0.0, np.isinf(plant.I_max), work.torque.count == 0, *kept])
+    side = np.logical_and.reduce([~has_rare_terms(work, lanes), plant.stiffness == 0.0, chip.step == 0.0,
+                                  plant.K_b > 0.0, work.torque.count == 0, *kept])
     side &= not work.curve[0]
     return np.asarray(side), np.asarray((plant.D_off == 0.0) & (plant.D_drive < plant.V))
+
+
+def has_rare_terms(work: Work, lanes: Lanes) -> NDArray[np.bool_]:
+    """Tell which lanes have a term that the plain walk leaves out."""
+    plant = Plant(*lanes.plants)
+    swept = np.concatenate([[0], np.cumsum(lanes.pieces[:, 6] != 0.0)])
+    terms = [getattr(plant, name) != value for name, value in _RARE.items()]
+    first, last = lanes.piece_first, lanes.piece_first + lanes.piece_count
+    return np.asarray(np.logical_or.reduce([*terms, swept[last] > swept[first]]))
 
 
 def lanes_of(work: Work) -> Lanes:

@@ -192,7 +192,8 @@ class Chunk:
         plant = [np.broadcast_to(_flat(x), self.which.shape) for x in self.plant]
         start = self.start
         with np.errstate(invalid="ignore"):
-            inside = (start[0] >= plant[_LOWER]) & (start[0] <= plant[_UPPER]) & (plant[_PLAY] == 0.0) & (plant[_HEAT] == 0.0)
+            between = (start[0] >= plant[_LOWER]) & (start[0] <= plant[_UPPER])
+            inside = between & (plant[_PLAY] == 0.0) & (plant[_HEAT] == 0.0)
         for k in np.flatnonzero(~inside).tolist():
             one = type(self.plant)(*(float(x[k]) for x in plant))
             try:

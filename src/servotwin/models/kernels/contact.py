@@ -19,7 +19,6 @@ from servotwin.models.kernels.plant import (
     ON_FORWARD,
     ON_LOWER,
     ON_UPPER,
-    RIGID,
     STUCK,
     Mode,
     Plant,
@@ -86,7 +85,7 @@ def friction_torque(plant: Plant, contact: int, w: float, tau_m: float, tau_e: f
 def settled(plant: Plant, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
     """Return the mode of a state in a zone; `smooth` keeps a smoothed friction in one piece."""
     q, w = y[0], y[1]
-    if mesh == INSIDE:
+    if plant.half_play > 0.0 and mesh == INSIDE:
         return apart(plant, zone, u, tau, y)
     if plant.kappa > 0.0:
         if not has_friction(plant):
@@ -103,7 +102,7 @@ def settled(plant: Plant, zone: int, u: float, tau: float, y: Vector, mesh: int,
     else:
         contact = _sliding(w > 0.0, has_friction(plant))
     mode = Mode(zone, contact, mesh, FREE)
-    if mesh != RIGID and pressing(plant, mode, u, tau, y) < 0.0:
+    if plant.half_play > 0.0 and pressing(plant, mode, u, tau, y) < 0.0:
         return apart(plant, zone, u, tau, y)
     return mode
 
@@ -193,7 +192,7 @@ def rebound(plant: Plant, mode: Mode, upper: bool, u: float, tau: float, y: Vect
     q = plant.upper if upper else plant.lower
     w = -plant.restitution * y[1]
     pushes = mode.mesh == (ON_FORWARD if upper else ON_BACKWARD)
-    together = mode.mesh == RIGID or pushes
+    together = plant.half_play == 0.0 or pushes
     mesh = mode.mesh if together else INSIDE
     after: Vector = (q, w, y[2], y[3], y[4], y[5], y[6])
     if together:

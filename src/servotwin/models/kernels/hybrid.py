@@ -19,7 +19,6 @@ from servotwin.models.kernels.plant import (
     ON_FORWARD,
     ON_LOWER,
     ON_UPPER,
-    RIGID,
     STUCK,
     Mode,
     Plant,
@@ -97,7 +96,7 @@ def jacobian(plant: Plant, mode: Mode, u: float, du: float, dtau: float, q: floa
 
 def guards(plant: Plant, mode: Mode, u: float, smooth: bool) -> int:
     """Return what can end this mode, as a sum of 1 << kind."""
-    zone, shaft, mesh, motor = mode
+    zone, shaft = mode.zone, mode.contact
     kinds = 0
     if shaft == CORE:
         if not smooth:
@@ -119,13 +118,13 @@ def guards(plant: Plant, mode: Mode, u: float, smooth: bool) -> int:
         kinds |= 1 << UPPER
     if plant.lower > -math.inf and (shaft == FREE or shaft == BACKWARD or shaft == CORE):
         kinds |= 1 << LOWER
-    if mesh == INSIDE:
+    if mode.mesh == INSIDE:
         kinds |= 1 << MEET_FORWARD | 1 << MEET_BACKWARD
-        if motor == STUCK:
+        if mode.motor == STUCK:
             kinds |= 1 << MOTOR_RELEASE_FORWARD | 1 << MOTOR_RELEASE_BACKWARD
-        elif motor != FREE:
+        elif mode.motor != FREE:
             kinds |= 1 << MOTOR_SPEED
-    elif mesh != RIGID:
+    elif plant.half_play > 0.0:
         kinds |= 1 << PART_MOTOR | 1 << PART_OUTPUT if at_rest(shaft) else 1 << PART
     return kinds
 
@@ -152,7 +151,7 @@ def guard(plant: Plant, mode: Mode, kind: int, u: float, du: float, tau: float, 
         rate = armature.zone_rate(plant, zone, du, y[6], dy[6], dy[2])
         low, high = armature.zone_limits(plant, zone, u)
         return (high - x, -rate) if kind == ZONE_UP else (x - low, rate)
-    if kind >= MEET_FORWARD:
+    if plant.half_play > 0.0 and kind >= MEET_FORWARD:
         return _play_guard(plant, mode, kind, u, tau, dtau, y, dy)
     return _release_guard(plant, mode, kind, u, du, tau, dtau, y, dy)
 
@@ -223,10 +222,10 @@ def cross(plant: Plant, mode: Mode, kind: int, u: float, tau: float, y: Vector) 
         return Mode(zone, shaft if dry else FREE, mesh, motor), y
     if kind == MOTOR_RELEASE_FORWARD or kind == MOTOR_RELEASE_BACKWARD:
         return Mode(zone, shaft, mesh, FORWARD if kind == MOTOR_RELEASE_FORWARD else BACKWARD), y
-    if kind == PART or kind == PART_OUTPUT or kind == PART_MOTOR:
+    if plant.half_play > 0.0 and (kind == PART or kind == PART_OUTPUT or kind == PART_MOTOR):
         return contact.apart(plant, zone, u, tau, y), y
     q, w, i, T_w, T_h, q_m, w_m = y
-    if kind == MEET_FORWARD or kind == MEET_BACKWARD:
+    if plant.half_play > 0.0 and (kind == MEET_FORWARD or kind == MEET_BACKWARD):
         y = contact.met(plant, kind == MEET_FORWARD, y)
         mesh = ON_FORWARD if kind == MEET_FORWARD else ON_BACKWARD
         if plant.V > 0.0:

@@ -61,18 +61,18 @@ def is_step(motion: Motion) -> bool:
 def begin(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float) -> Motion:
     """Return the motion from y at t0 [s]: exact, or one accepted step of at most `limit` [s]."""
     still = at_rest(mode.contact) and (mode.mesh != INSIDE or at_rest(mode.motor))
-    varies = plant.C_w > 0.0 or (not still and (plant.varies > 0.0 or mode.mesh == INSIDE))
     if still and plant.C_w == 0.0 and (plant.L == 0.0 or armature.constant_current(mode.zone)):
         return _closed(REST, plant, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if varies or (plant.V > 0.0 and (plant.gravity != 0.0 or (plant.L > 0.0 and plant.stiffness != 0.0))):
+    if (plant.C_w > 0.0 or (not still and (plant.varies > 0.0 or mode.mesh == INSIDE))
+            or (plant.V > 0.0 and (plant.gravity != 0.0 or (plant.L > 0.0 and plant.stiffness != 0.0)))):
         return _long_step(plant, mode, u, tau, t0, y, step, limit)
-    if still and mode.zone >= CONDUCTING:
+    if plant.L > 0.0 and still and mode.zone >= CONDUCTING:
         v, R = armature.loop(plant, mode.zone, u.value)
         fading = (R / plant.L, v / R, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return _closed(HELD, plant, mode, u, tau, t0, y, fading, (0.0, 0.0), step)
     follows = armature.in_linear_zone(mode.zone)
-    if (still or plant.gravity != 0.0 or mode.contact == CORE or (follows and u.sweep != 0.0)
-            or (plant.V == 0.0 and plant.L > 0.0 and (plant.p != 0.0 or plant.stiffness != 0.0))):  # of third order
+    if (plant.gravity != 0.0 or mode.contact == CORE or (follows and u.sweep != 0.0)
+            or (plant.L > 0.0 and (still or (plant.V == 0.0 and (plant.p != 0.0 or plant.stiffness != 0.0))))):
         return _integrated(plant, mode, u, tau, t0, y, step, limit)
     wave = (u.value + u.slope * (t0 - u.start), u.slope, 0.0, 0.0, 0.0)
     if follows:
@@ -156,7 +156,7 @@ def prepared(motion: Motion) -> Motion:
     dense, long_dense = motion.dense, motion.long_dense
     if motion.kind == STEP:
         dense = rodas.dense_coefficients(motion.stages)
-    else:
+    elif motion.kind == LONG_STEP:
         long_dense = dormand_prince.dense(motion.plant, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
                                           motion.length)
     return Motion(motion.kind, motion.plant, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
@@ -199,7 +199,9 @@ def state(motion: Motion, s: float) -> Vector:
     x = s / motion.length
     if kind == STEP:
         return rodas.interpolate(start, motion.end, motion.dense, x)
-    return dormand_prince.interpolate(start, motion.long_dense, x)
+    if kind == LONG_STEP:
+        return dormand_prince.interpolate(start, motion.long_dense, x)
+    return start
 
 
 def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:
@@ -229,8 +231,10 @@ def rates(motion: Motion, s: float, y: Vector) -> Vector:
         return w, dw, (plant.J * ddw + plant.b * dw + motion.against[1]) / plant.K, 0.0, 0.0, w_m, dw
     if kind == HELD:
         return 0.0, 0.0, motion.coefficients[0] * (motion.coefficients[1] - y[2]), 0.0, 0.0, 0.0, 0.0
-    t = motion.t0 + s
-    return hybrid.rates(plant, motion.mode, piece_value(motion.u, t), piece_value(motion.tau, t), y)
+    if is_step(motion):
+        t = motion.t0 + s
+        return hybrid.rates(plant, motion.mode, piece_value(motion.u, t), piece_value(motion.tau, t), y)
+    return NOWHERE
 
 
 def scales(motion: Motion) -> tuple[float, float]:

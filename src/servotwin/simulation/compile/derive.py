@@ -2,8 +2,9 @@
 
 Starting from the entries, every function that is called is collected from its own module under the name
 `module__function`; constants come along by value, classes are imported from where they are. A kernel is changed in
-these ways only: docstrings and annotations are dropped; in the float32 form every float literal gets that type; in
-the vector form `math.exp`, `math.log` and `math.log1p` become the polynomials of `kernels.elementary`.
+these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out; in the float32 form
+every float literal gets that type; in the vector form `math.exp`, `math.log` and `math.log1p` become the polynomials of
+`kernels.elementary`.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ import ast
 import builtins
 import inspect
 import math
+import operator
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType, ModuleType
+from typing import cast
 
 _ELEMENTARY = "servotwin.models.kernels.elementary"
 _INTRINSICS = "servotwin.simulation.compile.intrinsics"
@@ -43,12 +47,18 @@ class Recipe:
         become polynomials.
     single : bool
         Whether floats have 32 bits.
+    absent : tuple of (str, float)
+        Fields that have this value in all that will run; what depends on another one is left out.
+    never : tuple of str
+        Constants that nothing will be equal to.
     """
 
     name: str
     entries: tuple[str, ...]
     vector: bool = False
     single: bool = False
+    absent: tuple[tuple[str, float], ...] = ()
+    never: tuple[str, ...] = ()
 
 
 def derive(recipe: Recipe) -> str:
@@ -160,6 +170,67 @@ class _Rewriting(ast.NodeTransformer):
         node.args.defaults = [self.visit(default) for default in node.args.defaults]
         return node
 
+    def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
+        """Leave out the branch that is not taken."""
+        known = self._truth(node.test)
+        if known is None:
+            return self.generic_visit(node)
+        taken = [self.visit(statement) for statement in (node.body if known else node.orelse)]
+        flat = [one for part in taken for one in (part if isinstance(part, list) else [part])]
+        return flat or [ast.Pass()]
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        """Leave out the value that is not taken."""
+        known = self._truth(node.test)
+        if known is None:
+            return self.generic_visit(node)
+        return cast("ast.AST", self.visit(node.body if known else node.orelse))
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        """Leave out what decides nothing."""
+        decided = self._truth(node)
+        if decided is not None:
+            return ast.Constant(decided)
+        left = [self.visit(value) for value in node.values if self._truth(value) is None]
+        return left[0] if len(left) == 1 else ast.copy_location(ast.BoolOp(node.op, left), node)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        """Tell the outcome where it is known."""
+        known = self._truth(node)
+        return self.generic_visit(node) if known is None else ast.Constant(known)
+
+    def _truth(self, node: ast.expr) -> bool | None:
+        """Return whether a condition holds for all that a recipe is for; None where it depends."""
+        if not self._work.recipe.absent and not self._work.recipe.never:
+            return None
+        if isinstance(node, ast.BoolOp):
+            parts = [self._truth(value) for value in node.values]
+            decisive = isinstance(node.op, ast.Or)
+            if decisive in parts:
+                return decisive
+            return None if None in parts else not decisive
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            inner = self._truth(node.operand)
+            return None if inner is None else not inner
+        if not isinstance(node, ast.Compare) or len(node.ops) != 1:
+            return None
+        sides, op = (node.left, node.comparators[0]), node.ops[0]
+        if any(isinstance(side, ast.Name | ast.Attribute) and _last(side) in self._work.recipe.never for side in sides):
+            return {ast.Eq: False, ast.NotEq: True}.get(type(op))
+        a, b = (self._number(side) for side in sides)
+        compare = _COMPARISONS.get(type(op))
+        return None if a is None or b is None or compare is None else bool(compare(a, b))
+
+    def _number(self, node: ast.expr) -> float | None:
+        """Return the value of a number that is known."""
+        if isinstance(node, ast.Constant) and isinstance(node.value, float | int):
+            return node.value
+        if isinstance(node, ast.Attribute):
+            if ast.unparse(node) == "math.inf":
+                return math.inf
+            return dict(self._work.recipe.absent).get(node.attr)
+        return None
+
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
         """Drop the annotation of a local variable."""
         if node.value is None:
@@ -181,8 +252,12 @@ class _Rewriting(ast.NodeTransformer):
         return ast.copy_location(ast.Name(self._work.value(*_home(self._module, name, value)), node.ctx), node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        """Flatten `module.name`."""
+        """Flatten `module.name`, and put in the value of what is absent."""
         owner = node.value
+        value = dict(self._work.recipe.absent).get(node.attr)
+        if value is not None and isinstance(node.ctx, ast.Load):
+            text = f"_f({value!r})" if math.isfinite(value) else "_f(math.inf)"
+            return ast.parse(text, mode="eval").body
         if isinstance(owner, ast.Name) and owner.id not in self._local:
             module = self._space.get(owner.id)
             if isinstance(module, ModuleType):
@@ -209,6 +284,16 @@ class _Rewriting(ast.NodeTransformer):
         if not self._work.typed(self._module):
             return node
         return ast.copy_location(ast.Call(ast.Name("_f", ast.Load()), [node], []), node)
+
+
+_COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
+    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
+    ast.GtE: operator.ge}
+
+
+def _last(node: ast.expr) -> str:
+    """Return the name, or what stands after the last dot."""
+    return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
 
 
 def _home(module: str, name: str, value: object) -> tuple[str, str, object]:
