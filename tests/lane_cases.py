@@ -24,7 +24,7 @@ def case(lanes, *, duration, times, fields=("angle",), dtype="float64", seed=0, 
         "F_forward": between(0.05, 0.25), "F_backward": between(0.05, 0.25), "breakaway": between(1.0, 1.5),
         "coulomb": between(0.0, 0.02), "gain": 1.0, "p": p, "b_o": 0.6, "V_max": math.inf, "lower": -math.inf,
         "upper": math.inf, "I_max": math.inf, "alpha": 1.0, "V": 6.0,
-         "D_drive": between(0.2, 0.4), "R_drive": R + 0.1, "R_off": R}
+         "D_drive": between(0.2, 0.4), "R_drive": R + 0.1, "R_off": R, "R_b": 0.05}
     chip = dict.fromkeys(Chip._fields, 0.0) | {
         "T_0": -0.163e-3, "slope": 1.36e-3, "p": p, "b_o": 0.6, "half_deadband": between(2e-6, 5e-6),
         "K": between(40.0, 120.0), "t_min": between(0.0, 5e-4), "longest": math.inf, "timeout": math.inf,

@@ -162,7 +162,9 @@ def test_lanes_that_need_the_general_way_are_mixed_with_others():
 
 def test_numbers_beyond_all_bounds_end_with_a_status():
     work = case(3, duration=0.2, times=np.array([0.0, 0.2]), fields=FIELDS)
-    broken = replace(work, speed=np.array([0.0, math.nan, 0.0]))
+    start = work.start.copy()
+    start[1, 1] = math.nan
+    broken = replace(work, start=start)
     raw = run_lanes(broken)
     assert raw.status.tolist()[::2] == [0, 0]
     assert raw.status[1] != 0

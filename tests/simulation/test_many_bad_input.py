@@ -175,5 +175,5 @@ def test_a_grid_has_each_name_once():
 
 def test_models_without_a_way_to_run_many():
     for model in (st.AveragedServo(SERVO), 3):
-        with pytest.raises(InputError, match="PulseServo or BoundedServo"):
+        with pytest.raises(InputError, match="PulseServo or PulseServoInductive or BoundedServo"):
             st.simulate_many(model, STEP, duration=0.1)

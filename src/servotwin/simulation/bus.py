@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -225,6 +226,8 @@ class _BusVoltage:
         members, states = [], []
         for plan, chip, s in zip(self.plans, self.chips, samples, strict=True):
             y = (s.angle[k], s.speed[k], s.current[k], s.winding[k], s.housing[k], s.motor_angle[k], s.motor_speed[k])
+            if not np.isfinite(y[0]):  # after the run has ended
+                return math.nan
             drive = float(s.drive[k])
             if drive == 0.0 and not (chip.coast > 0.0 and (y[2] != 0.0 or y[6] != 0.0)):
                 continue

@@ -14,6 +14,7 @@ from servotwin.models.kernels.walk import Point
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 _BELOW = -1e-13  # rounding is not an event
+_BELOW_OF_SUM = -1e-10  # A: nor what the currents of all have gathered
 _HALVINGS = 200
 _LOOKS = (0.25, 0.5, 0.75, 1.0)  # parts of a motion at which its guards are looked at
 _JUMPS = (hybrid.UPPER, hybrid.LOWER, hybrid.MEET_FORWARD, hybrid.MEET_BACKWARD, hybrid.SPEED)  # signs may turn
@@ -137,14 +138,17 @@ class Group:
 
     def _crossing(self, j: int, kind: int, time: float, length: float) -> float:
         """Return when a guard falls below zero, at most `length` [s]; inf where it does not."""
+        a, f_a = 0.0, self._guard(j, kind, time, 0.0)
+        below = _BELOW if j >= 0 else _BELOW_OF_SUM
+        if f_a < below:  # what another member did has ended this mode too
+            return 0.0
         for fraction in _LOOKS:
             b = fraction * length
             f_b = self._guard(j, kind, time, b)
-            if f_b < _BELOW:
+            if f_b < below:
                 break
         else:
             return math.inf
-        a, f_a = 0.0, self._guard(j, kind, time, 0.0)
         if f_a <= 0.0:  # it starts at zero, to rounding: look whether it rises before it falls
             for k in range(1, 50):
                 s = b * 0.5**k

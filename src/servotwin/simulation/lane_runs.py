@@ -47,7 +47,7 @@ def run(work: Work) -> Raw:
     for recipe, some in ((_PLAIN_WALKS, ~rare), (_WALKS, rare)):
         rest = np.flatnonzero(some & (given_up != 0))
         if len(rest):
-            run_walks(recipe, work, lanes, rest, times, raw)
+            run_walks(work, lanes, rest, times, raw, recipe)
     return raw
 
 
@@ -72,7 +72,8 @@ def _run_some(work: Work, lanes: Lanes, braked: bool, which: NDArray[np.int64], 
     given_up[which] = marks
 
 
-def run_walks(recipe: Recipe, work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw) -> None:
+def run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw,
+              recipe: Recipe = _WALKS) -> None:
     """Run some lanes one after the other, in float64."""
     at_once = max(1, _ROOM // (len(_ALL) * max(len(times), 1)))
     for start in range(0, len(which), at_once):

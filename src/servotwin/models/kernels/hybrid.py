@@ -230,8 +230,8 @@ def cross(plant: Plant, mode: Mode, kind: int, u: float, tau: float, y: Vector) 
         mesh = ON_FORWARD if kind == MEET_FORWARD else ON_BACKWARD
         if plant.V > 0.0:
             zone = armature.zone_of(plant, u, 0.0, q, y[6], i)
-        upper = q >= plant.upper and y[1] > 0.0
-        if upper or (q <= plant.lower and y[1] < 0.0):  # the output rests on a stop: both hit it at once
+        upper = shaft == ON_UPPER and y[1] > 0.0
+        if upper or (shaft == ON_LOWER and y[1] < 0.0):  # the output rests on a stop: both hit it at once
             return contact.rebound(plant, Mode(zone, shaft, mesh, motor), upper, u, tau, y)
     elif kind == MOTOR_SPEED:
         y = (q, w, i, T_w, T_h, q_m, 0.0)
