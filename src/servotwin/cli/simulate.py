@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, pairs, patience, show
 
 if TYPE_CHECKING:
@@ -16,71 +17,51 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.simulation import Result
 
-_COMMAND, _PLANT, _OUTPUT = "Command (one of)", "Servo and load", "Run and output"
 _MOST_FRAMES = 1e6  # they take an hour, and each is kept for metrics and energy
 
 
 def simulate(
-    servo: Annotated[str, typer.Argument(help="Id in the catalog, or path of a servo file (.toml).")],
-    step: Annotated[str | None, typer.Option(
-        metavar="BEFORE:AFTER", help="Step, at --at.", rich_help_panel=_COMMAND)] = None,
-    ramp: Annotated[str | None, typer.Option(
-        metavar="BEFORE:AFTER", help="Ramp from --at on, in --over seconds.", rich_help_panel=_COMMAND)] = None,
-    sine: Annotated[str | None, typer.Option(
-        metavar="MEAN:AMPLITUDE:HZ", help="Sine.", rich_help_panel=_COMMAND)] = None,
-    chirp: Annotated[str | None, typer.Option(
-        metavar="MEAN:AMPLITUDE:HZ:HZ", help="Sine whose frequency goes from one to the other during the run.",
-        rich_help_panel=_COMMAND)] = None,
-    prbs: Annotated[str | None, typer.Option(
-        metavar="LOW:HIGH:SECONDS", help="Pseudo-random sequence of two values, with the time of a bit.",
-        rich_help_panel=_COMMAND)] = None,
-    constant: Annotated[str | None, typer.Option(
-        metavar="VALUE", help="The same all the time.", rich_help_panel=_COMMAND)] = None,
-    pulses: Annotated[Path | None, typer.Option(
-        metavar="FILE.csv", help="Pulses one by one: columns time_s (rising edge), pulse_width_us.",
-        rich_help_panel=_COMMAND)] = None,
-    command: Annotated[Path | None, typer.Option(
-        metavar="FILE.csv", help="Samples: time_s and pulse_width_us, command_angle_deg or command_voltage_V.",
-        rich_help_panel=_COMMAND)] = None,
+    servo: shared.ServoArgument,
+    step: shared.StepOption = None,
+    ramp: shared.RampOption = None,
+    sine: shared.SineOption = None,
+    chirp: shared.ChirpOption = None,
+    prbs: shared.PrbsOption = None,
+    constant: shared.ConstantOption = None,
+    pulses: shared.PulsesOption = None,
+    command: shared.CommandOption = None,
     unit: Annotated[str | None, typer.Option(
         metavar="UNIT", help="Unit of the command: deg (default), rad, us, ms, s, V or mV.",
-        rich_help_panel=_COMMAND)] = None,
-    at: Annotated[float | None, typer.Option(
-        metavar="SECONDS", help="When a step or ramp begins (default 0.1).", rich_help_panel=_COMMAND)] = None,
-    over: Annotated[float | None, typer.Option(
-        metavar="SECONDS", help="How long a ramp takes.", rich_help_panel=_COMMAND)] = None,
-    hold: Annotated[str | None, typer.Option(
-        metavar="HOW", help="Between samples of --command: previous (default) or linear.",
-        rich_help_panel=_COMMAND)] = None,
-    column: Annotated[str | None, typer.Option(
-        metavar="NAME", help="Which column of --command, where it has several commands.",
-        rich_help_panel=_COMMAND)] = None,
+        rich_help_panel=shared.COMMAND)] = None,
+    at: shared.AtOption = None,
+    over: shared.OverOption = None,
+    hold: shared.HoldOption = None,
+    column: shared.ColumnOption = None,
     model: Annotated[str, typer.Option(
         metavar="MODEL",
         help="bounded, pulse, pulse-inductive, averaged, averaged-inductive, geared-motor or dc-motor.",
-        rich_help_panel=_PLANT)] = "bounded",
+        rich_help_panel=shared.PLANT)] = "bounded",
     load: Annotated[list[str] | None, typer.Option(
         metavar="PART=VALUE", help="What hangs on the shaft, repeatable or with commas, SI: inertia=, viscous=, "
         "torque=, coulomb=, pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
-        "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=_PLANT)] = None,
+        "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, or give one that the servo lacks, such as "
         "supply.current_limit=1; repeatable, SI.",
-        rich_help_panel=_PLANT)] = None,
+        rich_help_panel=shared.PLANT)] = None,
     seed: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Seed of a pulse servo's noise.", rich_help_panel=_PLANT)] = 0,
-    duration: Annotated[float, typer.Option(
-        metavar="SECONDS", help="Time to simulate.", rich_help_panel=_OUTPUT)] = 1.5,
+        metavar="NUMBER", help="Seed of a pulse servo's noise.", rich_help_panel=shared.PLANT)] = 0,
+    duration: shared.DurationOption = 1.5,
     output_step: Annotated[float | None, typer.Option(
         metavar="SECONDS", help="Distance of the outputs in time (default 0.001); it does not change the solution.",
-        rich_help_panel=_OUTPUT)] = None,
+        rich_help_panel=shared.OUTPUT)] = None,
     out: Annotated[Path | None, typer.Option(
-        metavar="FILE.csv", help="Write all signals.", rich_help_panel=_OUTPUT)] = None,
+        metavar="FILE.csv", help="Write all signals.", rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
-        metavar="FILE", help="Draw the response: .png, .svg or .pdf.", rich_help_panel=_OUTPUT)] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.", rich_help_panel=_OUTPUT)] = False,
-    as_json: Annotated[bool, typer.Option(
-        "--json", help="Print the summary as JSON, in SI.", rich_help_panel=_OUTPUT)] = False,
+        metavar="FILE", help="Draw the response: .png, .svg or .pdf.", rich_help_panel=shared.OUTPUT)] = None,
+    force: Annotated[bool, typer.Option(
+        "--force", help="Replace files that exist.", rich_help_panel=shared.OUTPUT)] = False,
+    as_json: shared.JsonOption = False,
 ) -> None:
     """Simulate one servo under one command and one load."""
     from servotwin.cli import load_words

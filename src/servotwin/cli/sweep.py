@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli import shared_options as shared
 from servotwin.cli.simulate import _model
 from servotwin.cli.terminal import emit_json, patience, show
 
@@ -15,53 +16,36 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.simulation.sweep import Study
 
-_COMMAND, _PLANT, _VARIED, _OUTPUT = "Command (one of)", "Servo and load", "What varies", "Run and output"
+_VARIED = "What varies"
 
 
 def sweep(
-    servo: Annotated[str, typer.Argument(help="Id in the catalog, or path of a servo file (.toml).")],
-    step: Annotated[str | None, typer.Option(
-        metavar="BEFORE:AFTER", help="Step, at --at.", rich_help_panel=_COMMAND)] = None,
-    ramp: Annotated[str | None, typer.Option(
-        metavar="BEFORE:AFTER", help="Ramp from --at on, in --over seconds.", rich_help_panel=_COMMAND)] = None,
-    sine: Annotated[str | None, typer.Option(
-        metavar="MEAN:AMPLITUDE:HZ", help="Sine.", rich_help_panel=_COMMAND)] = None,
-    chirp: Annotated[str | None, typer.Option(
-        metavar="MEAN:AMPLITUDE:HZ:HZ", help="Sine whose frequency goes from one to the other during the run.",
-        rich_help_panel=_COMMAND)] = None,
-    prbs: Annotated[str | None, typer.Option(
-        metavar="LOW:HIGH:SECONDS", help="Pseudo-random sequence of two values, with the time of a bit.",
-        rich_help_panel=_COMMAND)] = None,
-    constant: Annotated[str | None, typer.Option(
-        metavar="VALUE", help="The same all the time.", rich_help_panel=_COMMAND)] = None,
-    pulses: Annotated[Path | None, typer.Option(
-        metavar="FILE.csv", help="Pulses one by one: columns time_s (rising edge), pulse_width_us.",
-        rich_help_panel=_COMMAND)] = None,
-    command: Annotated[Path | None, typer.Option(
-        metavar="FILE.csv", help="Samples: time_s and pulse_width_us, command_angle_deg or command_voltage_V.",
-        rich_help_panel=_COMMAND)] = None,
+    servo: shared.ServoArgument,
+    step: shared.StepOption = None,
+    ramp: shared.RampOption = None,
+    sine: shared.SineOption = None,
+    chirp: shared.ChirpOption = None,
+    prbs: shared.PrbsOption = None,
+    constant: shared.ConstantOption = None,
+    pulses: shared.PulsesOption = None,
+    command: shared.CommandOption = None,
     unit: Annotated[str | None, typer.Option(
         metavar="UNIT", help="Unit of the command: deg (default), rad, us, ms, s, V or mV. An angle becomes a pulse "
-        "by each servo's own calibration; us, ms and s are the same pulse for all.", rich_help_panel=_COMMAND)] = None,
-    at: Annotated[float | None, typer.Option(
-        metavar="SECONDS", help="When a step or ramp begins (default 0.1).", rich_help_panel=_COMMAND)] = None,
-    over: Annotated[float | None, typer.Option(
-        metavar="SECONDS", help="How long a ramp takes.", rich_help_panel=_COMMAND)] = None,
-    hold: Annotated[str | None, typer.Option(
-        metavar="HOW", help="Between samples of --command: previous (default) or linear.",
-        rich_help_panel=_COMMAND)] = None,
-    column: Annotated[str | None, typer.Option(
-        metavar="NAME", help="Which column of --command, where it has several commands.",
-        rich_help_panel=_COMMAND)] = None,
+        "by each servo's own calibration; us, ms and s are the same pulse for all.",
+        rich_help_panel=shared.COMMAND)] = None,
+    at: shared.AtOption = None,
+    over: shared.OverOption = None,
+    hold: shared.HoldOption = None,
+    column: shared.ColumnOption = None,
     model: Annotated[str, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded.", rich_help_panel=_PLANT)] = "pulse",
+        metavar="MODEL", help="pulse, pulse-inductive or bounded.", rich_help_panel=shared.PLANT)] = "pulse",
     load: Annotated[list[str] | None, typer.Option(
         metavar="PART=VALUE", help="What hangs on the shaft, as in servotwin simulate.",
-        rich_help_panel=_PLANT)] = None,
+        rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE",
         help="Change a nominal parameter, or give one that the servo lacks; repeatable, SI.",
-        rich_help_panel=_PLANT)] = None,
+        rich_help_panel=shared.PLANT)] = None,
     vary: Annotated[list[str] | None, typer.Option(
         metavar="NAME=DISTRIBUTION", help="Draw a parameter of servo or load, repeatable: normal:10%, uniform:10%, "
         "uniform:4us..8us, normal:3ohm±0.3ohm, lognormal:10%, triangular:4us..6us..8us, choice:brake,coast. A single "
@@ -81,27 +65,25 @@ def sweep(
         "--truncate", help="Cut distributions off at the physical range.", rich_help_panel=_VARIED)] = False,
     seed: Annotated[int, typer.Option(
         metavar="NUMBER", help="Of all that is random.", rich_help_panel=_VARIED)] = 0,
-    duration: Annotated[float, typer.Option(
-        metavar="SECONDS", help="Time to simulate.", rich_help_panel=_OUTPUT)] = 1.5,
+    duration: shared.DurationOption = 1.5,
     output_step: Annotated[float, typer.Option(
-        metavar="SECONDS", help="How often the metrics look.", rich_help_panel=_OUTPUT)] = 0.01,
+        metavar="SECONDS", help="How often the metrics look.", rich_help_panel=shared.OUTPUT)] = 0.01,
     metric: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Metric of the tornado (the first one), repeatable: overshoot, rise_time, settling_time, "
         "steady_error, slew_rate, peak_current, rms_error, peak_error, or end_ and the name of a signal.",
-        rich_help_panel=_OUTPUT)] = None,
+        rich_help_panel=shared.OUTPUT)] = None,
     out: Annotated[Path | None, typer.Option(
-        metavar="FOLDER", help="Write all lanes, chunk by chunk.", rich_help_panel=_OUTPUT)] = None,
+        metavar="FOLDER", help="Write all lanes, chunk by chunk.", rich_help_panel=shared.OUTPUT)] = None,
     file_format: Annotated[str, typer.Option(
-        "--format", metavar="FORMAT", help="Of the lanes: csv or parquet.", rich_help_panel=_OUTPUT)] = "csv",
+        "--format", metavar="FORMAT", help="Of the lanes: csv or parquet.", rich_help_panel=shared.OUTPUT)] = "csv",
     resume: Annotated[bool, typer.Option(
-        "--resume", help="Go on with the unfinished study in --out.", rich_help_panel=_OUTPUT)] = False,
+        "--resume", help="Go on with the unfinished study in --out.", rich_help_panel=shared.OUTPUT)] = False,
     plot: Annotated[bool, typer.Option(
-        "--plot", help="Draw tornado.png into --out.", rich_help_panel=_OUTPUT)] = False,
+        "--plot", help="Draw tornado.png into --out.", rich_help_panel=shared.OUTPUT)] = False,
     scheduler: Annotated[str | None, typer.Option(
         metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.",
-        rich_help_panel=_OUTPUT)] = None,
-    as_json: Annotated[bool, typer.Option(
-        "--json", help="Print the summary as JSON, in SI.", rich_help_panel=_OUTPUT)] = False,
+        rich_help_panel=shared.OUTPUT)] = None,
+    as_json: shared.JsonOption = False,
 ) -> None:
     """Draw the parameters of a servo, simulate all, and say what that does to a few metrics."""
     from servotwin.cli.command_words import CommandWords

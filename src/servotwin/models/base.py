@@ -55,6 +55,8 @@ class Model(ABC):
     signals: ClassVar[tuple[str, ...]]
     """Names of all output signals that the class can have, `time` apart."""
 
+    _packed: tuple[Load, Plant] | None = None
+
     def __init__(self, servo: Servo) -> None:
         if not isinstance(servo, Servo):
             raise InputError(f"servo of {type(self).__name__}", got=servo, allowed="a servo, such as load_servo(...)")
@@ -142,6 +144,13 @@ class Model(ABC):
     @abstractmethod
     def pack(self, load: Load) -> Plant:
         """Return everything that the engine reads, as plain floats."""
+
+    @final
+    def plant(self, load: Load) -> Plant:
+        """Return `pack(load)`, which is kept for the next time."""
+        if self._packed is None or self._packed[0] is not load:
+            self._packed = (load, self.pack(load))
+        return self._packed[1]
 
     @abstractmethod
     def command(self, signal: Signal) -> Pieces:

@@ -35,7 +35,7 @@ class Output(NamedTuple):
 
 def warm_plant(model: Model, samples: Samples, load: Load) -> Plant:
     """Return the plant at the temperatures of the samples."""
-    plant = model.pack(load)
+    plant = model.plant(load)
     if not np.any(plant.C_w > 0.0):
         return plant
     T_w, T_h = cast("Any", samples.winding), cast("Any", samples.housing)
@@ -143,7 +143,7 @@ def _motor_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> 
 
 
 def _feedback(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
-    plant, (angles, errors) = model.pack(load), model.curve()
+    plant, (angles, errors) = model.plant(load), model.curve()
     count: Any = model.value_or("potentiometer.quantisation", 0.0) if np.any(plant.V > 0.0) else 0.0
     if not angles and not np.any(count) and not np.any(plant.half_slack):
         return np.asarray(potentiometer.feedback_voltage(samples.angle, plant.p, plant.b_o))
@@ -154,7 +154,7 @@ def _feedback(model: Model, samples: Samples, drive: Pieces, load: Load) -> Arra
 def _of_motor(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
     """Angle or speed of the motor: that of the output but inside the play of a gear."""
     def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
-        play = np.any(model.pack(load).half_play)
+        play = np.any(model.plant(load).half_play)
         values: Array = getattr(samples, f"motor_{name}" if play else name)
         return np.asarray(gear.motor_from_output(values, _reduction(model)))
     return compute

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from servotwin.models.kernels import coupled, frame, hybrid, motion, walk
+from servotwin.models.kernels import coupled, frame, hybrid, motion, together, walk
 from servotwin.models.kernels.coupled import Member, Source
 from servotwin.models.kernels.motion import Motion
 from servotwin.models.kernels.plant import NO_CURRENT, Mode, Plant, Vector
@@ -79,8 +79,8 @@ class Group:
             self._members = [self._settled(m, y, time) for m, y in zip(members, states, strict=True)]
         self._points = [Point(time, one.point.y, m.mode, time, one.point.y, one.point.step, one.point.wiper)
                         for one, m in zip(connected, self._members, strict=True)]
-        if all(map(coupled.is_linear, self._members)):
-            length = min(limit - time, coupled.longest_series(self._members))
+        if all(map(together.is_linear, self._members)):
+            length = min(limit - time, together.longest_series(self._members))
             self._motions = self._by_series(states, time, length)
         else:
             length, self._motions = self._by_step(states, time, limit - time)
@@ -94,14 +94,14 @@ class Group:
         return Member(member.plant, mode, member.sign, member.tau, member.returns)
 
     def _by_series(self, states: Sequence[Vector], time: float, length: float) -> list[Motion]:
-        series = coupled.series(self._source, self._state, self._members, states, time, length)
+        series = together.series(self._source, self._state, self._members, states, time, length)
         return [motion.by_series(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length,
                                  one.speed, one.current)
                 for m, y, one in zip(self._members, states, series, strict=True)]
 
     def _by_step(self, states: Sequence[Vector], time: float, limit: float) -> tuple[float, list[Motion]]:
         tried = min(self._step, limit)
-        length, following, dense, ends = coupled.joint_step(
+        length, following, dense, ends = together.joint_step(
             self._source, self._state, self._members, states, time, tried)
         self._step = max(self._step, following) if length == limit else following
         return length, [
@@ -115,7 +115,7 @@ class Group:
         first, whose = length, (-1, -1)
         ends = self._ends = [motion.state(m, length) for m in self._motions]
         for j, (member, m) in enumerate(zip(self._members, self._motions, strict=True)):
-            if m.kind == motion.SERIES and coupled.is_calm(member, m, ends[j], length):
+            if m.kind == motion.SERIES and together.is_calm(member, m, ends[j], length):
                 continue
             for kind in self._kinds(member):
                 s = self._crossing(j, kind, time, first)

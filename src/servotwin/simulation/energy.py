@@ -74,7 +74,7 @@ def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -
                          (plant.K_b - plant.K) * i * w_m, (own_viscous + torques.servo_friction) * w_m, to_load])
 
     supply, winding, bridge, brush, conversion, friction, to_load = trajectory.integral(powers).tolist()
-    stored, stops = _kinetic(model.pack(load), trajectory)
+    stored, stops = _kinetic(model.plant(load), trajectory)
     return Energy(supply, winding, bridge, brush, conversion, friction, stops, to_load, stored,
                   supply - winding - bridge - brush - conversion - friction - stops - to_load - stored)
 

@@ -103,8 +103,12 @@ def _highest(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.floa
     """Return time and value of the highest point from `start` on."""
     when, best = math.nan, -math.inf
     found = []
-    for k in range(len(trajectory.segments)):
-        times, values = _values(trajectory, k, signal, start)
+    looked_at = [trajectory.dense_times(k) for k in range(len(trajectory.segments))]
+    looked_at = [times[times >= start] for times in looked_at]
+    if not looked_at:
+        return when, best
+    of_each = np.split(signal(trajectory.inside_each(looked_at)), np.cumsum([times.size for times in looked_at])[:-1])
+    for k, (times, values) in enumerate(zip(looked_at, of_each, strict=True)):
         if values.size == 0:
             continue
         n = int(values.argmax())

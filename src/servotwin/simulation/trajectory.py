@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,6 +17,7 @@ from servotwin.simulation.engine import Segment
 
 Array = NDArray[np.float64]
 _NODES = 12  # Gauss-Legendre nodes per interval
+_AT_ONCE = 1000  # segments
 
 
 @dataclass(frozen=True)
@@ -44,12 +45,20 @@ class Trajectory:
         segment = self.segments[index]  # by rounding, a time may lie just outside
         return self._states(np.clip(time, segment.start, segment.end), np.full(time.size, index))
 
+    def inside_each(self, times: Sequence[Array]) -> Samples:
+        """Return the states at times [s] of all segments, one array for each, one after the other."""
+        clipped = [np.clip(t, segment.start, segment.end) for t, segment in zip(times, self.segments, strict=True)]
+        return self._states(np.concatenate(clipped), np.repeat(np.arange(len(times)), [t.size for t in times]))
+
     def _states(self, t: Array, index: NDArray[np.intp]) -> Samples:
         y = np.full((7, t.size), math.nan)
         mode, wiper, drive, error = np.zeros((4, t.size)), *np.zeros((3, t.size))
-        for k in np.unique(index):
+        order = np.argsort(index, kind="stable")
+        used, first = np.unique(index[order], return_index=True)
+        groups = np.split(order, first[1:]) if t.size else []
+        for k, those in zip(used.tolist(), groups, strict=True):
             segment = self.segments[k]
-            where = np.flatnonzero((index == k) & (t <= segment.end) & (t >= segment.start))
+            where = those[(t[those] <= segment.end) & (t[those] >= segment.start)]
             if where.size == 0:
                 continue
             s = t[where] - segment.anchor
@@ -75,12 +84,18 @@ class Trajectory:
         """Return the integral over the whole run of a vector of signals; `integrand` returns shape (m, n)."""
         x, weight = np.polynomial.legendre.leggauss(_NODES)
         total: Array | float = 0.0
-        for k in range(len(self.segments)):
+        times, weights, index = [], [], []
+        for k, segment in enumerate(self.segments):
             edges = self.intervals(k)
-            half = 0.5 * np.diff(edges)
-            nodes = (edges[:-1] + half)[:, None] + half[:, None] * x
-            values = integrand(self.inside(k, nodes.ravel()))
-            total = total + (values * (half[:, None] * weight).ravel()).sum(axis=1)
+            half = 0.5 * np.diff(edges)[:, None]
+            nodes = (edges[:-1, None] + half + half * x).ravel()
+            times.append(np.clip(nodes, segment.start, segment.end))  # by rounding, one may lie just outside
+            weights.append((half * weight).ravel())
+            index.append(np.full(nodes.size, k))
+            if len(times) == _AT_ONCE or k == len(self.segments) - 1:
+                values = integrand(self._states(np.concatenate(times), np.concatenate(index)))
+                total = total + (values * np.concatenate(weights)).sum(axis=1)
+                times, weights, index = [], [], []
         return np.asarray(total)
 
     def dense_times(self, index: int, per_interval: int = 8) -> Array:
