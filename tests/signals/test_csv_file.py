@@ -178,7 +178,7 @@ def test_random_bytes_are_read_or_refused(file, content):
 cells = st.one_of(st.text(alphabet='0123456789.,-+eE"\r\n\0 _;infa\ufeff٣', max_size=8), st.floats().map(repr))
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.lists(cells, max_size=4), max_size=6))
 @example([["0", "1_5"]])
 def test_almost_right_files_are_read_or_refused(file, rows):

@@ -13,9 +13,10 @@ from reference.drivetrain_circuit import Source
 BATTERY, REGULATOR = (6.0, 0.4, None), (6.0, 0.4, 1.2)
 FEW = [(terms, supply, 7) for terms in ((), ("coast",), ("inductance",), ("backlash", "stribeck"), ("heat", "m5"))
        for supply in (BATTERY, REGULATOR)]
-MANY = [(terms, supply, seed) for seed in range(6) for supply in (BATTERY, REGULATOR)
+ALL = ("inductance", "coast", "heat", "m4", "backlash")
+MANY = [(terms, supply, seed) for seed in range(2) for supply in (BATTERY, REGULATOR)
         for terms in ((), ("coast",), ("inductance",), ("coast", "inductance"), ("backlash", "stribeck"),
-                      ("coulomb", "spring", "stops"), ("inductance", "coast", "heat", "m4", "backlash"))]
+                      ("coulomb", "spring", "stops"), ALL)]
 
 
 def fleets(terms, supply, seed, servos=3):

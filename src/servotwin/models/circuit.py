@@ -51,6 +51,7 @@ def circuit_of(model: Model, plant: Plant, samples: Samples, drive: Pieces) -> C
 
 def _behind_bridge(model: Model, plant: Plant, samples: Samples) -> Circuit:
     s, driven = samples.drive, samples.drive != 0.0
+    coasts = plant.D_off >= plant.V  # nothing flows before the back-EMF opens the diodes
     shared = getattr(samples, "bus", None)
     if shared is not None:
         plant = on_bus(plant, shared)
@@ -61,7 +62,6 @@ def _behind_bridge(model: Model, plant: Plant, samples: Samples) -> Circuit:
         s * plant.V, v_b, np.where(driven, plant.D_drive, plant.D_off), np.where(driven, plant.R_drive, plant.R_off)))
     if not inductive and np.any(np.isfinite(plant.I_max)):
         i = np.where(driven, _from_regulator(plant, s, v_b, i), i)
-    coasts = plant.D_off >= plant.V  # nothing flows before the back-EMF opens the diodes
     of_supply = np.where(driven, s * i, np.where(coasts, -np.abs(i), 0.0))
     bus = plant.V - plant.R_b * of_supply
     if np.any(np.isfinite(plant.I_max)):

@@ -138,8 +138,7 @@ class _Pulsed(Model):
             timeout=_edges_first(self.value_or("electronics.pulse_timeout", math.inf), period), frame_period=period,
             R_a=self.value("motor.armature_resistance"), R_b=self.value_or("supply.internal_resistance", 0.0),
             V_br=self.value_or("motor.brush_drop_voltage", 0.0), V_oc=self.value("supply.open_circuit_voltage"),
-            coast=self._coasts(), step=self.value_or("potentiometer.quantisation", 0.0),
-            half_slack=0.5 * self.value_or("potentiometer.backlash", 0.0))
+            coast=self._coasts(), step=self.value_or("potentiometer.quantisation", 0.0))
 
     def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return angles [rad] and errors [V] of the potentiometer's linearity table; empty without one."""

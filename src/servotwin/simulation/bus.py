@@ -50,6 +50,8 @@ class Fleet(Mapping[str, Result]):
         Of each servo, by its name.
     status : Status
         How the run ended; `cause` says it in words, `ended` when [s].
+    bus : callable
+        Voltage of the supply under load [V] at any times [s], an array.
 
     Examples
     --------
@@ -232,6 +234,7 @@ class _BusVoltage:
             if drive == 0.0 and not (chip.coast > 0.0 and (y[2] != 0.0 or y[6] != 0.0)):
                 continue
             mode = Mode(int(s.zone[k]), int(s.contact[k]), int(s.mesh[k]), int(s.motor[k]))
-            members.append(coupled.member_of(plan.plant, mode, drive, Piece(), y))
+            stiff = coupled.on_stiff_source(plan.plant, drive == 0.0)
+            members.append(coupled.member_of(stiff, mode, drive, Piece(), y))
             states.append(y)
         return coupled.zoned(self.source, members, states, self.source.V)[2]

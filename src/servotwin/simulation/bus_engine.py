@@ -10,10 +10,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from servotwin.models.kernels import armature, frame, hybrid, motion, walk
+from servotwin.models.kernels import armature, coupled, frame, hybrid, motion, walk
 from servotwin.models.kernels.frame import Chip, Frame
 from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.plant import Vector
+from servotwin.models.kernels.plant import Plant, Vector
 from servotwin.models.kernels.walk import MOST_IDLE, Point
 from servotwin.physics.pieces import Piece, piece_value
 from servotwin.simulation.bus_group import Connected, Group
@@ -35,9 +35,14 @@ class Unit:
     inputs: tuple[float, Piece] | None = None  # drive and torque of the present motion
     motion: Motion | None = None
     arrival: tuple[Point, int] | None = None  # when left alone: its next point, and the event there (−1: none)
+    stiff: dict[bool, Plant] = field(default_factory=dict)  # the plant on a given bus voltage, driven or returning
 
     switch: float = -math.inf  # when drive or load change next, as far as is known [s]
     limit: float = -math.inf  # when its chip or its load do something next [s]
+
+    def __post_init__(self) -> None:
+        for returning in (False, True):
+            self.stiff[returning] = coupled.on_stiff_source(self.plan.plant, returning)
 
     def plan_ahead(self) -> None:
         """Find out when chip and load do something next."""
@@ -124,6 +129,8 @@ class Bus:
                     unit.move(*unit.arrival)
             if self._group.end <= time:
                 for unit, (point, kind) in zip(self._in_group, self._group.arrivals(), strict=True):
+                    if walk.status_of(point.y) != walk.COMPLETED:
+                        raise failure(Status.DIVERGED, time)
                     unit.move(point, kind)
                 self._before = [(id(unit), unit.inputs) for unit in self._in_group]
                 self._leave()
@@ -175,7 +182,7 @@ class Bus:
             V_bus = walk.voltages(other.plan.plant, other.chip, u, other.at(time).y)[1]
         else:
             V_bus = self._group.voltage_of([_connection(other, time) for other in connected])
-        stiff = hybrid.warm(plant._replace(R_drive=plant.R_drive - plant.R_b, R_b=0.0, I_max=math.inf), y)
+        stiff = hybrid.warm(unit.stiff[False], y)
         u = drive * V_bus
         zone = armature.zone_of(stiff, u, 0.0, y[0], y[6], y[2])
         i = y[2] if stiff.L > 0.0 else armature.current(stiff, zone, u, y[0], y[6])
@@ -208,4 +215,4 @@ class Bus:
 
 def _connection(unit: Unit, time: float) -> Connected:
     """Return how a unit is connected to the bus."""
-    return Connected(unit.plan.plant, unit.at(time), unit.frame.drive, unit.tau)
+    return Connected(unit.stiff[unit.frame.drive == 0.0], unit.at(time), unit.frame.drive, unit.tau)

@@ -21,7 +21,7 @@ _JUMPS = (hybrid.UPPER, hybrid.LOWER, hybrid.MEET_FORWARD, hybrid.MEET_BACKWARD,
 
 
 class Connected(NamedTuple):
-    """A servo on the bus: its plant when alone, where it stands, how its bridge drives, and its load."""
+    """A servo on the bus: its plant on a stiff source, where it stands, how its bridge drives, and its load."""
 
     plant: Plant
     point: Point

@@ -57,7 +57,7 @@ class Lanes(NamedTuple):
     """What comes in, for all lanes of a chunk; each array has a column or an entry for each lane."""
 
     plants: Numbers  # (49, B), fields of Plant
-    chips: Numbers  # (22, B), fields of Chip
+    chips: Numbers  # (21, B), fields of Chip
     start: Numbers  # (7, B), numbers of the state at t = 0
     torque: Numbers
     seeds: Indices
@@ -177,7 +177,7 @@ def chip_at(s: Numbers, j: int) -> Chip:
         s[c], s[c + BLOCK], s[c + 2 * BLOCK], s[c + 3 * BLOCK], s[c + 4 * BLOCK], s[c + 5 * BLOCK],
         s[c + 6 * BLOCK], s[c + 7 * BLOCK], s[c + 8 * BLOCK], s[c + 9 * BLOCK], s[c + 10 * BLOCK],
         s[c + 11 * BLOCK], s[c + 12 * BLOCK], s[c + 13 * BLOCK], s[c + 14 * BLOCK], s[c + 15 * BLOCK],
-        s[c + 16 * BLOCK], s[c + 17 * BLOCK], s[c + 18 * BLOCK], s[c + 19 * BLOCK], 0.0, 0.0)
+        s[c + 16 * BLOCK], s[c + 17 * BLOCK], s[c + 18 * BLOCK], s[c + 19 * BLOCK], 0.0)
 
 
 def plain_chip_at(s: Numbers, j: int) -> Chip:
@@ -185,4 +185,4 @@ def plain_chip_at(s: Numbers, j: int) -> Chip:
     c = CHIP + j
     return Chip(s[c], s[c + BLOCK], s[c + 2 * BLOCK], s[c + 3 * BLOCK], 0.0, 0.0, 0.0, s[c + 7 * BLOCK],
                 s[c + 8 * BLOCK], s[c + 9 * BLOCK], 0.0, s[c + 11 * BLOCK], s[c + 12 * BLOCK], s[c + 13 * BLOCK],
-                0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+                0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

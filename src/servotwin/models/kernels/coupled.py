@@ -14,7 +14,7 @@ from servotwin.models.kernels import armature, hybrid
 from servotwin.models.kernels.plant import NO_CURRENT, Mode, Plant, Vector
 from servotwin.physics.pieces import Piece
 
-_EDGE = 1e-10
+_EDGE = 1e-8  # of a limit: so near to it the sum of currents counts as being there
 
 # What the source does: it follows its resistance, gives its most, has broken down, or takes nothing back.
 FOLLOWING, LIMITED, BROKEN_DOWN, KEEPING = range(4)
@@ -47,13 +47,12 @@ def on_stiff_source(plant: Plant, returning: bool) -> Plant:
     return plant._replace(R_drive=R_drive, R_b=0.0, I_max=math.inf, D_drive=D)
 
 
-def member_of(plant: Plant, mode: Mode, drive: float, tau: Piece, y: Vector,
-              stiff: Plant | None = None) -> Member:
+def member_of(stiff: Plant, mode: Mode, drive: float, tau: Piece, y: Vector) -> Member:
     """Return a servo as a member, driven or (0) returning current through the diodes of a coasting bridge."""
     sign = drive
     if sign == 0.0:  # against the current, or against the one that the back-EMF would drive
         sign = -math.copysign(1.0, y[2]) if y[2] != 0.0 else math.copysign(1.0, y[6])
-    return Member(stiff or on_stiff_source(plant, drive == 0.0), mode, sign, tau, drive == 0.0)
+    return Member(stiff, mode, sign, tau, drive == 0.0)
 
 
 def _demand(members: Sequence[Member], states: Sequence[Vector]) -> tuple[float, float, float]:

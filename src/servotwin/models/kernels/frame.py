@@ -42,7 +42,6 @@ class Chip(NamedTuple):
     V_oc: float
     coast: float  # 1: the bridge opens between drives; 0: it brakes
     step: float  # V from one step of the potentiometer to the next; 0: none
-    half_slack: float  # rad, of the play between output and potentiometer
 
 
 class Decision(NamedTuple):

@@ -89,16 +89,17 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
         y = motion.state(m, end - t0)
         wiper = frame.wiper_at(m.plant.half_slack, point.wiper, y[0])
         if motion.is_step(m) and end == step_end:
-            return Point(end, y, m.mode, end, y, m.next_step, wiper), -1, _status(y)
-        return Point(end, y, m.mode, t0, point.anchor, point.step, wiper), -1, _status(y)
+            return Point(end, y, m.mode, end, y, m.next_step, wiper), -1, status_of(y)
+        return Point(end, y, m.mode, t0, point.anchor, point.step, wiper), -1, status_of(y)
     t = min(max(t0 + s, point.time), end)
     before = motion.state(motion.prepared(m), s)
     wiper = frame.wiper_at(m.plant.half_slack, point.wiper, before[0])
     after, y = hybrid.cross(m.plant, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), before)
-    return Point(t, y, after, t, y, point.step, wiper), kind, _status(y)
+    return Point(t, y, after, t, y, point.step, wiper), kind, status_of(y)
 
 
-def _status(y: Vector) -> int:
+def status_of(y: Vector) -> int:
+    """Tell whether a state is finite, as a code."""
     total = y[0] + y[1] + y[2] + y[3] + y[4] + y[5] + y[6]
     return COMPLETED if math.isfinite(total) else DIVERGED
 

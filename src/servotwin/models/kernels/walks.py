@@ -37,5 +37,4 @@ def walk_lanes(pulsed: bool, lanes: Lanes, curve: Numbers, torques: Numbers, tor
 def chip_at(c: Numbers, j: int) -> Chip:
     """Return the chip in column j."""
     return Chip(c[0, j], c[1, j], c[2, j], c[3, j], c[4, j], c[5, j], c[6, j], c[7, j], c[8, j], c[9, j], c[10, j],
-                c[11, j], c[12, j], c[13, j], c[14, j], c[15, j], c[16, j], c[17, j], c[18, j], c[19, j], c[20, j],
-                c[21, j])
+                c[11, j], c[12, j], c[13, j], c[14, j], c[15, j], c[16, j], c[17, j], c[18, j], c[19, j], c[20, j])
