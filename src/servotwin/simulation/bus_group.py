@@ -12,6 +12,8 @@ from servotwin.models.kernels.motion import Motion
 from servotwin.models.kernels.plant import NO_CURRENT, Mode, Plant, Vector
 from servotwin.models.kernels.walk import Point
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
+from servotwin.simulation.engine import failure
+from servotwin.simulation.status import Status
 
 _BELOW = -1e-13  # rounding is not an event
 _BELOW_OF_SUM = -1e-10  # A: nor what the currents of all have gathered
@@ -103,6 +105,8 @@ class Group:
         tried = min(self._step, limit)
         length, following, dense, ends = together.joint_step(
             self._source, self._state, self._members, states, time, tried)
+        if length == 0.0:
+            raise failure(Status.STEP_TOO_SMALL, time)
         self._step = max(self._step, following) if length == limit else following
         return length, [
             motion.by_step(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length, vectors, end)

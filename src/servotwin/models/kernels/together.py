@@ -231,7 +231,10 @@ def joint_rates(source: Source, state: int, members: Sequence[Member], time: flo
 
 def joint_step(source: Source, state: int, members: Sequence[Member], states: Sequence[Vector], time: float,
                step: float) -> tuple[float, float, list[tuple[Vector, ...]], list[Vector]]:
-    """Return the length of one accepted step of at most `step` [s], the next to try, dense outputs and ends."""
+    """Return the length of one accepted step of at most `step` [s], the next to try, dense outputs and ends.
+
+    The length is 0 where none is short enough.
+    """
     count, h = len(members), step
     for _ in range(60):
         ks = [[NOWHERE] * 16 for _ in range(count)]
@@ -248,6 +251,8 @@ def joint_step(source: Source, state: int, members: Sequence[Member], states: Se
         if size <= 1.0:
             break
         h *= factor
+    if size > 1.0:
+        return 0.0, 0.0, [], list(states)
     for j in range(STAGES, 16):
         at = [dormand_prince.moved(y, k, j, h) for y, k in zip(states, ks, strict=True)]
         for k, rate in zip(ks, joint_rates(source, state, members, time + dormand_prince.FRACTIONS[j] * h, at),
