@@ -148,9 +148,10 @@ class Model(ABC):
     @final
     def plant(self, load: Load) -> Plant:
         """Return `pack(load)`, which is kept for the next time."""
-        if self._packed is None or self._packed[0] is not load:
-            self._packed = (load, self.pack(load))
-        return self._packed[1]
+        packed = self._packed
+        if packed is None or packed[0] is not load:
+            packed = self._packed = (load, self.pack(load))
+        return packed[1]
 
     @abstractmethod
     def command(self, signal: Signal) -> Pieces:
