@@ -119,14 +119,14 @@ def units() -> str:
 
 
 def catalog() -> str:
-    """The servos of the catalog, with the share of what is only assumed."""
+    """The servos of the catalog, with the share of what is only assumed, and what their sheets lack."""
     rows = []
     for name in catalog_names():
         servo = load_servo(name)
         origins = [servo.source(parameter).origin for parameter in servo.names()]
         assumed = sum(origin == "assumed" for origin in origins)
-        rows.append((f"`{name}`", servo.title, str(len(origins)), str(assumed)))
-    return markdown(("id", "servo", "parameters", "of these assumed"), rows)
+        rows.append((f"`{name}`", servo.title, f"{assumed} of {len(origins)}", "; ".join(servo.sheet.get("flags", []))))
+    return markdown(("id", "servo", "assumed", "flags of its sheet"), rows)
 
 
 def top_level() -> str:

@@ -18,8 +18,10 @@ _LAZY = {
     **dict.fromkeys(("Batch", "Fleet", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_bus",
                      "simulate_many"), "simulation"),
     **dict.fromkeys(("Study", "distributions", "sweep"), "simulation.sweep"),
+    **dict.fromkeys(("Fit", "Log", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "read_logs",
+                     "servo_from_sheet"), "identification"),
 }
-_MODULES = ("bench", "errors", "linear", "loads", "models", "parameters", "physics", "plotting", "signals",
+_MODULES = ("bench", "errors", "identification", "linear", "loads", "models", "parameters", "physics", "plotting", "signals",
             "simulation", "units")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]

@@ -1,5 +1,6 @@
 from servotwin import bench as bench
 from servotwin import errors as errors
+from servotwin import identification as identification
 from servotwin import linear as linear
 from servotwin import loads as loads
 from servotwin import models as models
@@ -9,6 +10,15 @@ from servotwin import plotting as plotting
 from servotwin import signals as signals
 from servotwin import simulation as simulation
 from servotwin import units as units
+from servotwin.identification import Fit as Fit
+from servotwin.identification import Log as Log
+from servotwin.identification import Sheet as Sheet
+from servotwin.identification import SheetPoint as SheetPoint
+from servotwin.identification import advise as advise
+from servotwin.identification import friction_ladder as friction_ladder
+from servotwin.identification import identify as identify
+from servotwin.identification import read_logs as read_logs
+from servotwin.identification import servo_from_sheet as servo_from_sheet
 from servotwin.models import AveragedServo as AveragedServo
 from servotwin.models import AveragedServoInductive as AveragedServoInductive
 from servotwin.models import BoundedServo as BoundedServo

@@ -90,7 +90,8 @@ class UnknownNameError(InputError, KeyError):
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.name = name
         self.known = tuple(known)
-        near = get_close_matches(str(name), self.known, n=1, cutoff=0.4)
+        begun = [known for known in self.known if len(str(name)) > 2 and str(known).startswith(str(name))]
+        near = begun[:1] or get_close_matches(str(name), self.known, n=1, cutoff=0.4)
         self.suggestion = near[0] if near else None
         hint = f"; did you mean {self.suggestion!r}?" if near else ""
         super().__init__(f"unknown {kind} {_shown(name)}{hint}", allowed=", ".join(self.known) or "none")

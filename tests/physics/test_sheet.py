@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from servotwin.errors import ParameterError
-from servotwin.physics.sheet import motor_from_sheet
+from servotwin.physics import forward_efficiency
+from servotwin.physics.sheet import (
+    load_share,
+    motor_from_sheet,
+    sheet_efficiency,
+    sheet_growth,
+    stall_current_for,
+)
 
 HS_755HB = {"supply_voltage": 6.0, "stall_torque": 1.2945, "no_load_speed": math.pi / 3 / 0.23,
             "no_load_current": 0.285}
@@ -146,3 +153,40 @@ def test_a_bad_sheet_is_refused_in_one_line(change, named):
     assert named in str(caught.value)
     assert caught.value.allowed
     assert "\n" not in str(caught.value)
+
+
+@given(sheets)
+def test_the_efficiency_in_closed_form_is_that_of_the_motor(sheet):
+    motor = motor_from_sheet(**sheet)
+    assert sheet_efficiency(sheet["supply_voltage"], sheet["stall_torque"], sheet["no_load_speed"],
+                            sheet["no_load_current"], motor.stall_current, sheet["drop_voltage"]) == pytest.approx(
+                                sheet["gear_efficiency"], rel=1e-5)
+
+
+@given(sheets)
+def test_the_stall_current_for_an_efficiency_is_that_of_the_motor(sheet):
+    motor = motor_from_sheet(**sheet)
+    found = stall_current_for(sheet["supply_voltage"], sheet["stall_torque"], sheet["no_load_speed"],
+                              sheet["no_load_current"], sheet["gear_efficiency"], sheet["drop_voltage"])
+    assert found == pytest.approx(motor.stall_current, rel=1e-6)
+    assert found > sheet["no_load_current"]
+
+
+@given(st.floats(0.05, 1.0))
+def test_the_share_of_friction_makes_the_efficiency(eta):
+    assert forward_efficiency(load_share(eta), load_share(eta)) == pytest.approx(eta)
+
+
+@given(sheets, st.floats(1.01, 2.0))
+def test_torque_and_speed_of_one_motor_grow_alike(sheet, ratio):
+    """The same motor, drop and friction at a higher voltage."""
+    motor = motor_from_sheet(**sheet)
+    V, V_d, I_0, K = sheet["supply_voltage"], sheet["drop_voltage"], sheet["no_load_current"], \
+        motor.output_torque_constant
+    U = V * ratio - V_d
+    speed, torque = (U - motor.resistance * I_0) / K, sheet["gear_efficiency"] * K * (U / motor.resistance - I_0)
+    growth = sheet_growth(V, ratio * V, V_d, I_0 / motor.stall_current)
+    if I_0 < 0.99 * motor.stall_current:  # else nothing is left to grow from
+        assert speed / sheet["no_load_speed"] == pytest.approx(growth, rel=1e-5)
+        assert torque / sheet["stall_torque"] == pytest.approx(growth, rel=1e-3)
+    assert growth >= ratio * (1.0 - 1e-12)

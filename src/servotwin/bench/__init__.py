@@ -8,8 +8,9 @@ from servotwin.bench.bench import Bench, BenchRun, bench_servo
 from servotwin.bench.calibration import Interval, command_voltage_interval, zero_offset_interval
 from servotwin.bench.control_supply import ControlSupply, run_on_one_supply
 from servotwin.bench.converter import FEEDBACK_CONVERTER, INPUT_CONVERTER, Converter
-from servotwin.bench.fits import CurvatureTest, LineFit, TableFit, curvature_test, fit_line, table_fits
+from servotwin.bench.fits import CurvatureTest, LineFit, TableFit, curvature_test, fit_line, table_fit, table_fits
 from servotwin.bench.generator import PulseGenerator
+from servotwin.bench.instruments import InstrumentPair, instrument_pairs
 from servotwin.bench.reading import Reading, TableRow
 from servotwin.bench.residuals import (
     Comparison,
@@ -20,34 +21,47 @@ from servotwin.bench.residuals import (
     model_shares,
 )
 from servotwin.bench.standing import Standing, standing
+from servotwin.bench.table_calibration import TableCalibration, calibrate_table
+from servotwin.bench.table_columns import BenchTable, TableColumn, bench_table
+from servotwin.bench.table_rows import RowFinding, row_findings
 
 __all__ = [
     "FEEDBACK_CONVERTER",
     "INPUT_CONVERTER",
     "Bench",
     "BenchRun",
+    "BenchTable",
     "Comparison",
     "ControlSupply",
     "Converter",
     "CurvatureTest",
+    "InstrumentPair",
     "Interval",
     "LineFit",
     "ModelShares",
     "PulseGenerator",
     "Reading",
+    "RowFinding",
     "Shares",
     "Standing",
+    "TableCalibration",
+    "TableColumn",
     "TableFit",
     "TableRow",
     "bench_servo",
+    "bench_table",
+    "calibrate_table",
     "command_voltage_interval",
     "compare",
     "curvature_test",
     "fit_line",
+    "instrument_pairs",
     "measured_shares",
     "model_shares",
+    "row_findings",
     "run_on_one_supply",
     "standing",
+    "table_fit",
     "table_fits",
     "zero_offset_interval",
 ]

@@ -23,6 +23,8 @@ class LineFit:
         In the units of y per x, and of y.
     slope_error, intercept_error : float
         One standard error of each.
+    covariance : float
+        Of slope and intercept, in the product of their units.
     residuals : tuple of float, length n
         y − (slope x + intercept).
 
@@ -37,6 +39,7 @@ class LineFit:
     intercept: float
     slope_error: float
     intercept_error: float
+    covariance: float
     residuals: tuple[float, ...]
 
     @property
@@ -85,7 +88,7 @@ class CurvatureTest:
 
 @dataclass(frozen=True, kw_only=True)
 class TableFit:
-    """A named fit of one column of Table II over another.
+    """A named fit of one column of a bench table over another.
 
     Parameters
     ----------
@@ -135,7 +138,7 @@ def fit_line(x: ArrayLike, y: ArrayLike) -> LineFit:
     return LineFit(
         slope=slope, intercept=intercept, slope_error=math.sqrt(variance / spread),
         intercept_error=math.sqrt(variance * (1.0 / a.size + a_mean**2 / spread)),
-        residuals=tuple(residuals.tolist()))
+        covariance=-a_mean * variance / spread, residuals=tuple(residuals.tolist()))
 
 
 def curvature_test(x: ArrayLike, y: ArrayLike) -> CurvatureTest:
@@ -213,11 +216,41 @@ def table_fits(columns: Mapping[str, ArrayLike]) -> dict[str, TableFit]:
         for column in (abscissa, ordinate):
             if column not in columns:
                 raise InputError("columns of the table", got=", ".join(columns), allowed=f"a column {column}")
-        x, y = _points(columns[abscissa], columns[ordinate], 4)
-        fits[name] = TableFit(name=name, abscissa=abscissa, ordinate=ordinate, slope_unit=slope_unit, unit=unit,
-                              line=fit_line(x, y), curvature=curvature_test(x, y),
-                              x=tuple(x.tolist()), y=tuple(y.tolist()))
+        fits[name] = table_fit(name, columns, abscissa, ordinate, slope_unit=slope_unit, unit=unit)
     return fits
+
+
+def table_fit(name: str, columns: Mapping[str, ArrayLike], abscissa: str, ordinate: str, *, slope_unit: str,
+              unit: str) -> TableFit:
+    """Return the straight line of one column over another.
+
+    Parameters
+    ----------
+    name : str
+        Of the fit.
+    columns : mapping
+        Has both columns, of one length, at least 4.
+    abscissa, ordinate : str
+        Names of the columns.
+    slope_unit, unit : str
+        Of the slope, and of the ordinate.
+
+    Raises
+    ------
+    InputError
+        If a column is not usable.
+
+    Examples
+    --------
+    >>> columns = {"V_i_V": [1.0, 2.0, 3.0, 4.0], "q_deg": [10.0, 20.0, 30.5, 40.0]}
+    >>> fit = table_fit("q(V_i)", columns, "V_i_V", "q_deg", slope_unit="°/V", unit="°")
+    >>> f"{fit.line.slope:.2f} ± {fit.line.slope_error:.2f} {fit.slope_unit}"
+    '10.05 ± 0.13 °/V'
+    """
+    x, y = _points(columns[abscissa], columns[ordinate], 4)
+    return TableFit(name=name, abscissa=abscissa, ordinate=ordinate, slope_unit=slope_unit, unit=unit,
+                    line=fit_line(x, y), curvature=curvature_test(x, y),
+                    x=tuple(x.tolist()), y=tuple(y.tolist()))
 
 
 def _points(x: ArrayLike, y: ArrayLike, least: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -8,10 +8,12 @@ import typer
 
 from servotwin import __version__
 from servotwin.cli.catalog import catalog
+from servotwin.cli.fit import fit
 from servotwin.cli.paper_command import paper
 from servotwin.cli.simulate import simulate
 from servotwin.cli.sweep import sweep
 from servotwin.cli.terminal import emit, emit_help
+from servotwin.cli.validate import validate
 
 app = typer.Typer(
     name="servotwin", add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
@@ -45,4 +47,11 @@ app.command("simulate", help="Simulate one servo under one command and one load.
 app.command("sweep", help="Draw the parameters of a servo, simulate all, and say which of them matter.",
             epilog="Example: servotwin sweep hitec-hs-755hb --step 0:60 --vary motor.torque_constant=normal:10% "
                    "--vary electronics.deadband=uniform:4us..8us --lanes 10000 --out study --plot")(sweep)
+app.command("fit", help="Find the parameters of a servo, with intervals, from its logs or a bench table.",
+            epilog="Example: servotwin fit runs/ --servo hitec-hs-755hb --free output_inertia,output_torque_constant "
+                   "--out my-servo.toml --report fit.html\n\n"
+                   "Example: servotwin fit --table bench.csv --out my-servo.toml\n\n"
+                   "Example: servotwin fit --advise --servo hitec-hs-755hb")(fit)
+app.command("validate", help="Run a servo against logs, and say how far it is off.",
+            epilog="Example: servotwin validate my-servo.toml new-runs/ --max-error 3deg --report check.html")(validate)
 app.add_typer(catalog, name="catalog")

@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli.from_sheet import from_sheet
 from servotwin.cli.terminal import emit_help, emit_json, pairs, show, table
 
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
+_TELLING = ("impossible", "sources disagree", "digital", "currents unknown", "stall current unknown",
+            "running current unknown")  # what a list has room for
 _Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 catalog = typer.Typer(
@@ -39,8 +42,9 @@ def list_servos(as_json: _Json = False) -> None:
         emit_json(found)
         return
     rows = [(servo["id"], servo["title"], _number(servo["supply_voltage"], "{:.3g} V"),
-             _number(servo["stall_torque"], "{:.3g} N m"), _number(servo["speed"], "{:.3g} deg/s")) for servo in found]
-    show(table(("id", "title", "at", "torque", "speed"), rows))
+             _number(servo["stall_torque"], "{:.3g} N m"), _number(servo["speed"], "{:.0f} deg/s"),
+             _brief(servo["flags"])) for servo in found]
+    show(table(("id", "title", "at", "torque", "speed", "flags"), rows, wraps="flags"))
 
 
 @catalog.command("show", help="Show every parameter of a servo and its source.",
@@ -51,6 +55,7 @@ def show_servo(
 ) -> None:
     """Show every parameter of a servo."""
     from servotwin.cli.servo_facts import headline, parameters
+    from servotwin.cli.servo_page import heading, parameter_table
     from servotwin.parameters import load_servo
 
     loaded = load_servo(servo)
@@ -58,19 +63,7 @@ def show_servo(
     if as_json:
         emit_json({**headline(loaded), "notes": loaded.notes.strip(), "parameters": found})
         return
-    sources = list(dict.fromkeys(row["source"] for row in found if row["source"]))
-    rows: list[tuple[str, ...]] = []
-    group = ""
-    for row in found:
-        table_name, _, key = row["name"].partition(".")
-        if table_name != group:
-            rows.append((table_name, *[""] * 5))
-            group = table_name
-        source = f"[{sources.index(row['source']) + 1}]" if row["source"] else ""
-        rows.append((f"  {key}", _value(row["value"]), row["unit"], row["origin"], row["spread"], source))
-    show(f"{loaded.title} ({loaded.name})", " ".join(loaded.notes.split()), "",
-         table(("parameter", "value", "unit", "origin", "spread", "source"), rows, wraps="spread"), "",
-         *[f"[{k}] {source}" for k, source in enumerate(sources, start=1)])
+    show(*heading(loaded), "", *parameter_table(found))
 
 
 @catalog.command("check", help="Check a servo file, and which models it can run.",
@@ -119,10 +112,18 @@ def _ready(model: dict[str, Any]) -> str:
     return "runs" + (f", {len(model['ignored'])} parameters not read" if model["ignored"] else "")
 
 
+def _brief(flags: list[str]) -> str:
+    """Return the flags that matter most when one looks for a servo, each in a word or two."""
+    short = (flag.partition(":")[0].replace("current not given", "current unknown").replace(
+        "no current given", "currents unknown") for flag in flags)
+    return "; ".join(dict.fromkeys(flag for flag in short if flag in _TELLING))
+
+
 def _number(value: float | None, form: str) -> str:
     return "" if value is None else form.format(value)
 
 
-def _value(value: Any) -> str:
-    return ", ".join(f"{x:.5g}" for x in value) if isinstance(value, list) else (
-        value if isinstance(value, str) else f"{value:.5g}")
+catalog.command("from-sheet", help="Make a servo file out of what a maker prints.", epilog=(
+    'Example: servotwin catalog from-sheet --name my-servo --torque "13.2 kgf.cm" --speed "0.23 s/60deg" '
+    '--running-current "285 mA" --at 6V --deadband "8 us" --out my-servo.toml\n\n'
+    "Example: servotwin catalog from-sheet --csv sheets.csv --out my-catalog"))(from_sheet)

@@ -26,7 +26,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0: done; 2: bad input or an output that cannot be written; 130: interrupted; 1: a mistake of servotwin.
+        0: done; 2: bad input or an output that cannot be written; 130: interrupted; 1: a validation
+        above its --max-error, or a mistake of servotwin.
 
     Examples
     --------

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def headline(servo: Servo) -> dict[str, Any]:
-    """Return id, title, and supply voltage [V], stall torque [N m] and speed [deg/s] of its data sheet.
+    """Return id, title, supply voltage [V], stall torque [N m] and speed [deg/s] of its data sheet, and flags.
 
     Examples
     --------
@@ -28,7 +28,21 @@ def headline(servo: Servo) -> dict[str, Any]:
         "supply_voltage": _fact(servo, "supply_voltage", "voltage"),
         "stall_torque": _fact(servo, "stall_torque", "torque"),
         "speed": 60.0 / seconds if seconds else None,
+        "flags": flags(servo),
     }
+
+
+def flags(servo: Servo) -> list[str]:
+    """Return what the file's [sheet] says of itself: what it lacks, and where it contradicts itself.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import servo_from_values
+    >>> flags(servo_from_values("mine", {}))
+    []
+    """
+    found = servo.sheet.get("flags")
+    return [flag for flag in found if isinstance(flag, str)] if isinstance(found, list) else []
 
 
 def parameters(servo: Servo) -> list[dict[str, Any]]:

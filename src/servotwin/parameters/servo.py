@@ -25,7 +25,7 @@ from servotwin.parameters.quantity import Quantity
 from servotwin.units import si_unit
 
 Value = float | tuple[float, ...] | str
-_NAMES = tuple(f"{group}.{f.name}" for group, kind in GROUPS.items() for f in fields(kind))
+_PLACES = {f"{group}.{f.name}": (group, f.name) for group, kind in GROUPS.items() for f in fields(kind)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +83,7 @@ class Servo:
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     def _quantity(self, name: str) -> Quantity:
-        value = getattr(getattr(self, name.partition(".")[0]), name.partition(".")[2])
+        value = self.get(name)
         known = self.quantities.get(name)
         if known is not None and known.value == value:
             return known
@@ -99,7 +99,7 @@ class Servo:
 
     def names(self) -> tuple[str, ...]:
         """Return the dotted names of all values that are given, in the order of the groups."""
-        return tuple(name for name in _NAMES if self.get(name) is not None)
+        return tuple(name for name, (group, key) in _PLACES.items() if getattr(getattr(self, group), key) is not None)
 
     def get(self, name: str) -> Value | None:
         """Return a value (SI) by its dotted name, None where it is absent.
@@ -147,8 +147,24 @@ class Servo:
             group, key = check_name(name)
             value = getattr(groups[group], key)
             if value is not None:
-                quantities[name] = Quantity(value=value, unit=unit_of(name), origin="assumed", source="replaced")
+                quantities[name] = _replaced(name, value)
         return replace(self, quantities=quantities, **groups)
+
+    def with_checked(self, values: Mapping[str, Value | None]) -> Servo:
+        """Return what `replace` does, faster where numbers stand for numbers; all values were checked before."""
+        if not all(isinstance(value, float) and name in self.quantities for name, value in values.items()):
+            return self.replace(values)
+        made = object.__new__(Servo)
+        made.__dict__.update(self.__dict__)
+        for name, value in values.items():
+            group, key = check_name(name)
+            if made.__dict__[group] is self.__dict__[group]:
+                made.__dict__[group] = object.__new__(GROUPS[group])
+                made.__dict__[group].__dict__.update(self.__dict__[group].__dict__)
+            made.__dict__[group].__dict__[key] = value
+        changed = {name: _replaced(name, value) for name, value in values.items() if value is not None}
+        made.__dict__["quantities"] = MappingProxyType({**self.quantities, **changed})
+        return made
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a servo file that `load_servo` reads back as an equal servo.
@@ -207,12 +223,12 @@ def check_name(name: str) -> tuple[str, str]:
     >>> check_name("motor.rotor_inertia")
     ('motor', 'rotor_inertia')
     """
-    if name not in _NAMES:
+    place = _PLACES.get(name)
+    if place is None:
         group = name.partition(".")[0]
-        near = [n for n in _NAMES if n.startswith(f"{group}.")] or list(_NAMES)
+        near = [n for n in _PLACES if n.startswith(f"{group}.")] or list(_PLACES)
         raise UnknownNameError("parameter", name, near)
-    group, _, key = name.partition(".")
-    return group, key
+    return place
 
 
 def unit_of(name: str) -> str:
@@ -226,6 +242,10 @@ def unit_of(name: str) -> str:
     group, key = check_name(name)
     dimension = GROUPS[group].__dataclass_fields__[key].metadata["dimension"]
     return "" if dimension == "word" else si_unit(dimension)
+
+
+def _replaced(name: str, value: Value) -> Quantity:
+    return Quantity(value=value, unit=unit_of(name), origin="assumed", source="replaced")
 
 
 def _rebuild(state: dict[str, Any]) -> Servo:

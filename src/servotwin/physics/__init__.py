@@ -56,7 +56,14 @@ from servotwin.physics.potentiometer import (
     sensed_voltage,
 )
 from servotwin.physics.pulse import drive_time, full_drive_error, one_shot_width, pulse_stiffness
-from servotwin.physics.sheet import SheetMotor, motor_from_sheet
+from servotwin.physics.sheet import (
+    SheetMotor,
+    load_share,
+    motor_from_sheet,
+    sheet_efficiency,
+    sheet_growth,
+    stall_current_for,
+)
 from servotwin.physics.supply import Conduction, bridge_supply_current, bus_voltage, conduction, source_voltage
 from servotwin.physics.thermal import (
     Temperatures,
@@ -102,6 +109,7 @@ __all__ = [
     "impact_energy",
     "impact_speed",
     "linearity_error",
+    "load_share",
     "loop_voltage",
     "magnet_factor",
     "motor_from_output",
@@ -119,9 +127,12 @@ __all__ = [
     "reflected_viscous_friction",
     "required_motor_torque",
     "sensed_voltage",
+    "sheet_efficiency",
+    "sheet_growth",
     "smoothed_coulomb_torque",
     "source_voltage",
     "spindle_torque",
+    "stall_current_for",
     "steady_armature_current",
     "steady_temperatures",
     "sticks",

@@ -3,6 +3,9 @@
 All at the output shaft, R = R_a + r_c + R_b in series, V_d the drop of bridge and brushes:
 
     I_s = (V − V_d)/R,    ω_0 = (V − V_d − R I_0)/K_out,    T_s = η_g K_out (I_s − I_0)
+
+The efficiency η_g of the gear acts as friction that grows with the torque through it, with the same share
+μ = (1 − η_g)/(1 + η_g) for the torque of the motor and that of the load.
 """
 
 from __future__ import annotations
@@ -11,6 +14,9 @@ import math
 from dataclasses import dataclass
 
 from servotwin.errors import ParameterError
+from servotwin.physics._typing import Real
+
+LEAST_EFFICIENCY = 0.5  # below it the gear of no servo is, and a sheet that says so contradicts itself
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +46,7 @@ class SheetMotor:
     @property
     def feasible(self) -> bool:
         """Whether the efficiency is one that a gear train has, 0.5 to 1."""
-        return 0.5 <= self.gear_efficiency <= 1.0
+        return LEAST_EFFICIENCY <= self.gear_efficiency <= 1.0
 
 
 def motor_from_sheet(*, supply_voltage: float, stall_torque: float, no_load_speed: float, no_load_current: float,
@@ -102,6 +108,128 @@ def motor_from_sheet(*, supply_voltage: float, stall_torque: float, no_load_spee
     K_out = (U - R * no_load_current) / no_load_speed
     if stall_current is not None:
         eta = stall_torque / (K_out * (stall_current - no_load_current))
-    mu_m = (1.0 - eta) / (1.0 + eta) if eta < 1.0 else 0.0
+    mu_m = load_share(min(eta, 1.0))
     return SheetMotor(resistance=R, output_torque_constant=K_out, stall_current=U / R, gear_efficiency=eta,
                       coulomb_torque=K_out * no_load_current * (1.0 - mu_m))
+
+
+def load_share(gear_efficiency: float) -> float:
+    """Return the friction per torque through the gear that makes an efficiency, equal for motor and load.
+
+    Parameters
+    ----------
+    gear_efficiency : float
+        η_g, above 0 and at most 1 [1].
+
+    Returns
+    -------
+    float
+        μ_m = μ_e = (1 − η_g)/(1 + η_g), which gives η_g = (1 − μ_m)/(1 + μ_e) [1].
+
+    Examples
+    --------
+    >>> round(load_share(0.8), 4)
+    0.1111
+    """
+    return (1.0 - gear_efficiency) / (1.0 + gear_efficiency)
+
+
+def sheet_efficiency(supply_voltage: Real, stall_torque: Real, no_load_speed: Real, no_load_current: Real,
+                     stall_current: Real, drop_voltage: Real = 0.4) -> Real:
+    """Return the efficiency of the gear that four figures of a sheet imply together.
+
+    Parameters
+    ----------
+    supply_voltage : float or array
+        V [V].
+    stall_torque : float or array
+        T_s [N m].
+    no_load_speed : float or array
+        ω_0 [rad/s].
+    no_load_current : float or array
+        I_0, less than I_s [A].
+    stall_current : float or array
+        I_s [A].
+    drop_voltage : float or array
+        V_d [V].
+
+    Returns
+    -------
+    float or array
+        η_g = T_s ω_0 I_s/((V − V_d)(I_s − I_0)²); no gear has more than 1 [1].
+
+    Notes
+    -----
+    It is least where nothing is lost at bridge and brushes (V_d = 0) and the motor idles without current (I_0 = 0):
+    T_s ω_0/(V I_s), both ends of the speed-torque line over the power of the stalled motor.
+
+    Examples
+    --------
+    >>> round(sheet_efficiency(6.0, 0.3432, math.pi / 3 / 0.15, 0.18, 0.8), 3)
+    0.89
+    """
+    V, T_s, w_0, I_0, I_s, V_d = supply_voltage, stall_torque, no_load_speed, no_load_current, stall_current, \
+        drop_voltage
+    return T_s * w_0 * I_s / ((V - V_d) * (I_s - I_0) ** 2)
+
+
+def stall_current_for(supply_voltage: Real, stall_torque: Real, no_load_speed: Real, no_load_current: Real,
+                      gear_efficiency: Real = 1.0, drop_voltage: Real = 0.0) -> Real:
+    """Return the stall current with which torque and speed have a given efficiency of the gear.
+
+    Parameters
+    ----------
+    supply_voltage : float or array
+        V [V].
+    stall_torque : float or array
+        T_s [N m].
+    no_load_speed : float or array
+        ω_0 [rad/s].
+    no_load_current : float or array
+        I_0 [A].
+    gear_efficiency : float or array
+        η_g; with 1 and no drop the result is the least current that can make the torque [1].
+    drop_voltage : float or array
+        V_d [V].
+
+    Returns
+    -------
+    float or array
+        I_s, the root above I_0 of η_g (V − V_d)(I_s − I_0)² = T_s ω_0 I_s [A].
+
+    Examples
+    --------
+    >>> round(stall_current_for(6.0, 0.3432, math.pi / 3 / 0.15, 0.18, 0.89, 0.4), 2)
+    0.8
+    """
+    half = 0.5 * stall_torque * no_load_speed / (gear_efficiency * (supply_voltage - drop_voltage))
+    I_0 = no_load_current
+    return I_0 + half + (half * (half + 2.0 * I_0)) ** 0.5
+
+
+def sheet_growth(lower_voltage: Real, upper_voltage: Real, drop_voltage: Real = 0.0,
+                 current_ratio: Real = 0.0) -> Real:
+    """Return by what factor stall torque and no-load speed grow from one supply voltage to a higher one.
+
+    Parameters
+    ----------
+    lower_voltage, upper_voltage : float or array
+        V_1 < V_2 [V].
+    drop_voltage : float or array
+        V_d [V].
+    current_ratio : float or array
+        ρ = I_0/I_s at the lower voltage, less than 1 [1].
+
+    Returns
+    -------
+    float or array
+        (V_2 − V_d − ρ (V_1 − V_d))/((1 − ρ)(V_1 − V_d)): what drop and friction take is the same at both voltages.
+        Without them it is V_2/V_1, the least that a motor alone does [1].
+
+    Examples
+    --------
+    >>> round(sheet_growth(4.8, 6.0), 3), round(sheet_growth(4.8, 6.0, 0.4, 0.2), 3)
+    (1.25, 1.341)
+    """
+    U_1, U_2, rho = lower_voltage - drop_voltage, upper_voltage - drop_voltage, current_ratio
+    return (U_2 - rho * U_1) / ((1.0 - rho) * U_1)

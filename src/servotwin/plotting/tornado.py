@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from servotwin import units
 from servotwin.errors import InputError
+from servotwin.look import COLOURS, axes_grid, context, finished, readable
 from servotwin.models.outputs import SIGNALS
 from servotwin.plotting.responses import SHOWN, Shown
-from servotwin.plotting.style import COLOURS, axes_grid, context, finished
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,9 +29,6 @@ _METRICS = {
 }
 _WIDTH, _ROW = 6.6, 0.42  # inch
 _SIDES = (("low end (5 %)", COLOURS["blue"], ""), ("high end (95 %)", COLOURS["orange"], "////"))
-_FOREIGN = ("kgf cm", "ozf in", "V/krpm", "min", "%", "%/K", "s/deg", "N m/deg", "V/deg", "rpm", "deg/s")
-_PRINTED = {"ohm": "Ω", "mohm": "mΩ", "us": "µs", "uH": "µH", "us/V": "µs/V", "deg": "°", "1": "",
-            "mV/us": "mV/µs"}
 
 
 def metric_shown(name: str) -> Shown:
@@ -50,25 +47,6 @@ def metric_shown(name: str) -> Shown:
     unit = SIGNALS[signal].unit
     dimension = next(name for name, known in units.DIMENSIONS.items() if unit in known)
     return Shown(f"final {signal.replace('_', ' ')}", "", unit if unit != "1" else "", unit, dimension)
-
-
-def readable(value: float | str, dimension: str) -> str:
-    """Return a value (SI) with the unit in which its number is neither long nor small; a word as it is.
-
-    Examples
-    --------
-    >>> readable(8e-6, "time"), readable(3.04101, "resistance"), readable("coast", "word")
-    ('8 µs', '3.041 Ω', 'coast')
-    """
-    if isinstance(value, str):
-        return value
-    known = [unit for unit in units.DIMENSIONS[dimension] if unit not in _FOREIGN]
-    if "deg" in known:
-        known = ["deg"]
-    numbers = {unit: units.from_si(value, unit, dimension) for unit in known}
-    unit = min(known, key=lambda unit: abs(math.log10(abs(numbers[unit])) - 1.0) if value else 0.0)
-    text = _PRINTED.get(unit, unit.replace("m2", "m²"))
-    return f"{numbers[unit]:.4g}{'' if text in ('', '°') else ' '}{text}"
 
 
 def tornado(found: Tornado, *, most: int = 12) -> Figure:
@@ -115,7 +93,6 @@ def tornado(found: Tornado, *, most: int = 12) -> Figure:
         ax.annotate("share of\nvariance", xy=(1.0, 1.0), xycoords="axes fraction", xytext=(4.0, 3.0),
                     textcoords="offset points", ha="left", va="bottom", fontsize=7.5, color=COLOURS["grey"])
     return finished(figure)
-
 
 
 def _draw(ax: Axes, row: int, bar: Bar, nominal: float, shown: Shown) -> None:

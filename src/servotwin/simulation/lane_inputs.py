@@ -212,6 +212,8 @@ def _once(given: Any) -> tuple[tuple[Any, ...], Indices]:
     if isinstance(given, np.ndarray):
         given = given.tolist()  # of no dimensions, it is the thing itself
     items = list(given) if isinstance(given, Sequence) else [given]
+    if items and all(item is items[0] for item in items):
+        return (items[0],), np.zeros(len(items), dtype=np.int64)
     ids = np.fromiter(map(id, items), dtype=np.uint64, count=len(items))
     _, where, index = np.unique(ids, return_index=True, return_inverse=True)
     place = np.empty_like(where)
@@ -241,8 +243,8 @@ def _servo_of_first(servo: Servo, values: Mapping[str, Any]) -> Servo:
         if given:
             own = getattr(servo, group)
             check_columns(group, {key: getattr(own, key) for key in kind.__dataclass_fields__} | given)
-    return servo.replace({name: value[0].item() if isinstance(value, np.ndarray) else value
-                          for name, value in values.items()})
+    return servo.with_checked({name: value[0].item() if isinstance(value, np.ndarray) else value
+                               for name, value in values.items()})
 
 
 def _with_numbers(loads: tuple[Load, ...], load_of: Indices, values: Mapping[str, Any]) -> tuple[Load, ...]:

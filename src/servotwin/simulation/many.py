@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 _MOST_LANES = 65536  # of a chunk
 _LEAST_LANES = 256  # fewer do not pay for the way to a worker
 _CHUNK_BYTES = 16e6  # of a chunk's raw fields
+_SMALL = 1e7  # bytes of outputs that any machine has
 _CHUNK_FRAMES = 2e7  # of a chunk's lanes together: seconds, and an interrupt waits no longer
 
 Indices = NDArray[np.int64]
@@ -209,7 +210,7 @@ def _space(lanes: Lanes, asked: Asked) -> dict[str, NDArray[Any]]:
     """Return the arrays of the outputs, if the machine has the memory."""
     shape = (lanes.count, len(asked.times))
     size = len(asked.outputs) * math.prod(shape) * np.dtype(asked.dtype).itemsize
-    memory = _memory()
+    memory = _memory() if size > _SMALL else math.inf
     try:
         if size > 0.8 * memory:
             raise MemoryError

@@ -168,8 +168,13 @@ class Chunk:
         before = cast("LanePieces", self.model.command(cast("Any", self.commands.before(self.which))))
         initial = {name: column[self.which if len(column) > 1 else [0], None]
                    for name, column in self.lanes.initial.items()}
-        y = start_vector(self.model.states, self.plant, self.model.start_angle(cast("Any", before.initial)), initial)
-        return np.array([np.broadcast_to(x, (len(self.which), 1))[:, 0] for x in y], dtype=np.float64)
+        angle = initial.get("output_angle")
+        if angle is None:
+            angle = self.model.start_angle(cast("Any", before.initial))
+        y = np.empty((7, len(self.which), 1))
+        for k, values in enumerate(start_vector(self.model.states, self.plant, angle, initial)):
+            y[k] = values
+        return y[:, :, 0]
 
     def check(self, duration: float) -> None:
         """Raise where a command, an initial value or a load is not possible; names the lane."""
@@ -181,7 +186,7 @@ class Chunk:
                 lane = self.which[np.argmax(of == k)]
                 raise LoadError(f"{error.what} of lane {lane}", got=error.got, allowed=error.allowed) from None
         with np.errstate(all="ignore"):
-            self.model.command(cast("Any", self.commands.signal(self.which)))  # raises if it cannot be followed
+            _ = self.drive  # raises if it cannot be followed
         frames = np.broadcast_to(self.frames(duration), self.which.shape)
         if (frames > _MOST_FRAMES).any():
             k = int(np.argmax(frames > _MOST_FRAMES))
@@ -189,11 +194,13 @@ class Chunk:
                              allowed=f"at most {_MOST_FRAMES:.0e} in one run")
         if not self.lanes.initial:
             return  # it starts between the stops, and the motor in the middle of its play
-        plant = [np.broadcast_to(_flat(x), self.which.shape) for x in self.plant]
         start = self.start
+        lower, upper, play, heat = (_flat(self.plant[k]) for k in (_LOWER, _UPPER, _PLAY, _HEAT))
         with np.errstate(invalid="ignore"):
-            between = (start[0] >= plant[_LOWER]) & (start[0] <= plant[_UPPER])
-            inside = between & (plant[_PLAY] == 0.0) & (plant[_HEAT] == 0.0)
+            inside = (start[0] >= lower) & (start[0] <= upper) & (play == 0.0) & (heat == 0.0)
+        if inside.all():
+            return
+        plant = [np.broadcast_to(_flat(x), self.which.shape) for x in self.plant]
         for k in np.flatnonzero(~inside).tolist():
             one = type(self.plant)(*(float(x[k]) for x in plant))
             try:
@@ -234,10 +241,12 @@ class Chunk:
 
     def fields(self, asked: Asked) -> tuple[str, ...]:
         """Return the raw fields that the outputs read: those that they look at when they are computed for one lane."""
-        one = Chunk(self.lanes, self.commands, self.which[:1])
         probe = _Probe(asked.times[:1])
+        probe.seen.update(FIELDS_OF[name] for name in asked.outputs if name in FIELDS_OF)
+        computed = [name for name in asked.outputs if name not in FIELDS_OF]
+        one = Chunk(self.lanes, self.commands, self.which[:1])
         with np.errstate(all="ignore"):
-            for name in asked.outputs:
+            for name in computed:
                 one.model.output(name, cast("Samples", probe), cast("Any", one.drive), one.load)
         return tuple(field for field in (*FIELDS, *MORE_FIELDS) if field in probe.seen) or FIELDS[:1]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from servotwin import plotting
 from servotwin.cli.paper.study import APPROACH_ROW, LABELS, BenchStudy, Study
-from servotwin.cli.paper.words import fixed
+from servotwin.look import fixed
 from servotwin.plotting import Curve, Limit
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import numpy as np
 
 from servotwin import bench
 from servotwin.cli.paper.study import LOAD_INERTIA
-from servotwin.cli.paper.words import fixed, number, with_error
+from servotwin.look import fixed, number, with_error
 from servotwin.physics.friction import creep_speed
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from servotwin.cli.paper.study import LOAD_INERTIA, Study
-from servotwin.cli.paper.words import picture
 from servotwin.loads import Inertia
+from servotwin.look import picture
 from servotwin.models import AveragedServo, DCMotor, GearedMotor
 from servotwin.plotting import formula_svg
 

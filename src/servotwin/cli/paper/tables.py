@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from servotwin import units
 from servotwin.cli.paper.study import LABELS, LOAD_INERTIA, MODELS, Study
-from servotwin.cli.paper.words import escape, fixed, number, table, with_error
+from servotwin.look import escape, fixed, number, table, with_error
 from servotwin.parameters import GROUPS
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from servotwin import plotting
 from servotwin.cli.paper.figures import Picture
 from servotwin.cli.paper.vibration import CIRCUITS, LOOKED_AT, SHOWN_ROW, SOFT
-from servotwin.cli.paper.words import fixed, number, table
+from servotwin.look import fixed, number, table
 from servotwin.plotting import Curve, Limit
 
 if TYPE_CHECKING:

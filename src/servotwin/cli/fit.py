@@ -1,0 +1,260 @@
+"""`servotwin fit`: the parameters of a servo, from its logs or from a bench table."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from servotwin.cli.terminal import emit_json, patience, show
+
+if TYPE_CHECKING:
+    from servotwin.cli.outputs import Target
+    from servotwin.identification import Advice, Fit, Ladder, Log
+    from servotwin.models import Model
+
+_LOGS, _SEARCH, _OUTPUT = "Logs and servo", "What is searched, and how", "Output"
+_INTERRUPTED = 130  # exit code
+
+
+def fit(
+    logs: Annotated[list[Path] | None, typer.Argument(
+        metavar="LOGS", help="Files or folders of logs: CSV with or without a sidecar, JSON of BAM or Miuzei.")] = None,
+    servo: Annotated[str | None, typer.Option(
+        metavar="SERVO", help="Where the search begins, and what is not searched: id in the catalog, or path of a "
+        "servo file (.toml).", rich_help_panel=_LOGS)] = None,
+    file_format: Annotated[str, typer.Option(
+        "--format", metavar="FORMAT", help="Of the logs: auto, csv, bam or miuzei.", rich_help_panel=_LOGS)] = "auto",
+    change: Annotated[list[str] | None, typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable, SI.",
+        rich_help_panel=_LOGS)] = None,
+    holdout: Annotated[str | None, typer.Option(
+        metavar="SHARE|NAMES", help="Logs that are predicted and not fitted: a share of each kind of motion such as "
+        "0.25, or names with commas; 0 for none (default: a fourth of each kind with four logs or more).",
+        rich_help_panel=_LOGS)] = None,
+    leave_out: Annotated[list[str] | None, typer.Option(
+        "--leave-out", metavar="START..STOP", help="A window of time that says nothing about the servo, in all logs or "
+        "in one: LOG=START..STOP; repeatable.", rich_help_panel=_LOGS)] = None,
+    sensors: Annotated[list[str] | None, typer.Option(
+        metavar="NAME", help="Measured signals that are fitted; repeatable or with commas (default: the angle and all "
+        "currents).", rich_help_panel=_LOGS)] = None,
+    table: Annotated[Path | None, typer.Option(
+        metavar="FILE.csv", help="Calibrate from a bench table instead of logs.", rich_help_panel=_LOGS)] = None,
+    model: Annotated[str, typer.Option(
+        metavar="MODEL", help="pulse, pulse-inductive or bounded.", rich_help_panel=_SEARCH)] = "pulse",
+    free: Annotated[list[str] | None, typer.Option(
+        metavar="NAME", help="What is searched, repeatable or with commas: names of servo and load, and "
+        "output_torque_constant, output_inertia, output_coulomb_torque.", rich_help_panel=_SEARCH)] = None,
+    bounds: Annotated[list[str] | None, typer.Option(
+        metavar="NAME=LOWEST..HIGHEST", help="Where it is searched, such as motor.armature_resistance=2ohm..5ohm; "
+        "repeatable.", rich_help_panel=_SEARCH)] = None,
+    prior: Annotated[list[str] | None, typer.Option(
+        metavar="NAME=VALUE±STD", help="What is believed before, such as motor.armature_resistance=3ohm±10%; "
+        "repeatable. The spreads of the servo file hold for the others.", rich_help_panel=_SEARCH)] = None,
+    no_priors: Annotated[bool, typer.Option(
+        "--no-priors", help="The spreads of the servo file do not count.", rich_help_panel=_SEARCH)] = False,
+    nuisance: Annotated[list[str] | None, typer.Option(
+        metavar="NAME", help="What belongs to the rig: delay, log_delay, angle_offset, initial_state, or none "
+        "(default: delay, angle_offset, initial_state).", rich_help_panel=_SEARCH)] = None,
+    starts: Annotated[int, typer.Option(
+        metavar="NUMBER", help="Searches, all but the first from random values.", rich_help_panel=_SEARCH)] = 3,
+    loss: Annotated[str, typer.Option(
+        metavar="HOW", help="huber (large residuals count less) or squares.", rich_help_panel=_SEARCH)] = "huber",
+    level: Annotated[str, typer.Option(
+        metavar="SHARE", help="Of the intervals.", rich_help_panel=_SEARCH)] = "0.95",
+    intervals: Annotated[bool, typer.Option(
+        "--intervals/--no-intervals", help="Without them it is faster.", rich_help_panel=_SEARCH)] = True,
+    seed: Annotated[int, typer.Option(
+        metavar="NUMBER", help="Of random starts and of what is held out.", rich_help_panel=_SEARCH)] = 0,
+    compare: Annotated[bool, typer.Option(
+        "--compare/--no-compare", help="Fit simpler models to the same logs, beside it.",
+        rich_help_panel=_SEARCH)] = True,
+    ladder: Annotated[bool, typer.Option(
+        "--ladder", help="Fit friction laws M1 to M6 and choose one by the logs that were held out.",
+        rich_help_panel=_SEARCH)] = False,
+    advise: Annotated[bool, typer.Option(
+        "--advise", help="Say which experiment to do next; without logs, which one to begin with.",
+        rich_help_panel=_SEARCH)] = False,
+    out: Annotated[Path | None, typer.Option(
+        metavar="FILE.toml", help="Write the servo with what was found.", rich_help_panel=_OUTPUT)] = None,
+    report: Annotated[Path | None, typer.Option(
+        metavar="FILE.html", help="Write a page with pictures.", rich_help_panel=_OUTPUT)] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.", rich_help_panel=_OUTPUT)] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI.", rich_help_panel=_OUTPUT)] = False,
+) -> None:
+    """Find the parameters of a servo, with intervals."""
+    _check_words(logs, servo, table, report, advise=advise)
+    if table is not None:
+        from servotwin.cli.fit_table import show_table_calibration
+
+        show_table_calibration(table, servo, out, force=force, as_json=as_json)
+        return
+    targets = _targets(out, report, [*(logs or []), Path(servo or "")], force=force)
+    search = _search(servo or "", model, change or [], free, bounds or [], prior or [], priors=not no_priors)
+    if not logs:
+        _show_advice(_first_advice(search), as_json=as_json)
+        return
+    options = {"holdout": holdout, "nuisance": nuisance, "sensors": sensors, "starts": starts, "loss": loss,
+               "level": level, "intervals": intervals, "seed": seed, "compare": compare}
+    found = _run(search, _read(logs, file_format, leave_out or []), _options(options), ladder=ladder)
+    files = _write(found.fit, targets, force=force)
+    if advise and not found.fit.interrupted and found.fit.doubt is not None:
+        found = _Found(found.fit, found.ladder, _advice(found.fit))
+    _report(found, files, as_json=as_json)
+    if found.fit.interrupted:
+        raise typer.Exit(_INTERRUPTED)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Where a search begins, and what is searched."""
+
+    model: Model
+    free: tuple[str, ...]
+    bounds: dict[str, tuple[float, float]]
+    priors: dict[str, tuple[float, float]] | None
+
+
+@dataclass(frozen=True)
+class _Found:
+    fit: Fit
+    ladder: Ladder | None = None
+    advice: Advice | None = None
+
+
+def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None, report: Path | None, *,
+                 advise: bool) -> None:
+    from servotwin.errors import InputError
+
+    if table is not None:
+        for given, what in ((bool(logs), "logs"), (report is not None, "--report"), (advise, "--advise")):
+            if given:
+                raise InputError("--table", got=f"also {what}", allowed="a table alone; it is calibrated, not fitted")
+        return
+    if not logs and not advise:
+        raise InputError("no logs; give files or folders, or --table FILE.csv, or --advise for where to begin")
+    if servo is None:
+        raise InputError("--servo is needed: an id of servotwin catalog list, or a servo file; servotwin catalog "
+                         "from-sheet makes one from a data sheet")
+
+
+def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force: bool) -> list[Target]:
+    from servotwin.cli.outputs import Target, check_targets
+
+    targets = []
+    if out is not None:
+        targets.append(Target(option="--out", path=out, endings=(".toml",)))
+    if report is not None:
+        targets.append(Target(option="--report", path=report, endings=(".html", ".htm")))
+    check_targets(targets, force=force, inputs=inputs)
+    return targets
+
+
+def _search(servo: str, model: str, change: list[str], free: list[str] | None, bounds: list[str], prior: list[str], *,
+            priors: bool) -> _Search:
+    from servotwin.cli import fit_words
+    from servotwin.cli.settings import settings
+    from servotwin.identification.checks import usual_free
+    from servotwin.parameters import load_servo
+
+    kind = fit_words.model_of(model)
+    loaded = load_servo(servo)
+    nominal = kind(loaded.replace(settings(change)) if change else loaded)
+    names = fit_words.names(free) or usual_free(nominal)
+    fit_words.check_free(names, nominal)
+    return _Search(nominal, names, fit_words.bounds_of(bounds, names),
+                   fit_words.priors_of(prior, names, nominal, of_servo=priors))
+
+
+def _read(paths: list[Path], file_format: str, leave_out: list[str]) -> list[Log]:
+    from servotwin.cli import fit_words
+
+    windows = fit_words.left_out(leave_out)
+    with patience("reading"):
+        return fit_words.without(fit_words.read_all(paths, file_format), windows)
+
+
+def _options(given: dict[str, Any]) -> dict[str, Any]:
+    """Return the options of `identify` that words say."""
+    from servotwin.cli import fit_words
+    from servotwin.identification.identify import NUISANCE
+
+    return {
+        "holdout": fit_words.held_out(given["holdout"]), "sensors": fit_words.names(given["sensors"]),
+        "nuisance": fit_words.some_or_none("--nuisance", given["nuisance"], NUISANCE),
+        "level": fit_words.share("--level", given["level"]), "starts": given["starts"], "loss": given["loss"],
+        "intervals": given["intervals"], "seed": given["seed"],
+        "compare_with": ("slew", "M1") if given["compare"] else ()}
+
+
+def _run(search: _Search, logs: list[Log], options: dict[str, Any], *, ladder: bool) -> _Found:
+    from servotwin.identification import friction_ladder, identify
+
+    servo, kind = search.model.servo, type(search.model)
+    progress = sys.stderr is not None and sys.stderr.isatty()
+    if ladder:
+        climbed = friction_ladder(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
+                                  progress=progress, **options)
+        found = _Found(climbed.fit, climbed)
+    else:
+        found = _Found(identify(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
+                                progress=progress, **options))
+    if found.fit.interrupted and found.fit.cost == float("inf"):
+        raise KeyboardInterrupt  # before the first step: there is nothing to keep
+    return found
+
+
+def _first_advice(search: _Search) -> Advice:
+    from servotwin.identification import advise
+
+    with patience("simulating experiments"):
+        return advise(search.model.servo, model=type(search.model), free=search.free, priors=search.priors)
+
+
+def _advice(fit: Fit) -> Advice:
+    from servotwin.identification import advise
+
+    with patience("simulating experiments"):
+        return advise(fit)
+
+
+def _write(fit: Fit, targets: list[Target], *, force: bool) -> list[str]:
+    from servotwin.cli.outputs import staged
+
+    with patience("writing"), staged(targets, force=force) as drafts:
+        for target, draft in zip(targets, drafts, strict=True):
+            if target.option == "--out":
+                fit.servo.save(draft)
+            else:
+                fit.report(draft)
+    return [str(target.path) for target in targets]
+
+
+def _show_advice(advice: Advice, *, as_json: bool) -> None:
+    from servotwin.cli.fit_show import advice_facts, advice_table
+
+    if as_json:
+        emit_json({"advice": advice_facts(advice)})
+        return
+    show(*advice_table(advice))
+
+
+def _report(found: _Found, files: list[str], *, as_json: bool) -> None:
+    from servotwin.cli import fit_show
+
+    if as_json:
+        more: dict[str, Any] = {}
+        if found.ladder is not None:
+            more["ladder"] = fit_show.ladder_facts(found.ladder)
+        if found.advice is not None:
+            more["advice"] = fit_show.advice_facts(found.advice)
+        emit_json({**fit_show.facts(found.fit, files), **more})
+        return
+    parts = [] if found.ladder is None else fit_show.ladder_table(found.ladder)
+    parts += fit_show.sections(found.fit, files)
+    if found.advice is not None:
+        parts += ["", *fit_show.advice_table(found.advice)]
+    show(*parts)

@@ -1,0 +1,158 @@
+"""A fit in tables, and as facts for JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from servotwin.cli.terminal import pairs, table
+from servotwin.identification.shown import (
+    MODELS,
+    error_rows,
+    error_shown,
+    estimate_lines,
+    nominal_of,
+    tables_of,
+)
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from servotwin.identification import Advice, Fit, Ladder
+    from servotwin.identification.fit import Trace
+    from servotwin.identification.holdout import ErrorTable
+
+_MOST_EXPERIMENTS = 8
+
+
+def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
+    """Return what is printed of a fit."""
+    held = sum(trace.held_out for trace in fit.traces)
+    head = f"{fit.servo.title or fit.servo.name} ({fit.servo.name}), {type(fit.model).__name__}, " \
+           f"{len(fit.traces)} logs, {held} of them held out, {fit.seconds:.1f} s"
+    parts: list[RenderableType] = [head]
+    if fit.interrupted:
+        parts.append("INTERRUPTED: the best so far, without intervals")
+    parts += ["", _estimates(fit), ""]
+    parts += [f"- {item}" for item in fit.unidentifiable]
+    parts += [f"- {name} ended at a bound of the search" for name in fit.at_bound]
+    parts += [""] if fit.unidentifiable or fit.at_bound else []
+    parts.append(errors(tables_of(fit), fit.traces, "motion"))
+    if fit.warnings:
+        parts += ["", *[f"! {text}" for text in fit.warnings]]
+    if files:
+        parts += ["", written(files)]
+    return parts
+
+
+def written(files: Sequence[str]) -> RenderableType:
+    """Return the names of files that were written."""
+    return pairs([("written", name) for name in files])
+
+
+def _estimates(fit: Fit) -> RenderableType:
+    rows = []
+    for line in estimate_lines(fit):
+        found_by = line.method if line.interval != line.method else ""
+        rows.append((line.name, line.value, line.interval, line.unit, found_by, "rig" if line.nuisance else line.sheet))
+    level = f"{100.0 * fit.level:g} % interval"
+    return table(("parameter", "value", level, "unit", "found by", "before"), rows, wraps="parameter")
+
+
+def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], label: str) -> RenderableType:
+    """Return a table of rms errors by the values of a label, all models beside each other."""
+    models = next(iter(tables.values())).models
+    factor, unit = error_shown(traces)
+    rows = [(row.value, row.which, *(_error(row.errors, model, factor) for model in models))
+            for row in error_rows(tables, label)]
+    rows += [("all", which, *(_error(held.total(), model, factor) for model in models))
+             for which, held in tables.items()]
+    named = any(tables)
+    header = (label.replace("_", " "), "logs", *(f"{MODELS.get(name, name)} ({unit})" for name in models))
+    if not named:
+        header, rows = (header[0], *header[2:]), [(row[0], *row[2:]) for row in rows]
+    return table(header, rows)
+
+
+def _error(errors_of: Mapping[str, float], model: str, factor: float) -> str:
+    value = errors_of.get(model, math.nan) * factor
+    return f"{value:.3g}" if math.isfinite(value) else "–"
+
+
+def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
+    """Return a fit as plain data for JSON, in SI."""
+    found = fit.intervals()
+    estimates = {name: {
+        "value": fit.estimates[name], "unit": fit.units[name], "lower": float(found[name].lower),
+        "upper": float(found[name].upper), "method": found[name].method, "before": nominal_of(fit, name)}
+        for name in fit.names}
+    return {
+        "servo": fit.servo.name, "model": type(fit.model).__name__, "logs": len(fit.traces),
+        "held_out": [trace.log.name for trace in fit.traces if trace.held_out], "level": fit.level,
+        "estimates": estimates, "covariance": {"names": list(fit.names), "rows": fit.covariance.tolist()},
+        "undetermined": [{
+            "parameters": list(item.parameters), "direction": list(item.direction),
+            "combinations": list(item.combinations), "remedies": list(item.remedies), "words": str(item)}
+            for item in fit.unidentifiable],
+        "at_bound": list(fit.at_bound),
+        "errors": {which.replace(" ", "_"): error_facts(held) for which, held in tables_of(fit).items()},
+        "noise": {name: float(value) for name, value in fit.noise.items()}, "warnings": list(fit.warnings),
+        "starts": [{"cost": float(start.cost), "converged": bool(start.converged)} for start in fit.starts],
+        "data": fit.servo.fit.get("data"), "seconds": fit.seconds, "interrupted": fit.interrupted,
+        "files": list(files),
+    }
+
+
+def error_facts(held: ErrorTable) -> dict[str, Any]:
+    """Return errors as plain data (SI): in all, by every label, and of each log."""
+    return {
+        "all": held.total(), "by": {label: held.by(label) for label in held.labels()},
+        "logs": {model: [{"log": e.log, "motion": e.motion, "conditions": dict(e.conditions), "rms": e.rms,
+                          "largest": e.largest, "samples": e.samples} for e in held.errors[model]]
+                 for model in held.models}}
+
+
+def ladder_table(ladder: Ladder) -> list[RenderableType]:
+    """Return the rungs of a friction ladder, and which one is chosen."""
+    factor, unit = error_shown(ladder.fit.traces)
+    rows = []
+    for rung in ladder.rungs:
+        said = ["chosen"] if rung.name == ladder.chosen else []
+        said += ["overfitted"] if rung.overfits else []
+        rows.append((rung.name, str(len(rung.fit.space)), f"{rung.training * factor:.3g}",
+                     f"{rung.holdout * factor:.3g}" if math.isfinite(rung.holdout) else "–", f"{rung.criterion:.1f}",
+                     ", ".join(said)))
+    return [table(("friction", "parameters", f"fitted ({unit})", f"held out ({unit})", "information criterion", ""),
+                  rows), f"{ladder.chosen}: {ladder.reason}", ""]
+
+
+def ladder_facts(ladder: Ladder) -> dict[str, Any]:
+    """Return a friction ladder as plain data."""
+    return {"chosen": ladder.chosen, "reason": ladder.reason, "rungs": [
+        {"name": rung.name, "training": rung.training, "holdout": rung.holdout, "criterion": rung.criterion,
+         "overfits": rung.overfits, "estimates": dict(rung.fit.estimates)} for rung in ladder.rungs]}
+
+
+def advice_table(advice: Advice) -> list[RenderableType]:
+    """Return the next experiments, the best first, with the predicted half width of the worst-known parameters."""
+    worst = sorted(advice.now, key=lambda name: -advice.now[name])[:3]
+    rows: list[tuple[str, ...]] = [("as it is now", *(_width(advice.now[name]) for name in worst),
+                                    _width(max(advice.now.values())))]
+    rows += [(str(experiment), *(_width(experiment.widths[name]) for name in worst), _width(experiment.widest))
+             for experiment in advice.experiments[:_MOST_EXPERIMENTS]]
+    return ["next experiments, and how surely what is known worst would be known with them (half a 95 % interval)",
+            table(("experiment", *worst, "widest"), rows, wraps="experiment"), str(advice)]
+
+
+def advice_facts(advice: Advice) -> dict[str, Any]:
+    """Return advice as plain data; widths are relative."""
+    return {"now": dict(advice.now), "widest": advice.widest, "experiments": [
+        {"motion": one.motion, "load": one.load, "voltage": one.voltage, "sensors": list(one.sensors),
+         "widths": dict(one.widths), "widest": one.widest} for one in advice.experiments]}
+
+
+def _width(share: float) -> str:
+    if share > 10.0:
+        return "unknown"
+    return f"±{100.0 * share:.2g} %" if share < 1.0 else f"±{100.0 * share:.0f} %"

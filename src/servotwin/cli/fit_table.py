@@ -1,0 +1,113 @@
+"""`servotwin fit --table`: the calibration that a bench table gives, in words, as JSON, and as a servo file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from servotwin.cli.terminal import emit_json, pairs, show, table
+
+if TYPE_CHECKING:
+    from servotwin.bench import TableCalibration
+    from servotwin.parameters import Quantity
+
+
+def show_table_calibration(path: Path, servo: str | None, out: Path | None, *, force: bool = False,
+                           as_json: bool = False) -> None:
+    """Calibrate from a bench table, show what was found, and write the servo.
+
+    Parameters
+    ----------
+    path : Path
+        The table, a CSV file.
+    servo : str or None
+        Id in the catalog or path of a servo file, which takes the values.
+    out : Path or None
+        Where the servo is written, a .toml.
+    force : bool
+        Replace it where it exists.
+    as_json : bool
+        Print JSON, values in SI.
+
+    Raises
+    ------
+    InputError
+        If table, servo or output is not usable.
+    """
+    from servotwin.bench import calibrate_table
+    from servotwin.cli.outputs import Target, check_targets
+    from servotwin.parameters import load_servo
+
+    if out is not None:
+        check_targets([Target(option="--out", path=out, endings=(".toml",))], force=force,
+                      inputs=[path, *([] if servo is None else [Path(servo)])])
+    loaded = None if servo is None else load_servo(servo)
+    found = calibrate_table(path, loaded)
+    if out is not None:
+        found.servo.save(out, overwrite=force)
+    if as_json:
+        emit_json(calibration_facts(found, out))
+        return
+    written = [] if out is None else ["", pairs([("written", str(out))])]
+    show(f"{found.source}: {found.table.rows} rows, " + ", ".join(c.name for c in found.table.columns), "",
+         _lines(found), "", *_parameters(found), *[f"- {text}" for text in found.findings()], *written)
+
+
+def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[str, Any]:
+    """Return a calibration as plain data for JSON: lines in the table's units, parameters in SI.
+
+    Examples
+    --------
+    >>> from servotwin.bench import calibrate_table
+    >>> facts = calibration_facts(calibrate_table({"q_deg": [0, 45, 90, 135], "V_o_V": [0.590, 0.912, 1.253, 1.572]}))
+    >>> list(facts["parameters"])
+    ['potentiometer.feedback_gain', 'potentiometer.feedback_offset']
+    """
+    return {
+        "source": found.source, "servo": found.servo.name, "rows": found.table.rows,
+        "columns": [column.name for column in found.table.columns], "ignored_columns": list(found.table.ignored),
+        "lines": {name: {
+            "abscissa": fit.abscissa, "ordinate": fit.ordinate, "slope": fit.line.slope,
+            "slope_error": fit.line.slope_error, "slope_unit": fit.slope_unit, "intercept": fit.line.intercept,
+            "intercept_error": fit.line.intercept_error, "covariance": fit.line.covariance, "unit": fit.unit,
+            "residuals": list(fit.line.residuals), "largest_residual": fit.line.max_residual,
+            "curvature_F": fit.curvature.f_value, "curvature_p": fit.curvature.p_value,
+            "sagitta": fit.curvature.sagitta, "curved": name in found.curved} for name, fit in found.lines.items()},
+        "parameters": {name: {"value": one.value, "std": one.std, "unit": one.unit, "source": one.source}
+                       for name, one in found.parameters.items()},
+        "instruments": [{
+            "first": pair.first, "second": pair.second, "gain": pair.line.slope, "gain_error": pair.gain_error,
+            "zero": pair.line.intercept, "zero_error": pair.zero_error, "same": pair.same,
+            "expected_gain": pair.expected_gain, "expected_from": pair.expected_from, "gain_p": pair.gain_p,
+            "zero_p": pair.zero_p, "disagrees_in": list(pair.disagrees_in), "words": pair.words}
+            for pair in found.instruments],
+        "rows_off": [{"row": one.row + 1, "line": one.line, "residual": one.residual, "t": one.t_value,
+                      "p": one.p_value, "certain": one.certain, "column": one.column, "better": one.better,
+                      "words": one.words} for one in found.rows],
+        "findings": list(found.findings()), "files": [] if out is None else [str(out)],
+    }
+
+
+def _lines(found: TableCalibration) -> Any:
+    from servotwin.bench.table_words import plus_minus
+
+    rows = []
+    for name, fit in found.lines.items():
+        line = fit.line
+        rows.append((name, f"{plus_minus(line.slope, line.slope_error)} {fit.slope_unit}",
+                     f"{plus_minus(line.intercept, line.intercept_error)} {fit.unit}",
+                     f"{line.max_residual:.3g} {fit.unit}",
+                     f"p = {fit.curvature.p_value:.2g}" + (", curved" if name in found.curved else "")))
+    return table(("line", "slope", "at 0", "largest residual", "parabola"), rows)
+
+
+def _parameters(found: TableCalibration) -> list[Any]:
+    if not found.parameters:
+        return []
+    rows = [(name, *_values(one), one.unit, (one.source or "").rpartition("least squares: ")[2])
+            for name, one in found.parameters.items()]
+    return [table(("parameter", "value", "standard error", "unit", "from"), rows, wraps="from"), ""]
+
+
+def _values(one: Quantity) -> tuple[str, str]:
+    return f"{one.value:.6g}", "" if one.std is None else f"{one.std:.2g}"

@@ -1,0 +1,312 @@
+"""The words of `servotwin fit` and `servotwin validate`: names, bounds, priors, what is held out and left out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from servotwin import units
+from servotwin.errors import InputError, ServotwinError, UnknownNameError
+from servotwin.identification.free import Space, nominal
+from servotwin.identification.shown import dimension_of_free
+from servotwin.simulation.sweep.distributions import Normal, Uniform
+from servotwin.simulation.sweep.words import distribution_of
+
+if TYPE_CHECKING:
+    from servotwin.identification import Log
+    from servotwin.models import Model
+    from servotwin.parameters import Servo
+
+MODEL_NAMES = ("pulse", "pulse-inductive", "bounded")
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+
+
+def names(words: Sequence[str] | None) -> tuple[str, ...] | None:
+    """Return names of an option that is repeated or has commas; None where it was not given.
+
+    Examples
+    --------
+    >>> names(["a,b", "c"]), names([])
+    (('a', 'b', 'c'), None)
+    """
+    if not words:
+        return None
+    return tuple(part.strip() for word in words for part in word.split(",") if part.strip())
+
+
+def some_or_none(option: str, words: Sequence[str] | None, usual: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names, no name at all for the word "none", and the usual ones where the option was not given.
+
+    Examples
+    --------
+    >>> some_or_none("--nuisance", ["none"], ("delay",)), some_or_none("--nuisance", None, ("delay",))
+    ((), ('delay',))
+    """
+    found = names(words)
+    if found is None:
+        return usual
+    if "none" in found and len(found) > 1:
+        raise InputError(option, got=", ".join(found), allowed="names, or none alone")
+    return () if "none" in found else found
+
+
+def model_of(name: str) -> type[Model]:
+    """Return the class of a model that can be fitted.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of this name.
+    """
+    from servotwin.models import MODELS
+
+    if name not in MODEL_NAMES:
+        raise UnknownNameError("model of a fit", name, MODEL_NAMES)
+    return MODELS[name]
+
+
+def share(option: str, text: str) -> float:
+    """Return a number from 0 to 1, or a percentage.
+
+    Examples
+    --------
+    >>> share("--level", "95%"), share("--level", "0.9")
+    (0.95, 0.9)
+    """
+    try:
+        return float(text.removesuffix("%")) / 100.0 if text.endswith("%") else float(text)
+    except ValueError:
+        raise InputError(option, got=text, allowed="a share such as 0.25 or 25%") from None
+
+
+def held_out(text: str | None) -> float | tuple[str, ...] | None:
+    """Return what is held out: a share, or names of logs.
+
+    Examples
+    --------
+    >>> held_out("25%"), held_out("step-1, step-2"), held_out(None)
+    (0.25, ('step-1', 'step-2'), None)
+    """
+    if text is None:
+        return None
+    return share("--holdout", text.strip()) if _NUMBER.fullmatch(text.removesuffix("%")) and _is_number(text) \
+        else tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.strip().removesuffix("%"))
+    except ValueError:
+        return False
+    return True
+
+
+def bounds_of(words: Sequence[str], free: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return bounds (SI) by name, from words such as ``motor.armature_resistance=2ohm..5ohm``.
+
+    Raises
+    ------
+    InputError
+        If a word is none, a name is not searched, or the ends are not in order.
+
+    Examples
+    --------
+    >>> bounds_of(["electronics.deadband=2..8us"], ["electronics.deadband"])
+    {'electronics.deadband': (2e-06, 8e-06)}
+    """
+    found = {}
+    for name, text in _assigned("--bounds", words, free).items():
+        form = "LOWEST..HIGHEST, with units such as 2ohm..5ohm, or in SI"
+        if ".." not in text:
+            raise InputError(f"--bounds {name}", got=text, allowed=form)
+        try:
+            made = distribution_of(f"uniform:{text}", dimension_of_free(name))
+        except ServotwinError as error:
+            raise InputError(f"--bounds {name}", got=text, allowed=_allowed(error, form)) from None
+        if not isinstance(made, Uniform):
+            raise InputError(f"--bounds {name}", got=text, allowed=form)
+        found[name] = (made.lower, made.upper)
+    return found
+
+
+def priors_of(words: Sequence[str], free: Sequence[str], model: Model, *, of_servo: bool,
+              ) -> dict[str, tuple[float, float]] | None:
+    """Return means and standard deviations (SI) by name: what the servo's file states, then what the words say.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Such as ``motor.armature_resistance=3ohm±0.3ohm``, or ``=10%`` about the servo's own value.
+    free : sequence of str
+    model : Model
+    of_servo : bool
+        Whether the spreads of the servo's file count.
+
+    Raises
+    ------
+    InputError
+        If a word is none, or a name is not searched.
+    """
+    stated = {p.name: p.prior for p in Space(model, free, priors="servo").parameters} if of_servo else {}
+    found = {name: prior for name, prior in stated.items() if prior is not None}
+    for name, text in _assigned("--prior", words, free).items():
+        found[name] = _prior(name, text, model.servo)
+    return found or None
+
+
+def _prior(name: str, text: str, servo: Servo) -> tuple[float, float]:
+    form = "VALUE±STANDARD_DEVIATION, with units such as 3ohm±0.3ohm or 3ohm±10%, or ±10% about the servo's value"
+    try:
+        made = distribution_of(f"normal:{text}", dimension_of_free(name))
+    except ServotwinError as error:
+        raise InputError(f"--prior {name}", got=text, allowed=_allowed(error, form)) from None
+    if made.needs_nominal:
+        value = nominal(servo, name)
+        if value is None:
+            raise InputError(f"--prior {name}", got=text, allowed="a value too: the servo has none")
+        made = made.about(value)
+    if not isinstance(made, Normal) or not made.std > 0.0:
+        raise InputError(f"--prior {name}", got=text, allowed=form)
+    return made.mean, made.std
+
+
+def _assigned(option: str, words: Sequence[str], free: Sequence[str]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for word in words:
+        name, equals, text = (word.partition("=")[k].strip() for k in range(3))
+        if not (name and equals and text):
+            raise InputError(option, got=word, allowed="NAME=..., such as motor.armature_resistance=2ohm..5ohm"
+                             if option == "--bounds" else "NAME=..., such as motor.armature_resistance=3ohm±10%")
+        if name in found:
+            raise InputError(f"{option} {name}", got=f"{found[name]} and {text}", allowed="one of both")
+        if name not in free:
+            raise InputError(f"{option} {name}", got="a name that is not searched", allowed=", ".join(free))
+        found[name] = text
+    return found
+
+
+def _allowed(error: ServotwinError, form: str) -> str:
+    """Return the units that are allowed where one was wrong, else the form."""
+    known = getattr(error, "allowed", None)
+    return f"one of the units {known}" if type(error).__name__ == "UnitError" and known else form
+
+
+def check_free(free: Sequence[str], model: Model) -> None:
+    """Raise if a searched name is unknown, so that nothing else is said about it first.
+
+    Raises
+    ------
+    InputError
+    """
+    Space(model, tuple(free), priors=None)
+
+
+def left_out(words: Sequence[str]) -> list[tuple[str | None, float, float]]:
+    """Return windows of time [s], each of one log or, where it names none, of all.
+
+    Raises
+    ------
+    InputError
+        If a word is no window.
+
+    Examples
+    --------
+    >>> left_out(["3..4.5", "run-2=100ms..200ms"])
+    [(None, 3.0, 4.5), ('run-2', 0.1, 0.2)]
+    """
+    found = []
+    for word in words:
+        name, equals, text = word.rpartition("=")
+        ends = text.split("..")
+        if len(ends) != 2 or (equals and not name):
+            raise InputError("--leave-out", got=word, allowed="START..STOP or LOG=START..STOP, such as 3s..4.5s")
+        start, stop = (quantity("--leave-out", end, "time", bare="s") for end in ends)
+        if not start < stop:
+            raise InputError("--leave-out", got=word, allowed="START..STOP, the earlier one first")
+        found.append((name.strip() or None, start, stop))
+    return found
+
+
+def without(logs: Sequence[Log], windows: Sequence[tuple[str | None, float, float]]) -> list[Log]:
+    """Return logs with windows left out.
+
+    Raises
+    ------
+    InputError
+        If a window names a log that there is not, or nothing is left of one.
+    """
+    known = [log.name for log in logs]
+    for name, *_ in windows:
+        if name is not None and name not in known:
+            raise UnknownNameError("log of --leave-out", name, known)
+    return [replace(log, left_out=(*log.left_out, *((start, stop) for name, start, stop in windows
+                                                    if name in (None, log.name)))) if windows else log
+            for log in logs]
+
+
+def quantity(option: str, text: str, dimension: str, *, bare: str | None = None) -> float:
+    """Return a number with its unit, in SI.
+
+    Parameters
+    ----------
+    option, text : str
+    dimension : str
+        Of `servotwin.units`.
+    bare : str, optional
+        Unit of a number without one; else a unit is required.
+
+    Raises
+    ------
+    InputError
+        If it is no number, or its unit does not fit.
+
+    Examples
+    --------
+    >>> quantity("--max-error", "180 deg", "angle"), quantity("--leave-out", "3", "time", bare="s")
+    (3.141592653589793, 3.0)
+    """
+    match = _NUMBER.fullmatch(text)
+    unit = (match[2] or bare) if match else None
+    if match is None or unit is None:
+        raise InputError(option, got=text, allowed="a number with a unit: " + ", ".join(units.DIMENSIONS[dimension]))
+    try:
+        return units.to_si(float(match[1]), unit, dimension)
+    except ServotwinError:
+        raise InputError(option, got=text, allowed="a number with a unit: "
+                         + ", ".join(units.DIMENSIONS[dimension])) from None
+
+
+def limits_of(words: Sequence[str], angle: bool) -> Mapping[str | None, float]:
+    """Return the largest error that is allowed (SI), by kind of motion; None stands for every kind.
+
+    Examples
+    --------
+    >>> limits_of(["3 deg", "prbs=0.1 rad"], True)["prbs"]
+    0.1
+    """
+    found: dict[str | None, float] = {}
+    for word in words:
+        name, _, text = word.rpartition("=")
+        value = quantity("--max-error", text, "angle" if angle else "voltage")
+        if not value > 0.0:
+            raise InputError("--max-error", got=word, allowed="a positive number with a unit, such as 3deg")
+        found[name.strip() or None] = value
+    return found
+
+
+def read_all(paths: Sequence[Path], file_format: str) -> list[Log]:
+    """Return the logs of several files and folders.
+
+    Raises
+    ------
+    InputError
+        If one cannot be read.
+    """
+    from servotwin.identification import read_logs
+
+    return [log for path in paths for log in read_logs(path, file_format)]
+
+

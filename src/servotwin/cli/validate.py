@@ -1,0 +1,176 @@
+"""`servotwin validate`: how far a servo is off logs."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from servotwin.cli import shared_options as shared
+from servotwin.cli.terminal import emit_json, patience, show, table
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from servotwin.cli.outputs import Target
+    from servotwin.identification.validate import Validation
+    from servotwin.models import Model
+
+_EXCEEDED = 1  # exit code
+_MOST_LOGS = 30
+
+
+def validate(
+    servo: shared.ServoArgument,
+    logs: Annotated[list[Path], typer.Argument(
+        metavar="LOGS", help="Files or folders of logs: CSV with or without a sidecar, JSON of BAM or Miuzei.")],
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: that of the servo file's fit, else pulse).")]
+    = None,
+    file_format: Annotated[str, typer.Option(
+        "--format", metavar="FORMAT", help="Of the logs: auto, csv, bam or miuzei.")] = "auto",
+    change: Annotated[list[str] | None, typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable, SI.")] = None,
+    nuisance: Annotated[list[str] | None, typer.Option(
+        metavar="NAME", help="What belongs to the rig and is fitted to these logs: delay, log_delay, angle_offset, "
+        "initial_state; repeatable or with commas (default: none; delay and angle offset are those that the servo "
+        "file's fit recorded).")] = None,
+    sensors: Annotated[list[str] | None, typer.Option(
+        metavar="NAME", help="Measured signals that are compared; repeatable or with commas.")] = None,
+    leave_out: Annotated[list[str] | None, typer.Option(
+        "--leave-out", metavar="START..STOP", help="A window of time that does not count, in all logs, or in one: "
+        "LOG=START..STOP; repeatable.")] = None,
+    max_error: Annotated[list[str] | None, typer.Option(
+        "--max-error", metavar="ERROR", help="Exit with 1 where the rms error of a kind of motion is larger, such as "
+        "3deg, or prbs=8deg for one kind; repeatable.")] = None,
+    report: Annotated[Path | None, typer.Option(
+        metavar="FILE.html", help="Write a page with pictures.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI.")] = False,
+) -> None:
+    """Run a servo against logs, and say how far it is off."""
+    targets = _targets(report, [Path(servo), *logs], force=force)
+    found = _run(servo, model, change or [], logs, file_format, leave_out or [], nuisance, sensors)
+    limits = _limits(found, max_error or [])
+    files = _write(found, targets, force=force)
+    above = exceeded(found, limits)
+    _report(found, above, limits, files, as_json=as_json)
+    if above:
+        raise typer.Exit(_EXCEEDED)
+
+
+def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Target]:
+    from servotwin.cli.outputs import Target, check_targets
+
+    targets = [] if report is None else [Target(option="--report", path=report, endings=(".html", ".htm"))]
+    check_targets(targets, force=force, inputs=inputs)
+    return targets
+
+
+def _run(servo: str, model: str | None, change: list[str], logs: list[Path], file_format: str, leave_out: list[str],
+         nuisance: list[str] | None, sensors: list[str] | None) -> Validation:
+    from servotwin.cli import fit_words
+    from servotwin.cli.settings import settings
+    from servotwin.identification.validate import validate as run
+    from servotwin.parameters import load_servo
+
+    kind: type[Model] | None = None if model is None else fit_words.model_of(model)
+    loaded = load_servo(servo)
+    changed = loaded.replace(settings(change)) if change else loaded
+    fitted = fit_words.some_or_none("--nuisance", nuisance, ())
+    windows = fit_words.left_out(leave_out)
+    with patience("reading"):
+        given = fit_words.without(fit_words.read_all(logs, file_format), windows)
+    return run(given, changed, kind, nuisance=fitted, sensors=fit_words.names(sensors),
+               progress=sys.stderr is not None and sys.stderr.isatty())
+
+
+def _limits(found: Validation, words: list[str]) -> Mapping[str | None, float]:
+    from servotwin.cli import fit_words
+    from servotwin.errors import InputError, UnknownNameError
+
+    signals = {trace.signal for trace in found.traces}
+    if words and len(signals) > 1:
+        raise InputError("--max-error", got="logs with angles and logs with feedback voltages", allowed="one kind")
+    limits = fit_words.limits_of(words, angle="output_angle" in signals)
+    motions = list(found.errors.by("motion"))
+    for motion in limits:
+        if motion is not None and motion not in motions:
+            raise UnknownNameError("motion of --max-error", motion, motions)
+    return limits
+
+
+def exceeded(found: Validation, limits: Mapping[str | None, float]) -> dict[str, float]:
+    """Return the rms errors (SI), by kind of motion, that are above their limit."""
+    own = found.errors.models[0]
+    above = {}
+    for motion, errors in found.errors.by("motion").items():
+        limit = limits.get(motion, limits.get(None, math.inf))
+        if not errors[own] <= limit:  # what is no number is above it too
+            above[motion] = errors[own]
+    return above
+
+
+def _write(found: Validation, targets: list[Target], *, force: bool) -> list[str]:
+    from servotwin.cli.outputs import staged
+
+    if targets:
+        with patience("writing"), staged(targets, force=force) as drafts:
+            found.report(drafts[0])
+    return [str(target.path) for target in targets]
+
+
+def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str | None, float], files: list[str], *,
+            as_json: bool) -> None:
+    from servotwin.cli import fit_show
+
+    if as_json:
+        emit_json({
+            "servo": found.servo.name, "model": type(found.model).__name__, "logs": len(found.traces),
+            "nuisance": dict(found.nuisance), "fitted": list(found.fitted),
+            "errors": fit_show.error_facts(found.errors), "noise": dict(found.noise),
+            "max_error": {motion or "all": limit for motion, limit in limits.items()}, "above": dict(above),
+            "files": files})
+        return
+    show(*_sections(found, above, limits, files))
+
+
+def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str | None, float],
+              files: list[str]) -> list[RenderableType]:
+    from servotwin.cli import fit_show
+    from servotwin.identification.shown import error_shown
+    from servotwin.look import readable
+
+    tables = {"": found.errors}
+    dimension = {"delay": "time", "angle_offset": "angle"}
+    rig = [f"{name.replace('_', ' ')} {readable(value, dimension[name])}"
+           + (" (fitted)" if name in found.fitted else "") for name, value in found.nuisance.items()]
+    parts: list[RenderableType] = [
+        f"{found.servo.title or found.servo.name} ({found.servo.name}), {type(found.model).__name__}, "
+        f"{len(found.traces)} logs" + (f"; {', '.join(rig)}" if rig else "")]
+    for label in found.errors.labels():
+        parts += ["", fit_show.errors(tables, found.traces, label)]
+    parts += ["", _log_table(found)]
+    factor, unit = error_shown(found.traces)
+    for motion, error in above.items():
+        limit = limits.get(motion, limits.get(None, math.inf))
+        parts += ["", f"! {motion}: {error * factor:.3g} {unit} is above {limit * factor:.3g} {unit}"]
+    return [*parts, "", fit_show.written(files)] if files else parts
+
+
+def _log_table(found: Validation) -> Any:
+    from servotwin.identification.shown import sensor_shown
+
+    errors = found.errors.errors[found.errors.models[0]]
+    signals = {trace.log.name: trace.signal for trace in found.traces}
+    rows = []
+    for error in sorted(errors, key=lambda error: -error.rms)[:_MOST_LOGS]:
+        factor, unit = sensor_shown(signals[error.log])
+        rows.append((error.log, error.motion or "other", f"{error.rms * factor:.3g} {unit}",
+                     f"{error.largest * factor:.3g} {unit}"))
+    more = f"log ({_MOST_LOGS} worst of {len(errors)})" if len(errors) > _MOST_LOGS else "log"
+    return table((more, "motion", "rms error", "largest"), rows, wraps=more)
