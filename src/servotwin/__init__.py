@@ -19,10 +19,10 @@ _LAZY = {
                      "simulate_many"), "simulation"),
     **dict.fromkeys(("Study", "distributions", "sweep"), "simulation.sweep"),
     **dict.fromkeys(("Fit", "Log", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "read_logs",
-                     "servo_from_sheet"), "identification"),
+                     "servo_from_sheet", "validate"), "identification"),
 }
-_MODULES = ("bench", "errors", "identification", "linear", "loads", "models", "parameters", "physics", "plotting", "signals",
-            "simulation", "units")
+_MODULES = ("bench", "errors", "identification", "linear", "loads", "models", "parameters", "physics", "plotting",
+            "signals", "simulation", "units")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 

@@ -106,7 +106,7 @@ def plain(work):
     raw = empty_raw(work)
     given_up = np.zeros(work.lanes, np.int8)
     lanes = lane_runs.lanes_of(work)
-    _, braked = lane_runs.side_by_side(work, lanes)
+    _, braked = lane_runs.side_by_side(work, lanes, lane_runs.has_rare_terms(work, lanes)[0])
     assert braked.all() or not braked.any()
     with np.errstate(all="ignore"):
         blocks.run(lanes, bool(braked.all()), work.duration, work.times, lane_runs.outputs_of(work, raw, given_up),

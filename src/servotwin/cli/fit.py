@@ -57,8 +57,8 @@ def fit(
     no_priors: Annotated[bool, typer.Option(
         "--no-priors", help="The spreads of the servo file do not count.", rich_help_panel=_SEARCH)] = False,
     nuisance: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="What belongs to the rig: delay, log_delay, angle_offset, initial_state, or none "
-        "(default: delay, angle_offset, initial_state).", rich_help_panel=_SEARCH)] = None,
+        metavar="NAME", help="What belongs to the rig: delay, log_delay, angle_offset, angle_sag, initial_state, or "
+        "none (default: delay, angle_offset, initial_state).", rich_help_panel=_SEARCH)] = None,
     starts: Annotated[int, typer.Option(
         metavar="NUMBER", help="Searches, all but the first from random values.", rich_help_panel=_SEARCH)] = 3,
     loss: Annotated[str, typer.Option(
@@ -97,6 +97,7 @@ def fit(
     if not logs:
         _show_advice(_first_advice(search), as_json=as_json)
         return
+    _check_ladder(model, ladder=ladder)
     options = {"holdout": holdout, "nuisance": nuisance, "sensors": sensors, "starts": starts, "loss": loss,
                "level": level, "intervals": intervals, "seed": seed, "compare": compare}
     found = _run(search, _read(logs, file_format, leave_out or []), _options(options), ladder=ladder)
@@ -139,6 +140,14 @@ def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None,
     if servo is None:
         raise InputError("--servo is needed: an id of servotwin catalog list, or a servo file; servotwin catalog "
                          "from-sheet makes one from a data sheet")
+
+
+def _check_ladder(model: str, *, ladder: bool) -> None:
+    from servotwin.errors import InputError
+
+    if ladder and model == "bounded":
+        raise InputError("--ladder", got="--model bounded",
+                         allowed="pulse or pulse-inductive, which know friction that grows with the load")
 
 
 def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force: bool) -> list[Target]:
@@ -211,14 +220,21 @@ def _first_advice(search: _Search) -> Advice:
     from servotwin.identification import advise
 
     with patience("simulating experiments"):
-        return advise(search.model.servo, model=type(search.model), free=search.free, priors=search.priors)
+        return advise(search.model.servo, model=type(search.model), free=search.free, priors=search.priors,
+                      sensors=_further(search.model))
 
 
 def _advice(fit: Fit) -> Advice:
     from servotwin.identification import advise
 
     with patience("simulating experiments"):
-        return advise(fit)
+        return advise(fit, sensors=[name for name in _further(fit.model) if name not in fit.noise])
+
+
+def _further(model: Model) -> list[str]:
+    """Return the sensor that is easiest to add, of those that the model knows."""
+    known: tuple[str, ...] = ("supply_current", "armature_current")
+    return [name for name in known if name in model.available][:1]
 
 
 def _write(fit: Fit, targets: list[Target], *, force: bool) -> list[str]:

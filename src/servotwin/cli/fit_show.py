@@ -36,7 +36,8 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
         parts.append("INTERRUPTED: the best so far, without intervals")
     parts += ["", _estimates(fit), ""]
     parts += [f"- {item}" for item in fit.unidentifiable]
-    parts += [f"- {name} ended at a bound of the search" for name in fit.at_bound]
+    parts += ["- no delay is seen: it ended at 0" if name == "delay" and fit.estimates[name] == 0.0
+              else f"- {name} ended at a bound of the search" for name in fit.at_bound]
     parts += [""] if fit.unidentifiable or fit.at_bound else []
     parts.append(errors(tables_of(fit), fit.traces, "motion"))
     if fit.warnings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,7 +13,7 @@ from servotwin import units
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.free import Space, nominal
 from servotwin.identification.shown import dimension_of_free
-from servotwin.simulation.sweep.distributions import Normal, Uniform
+from servotwin.simulation.sweep.distributions import Distribution, Normal, Offset, Relative, Uniform
 from servotwin.simulation.sweep.words import distribution_of
 
 if TYPE_CHECKING:
@@ -69,17 +70,23 @@ def model_of(name: str) -> type[Model]:
 
 
 def share(option: str, text: str) -> float:
-    """Return a number from 0 to 1, or a percentage.
+    """Return a number between 0 and 1, or a percentage.
+
+    Raises
+    ------
+    InputError
+        If it is none.
 
     Examples
     --------
     >>> share("--level", "95%"), share("--level", "0.9")
     (0.95, 0.9)
     """
-    try:
-        return float(text.removesuffix("%")) / 100.0 if text.endswith("%") else float(text)
-    except ValueError:
-        raise InputError(option, got=text, allowed="a share such as 0.25 or 25%") from None
+    found = float(text.strip().removesuffix("%")) / (100.0 if text.strip().endswith("%") else 1.0) \
+        if _is_number(text) else math.nan
+    if not 0.0 <= found < 1.0:
+        raise InputError(option, got=text, allowed="a share from 0 to below 1, such as 0.25 or 25%")
+    return found
 
 
 def held_out(text: str | None) -> float | tuple[str, ...] | None:
@@ -92,8 +99,7 @@ def held_out(text: str | None) -> float | tuple[str, ...] | None:
     """
     if text is None:
         return None
-    return share("--holdout", text.strip()) if _NUMBER.fullmatch(text.removesuffix("%")) and _is_number(text) \
-        else tuple(part.strip() for part in text.split(",") if part.strip())
+    return share("--holdout", text) if _is_number(text) else names([text]) or ()
 
 
 def _is_number(text: str) -> bool:
@@ -163,14 +169,22 @@ def _prior(name: str, text: str, servo: Servo) -> tuple[float, float]:
         made = distribution_of(f"normal:{text}", dimension_of_free(name))
     except ServotwinError as error:
         raise InputError(f"--prior {name}", got=text, allowed=_allowed(error, form)) from None
-    if made.needs_nominal:
-        value = nominal(servo, name)
-        if value is None:
-            raise InputError(f"--prior {name}", got=text, allowed="a value too: the servo has none")
-        made = made.about(value)
-    if not isinstance(made, Normal) or not made.std > 0.0:
+    value = nominal(servo, name)
+    if isinstance(made, Relative | Offset) and value is None:
+        raise InputError(f"--prior {name}", got=text, allowed="a value too: the servo has none")
+    mean, std = _moments(made, value or 0.0)
+    if not std > 0.0:
         raise InputError(f"--prior {name}", got=text, allowed=form)
-    return made.mean, made.std
+    return mean, std
+
+
+def _moments(law: Distribution, value: float) -> tuple[float, float]:
+    """Return mean and standard deviation of a normal law, which may be one about a value."""
+    if isinstance(law, Relative) and isinstance(law.factor, Normal):
+        return value * law.factor.mean, abs(value) * law.factor.std
+    if isinstance(law, Offset) and isinstance(law.added, Normal):
+        return value + law.added.mean, law.added.std
+    return (law.mean, law.std) if isinstance(law, Normal) else (math.nan, math.nan)
 
 
 def _assigned(option: str, words: Sequence[str], free: Sequence[str]) -> dict[str, str]:

@@ -37,8 +37,8 @@ def validate(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable, SI.")] = None,
     nuisance: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="What belongs to the rig and is fitted to these logs: delay, log_delay, angle_offset, "
-        "initial_state; repeatable or with commas (default: none; delay and angle offset are those that the servo "
-        "file's fit recorded).")] = None,
+        "angle_sag, initial_state; repeatable or with commas (default: none; the others are as the servo file's fit "
+        "recorded them).")] = None,
     sensors: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Measured signals that are compared; repeatable or with commas.")] = None,
     leave_out: Annotated[list[str] | None, typer.Option(
@@ -142,13 +142,11 @@ def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str |
 def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str | None, float],
               files: list[str]) -> list[RenderableType]:
     from servotwin.cli import fit_show
-    from servotwin.identification.shown import error_shown
-    from servotwin.look import readable
+    from servotwin.identification.shown import error_shown, rig_text
 
     tables = {"": found.errors}
-    dimension = {"delay": "time", "angle_offset": "angle"}
-    rig = [f"{name.replace('_', ' ')} {readable(value, dimension[name])}"
-           + (" (fitted)" if name in found.fitted else "") for name, value in found.nuisance.items()]
+    rig = [rig_text(name, value) + (" (fitted)" if name in found.fitted else "")
+           for name, value in found.nuisance.items()]
     parts: list[RenderableType] = [
         f"{found.servo.title or found.servo.name} ({found.servo.name}), {type(found.model).__name__}, "
         f"{len(found.traces)} logs" + (f"; {', '.join(rig)}" if rig else "")]
@@ -156,20 +154,21 @@ def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str
         parts += ["", fit_show.errors(tables, found.traces, label)]
     parts += ["", _log_table(found)]
     factor, unit = error_shown(found.traces)
+    parts += [""] if above else []
     for motion, error in above.items():
         limit = limits.get(motion, limits.get(None, math.inf))
-        parts += ["", f"! {motion}: {error * factor:.3g} {unit} is above {limit * factor:.3g} {unit}"]
+        parts += [f"! {motion}: {error * factor:.3g} {unit} is above {limit * factor:.3g} {unit}"]
     return [*parts, "", fit_show.written(files)] if files else parts
 
 
 def _log_table(found: Validation) -> Any:
-    from servotwin.identification.shown import sensor_shown
+    from servotwin.identification.shown import error_unit
 
     errors = found.errors.errors[found.errors.models[0]]
     signals = {trace.log.name: trace.signal for trace in found.traces}
     rows = []
     for error in sorted(errors, key=lambda error: -error.rms)[:_MOST_LOGS]:
-        factor, unit = sensor_shown(signals[error.log])
+        factor, unit = error_unit(signals[error.log])
         rows.append((error.log, error.motion or "other", f"{error.rms * factor:.3g} {unit}",
                      f"{error.largest * factor:.3g} {unit}"))
     more = f"log ({_MOST_LOGS} worst of {len(errors)})" if len(errors) > _MOST_LOGS else "log"

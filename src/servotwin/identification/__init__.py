@@ -22,6 +22,7 @@ from servotwin.identification.sheet_motor import MotorRange, Range, motor_range
 from servotwin.identification.sheet_servo import servo_from_sheet
 from servotwin.identification.sheet_words import Contradiction, sheet_contradictions, sheet_flags
 from servotwin.identification.uncertainty import Uncertainty
+from servotwin.identification.validate import Validation, validate
 from servotwin.identification.words import Unidentifiable
 
 __all__ = [
@@ -52,6 +53,7 @@ __all__ = [
     "Trace",
     "Uncertainty",
     "Unidentifiable",
+    "Validation",
     "advise",
     "friction_ladder",
     "identify",
@@ -68,6 +70,7 @@ __all__ = [
     "sheet_flags",
     "sheet_of",
     "sheet_table",
+    "validate",
     "write_bam_log",
     "write_bam_parameters",
     "write_log",

@@ -20,7 +20,7 @@ from servotwin.identification.point import Part, Point
 Array = NDArray[np.float64]
 
 _LEAST_STEP = 1e-7  # of a searched number
-_LEAST_GAIN = 1e-9  # of the cost
+_LEAST_GAIN = 1e-3  # of the cost, half a sum of squares in units of noise: a twentieth of a standard error
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class Search:
         best = Outcome(point, self.cost_of(point, parts), False, 0)
         if not math.isfinite(best.cost):
             return best
-        damping, small = 1e-3, 0
+        damping = 1e-3
         scale = np.zeros(self.forecast.size)
         for k in range(1, most + 1):
             normal = self.normal(best.point, parts)
@@ -192,12 +192,10 @@ class Search:
                 if damping > 1e9:
                     return Outcome(best.point, best.cost, True, k)
             damping = max(damping / 8.0, 1e-9)
-            gain = best.cost - cost
-            small = small + 1 if gain < least_gain * max(cost, 1.0) else 0
-            best = Outcome(trial, cost, small > 1, k)
+            best = Outcome(trial, cost, best.cost - cost < least_gain, k)
             if tell is not None:
                 tell(k, best)
-            if small > 1:
+            if best.converged:
                 return best
             parts = self.forecast.at(trial, cases=self.cases)
         return best

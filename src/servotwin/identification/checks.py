@@ -155,8 +155,8 @@ def warnings_of(prior: Prior, point: Point, doubt: Uncertainty | None, space: Sp
             if weight == 0.0 or p.prior is None:
                 continue
             # The sheet's belief is in the estimate; what the logs alone would say lies further off
-            left = 1.0 / weight**2 - doubt.std[k] ** 2
-            off = (point.shared[k] - prior.mean[k]) / math.sqrt(max(left, 1e-6 / weight**2))
+            left = 1.0 / weight**2 - min(doubt.std[k] ** 2, 0.96 / weight**2)
+            off = (point.shared[k] - prior.mean[k]) / math.sqrt(left)
             if abs(off) > _CONTRADICTS:
                 value = float(p.value(point.shared[k]))
                 found.append(f"the logs contradict the servo file: {p.name} is {value:.4g} {p.unit}, it says "
@@ -166,8 +166,9 @@ def warnings_of(prior: Prior, point: Point, doubt: Uncertainty | None, space: Sp
         new, old = tables.holdout.by(), tables.training.by()
         for motion in new:
             if motion in old and new[motion][model] > _OVERFITTED * old[motion][model]:
-                found.append(f"{motion}: logs that were held out are off by {new[motion][model]:.3g}, fitted ones by "
-                             f"{old[motion][model]:.3g}: the fit follows what does not repeat")
+                ratio = new[motion][model] / old[motion][model]
+                found.append(f"{motion}: logs that were held out are off {ratio:.2g} times as far as fitted ones: the "
+                             "fit follows what does not repeat")
     return tuple(found)
 
 

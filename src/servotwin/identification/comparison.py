@@ -55,7 +55,9 @@ def compare(logs: Sequence[Log], fitted: Sequence[int], held_out: Sequence[int],
     own = type(model).__name__
     errors: dict[str, dict[int, LogError]] = {own: {k: log_error(t.log, t.residual) for k, t in enumerate(traces)}}
     if "slew" in beside:
-        errors[SLEW] = _of_slew(logs, fitted, traces, loss)
+        slew = _of_slew(logs, fitted, traces, loss)
+        if slew:
+            errors[SLEW] = slew
     if "M1" in beside:
         simple = _of_m1(logs, fitted, traces, model, space, nuisance, loss, seed, noise)
         if simple:
@@ -66,10 +68,15 @@ def compare(logs: Sequence[Log], fitted: Sequence[int], held_out: Sequence[int],
 
 
 def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace], loss: float) -> dict[int, LogError]:
-    simple = fit_slew_lag([logs[k] for k in fitted], loss="linear" if math.isinf(loss) else "huber")
+    try:
+        simple = fit_slew_lag([logs[k] for k in fitted], loss="linear" if math.isinf(loss) else "huber")
+    except InputError:  # logs of several kinds of command or signal, or too few samples: there is no such model
+        return {}
     found = {}
     for k, trace in enumerate(traces):
         log = logs[k]
+        if simple.signal != trace.signal or simple.command_kind != log.command_kind:
+            return {}
         predicted = np.asarray(simple.predict(log))
         at = np.searchsorted(log.time, trace.time)
         difference = predicted[at] - trace.measured

@@ -33,7 +33,7 @@ class Interval(NamedTuple):
     lower, upper : float
         nan where the logs do not determine the value.
     method : str
-        "normal", "profile", "at bound" or "undetermined".
+        "normal", "profile", "at bound", "undetermined", or "not sought".
     """
 
     lower: float
@@ -158,8 +158,10 @@ class Fit:
         nowhere = float("nan")
         if name in self.undetermined:
             return Interval(nowhere, nowhere, "undetermined")
+        if name in self.at_bound:
+            return Interval(nowhere, nowhere, "at bound")
         if self.doubt is None or k not in self.ends:
-            return Interval(nowhere, nowhere, "at bound" if name in self.at_bound else "undetermined")
+            return Interval(nowhere, nowhere, "not sought")
         ends, std = self.ends[k], float(self.doubt.std[k])
         factor = self.doubt.quantile(level) / self.doubt.quantile(self.level)
         values = [self._value(k, self.best[k] + factor * end * std) for end in (ends.lower, ends.upper)]

@@ -186,7 +186,7 @@ class Forecast:
         later = LATER if job[0].needs_rate else 0.0
         times = case.times - delay
         asked = np.maximum(times if not later else np.concatenate([times, times + later]), 0.0)
-        order = np.argsort(asked, kind="stable")
+        order = np.argsort(asked, kind="stable") if later else np.arange(len(asked))
         sags = "angle_sag" in self.extra
         names = dict.fromkeys((*(name for name in self.sensors if name in case.places), "output_speed",
                                *(["bus_voltage"] if sags else [])))
@@ -198,7 +198,7 @@ class Forecast:
             initial=initial or None, seeds=np.zeros(lanes, np.int64), executor=_HERE)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        signals = {name: np.asarray(batch[name][:, back], np.float64) for name in names}
+        signals = {name: np.asarray(batch[name][:, back] if later else batch[name], np.float64) for name in names}
         if sags:
             open_circuit = np.asarray(columns.get(_VOLTAGE, self.model.value(_VOLTAGE)))
             signals["sag"] = signals.pop("bus_voltage") - open_circuit.reshape(-1, 1)

@@ -183,7 +183,7 @@ def _rung(name: str, fit: Fit) -> Rung:
     training = fit.training.total()[own]
     holdout = fit.holdout.total()[own] if fit.holdout else math.nan
     inflation = fit.doubt.inflation if fit.doubt is not None else 1.0
-    samples = sum(e.samples for e in fit.training.errors[own]) / inflation**2
+    samples = sum(e.samples for e in fit.training.errors[own]) / max(inflation, 1.0)**2
     criterion = samples * math.log(max(training, 1e-300) ** 2) + len(fit.names) * math.log(max(samples, 1.0))
     return Rung(name, fit, training, holdout, criterion)
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from servotwin.identification import report_parts, report_pictures, report_tables
 from servotwin.identification.report_parts import STYLE, figure, space
 from servotwin.identification.shown import error_shown, estimate_lines, share_text, tables_of
-from servotwin.look import document, escape, number
 from servotwin.parameters import write_file
+from servotwin.units.look import document, escape, number
 
 if TYPE_CHECKING:
     from servotwin.identification.fit import Fit
@@ -122,8 +122,11 @@ def _unknown(fit: Fit) -> str:
         items = "".join(f"<li>{escape(str(item))}.</li>" for item in fit.unidentifiable)
         parts.append("<p>These numbers have no interval. The values shown are one possibility of many: use them "
                      f"together only, and under conditions like those of the logs.</p><ul>{items}</ul>")
-    if fit.at_bound:
-        names = ", ".join(f"<code>{escape(name)}</code>" for name in fit.at_bound)
+    stuck = [name for name in fit.at_bound if name in fit.space.names]
+    if "delay" in fit.at_bound and fit.estimates["delay"] == 0.0:
+        parts.append("<p>No delay is seen: it ended at 0.</p>")
+    if stuck:
+        names = ", ".join(f"<code>{escape(name)}</code>" for name in stuck)
         parts.append(f'<div class="note"><p>At a bound of the search: {names}. The logs want more than '
                      "the bound allows; widen it, or ask what the model lacks.</p></div>")
     if fit.doubt is None:

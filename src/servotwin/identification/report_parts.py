@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from servotwin.identification import report_pictures, report_tables, report_traces
-from servotwin.identification.shown import error_shown, sensor_shown
-from servotwin.look import escape, number, picture, to_bytes
+from servotwin.identification.shown import error_shown, error_unit
+from servotwin.units.look import escape, number, picture, to_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +27,8 @@ STYLE = """
 figure img.drawing{width:100%;max-width:42rem}.logs figure img{width:100%}
 .good{border-left-color:#009e73;background:#f0faf6}
 details{margin:.8rem 0}summary{cursor:pointer;color:var(--blue)}
-@media print{.logs{grid-template-columns:repeat(3,1fr)}.logs figure{break-inside:avoid}}
+@media print{.logs{grid-template-columns:repeat(3,1fr)}.logs figure{break-inside:avoid}
+figure img.drawing{max-width:27rem}}
 """
 
 
@@ -75,7 +76,7 @@ def trace_grid(traces: Sequence[Trace]) -> str:
 
 
 def _small(trace: Trace, *, tagged: bool) -> str:
-    factor, unit = sensor_shown(trace.signal)
+    factor, unit = error_unit(trace.signal)
     rms = math.sqrt(float((trace.residual**2).mean())) * factor
     tag = ' <span class="tag">held out</span>' if tagged else ""
     words = f"<b>{escape(trace.log.name)}</b> {number(rms, 3)}{space(unit)} rms"

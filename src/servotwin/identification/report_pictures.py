@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from servotwin.identification.shown import MODELS, error_rows, nominal_of
-from servotwin.look import COLOURS, WIDTH, context, finished, new_figure
+from servotwin.units.look import COLOURS, WIDTH, context, finished, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from servotwin.identification.fit import Fit
     from servotwin.identification.holdout import ErrorTable
 
-_ROW, _BAR = 0.34, 0.2
+_ROW, _BAR = 0.34, 0.15
 _TICKS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 1.0, 1.02, 1.05, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0,
           20.0)
 _FAR = 20.0  # of the sheet's value: what lies further is cut off
@@ -61,9 +61,13 @@ def _row(fit: Fit, name: str) -> _Row | None:
         return None
     interval = fit.intervals()[name]
     ends = None if math.isnan(interval.lower) else (interval.lower / before, interval.upper / before)
-    prior = next(p.prior for p in fit.space.parameters if p.name == name)
-    reach = None if prior is None else tuple((prior[0] + side * 1.96 * prior[1]) / before for side in (-1.0, 1.0))
-    return _Row(name, fit.estimates[name] / before, ends, reach, interval.method)  # type: ignore[arg-type]
+    p = next(p for p in fit.space.parameters if p.name == name)
+    reach = None
+    if p.scaled_prior is not None:
+        mean, std = p.scaled_prior
+        low, high = (float(p.value(mean + side * 1.96 * std)) / before for side in (-1.0, 1.0))
+        reach = (min(low, high), max(low, high))
+    return _Row(name, fit.estimates[name] / before, ends, reach, interval.method)
 
 
 def _scale(ax: Axes, values: Sequence[float]) -> None:
@@ -139,7 +143,9 @@ def correlation(fit: Fit) -> Figure | None:
         colours = LinearSegmentedColormap.from_list("", [COLOURS["vermilion"], "#FFFFFF", COLOURS["blue"]])
         figure = new_figure(WIDTH, 1.5 + 0.42 * size)
         ax = figure.subplots()
-        drawn = ax.imshow(shown, cmap=colours, vmin=-1.0, vmax=1.0, aspect="auto")
+        places = np.arange(size)
+        ax.pcolormesh(places, places, shown, cmap=colours, vmin=-1.0, vmax=1.0, shading="nearest")
+        ax.set_ylim(size - 0.5, -0.5)
         for i in range(size):
             for j in range(size):
                 value = shown[i, j]
@@ -150,7 +156,7 @@ def correlation(fit: Fit) -> Figure | None:
         ax.set_xticks(range(size), [name.rpartition(".")[2].replace("_", " ") for name in names], rotation=40.0,
                       ha="right", rotation_mode="anchor")
         ax.grid(visible=False)
-        figure.colorbar(drawn, ax=ax, label="correlation (1)", shrink=0.9)
+        ax.set_title("correlation (1)")
     return finished(figure)
 
 
@@ -159,7 +165,7 @@ def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: st
     models = next(iter(tables.values())).models
     rows = error_rows(tables, label)
     with context():
-        height = 1.15 + len(rows) * (0.22 + _BAR * len(models))
+        height = 1.15 + len(rows) * (0.16 + _BAR * len(models))
         figure = new_figure(WIDTH, height)
         ax = figure.subplots()
         most = max((x for *_, by in rows for x in by.values() if math.isfinite(x)), default=1.0) * factor

@@ -10,18 +10,18 @@ from servotwin.identification.shown import (
     MODELS,
     dimension_of_free,
     error_rows,
+    error_unit,
     estimate_lines,
     sensor_dimension,
-    sensor_shown,
 )
-from servotwin.look import MINUS, escape, figure_in, label_of, number, readable, table, unit_for
+from servotwin.units.look import MINUS, escape, figure_in, label_of, number, readable, table, unit_for
 
 if TYPE_CHECKING:
     from servotwin.identification.fit import Fit, Trace
     from servotwin.identification.holdout import ErrorTable
 
 _HOW = {"normal": "normal law", "profile": "profile of the cost", "at bound": "none: at a bound",
-        "undetermined": "none: not determined"}
+        "undetermined": "none: not determined", "not sought": "none: not asked for"}
 
 
 def estimates(fit: Fit) -> str:
@@ -56,7 +56,7 @@ def logs(tables: Mapping[str, ErrorTable], traces: Sequence[Trace]) -> str:
     every = [(error, which) for which, held in tables.items() for error in held.errors[held.models[0]]]
     rows = []
     for error, which in sorted(every, key=lambda item: -item[0].rms if math.isfinite(item[0].rms) else -math.inf):
-        factor, unit = sensor_shown(signals.get(error.log, "output_angle"))
+        factor, unit = error_unit(signals.get(error.log, "output_angle"))
         rows.append([escape(error.log), escape(error.motion or "other"), which,
                      f"{_error(error.rms * factor)} {unit}", f"{_error(error.largest * factor)} {unit}",
                      str(error.samples)])

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.shown import sensor_shown
-from servotwin.look import COLOURS, WIDTH, context, finished, new_figure
+from servotwin.units.look import COLOURS, WIDTH, context, finished, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,9 +45,11 @@ def beside(trace: Trace) -> Figure:
     """Return what one log measured, the simulation over it, and below their difference."""
     factor, unit = sensor_shown(trace.signal)
     time, measured, simulated = _broken(trace.time, trace.measured * factor, trace.simulated * factor)
+    from matplotlib.ticker import MaxNLocator
+
     with context():
         figure = new_figure(*_SMALL, layout=None)
-        figure.subplots_adjust(left=0.19, right=0.985, top=0.97, bottom=0.185, hspace=0.12)
+        figure.subplots_adjust(left=0.19, right=0.965, top=0.97, bottom=0.185, hspace=0.12)
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
         above.plot(time, measured, color=COLOURS["black"], linewidth=2.4, alpha=0.45, label="measured")
         above.plot(time, simulated, color=COLOURS["blue"], linewidth=1.2, label="simulated")
@@ -57,6 +59,7 @@ def beside(trace: Trace) -> Figure:
         below.plot(time, simulated - measured, color=COLOURS["vermilion"], linewidth=1.0)
         below.set_ylabel(f"diff. ({unit})")
         below.set_xlabel("time (s)")
+        below.xaxis.set_major_locator(MaxNLocator(6))
         for ax in (above, below):
             ax.tick_params(labelsize=7.0)
             ax.yaxis.set_label_coords(-0.155, 0.5)
@@ -93,26 +96,22 @@ def residuals(traces: Sequence[Trace], noise: Mapping[str, float]) -> Figure:
     return finished(figure)
 
 
-def _over_time(ax: Axes, traces: Sequence[Trace], noise: Mapping[str, float], words: str, colour: str, dash: object,
+def _over_time(ax: Axes, traces: Sequence[Trace], noise: Mapping[str, float], words: str, colour: str, dash: Any,
                ) -> None:
     """Draw the median of the residuals over time, and the band of nine tenths of them."""
     time = np.concatenate([t.time - t.log.start for t in traces])
     value = np.concatenate([t.residual / noise[t.signal] for t in traces])
     edges = np.linspace(0.0, max(float(time.max()), 1e-9), _BINS + 1)
     place = np.clip(np.digitize(time, edges) - 1, 0, _BINS - 1)
-    middle, low, high, at = [], [], [], []
-    for k in range(_BINS):
-        here = value[place == k]
-        if len(here):
-            quantiles = np.quantile(here, [0.05, 0.5, 0.95])
-            low, middle, high = [*low, quantiles[0]], [*middle, quantiles[1]], [*high, quantiles[2]]
-            at.append(0.5 * (edges[k] + edges[k + 1]))
+    filled = [k for k in range(_BINS) if (place == k).any()]
+    at = 0.5 * (edges[:-1] + edges[1:])[filled]
+    low, middle, high = np.array([np.quantile(value[place == k], [0.05, 0.5, 0.95]) for k in filled]).T
     ax.fill_between(at, low, high, color=colour, alpha=0.18, linewidth=0.0)
-    ax.plot(at, middle, color=colour, linestyle=dash, label=f"{words}: median, 90 % band")  # type: ignore[arg-type]
+    ax.plot(at, middle, color=colour, linestyle=dash, label=f"{words}: median, 90 % band")
 
 
 def _spread(ax: Axes, traces: Sequence[Trace], noise: Mapping[str, float], words: str, colour: str,
-            dash: object) -> None:
+            dash: Any) -> None:
     value = np.concatenate([t.residual / noise[t.signal] for t in traces])
     far = float(np.mean(np.abs(value) > 5.0))
     label = f"{words}: {100.0 * far:.2g} % beyond 5 σ" if far else words
@@ -121,10 +120,10 @@ def _spread(ax: Axes, traces: Sequence[Trace], noise: Mapping[str, float], words
     ax.stairs(density, edges, color=colour, linestyle=dash, linewidth=1.4, label=label)
 
 
-def _follows(ax: Axes, traces: Sequence[Trace], words: str, colour: str, dash: object) -> None:
+def _follows(ax: Axes, traces: Sequence[Trace], words: str, colour: str, dash: Any) -> None:
     """Draw the mean autocorrelation of the logs, up to a third of the longest."""
     found = autocorrelation([t.residual for t in traces])
-    ax.plot(np.arange(len(found)), found, color=colour, linestyle=dash, label=words)  # type: ignore[arg-type]
+    ax.plot(np.arange(len(found)), found, color=colour, linestyle=dash, label=words)
 
 
 def autocorrelation(residuals: Sequence[Array]) -> Array:

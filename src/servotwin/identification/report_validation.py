@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING
 
 from servotwin.identification import report_parts
 from servotwin.identification.report_parts import STYLE, space
-from servotwin.identification.shown import error_shown
-from servotwin.look import document, escape, number, readable
+from servotwin.identification.shown import error_shown, rig_text
 from servotwin.parameters import write_file
+from servotwin.units.look import document, escape, number
 
 if TYPE_CHECKING:
     from servotwin.identification.validate import Validation
-
-_DIMENSIONS = {"delay": "time", "angle_offset": "angle"}
 
 
 def write_validation(found: Validation, path: Path, *, overwrite: bool = False) -> Path:
@@ -58,6 +56,6 @@ def _summary(found: Validation) -> str:
              (f"{number(max(error.largest for error in errors) * factor, 3)}{space(unit)}", "largest error of all")]
     for name, value in found.nuisance.items():
         how = "fitted to these logs" if name in found.fitted else "as the servo file's fit recorded it"
-        cards.append((escape(readable(value, _DIMENSIONS[name])), f"{name.replace('_', ' ')}, {how}"))
+        cards.append((escape(rig_text(name, value)), how))
     listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
     return f'<ul class="numbers">{listed}</ul>\n'

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin import units
 from servotwin.identification.free import LUMPED, nominal
-from servotwin.look import figure_in, label_of, unit_for
 from servotwin.simulation.sweep import dimension_of
+from servotwin.units.look import figure_in, label_of, readable, unit_for
 
 if TYPE_CHECKING:
     from servotwin.identification.fit import Fit, Interval, Trace
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 _LUMPED = {"output_torque_constant": "torque per current", "output_inertia": "inertia",
            "output_coulomb_torque": "torque"}
-_NUISANCE = {"delay": "time", "angle_offset": "angle"}
+_NUISANCE = {"delay": "time", "angle_offset": "angle", "angle_sag": "angle"}
+_PER = {"angle_sag": "/V"}  # after the unit of the dimension
 _SENSOR = {"output_angle": "angle", "feedback_voltage": "voltage", "armature_current": "current",
            "supply_current": "current"}
 MODELS = {"BoundedServo": "bounded servo", "PulseServo": "pulse servo", "PulseServoInductive": "inductive pulse servo",
@@ -38,7 +39,7 @@ class Line:
     unit : str
         As it is printed.
     method : str
-        How the interval was found: "normal", "profile", "at bound" or "undetermined".
+        How the interval was found: "normal", "profile", "at bound", "undetermined" or "not sought".
     nuisance : bool
         Whether it belongs to the rig and not to the servo.
     """
@@ -87,11 +88,12 @@ def _line(fit: Fit, name: str, interval: Interval) -> Line:
     dimension, value = dimension_of_free(name), fit.estimates[name]
     sheet = nominal_of(fit, name)
     unit = unit_for(value or sheet or 0.0, dimension)
+    method = "not sought" if fit.doubt is None and interval.method == "undetermined" else interval.method
     within = 0.5 * (interval.upper - interval.lower)
-    numbers = [figure_in(float(x), unit, dimension, within=float(within))
-               for x in (value, interval.lower, interval.upper)]
+    shown, lower, upper = (figure_in(float(x), unit, dimension, within=float(within))
+                           for x in (value, interval.lower, interval.upper))
     said = "–" if sheet is None else figure_in(sheet, unit, dimension)
-    return Line(name, *numbers, said, label_of(unit), interval.method, name in _NUISANCE)
+    return Line(name, shown, lower, upper, said, label_of(unit) + _PER.get(name, ""), method, name in _NUISANCE)
 
 
 def nominal_of(fit: Fit, name: str) -> float | None:
@@ -101,6 +103,17 @@ def nominal_of(fit: Fit, name: str) -> float | None:
     if name.startswith("load."):
         return next((p.start for p in fit.space.parameters if p.name == name), None)
     return nominal(fit.space.servo, name)
+
+
+def rig_text(name: str, value: float) -> str:
+    """Return a nuisance that all logs share, in words.
+
+    Examples
+    --------
+    >>> rig_text("angle_offset", 0.0174532925), rig_text("delay", 0.02)
+    ('angle offset 1°', 'delay 20 ms')
+    """
+    return f"{name.replace('_', ' ')} {readable(value, _NUISANCE[name])}{_PER.get(name, '')}"
 
 
 def sensor_shown(name: str) -> tuple[float, str]:
@@ -121,10 +134,22 @@ def sensor_dimension(name: str) -> str:
     return _SENSOR[name]
 
 
+def error_unit(name: str) -> tuple[float, str]:
+    """Return by what errors of a sensor (SI) are multiplied to be shown, and the unit.
+
+    Examples
+    --------
+    >>> error_unit("feedback_voltage")
+    (1000.0, 'mV')
+    """
+    factor, unit = sensor_shown(name)
+    return (factor, unit) if unit == "°" else (1e3 * factor, f"m{unit}")
+
+
 def error_shown(traces: Iterable[Trace]) -> tuple[float, str]:
     """Return by what errors of these logs are multiplied to be shown, and the unit."""
     names = {trace.signal for trace in traces}
-    return sensor_shown(names.pop()) if len(names) == 1 else (1.0, "rad or V")
+    return error_unit(names.pop()) if len(names) == 1 else (1.0, "rad or V")
 
 
 class ErrorRow(NamedTuple):

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 
 HUBER = 1.345  # of the noise: as good as least squares to 5 % where the noise is normal (Huber 1964)
 _TRIED = 8  # random points for each search that is begun
-_FIRST_LOGS = 12  # of the first, rough searches
+_FIRST_LOGS = 8  # of the first, rough searches
+_ROUGH = 0.003  # of the cost: what a step of a rough search has to gain
 _MOST_OFFSET = 0.6  # rad
 _MOST_SAG = 3.0  # rad/V
 _DELAY = 0.02  # s, where the search for it begins
@@ -65,7 +66,9 @@ class Task:
             for k, start in enumerate(self._candidates(nominal, few)):
                 tell(0.6 * k / self.starts, f"start {k + 1} of {self.starts}")
                 self._set_noise(self.forecast.at(start, derivatives=False, cases=few), few)
-                ended.append(self._refined(start, few, rounds=2, most=12))
+                search = self._search(few)
+                first = search.costs([start])[0]
+                ended.append(search.run(start, most=12, tell=self._keep, least_gain=_ROUGH * first))
             ended = self._on_one_scale(ended, few)
             nominal = ended[0].point
         tell(0.6, "all logs")

@@ -154,13 +154,20 @@ def uncertainty(rows: Sequence[Rows], prior: Prior, held: NDArray[np.bool_],
     H = (information + stiff + np.diag(prior.weight**2))[np.ix_(free, free)]
     M = (meat + np.diag(prior.weight**2))[np.ix_(free, free)]
     inverse = _inverse(H)
-    covariance = np.zeros((p, p))
-    covariance[np.ix_(free, free)] = inverse @ M @ inverse
-    simple = np.zeros((p, p))
-    simple[np.ix_(free, free)] = inverse @ (plain + np.diag(prior.weight**2))[np.ix_(free, free)] @ inverse
-    ratio = np.sqrt(np.diag(covariance)[free] / np.maximum(np.diag(simple)[free], 1e-300))
-    return Uncertainty(information, covariance, float(np.median(ratio)) if free.any() else 1.0, method, freedom,
-                       correlation)
+    covariance, simple = np.zeros((p, p)), np.zeros((p, p))
+    covariance[np.ix_(free, free)] = _sandwich(inverse, M)
+    simple[np.ix_(free, free)] = _sandwich(inverse, (plain + np.diag(prior.weight**2))[np.ix_(free, free)])
+    known = np.diag(simple) > 0.0
+    ratio = np.sqrt(np.diag(covariance)[known] / np.diag(simple)[known])
+    inflation = max(float(np.median(ratio)), 0.1) if known.any() else 1.0
+    return Uncertainty(information, covariance, inflation, method, freedom, correlation)
+
+
+def _sandwich(bread: Array, meat: Array) -> Array:
+    """Return bread · meat · bread, without variances that rounding makes negative."""
+    values, vectors = np.linalg.eigh(meat)
+    half = bread @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    return np.asarray(half @ half.T)
 
 
 def _inverse(H: Array) -> Array:

@@ -18,7 +18,7 @@ from servotwin.identification.forecast import Forecast
 from servotwin.identification.free import Space
 from servotwin.identification.holdout import ErrorTable, log_error
 from servotwin.identification.log import ANGLES, Log
-from servotwin.identification.point import DELAY_SCALE, NUISANCES, OFFSET_SCALE, Part, Point
+from servotwin.identification.point import NUISANCES, SHARED, Part, Point
 from servotwin.identification.task import HUBER, Task, by_sensor
 from servotwin.models import MODELS, Model, PulseServo
 from servotwin.parameters import Servo
@@ -28,7 +28,6 @@ from servotwin.units import is_finite
 Array = NDArray[np.float64]
 Progress = bool | Callable[[float, str], object]
 
-_SCALES = {"delay": DELAY_SCALE, "angle_offset": OFFSET_SCALE}
 _ROUNDS = 3  # of noise and search
 _ANY = ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant", "gear.gear_reduction")
 
@@ -46,7 +45,7 @@ class Validation:
     traces : tuple of Trace
         Every log beside the simulation.
     nuisance : mapping of str to float
-        Delay [s] and angle offset [rad] that were used.
+        Delay [s], angle offset [rad] and sag [rad/V] that were used.
     fitted : tuple of str
         Which nuisances were fitted to these logs; the others come from the servo file's record of its fit, or are 0.
     noise : mapping of str to float
@@ -95,7 +94,7 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
         `PulseServo`, `PulseServoInductive` or `BoundedServo`; that of the servo file's [fit] unless given, else
         `PulseServo`.
     nuisance : sequence of str
-        What belongs to the rig and is fitted to these logs: of "delay", "log_delay", "angle_offset", "initial_state".
+        What belongs to the rig and is fitted to these logs: as of `identify`.
     sensors : sequence of str, optional
         Measured signals that are compared; the angle and all currents unless given. The errors are those of the angle.
     progress : bool or callable
@@ -148,7 +147,7 @@ def recorded_model(servo: Any) -> type[Model]:
 
 
 def recorded_nuisance(servo: Servo) -> dict[str, float]:
-    """Return the delay [s] and angle offset [rad] that a servo file's [fit] recorded.
+    """Return the delay [s], angle offset [rad] and sag [rad/V] that a servo file's [fit] recorded.
 
     Raises
     ------
@@ -156,7 +155,7 @@ def recorded_nuisance(servo: Servo) -> dict[str, float]:
         If they are no numbers.
     """
     found = _recorded(servo, "nuisance")
-    return {name: found[name] for name in _SCALES if name in found}
+    return {name: found[name] for name in SHARED if name in found}
 
 
 def _recorded(servo: Servo, key: str) -> dict[str, float]:
@@ -186,7 +185,7 @@ def _point(forecast: Forecast, known: Mapping[str, float], nuisance: Sequence[st
     size = len(forecast.space)
     shared = start.shared.copy()
     for k, name in enumerate(forecast.extra):
-        shared[size + k] = known[name] / _SCALES[name] if name in known else shared[size + k]
+        shared[size + k] = known[name] / SHARED[name][0] if name in known else shared[size + k]
     point = Point(shared, start.own)
     if not nuisance:
         return point

@@ -122,9 +122,12 @@ class _Pulsed(Model):
             **source_numbers(self, self._coasts()), **gear_numbers(self, load), **thermal_numbers(self),
             **sensor_numbers(self))
 
+    def _period(self, signal: Signal | None) -> Any:
+        return self.frame_period if signal is None or signal.frame_period is None else signal.frame_period
+
     def chip(self, signal: Signal | None = None) -> Chip:
         """Return the numbers of the frame logic; the frame period is that of the command where it gives one."""
-        period = self.frame_period if signal is None or signal.frame_period is None else signal.frame_period
+        period = self._period(signal)
         return Chip(
             T_0=self.value_or("electronics.one_shot_offset", 0.0), slope=self.value("electronics.one_shot_slope"),
             p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0),
@@ -169,7 +172,7 @@ class _Pulsed(Model):
                 + slope * self.value_or("potentiometer.feedback_offset", 0.0))
         else:
             pieces = signal.pieces
-        check_widths(signal, pieces, self.chip(signal).frame_period if signal.edges is None else math.inf)
+        check_widths(signal, pieces, self._period(signal) if signal.edges is None else math.inf)
         return pieces
 
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:

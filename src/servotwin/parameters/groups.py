@@ -43,7 +43,7 @@ class Relation(NamedTuple):
 
     def check(self) -> None:
         """Raise ParameterError if it does not hold; of columns, for the first such lane."""
-        if np.all(self.holds):
+        if self.holds is True or np.all(self.holds):
             return
         lane = None
         if any(isinstance(x, np.ndarray) for x in (self.holds, self.got)):
@@ -94,15 +94,15 @@ class Group:
             if value not in rule:
                 raise ParameterError(what, got=value, allowed=" or ".join(rule))
             return value
-        unit = si_unit(metadata["dimension"])
         if rule == "table":
             if isinstance(value, np.ndarray) and value.ndim == 1:
                 value = value.tolist()
             if not isinstance(value, list | tuple) or not all(is_finite(x) for x in value) or not value:
+                unit = si_unit(metadata["dimension"])
                 raise ParameterError(what, got=value, allowed=f"a list of finite numbers [{unit}]")
             return tuple(float(x) for x in value)
         if not is_finite(value) or not _RULES[rule](float(value)):  # the float is kept, so it is what counts
-            raise ParameterError(what, got=value, allowed=f"{rule} [{unit}]")
+            raise ParameterError(what, got=value, allowed=f"{rule} [{si_unit(metadata['dimension'])}]")
         return float(value)
 
     def _relations(self) -> Iterator[Relation]:

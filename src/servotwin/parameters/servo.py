@@ -83,7 +83,8 @@ class Servo:
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     def _quantity(self, name: str) -> Quantity:
-        value = self.get(name)
+        group, key = check_name(name)
+        value = getattr(getattr(self, group), key)
         known = self.quantities.get(name)
         if known is not None and known.value == value:
             return known

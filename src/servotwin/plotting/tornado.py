@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from servotwin import units
 from servotwin.errors import InputError
-from servotwin.look import COLOURS, axes_grid, context, finished, readable
 from servotwin.models.outputs import SIGNALS
 from servotwin.plotting.responses import SHOWN, Shown
+from servotwin.units.look import COLOURS, axes_grid, context, finished, readable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -25,6 +25,9 @@ _RARE = {"varies": 0.0, "half_play": 0.0, "C_w": 0.0, "half_slack": 0.0, "L": 0.
 _PLAIN_WALKS = Recipe(
     "plain_walks", _ENTRY, absent=(*_RARE.items(), ("sweep", 0.0)),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
+_SWINGING = Recipe(
+    "pendulum_walks", _ENTRY, absent=(*((name, x) for name, x in _RARE.items() if name != "gravity"), ("sweep", 0.0)),
+    never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a walk leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
@@ -35,7 +38,8 @@ def run(work: Work) -> Raw:
     raw = empty_raw(work)
     lanes = lanes_of(work)
     times = _own(work.times, np.float64)
-    side, braked = side_by_side(work, lanes)
+    rare, swinging = has_rare_terms(work, lanes)
+    side, braked = side_by_side(work, lanes, rare | swinging)
     given_up = np.ones(work.lanes, np.int8)
     for kind in (True, False):
         which = side & (braked == kind)
@@ -43,8 +47,7 @@ def run(work: Work) -> Raw:
             _run_blocks(work, lanes, kind, times, outputs_of(work, raw, given_up))
         elif which.any():
             _run_some(work, lanes, kind, np.flatnonzero(which), times, raw, given_up)
-    rare = has_rare_terms(work, lanes)
-    for recipe, some in ((_PLAIN_WALKS, ~rare), (_WALKS, rare)):
+    for recipe, some in ((_PLAIN_WALKS, ~(rare | swinging)), (_SWINGING, swinging & ~rare), (_WALKS, rare)):
         rest = np.flatnonzero(some & (given_up != 0))
         if len(rest):
             run_walks(work, lanes, rest, times, raw, recipe)
@@ -92,7 +95,7 @@ def run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats,
                     raw.fields[name][part] = np.where(failed, 0 if name in SMALL_FIELDS else np.nan, room[:, k])
 
 
-def side_by_side(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def side_by_side(work: Work, lanes: Lanes, rare: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Tell which lanes have nothing that takes the general way, and which of these brake without a dead zone."""
     if work.law != "pulse":
         return np.zeros(work.lanes, np.bool_), np.zeros(work.lanes, np.bool_)
@@ -101,19 +104,20 @@ def side_by_side(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[n
         kept = [((x == 0.0) | (abs(x.astype(np.float32)) > 0.0)).all(axis=0) for x in (lanes.plants, lanes.chips)]
     else:
         kept = [np.ones(work.lanes, np.bool_)]
-    side = np.logical_and.reduce([~has_rare_terms(work, lanes), plant.stiffness == 0.0, chip.step == 0.0,
+    side = np.logical_and.reduce([~rare, plant.stiffness == 0.0, chip.step == 0.0,
                                   plant.K_b > 0.0, work.torque.count == 0, *kept])
     side &= not work.curve[0]
     return np.asarray(side), np.asarray((plant.D_off == 0.0) & (plant.D_drive < plant.V))
 
 
-def has_rare_terms(work: Work, lanes: Lanes) -> NDArray[np.bool_]:
-    """Tell which lanes have a term that the plain walk leaves out."""
+def has_rare_terms(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell which lanes have a term that the plain walk leaves out, and which have a pendulum."""
     plant = Plant(*lanes.plants)
-    swept = np.concatenate([[0], np.cumsum(lanes.pieces[:, 6] != 0.0)])
-    terms = [getattr(plant, name) != value for name, value in _RARE.items()]
-    first, last = lanes.piece_first, lanes.piece_first + lanes.piece_count
-    return np.asarray(np.logical_or.reduce([*terms, swept[last] > swept[first]]))
+    terms = [getattr(plant, name) != value for name, value in _RARE.items() if name != "gravity"]
+    if lanes.pieces[:, 6].any():
+        swept = np.concatenate([[0], np.cumsum(lanes.pieces[:, 6] != 0.0)])
+        terms.append(swept[lanes.piece_first + lanes.piece_count] > swept[lanes.piece_first])
+    return np.asarray(np.logical_or.reduce(terms)), np.asarray(plant.gravity != 0.0)
 
 
 def lanes_of(work: Work) -> Lanes:

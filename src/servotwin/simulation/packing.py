@@ -168,7 +168,7 @@ class Chunk:
         before = cast("LanePieces", self.model.command(cast("Any", self.commands.before(self.which))))
         initial = {name: column[self.which if len(column) > 1 else [0], None]
                    for name, column in self.lanes.initial.items()}
-        angle = initial.get("output_angle")
+        angle: Any = initial.get("output_angle")
         if angle is None:
             angle = self.model.start_angle(cast("Any", before.initial))
         y = np.empty((7, len(self.which), 1))

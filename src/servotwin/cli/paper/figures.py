@@ -11,8 +11,8 @@ import numpy as np
 
 from servotwin import plotting
 from servotwin.cli.paper.study import APPROACH_ROW, LABELS, BenchStudy, Study
-from servotwin.look import fixed
 from servotwin.plotting import Curve, Limit
+from servotwin.units.look import fixed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

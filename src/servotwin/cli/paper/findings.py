@@ -9,8 +9,8 @@ import numpy as np
 
 from servotwin import bench
 from servotwin.cli.paper.study import LOAD_INERTIA
-from servotwin.look import fixed, number, with_error
 from servotwin.physics.friction import creep_speed
+from servotwin.units.look import fixed, number, with_error
 
 if TYPE_CHECKING:
     from servotwin.cli.paper.study import Study

@@ -8,9 +8,9 @@ import numpy as np
 
 from servotwin.cli.paper.study import LOAD_INERTIA, Study
 from servotwin.loads import Inertia
-from servotwin.look import picture
 from servotwin.models import AveragedServo, DCMotor, GearedMotor
 from servotwin.plotting import formula_svg
+from servotwin.units.look import picture
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

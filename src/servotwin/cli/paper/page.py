@@ -10,7 +10,7 @@ from servotwin import __version__
 from servotwin.cli.paper import linear, tables, vibration_page
 from servotwin.cli.paper.findings import corrections, disagreements
 from servotwin.cli.paper.study import LABELS, LOAD_INERTIA, SERVO, BenchStudy, Study
-from servotwin.look import document, escape, fixed, number, picture, plain
+from servotwin.units.look import document, escape, fixed, number, picture, plain
 
 if TYPE_CHECKING:
     from servotwin.cli.paper.figures import Picture

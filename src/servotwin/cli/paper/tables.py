@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from servotwin import units
 from servotwin.cli.paper.study import LABELS, LOAD_INERTIA, MODELS, Study
-from servotwin.look import escape, fixed, number, table, with_error
 from servotwin.parameters import GROUPS
+from servotwin.units.look import escape, fixed, number, table, with_error
 
 if TYPE_CHECKING:
     from servotwin.bench import ModelShares

@@ -11,8 +11,8 @@ import numpy as np
 from servotwin import plotting
 from servotwin.cli.paper.figures import Picture
 from servotwin.cli.paper.vibration import CIRCUITS, LOOKED_AT, SHOWN_ROW, SOFT
-from servotwin.look import fixed, number, table
 from servotwin.plotting import Curve, Limit
+from servotwin.units.look import fixed, number, table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,7 @@ import io
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import OutputError
-from servotwin.look.style import context
+from servotwin.units.look.style import context
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +35,7 @@ def to_bytes(figure: Figure, file_format: str) -> bytes:
 
     Examples
     --------
-    >>> from servotwin.look import axes_grid
+    >>> from servotwin.units.look import axes_grid
     >>> to_bytes(axes_grid()[0], "png")[1:4]
     b'PNG'
     """

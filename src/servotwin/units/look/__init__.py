@@ -3,11 +3,11 @@
 What plotting, reports and the command line share. matplotlib is loaded when a picture is made.
 """
 
-from servotwin.look.files import FORMATS, to_bytes
-from servotwin.look.numbers import figure_in, label_of, readable, unit_for
-from servotwin.look.page import document
-from servotwin.look.style import COLOURS, LINES, WIDTH, axes_grid, context, finished, new_figure
-from servotwin.look.words import MINUS, TIMES, escape, fixed, number, picture, plain, table, with_error
+from servotwin.units.look.files import FORMATS, to_bytes
+from servotwin.units.look.numbers import figure_in, label_of, readable, unit_for
+from servotwin.units.look.page import document
+from servotwin.units.look.style import COLOURS, LINES, WIDTH, axes_grid, context, finished, new_figure
+from servotwin.units.look.words import MINUS, TIMES, escape, fixed, number, picture, plain, table, with_error
 
 __all__ = [
     "COLOURS",

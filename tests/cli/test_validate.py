@@ -1,0 +1,116 @@
+"""`servotwin validate`: what it says about a servo and logs, and when it fails."""
+
+import math
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from cli import fit_logs
+from servotwin.identification import read_logs
+from servotwin.identification.validate import validate
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return fit_logs.write_logs(tmp_path_factory.mktemp("validate") / "runs")
+
+
+@pytest.fixture(scope="module")
+def truth(tmp_path_factory):
+    path = tmp_path_factory.mktemp("servo") / "true.toml"
+    st.load_servo(fit_logs.SERVO).replace({"motor.rotor_inertia": fit_logs.INERTIA}).save(path)
+    return path
+
+
+def test_the_true_servo_is_off_by_the_noise(cli, folder, truth):
+    found = cli("validate", truth, folder, "--model", "bounded", "--json").data
+    assert found["errors"]["all"]["BoundedServo"] == pytest.approx(fit_logs.NOISE, rel=0.5)
+    assert set(found["errors"]["by"]["motion"]) == {"step", "stairs"}
+    assert found["nuisance"] == {}
+
+
+def test_another_servo_is_further_off(cli, folder, truth):
+    ended = cli("validate", fit_logs.SERVO, folder, "--model", "bounded", "--json")
+    better = cli("validate", truth, folder, "--model", "bounded", "--json")
+    assert ended.data["errors"]["all"]["BoundedServo"] > 5.0 * better.data["errors"]["all"]["BoundedServo"]
+
+
+def test_what_is_printed(cli, folder, truth):
+    lines = cli("validate", truth, folder, "--model", "bounded").out.splitlines()
+    assert lines[0] == "Hitec HS-755HB (hitec-hs-755hb), BoundedServo, 4 logs"
+    assert any(line.startswith("motion  bounded servo (°)") for line in lines)
+    assert {line.split()[0] for line in lines if line.endswith("°")} == {"step-0", "stairs-1", "step-2", "step-3"}
+
+
+def test_a_limit_that_is_exceeded_fails(cli, folder):
+    words = ["validate", fit_logs.SERVO, folder, "--model", "bounded"]
+    assert cli(*words, "--max-error", "20deg").code == 0
+    ended = cli(*words, "--max-error", "20deg", "--max-error", "step=1e-4 rad", "--json")
+    assert ended.code == 1
+    assert list(ended.data["above"]) == ["step"]
+    assert ended.err == ""
+    assert "! step: " in cli(*words, "--max-error", "step=1e-4 rad").out
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (["--max-error", "3"], "a number with a unit: rad, deg"), (["--max-error=-3deg"], "a positive number"),
+    (["--max-error", "3 V"], "rad, deg"), (["--max-error", "fish=3deg"], "unknown motion"),
+    (["--nuisance", "none,delay"], "none alone"), (["--nuisance", "fish"], "nuisance: got 'fish'"),
+    (["--report", "fish.txt"], "ends in .html"), (["--model", "dc-motor"], "unknown model"),
+])
+def test_bad_words(cli, folder, tmp_path, words, said):
+    assert said in cli("validate", fit_logs.SERVO, folder, *words).error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_report_is_not_overwritten(cli, folder, truth, tmp_path):
+    words = ["validate", truth, folder / "step-0.csv", "--model", "bounded", "--report", "check.html"]
+    assert cli(*words).code == 0
+    page = (tmp_path / "check.html").read_text()
+    assert "validated on 1 log<" in page
+    assert "held out" not in page
+    assert "exists already" in cli(*words).error
+    assert cli(*words, "--force").code == 0
+
+
+def test_the_nuisances_of_the_fit_are_used():
+    from dataclasses import replace
+
+    servo = st.load_servo(fit_logs.SERVO).replace({"motor.rotor_inertia": fit_logs.INERTIA})
+    late = [replace(log, measured={"output_angle": np.interp(log.time - 0.02, log.time, log.measured["output_angle"])
+                                   + 0.05}) for log in fit_logs.made_logs(2)]
+    plain = validate(late, servo, st.BoundedServo)
+    recorded = replace(servo, fit={"model": "BoundedServo", "nuisance": {"delay": 0.02, "angle_offset": 0.05}})
+    known = validate(late, recorded)
+    assert known.nuisance == {"delay": pytest.approx(0.02), "angle_offset": pytest.approx(0.05)}
+    assert isinstance(known.model, st.BoundedServo)
+    assert known.total < 0.2 * plain.total
+    fitted = validate(late, servo, st.BoundedServo, nuisance=["delay", "angle_offset"])
+    assert fitted.fitted == ("delay", "angle_offset")
+    assert fitted.nuisance["delay"] == pytest.approx(0.02, abs=2e-3)
+    assert fitted.nuisance["angle_offset"] == pytest.approx(0.05, abs=2e-3)
+    assert fitted.total == pytest.approx(known.total, rel=0.1)
+
+
+def test_a_record_that_is_no_number_is_named():
+    from dataclasses import replace
+
+    servo = replace(st.load_servo(fit_logs.SERVO), fit={"nuisance": {"delay": "late"}})
+    with pytest.raises(st.errors.ServoFileError, match=r"\[fit\] nuisance.delay"):
+        validate(fit_logs.made_logs(1), servo, st.BoundedServo)
+
+
+def test_the_load_of_a_fit_is_used():
+    from dataclasses import replace
+
+    servo = st.load_servo(fit_logs.SERVO)
+    loaded = validate(fit_logs.made_logs(1), replace(servo, fit={"load": {"load.inertia": 0.02}}), st.BoundedServo)
+    free = validate(fit_logs.made_logs(1), servo, st.BoundedServo)
+    assert loaded.total > 1.5 * free.total
+
+
+def test_errors_are_rms_over_samples(folder, truth):
+    found = validate(read_logs(folder), st.load_servo(truth), st.BoundedServo)
+    every = np.concatenate([trace.residual for trace in found.traces])
+    assert found.total == pytest.approx(math.sqrt(np.mean(every**2)), rel=1e-12)
