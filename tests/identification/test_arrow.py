@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from identification.toy_forecast import Toy
 from servotwin.identification.arrow import Block, Loss, Normal, Prior, Search, block
-from servotwin.identification.point import Part, Point
+from servotwin.identification.point import LogPart, Point
 
 T = np.linspace(0.0, 4.0, 31)
 TRUTH = np.array([1.3, 1.5, 0.4])
@@ -228,7 +228,7 @@ def test_elimination_is_that_of_the_whole_matrix():
     rng = np.random.default_rng(2)
     blocks = []
     for _ in range(3):
-        part = Part(rng.normal(size=9), rng.normal(size=(9, 2)), rng.normal(size=(9, 2)))
+        part = LogPart(rng.normal(size=9), rng.normal(size=(9, 2)), rng.normal(size=(9, 2)))
         blocks.append(block(part, Loss(1.0), Prior(rng.normal(size=2), np.array([0.5, 2.0])), rng.normal(size=2)))
     g, H = np.sum([b.g_s for b in blocks], axis=0), np.sum([b.H_ss for b in blocks], axis=0)
     whole, right = np.zeros((8, 8)), np.zeros(8)

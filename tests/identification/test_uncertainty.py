@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from servotwin.identification.arrow import Loss, Prior
-from servotwin.identification.point import Part
+from servotwin.identification.point import LogPart
 from servotwin.identification.uncertainty import Rows, rows_of, uncertainty
 
 NONE = Prior(np.zeros(1), np.zeros(1))
@@ -49,7 +49,7 @@ def doubt(X, y, limit=math.inf):
     """Return the numbers that fit, and what the package says of them."""
     n, p = X[0].shape
     theta, _ = solved(X, y, limit)
-    rows = [rows_of(Part(x @ theta[:p] + theta[p + k] - y[k], x, np.ones((n, 1))), Loss(limit), NONE,
+    rows = [rows_of(LogPart(x @ theta[:p] + theta[p + k] - y[k], x, np.ones((n, 1))), Loss(limit), NONE,
                     theta[p + k:p + k + 1]) for k, x in enumerate(X)]
     return theta[:p], uncertainty(rows, nothing(p), np.zeros(p, np.bool_))
 
@@ -100,14 +100,14 @@ def test_a_belief_about_a_logs_own_number_counts():
     """An offset that is known takes nothing away; one that is free takes away the mean of the slope."""
     n = 200
     slope = 1.0 + 0.2 * np.sin(np.linspace(0.0, 20.0, n))[:, None]
-    part = Part(np.random.default_rng(0).normal(size=n), slope, np.ones((n, 1)))
+    part = LogPart(np.random.default_rng(0).normal(size=n), slope, np.ones((n, 1)))
     known, free = (rows_of(part, Loss(), Prior(np.zeros(1), np.array([w])), np.zeros(1)) for w in (1e6, 0.0))
     assert (known.slope[:n] ** 2).sum() == pytest.approx((slope**2).sum(), rel=1e-6)
     assert (free.slope[:n] ** 2).sum() == pytest.approx(n * slope.var(), rel=1e-6)
 
 
 def test_residuals_beyond_the_limit_tell_only_their_sign():
-    part = Part(np.array([0.5, -9.0, 2.0, 1.0]), np.ones((4, 1)), np.zeros((4, 0)))
+    part = LogPart(np.array([0.5, -9.0, 2.0, 1.0]), np.ones((4, 1)), np.zeros((4, 0)))
     rows = rows_of(part, Loss(1.5), Prior(np.zeros(0), np.zeros(0)), np.zeros(0))
     assert rows.score.tolist() == [0.5, -1.5, 1.5, 1.0]
     assert rows.inside.tolist() == [1.0, 0.0, 0.0, 1.0]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from servotwin.identification.point import Part, Point
+from servotwin.identification.point import LogPart, Point
 
 Array = Any
 
@@ -39,7 +39,7 @@ class Toy:
                 shared[:, i] = np.imag(f(x + 1e-30j * np.eye(self.size)[i], y)) / 1e-30
             for i in range(width[1]):
                 own[:, i] = np.imag(f(x, y + 1e-30j * np.eye(self.own)[i])) / 1e-30
-            found.append(Part(residual, shared, own))
+            found.append(LogPart(residual, shared, own))
         return found
 
     def at_all(self, points: Sequence[Point], *, cases: Sequence[int] | None = None, **_: Any) -> list[list[Part]]:

@@ -13,7 +13,7 @@ from servotwin.identification.identify import identify
 from servotwin.identification.ladder import RUNGS, Ladder, Rung, friction_ladder
 from servotwin.identification.log import Log
 from servotwin.identification.miuzei import read_miuzei_logs
-from servotwin.identification.point import Part, Point
+from servotwin.identification.point import LogPart, Point
 from servotwin.identification.readers import read_logs
 from servotwin.identification.sheet import Sheet, SheetPoint
 from servotwin.identification.sheet_csv import SheetList, read_sheets
@@ -40,8 +40,8 @@ __all__ = [
     "Ladder",
     "Log",
     "LogError",
+    "LogPart",
     "MotorRange",
-    "Part",
     "Point",
     "Range",
     "Rung",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.forecast import Forecast
-from servotwin.identification.point import Part, Point
+from servotwin.identification.point import LogPart, Point
 
 Array = NDArray[np.float64]
 
@@ -93,12 +93,12 @@ def _safe(H: Array) -> Array:
     return np.asarray(H + np.diag(np.maximum(1e-12 * np.diag(H), 1e-12)))
 
 
-def block(part: Part, loss: Loss, own: Prior | None = None, at: Array | None = None) -> Block:
+def block(part: LogPart, loss: Loss, own: Prior | None = None, at: Array | None = None) -> Block:
     """Return the normal equations of one log, with the beliefs about its own numbers.
 
     Examples
     --------
-    >>> one = Part(np.array([1.0, 2.0]), np.array([[1.0], [1.0]]), np.zeros((2, 0)))
+    >>> one = LogPart(np.array([1.0, 2.0]), np.array([[1.0], [1.0]]), np.zeros((2, 0)))
     >>> block(one, Loss()).g_s.tolist()
     [3.0]
     """
@@ -147,7 +147,7 @@ class Search:
         self.own = [Prior(mean, weight) for mean, weight in beliefs]
         self.held = np.zeros(forecast.size, np.bool_) if held is None else held
 
-    def cost_of(self, point: Point, parts: Sequence[Part]) -> float:
+    def cost_of(self, point: Point, parts: Sequence[LogPart]) -> float:
         """Return the cost of a point; inf where a simulation failed."""
         total = sum(self.loss.cost(part.residual) for part in parts) + self.prior.cost(point.shared)
         total += sum(own.cost(point.own[k]) for k, own in zip(self.cases, self.own, strict=True))
@@ -158,7 +158,7 @@ class Search:
         return [self.cost_of(point, parts)
                 for point, parts in zip(points, self.forecast.at_all(points, cases=self.cases), strict=True)]
 
-    def normal(self, point: Point, parts: Sequence[Part]) -> Normal:
+    def normal(self, point: Point, parts: Sequence[LogPart]) -> Normal:
         """Return the normal equations at a point."""
         blocks = tuple(block(part, self.loss, own, point.own[k])
                        for k, part, own in zip(self.cases, parts, self.own, strict=True))

@@ -154,6 +154,14 @@ class Fit:
             raise InputError("level", got=level, allowed="a number between 0 and 1, such as 0.95")
         return {name: self._interval(k, name, wanted) for k, name in enumerate(self.names)}
 
+    def __str__(self) -> str:
+        """Return a line for each estimate, and what the logs cannot say."""
+        lines = []
+        for name, (lower, upper, method) in self.intervals().items():
+            spread = f"{lower:.4g} to {upper:.4g} ({method})" if lower == lower else method
+            lines.append(f"{name} = {self.estimates[name]:.4g} {self.units[name]}, {100 * self.level:g} %: {spread}")
+        return "\n".join((*lines, *map(str, self.unidentifiable), *self.warnings))
+
     def _interval(self, k: int, name: str, level: float) -> Interval:
         nowhere = float("nan")
         if name in self.undetermined:
@@ -171,7 +179,7 @@ class Fit:
         if k < len(self.space):
             p = self.space.parameters[k]
             return float(np.clip(p.value(x), p.lower, p.upper))
-        return x * self.scales[self.names[k]]
+        return float(x * self.scales[self.names[k]])
 
     @property
     def undetermined(self) -> tuple[str, ...]:

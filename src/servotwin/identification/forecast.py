@@ -28,7 +28,7 @@ from servotwin.identification.point import (
     SHARED,
     SPEED_SCALE,
     STEP,
-    Part,
+    LogPart,
     Point,
 )
 from servotwin.models import Model
@@ -127,7 +127,7 @@ class Forecast:
         return float(shared[len(self.space) + self.extra.index(name)]) * SHARED[name][0]
 
     def at(self, point: Point, *, derivatives: bool = True, central: bool = False, step: float = STEP,
-           cases: Sequence[int] | None = None) -> list[Part]:
+           cases: Sequence[int] | None = None) -> list[LogPart]:
         """Return what the logs say at a point, log by log; nan where a simulation failed.
 
         Derivatives are forward differences over `step`, or central ones at twice the lanes.
@@ -135,7 +135,7 @@ class Forecast:
         return self.at_all([point], derivatives=derivatives, central=central, step=step, cases=cases)[0]
 
     def at_all(self, points: Sequence[Point], *, derivatives: bool = False, central: bool = False,
-               step: float = STEP, cases: Sequence[int] | None = None) -> list[list[Part]]:
+               step: float = STEP, cases: Sequence[int] | None = None) -> list[list[LogPart]]:
         """Return what the logs say at several points, in one batch; for each point, log by log."""
         which = range(len(self.cases)) if cases is None else cases
         sides = (1 + central) * derivatives
@@ -151,7 +151,7 @@ class Forecast:
                 self._try(job)
         else:
             list(_pool().map(self._try, jobs))
-        found: list[list[Part]] = [[] for _ in points]
+        found: list[list[LogPart]] = [[] for _ in points]
         for lane in lanes:
             found[lane.at].append(lane.part)
         return found

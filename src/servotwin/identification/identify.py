@@ -144,7 +144,7 @@ def identify(
         show(0.95, "errors")
         traces = _traces(forecast, found.point, held_out)
         final = identified_servo(plain.servo, space, found.point.shared, doubt, reaching, level)
-        tables = compare(given, fitted, held_out, traces, plain, space, tuple(nuisance),
+        tables = compare(given, fitted, held_out, traces, type(plain)(final), space, tuple(nuisance),
                          () if interrupted else tuple(compare_with), loss=limit, seed=seed, noise=forecast.noise)
     fit = _fit(task, found, doubt, reaching, vague, stuck, final, traces, tables, ended)
     fit = replace(fit, level=level, seconds=clock.monotonic() - began, interrupted=interrupted)

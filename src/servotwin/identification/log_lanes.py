@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.free import Space
-from servotwin.identification.point import DELAY_SCALE, OFFSET_SCALE, SAG_SCALE, SPEED_SCALE, Part, Point
+from servotwin.identification.point import DELAY_SCALE, OFFSET_SCALE, SAG_SCALE, SPEED_SCALE, LogPart, Point
 
 if TYPE_CHECKING:
     from servotwin.identification.forecast import Forecast
@@ -44,13 +44,13 @@ class LogLanes:
         self.signal = self.case.signal
         self.delayed = sides > 0 and ("delay" in forecast.extra or "log_delay" in names)
         self.needs_rate = self.delayed and any(name != "output_angle" for name in self.case.places)
-        self.part: Part
+        self.part: LogPart
 
     def fail(self) -> None:
         """Make a part that is nan."""
         m, own = self.case.count, len(self.names)
         width = self.forecast.size if self.sides else 0
-        self.part = Part(np.full(m, np.nan), np.full((m, width), np.nan),
+        self.part = LogPart(np.full(m, np.nan), np.full((m, width), np.nan),
                          np.full((m, own if self.sides else 0), np.nan))
 
     def take(self, signals: dict[str, Array], early: Array, later: float) -> None:
@@ -90,9 +90,9 @@ class LogLanes:
             own.append(np.column_stack(columns) if columns else np.zeros((len(place), 0)))
         residual = np.concatenate(residuals)
         if not self.sides:
-            self.part = Part(residual, np.zeros((len(residual), 0)), np.zeros((len(residual), 0)))
+            self.part = LogPart(residual, np.zeros((len(residual), 0)), np.zeros((len(residual), 0)))
             return
-        self.part = Part(residual, np.concatenate(shared), np.concatenate(own))
+        self.part = LogPart(residual, np.concatenate(shared), np.concatenate(own))
 
     def _sloped(self, y: Array) -> Array:
         """Return the derivatives of the lanes' signals by every varied number, a row each."""

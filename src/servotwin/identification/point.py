@@ -35,7 +35,7 @@ class Point(NamedTuple):
     own: tuple[Array, ...]
 
 
-class Part(NamedTuple):
+class LogPart(NamedTuple):
     """What one log says: simulated less measured, and the derivatives of that.
 
     Parameters

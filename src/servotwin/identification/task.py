@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.arrow import Loss, Outcome, Prior, Search
 from servotwin.identification.forecast import Forecast
-from servotwin.identification.point import DELAY_SCALE, MOST_DELAY, OFFSET_SCALE, SAG_SCALE, Part, Point
+from servotwin.identification.point import DELAY_SCALE, MOST_DELAY, OFFSET_SCALE, SAG_SCALE, LogPart, Point
 
 Array = NDArray[np.float64]
 
@@ -142,7 +142,7 @@ class Task:
         scaled = [replace(outcome, cost=cost) for outcome, cost in zip(good, costs, strict=True)]
         return sorted(scaled, key=lambda outcome: outcome.cost)
 
-    def _set_noise(self, parts: Sequence[Part], cases: Sequence[int]) -> float:
+    def _set_noise(self, parts: Sequence[LogPart], cases: Sequence[int]) -> float:
         """Take the noise of each sensor from its residuals; return by which share it changed."""
         if self.noise is not None:
             new = {name: self.noise.get(name, self.forecast.noise[name]) for name in self.forecast.sensors}
@@ -152,7 +152,7 @@ class Task:
         self.forecast.noise = self.forecast.noise | new
         return change
 
-    def _spread(self, parts: Sequence[Part], cases: Sequence[int]) -> dict[str, float]:
+    def _spread(self, parts: Sequence[LogPart], cases: Sequence[int]) -> dict[str, float]:
         """Return the noise of each sensor: the median magnitude of its residuals, as of a normal law (SI)."""
         gathered: dict[str, list[Array]] = {}
         for k, part in zip(cases, parts, strict=True):
@@ -176,7 +176,7 @@ class Task:
         return np.asarray((x <= self.lower + 1e-9) | (x >= self.upper - 1e-9))
 
 
-def by_sensor(forecast: Forecast, k: int, part: Part) -> dict[str, Array]:
+def by_sensor(forecast: Forecast, k: int, part: LogPart) -> dict[str, Array]:
     """Return the residuals of a log by sensor (SI)."""
     found, first = {}, 0
     for name, place in forecast.cases[k].places.items():

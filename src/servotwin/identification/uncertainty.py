@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.arrow import Loss, Prior
-from servotwin.identification.point import Part
+from servotwin.identification.point import LogPart
 
 Array = NDArray[np.float64]
 
@@ -81,12 +81,12 @@ class Uncertainty:
         return float(ndtri(tail)) if math.isinf(self.freedom) else float(stdtrit(self.freedom, tail))
 
 
-def rows_of(part: Part, loss: Loss, own: Prior, at: Array) -> Rows:
+def rows_of(part: LogPart, loss: Loss, own: Prior, at: Array) -> Rows:
     """Return what a log says of the shared numbers.
 
     Parameters
     ----------
-    part : Part
+    part : LogPart
         With central derivatives.
     loss : Loss
     own : Prior

@@ -18,7 +18,7 @@ from servotwin.identification.forecast import Forecast
 from servotwin.identification.free import Space
 from servotwin.identification.holdout import ErrorTable, log_error
 from servotwin.identification.log import ANGLES, Log
-from servotwin.identification.point import NUISANCES, SHARED, Part, Point
+from servotwin.identification.point import NUISANCES, SHARED, LogPart, Point
 from servotwin.identification.task import HUBER, Task, by_sensor
 from servotwin.models import MODELS, Model, PulseServo
 from servotwin.parameters import Servo
@@ -210,14 +210,14 @@ def _as_measured(forecast: Forecast, point: Point, start: Point) -> Point:
     return Point(point.shared, tuple(own))
 
 
-def _failures(forecast: Forecast, parts: Sequence[Part]) -> None:
+def _failures(forecast: Forecast, parts: Sequence[LogPart]) -> None:
     for case, part in zip(forecast.cases, parts, strict=True):
         if not np.isfinite(part.residual).all():
             raise InputError(f"log {case.log.name!r}", got="a simulation that does not reach its end",
                              allowed="a servo and a load that can be simulated")
 
 
-def _noise(forecast: Forecast, parts: Sequence[Part]) -> dict[str, float]:
+def _noise(forecast: Forecast, parts: Sequence[LogPart]) -> dict[str, float]:
     """Return how far the residuals of each sensor scatter (SI): their median magnitude, as of a normal law."""
     gathered: dict[str, list[Array]] = {}
     for k, part in enumerate(parts):
@@ -230,7 +230,7 @@ def _noise(forecast: Forecast, parts: Sequence[Part]) -> dict[str, float]:
     return {**forecast.noise, **found}
 
 
-def _trace(forecast: Forecast, k: int, part: Part) -> Trace:
+def _trace(forecast: Forecast, k: int, part: LogPart) -> Trace:
     case = forecast.cases[k]
     name = next(name for name in ANGLES if name in case.places)
     measured = case.values[name]

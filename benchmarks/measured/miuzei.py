@@ -1,0 +1,58 @@
+"""The Miuzei 25 kg servo with an arm: four folds, each fitted on three quarters of the runs and held against the rest."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+from tables import folds, row
+
+import servotwin as st
+
+REDUCTION = 300.0  # assumed: only products with it act
+START = {
+    "motor": {"armature_resistance": 1.5, "torque_constant": 1.0 / REDUCTION, "back_emf_constant": 1.0 / REDUCTION,
+              "rotor_inertia": 0.012 / REDUCTION**2, "motor_viscous_friction": 0.0},
+    "gear": {"gear_reduction": REDUCTION},
+    "friction": {"coulomb_torque_forward": 0.3 / REDUCTION, "coulomb_torque_backward": 0.3 / REDUCTION},
+    "electronics": {"stretcher_gain": 75.0, "one_shot_slope": 1.0 / 850.0, "one_shot_offset": 0.0, "deadband": 5e-6,
+                    "frame_period": 0.01, "off_state": "brake", "pulse_timeout": 0.03, "pulse_width_min": 3e-4,
+                    "pulse_width_max": 2.7e-3},
+    "potentiometer": {"feedback_gain": 0.85 * 4.0 / 3.0 / np.pi, "feedback_offset": 0.85 * 1.5},
+    "supply": {"open_circuit_voltage": 6.0, "bridge_drop_voltage": 0.2},
+}
+M1 = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
+      "electronics.stretcher_gain", "electronics.deadband", "potentiometer.feedback_gain")
+EXTERNAL, LEAST = "friction.load_friction_external", "electronics.minimum_drive_time"
+TERMS = {EXTERNAL: 0.4, LEAST: 4e-4, "friction.load_friction": 0.1, "electronics.back_emf_injection": 0.01}
+MODELS = {  # label -> terms beyond Coulomb friction
+    "Coulomb friction (M1)": (),
+    "+ least drive time": (LEAST,),
+    "+ friction of any load (M3)": ("friction.load_friction",),
+    "+ friction of the load outside": (EXTERNAL,),
+    "+ both: outside, least drive time": (EXTERNAL, LEAST),
+}
+FOLDS = 4
+
+
+def main(folder: Path) -> None:
+    logs = [log for log in st.read_logs(folder / "miuzei_25kg" / "runs.json") if log.motion != "drop"]
+    servo = st.servo_from_values("miuzei-25kg", START)
+    print(f"Miuzei 25 kg: {len(logs)} runs, {FOLDS} folds by run; rms error of runs that were not fitted [deg], over all "
+          "samples (mean of the runs)")
+    held: dict[str, list[st.identification.LogError]] = {}
+    for label, terms in MODELS.items():
+        began, errors = time.perf_counter(), []
+        start = servo.replace({name: TERMS[name] for name in terms})
+        if EXTERNAL in terms:
+            start = start.replace({"friction.load_friction_motor": 0.01})
+        for names in folds(logs, FOLDS):
+            fit = st.identify(logs, start, free=[*M1, *terms], priors=None, holdout=names, starts=1, intervals=False,
+                              compare_with=() if terms else ("slew",))
+            table = fit.holdout
+            errors += table.errors["PulseServo"]
+            if not terms:
+                held.setdefault("slew", []).extend(table.errors["delay + slew + lag"])
+        if not terms:
+            row("delay + slew + lag", held["slew"])
+        row(label, errors)
+        print(f"  {'':34} {time.perf_counter() - began:.0f} s", flush=True)

@@ -1,0 +1,32 @@
+"""Fits to measured servos: errors on runs that were not fitted, beside simpler models, and what each physics earns.
+
+Needs the measurements, which are not part of the repository: give their folder, or have it at ../shared/data.
+    python benchmarks/measured/run.py [--data FOLDER] [miuzei] [bam] [maccepa]
+"""
+
+import sys
+from pathlib import Path
+
+import bam
+import maccepa
+import miuzei
+
+PARTS = {"miuzei": miuzei.main, "bam": bam.main, "maccepa": maccepa.main}
+DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
+
+
+def main(arguments: list[str]) -> None:
+    folder = DATA
+    if "--data" in arguments:
+        place = arguments.index("--data")
+        folder = Path(arguments[place + 1])
+        arguments = arguments[:place] + arguments[place + 2:]
+    if not folder.is_dir():
+        print(f"measured servos: left out, because there is no {folder}")
+        return
+    for name in arguments or PARTS:
+        PARTS[name](folder)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
