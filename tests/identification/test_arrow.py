@@ -7,10 +7,11 @@ import pytest
 from scipy.optimize import least_squares
 
 from identification.toy_forecast import Toy
-from servotwin.identification.arrow import Block, Loss, Normal, Prior, Search, block
+from servotwin.identification.arrow import _LEAST_GAIN, Block, Loss, Normal, Prior, Search, block
 from servotwin.identification.point import LogPart, Point
 
 T = np.linspace(0.0, 4.0, 31)
+WAVE = np.cos(7.0 * T)
 TRUTH = np.array([1.3, 1.5, 0.4])
 
 
@@ -20,9 +21,9 @@ def decays(logs=4, outliers=0.0, seed=0):
     functions = []
     for k in range(logs):
         a, b, c = TRUTH
-        y = a * np.exp(-b * T) + c * np.sin(3.0 * T) + 0.2 * k - 0.1 * k * np.cos(7.0 * T) + 0.02 * rng.normal(size=len(T))
+        y = a * np.exp(-b * T) + c * np.sin(3.0 * T) + 0.2 * k - 0.1 * k * WAVE + 0.02 * rng.normal(size=len(T))
         y += outliers * (rng.random(len(T)) < 0.1)
-        functions.append(lambda x, o, y=y: (x[0] * np.exp(-x[1] * T) + x[2] * np.sin(3.0 * T) + o[0] + o[1] * np.cos(7.0 * T) - y)
+        functions.append(lambda x, o, y=y: (x[0] * np.exp(-x[1] * T) + x[2] * np.sin(3.0 * T) + o[0] + o[1] * WAVE - y)
                          / 0.02)
     return functions
 
@@ -31,13 +32,20 @@ def rosenbrock(x, own):
     return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
 
 
+class Exact(Search):
+    """The search, to the very end."""
+
+    def run(self, start, **more):
+        return super().run(start, **{"least_gain": 1e-13, **more})
+
+
 def search(functions, size=3, own=2, *, limit=math.inf, prior=None, lower=None, upper=None, belief=(0.0, 0.0),
            **more):
     toy = Toy(functions, size, own, belief)
     prior = prior or Prior(np.zeros(size), np.zeros(size))
     lower = np.full(size, -np.inf) if lower is None else np.asarray(lower)
     upper = np.full(size, np.inf) if upper is None else np.asarray(upper)
-    return Search(toy, Loss(limit), prior, lower, upper, **more)
+    return Exact(toy, Loss(limit), prior, lower, upper, **more)
 
 
 def start(x, logs=4, own=2):
@@ -119,6 +127,18 @@ def test_a_curved_valley():
     np.testing.assert_allclose(bounded.point.shared, [0.8, 0.64], atol=1e-6)
 
 
+@pytest.mark.parametrize("steep", [1.0, 10.0, 100.0, 1000.0])
+@pytest.mark.parametrize("x", [(-1.2, 1.0), (3.0, -4.0)], ids=["left", "right"])
+def test_the_usual_end_is_within_a_tenth_of_a_standard_error(steep, x):
+    """In a valley that is steep and curved too, where steps are refused and the next ones small."""
+    def valley(z, own):
+        return np.array([steep * (z[1] - z[0] ** 2), 1.0 - z[0]])
+
+    outcome = search([valley], 2, 0).run(start(x, 1, 0), least_gain=_LEAST_GAIN, most=200)
+    assert outcome.converged
+    assert outcome.point.shared[0] == pytest.approx(1.0, abs=0.1)  # its standard error is 1
+
+
 def test_numbers_that_are_held_stay():
     functions, prior = decays(), Prior(np.array([0.0, 0.7, 0.0]), np.array([0.0, 1e7, 0.0]))
     held = search(functions, held=np.array([False, True, False])).run(start([0.5, 0.7, 0.0]))
@@ -129,7 +149,7 @@ def test_numbers_that_are_held_stay():
 def test_some_logs_only():
     functions = decays()
     outcome = search(functions, cases=[0, 2]).run(start([0.5, 0.2, 0.0]))
-    x, own, cost = scipy_says([functions[0], functions[2]], [0.5, 0.2, 0.0])
+    x, _, cost = scipy_says([functions[0], functions[2]], [0.5, 0.2, 0.0])
     np.testing.assert_allclose(outcome.point.shared, x, atol=1e-5)
     assert outcome.cost == pytest.approx(cost, rel=1e-8)
     assert (outcome.point.own[1] == 0.0).all()

@@ -108,12 +108,8 @@ def test_no_torque_at_all(logs):
     """Nothing is commanded: nothing can be said, and nothing is divided by it."""
     off = replace(logs[0], torque_on=np.zeros(len(logs[0]), np.bool_))
     refused("torque|counts", [off], model=st.BoundedServo)
-    try:
-        fit = identify([off], TRUTH, free=FREE, nuisance=(), priors=None, starts=1, compare_with=(), holdout=0)
-    except InputError as error:
-        assert "\n" not in str(error)
-    else:
-        assert all(np.isnan(i.lower) or i.lower <= i.upper for i in fit.intervals().values())
+    fit = identify([off], TRUTH, free=FREE, nuisance=(), priors=None, starts=1, compare_with=(), holdout=0)
+    assert set(fit.undetermined) == set(FREE)
 
 
 # --------------------------------------------------------------------------------------- arguments
@@ -135,7 +131,8 @@ def test_no_torque_at_all(logs):
     ({"level": 0.0}, "level"), ({"level": 1.0}, "level"), ({"level": 95}, "level"), ({"level": float("nan")}, "level"),
     ({"level": "high"}, "level"),
     ({"noise": {"output_angle": 0.0}}, "noise"), ({"noise": {"output_angle": -1e-3}}, "noise"),
-    ({"noise": {"output_angle": float("nan")}}, "noise"), ({"noise": {"angle": 1e-3}}, "noise"), ({"noise": 3.0}, "noise"),
+    ({"noise": {"output_angle": float("nan")}}, "noise"), ({"noise": {"angle": 1e-3}}, "noise"),
+    ({"noise": 3.0}, "noise"),
     ({"seed": -1}, "seed"), ({"seed": 1.5}, "seed"), ({"seed": "a"}, "seed"),
     ({"compare_with": ("M2",)}, "compare_with"), ({"compare_with": "slew"}, "compare_with"),
     ({"compare_with": 5}, "compare_with"), ({"progress": 3}, "progress"),

@@ -50,7 +50,7 @@ def test_unequal_motor_constants_become_one():
 
 def test_the_servo_of_a_point_has_its_values():
     s = space(["motor.armature_resistance", "output_inertia"])
-    servo = s.servo_at(s.start + [np.log(2.0), np.log(3.0)])
+    servo = s.servo_at(s.start + np.log([2.0, 3.0]))
     assert servo.motor.armature_resistance == pytest.approx(2.0 * TRUTH.motor.armature_resistance)
     assert servo.motor.rotor_inertia == pytest.approx(3.0 * TRUTH.motor.rotor_inertia)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from identification.synthetic_logs import TRUTH, noisy, run
+from identification.synthetic_logs import PENDULUM, TRUTH, noisy, run
 from servotwin.identification import identify
 from servotwin.identification.free import nominal
 
@@ -31,7 +31,8 @@ def some(servo=TRUTH, std=STD, motions=MOTIONS, **more):
 
 
 def fitted(logs, servo=TRUTH, **more):
-    return identify(logs, servo, **{"free": FREE, "priors": None, "starts": 1, "compare_with": (), "holdout": 0, **more})
+    plain = {"free": FREE, "priors": None, "starts": 1, "compare_with": (), "holdout": 0}
+    return identify(logs, servo, **{**plain, **more})
 
 
 def true(name, servo=TRUTH):
@@ -101,7 +102,7 @@ def test_outliers(loss):
         spoilt.append(replace(log, measured={"output_angle": angle}))
     found = fitted(spoilt, loss=loss)
     off = abs(found.estimates["angle_offset"])
-    assert off < 5e-4 if loss == "huber" else off > 4e-3
+    assert off < 1.5e-3 if loss == "huber" else off > 4e-3
 
 
 def test_what_priors_say_holds_where_logs_say_less():
@@ -183,8 +184,9 @@ def test_stretches_without_torque(kind):
     torque = np.ones(75, np.bool_)
     torque[50:65] = False
     if kind == "bounded":
-        logs = [replace(log, torque_on=torque, measured={"output_angle": np.where(
-            np.arange(75) < 50, log.measured["output_angle"], 0.9 * log.measured["output_angle"])}) for log in some(model=model)]
+        sagging = np.where(np.arange(75) < 50, 1.0, 0.9)
+        logs = [replace(log, torque_on=torque, measured={"output_angle": sagging * log.measured["output_angle"]})
+                for log in some(model=model)]
     else:
         logs = some(servo, torque_on=torque)
     near(fitted(logs, servo, model=model, free=free))
@@ -235,9 +237,9 @@ RAW = ["gear.gear_reduction", "motor.torque_constant", "motor.back_emf_constant"
        "friction.coulomb_torque_forward", "friction.coulomb_torque_backward"]
 
 
-def test_a_reduction_has_no_interval_from_motion_alone(logs):
+def test_a_reduction_has_no_interval_from_motion_alone():
     """N k_t, N k_b, N² J and N F are what the output shaft sees: five products of six numbers."""
-    found = fitted(logs, free=RAW)
+    found = fitted(some(load=PENDULUM), free=RAW)
     (item,) = found.unidentifiable
     assert set(item.parameters) == set(RAW)
     step = dict(zip(item.parameters, item.direction, strict=True))
@@ -264,17 +266,41 @@ def free_shaft():
     return some(load=None, motions=("step", "prbs"), signals=("output_angle", "supply_current"))
 
 
-SCALED = ["motor.armature_resistance", "motor.torque_constant", "motor.rotor_inertia", "output_coulomb_torque"]
+SCALED = ["motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque"]
+
+
+def test_without_a_load_torques_are_known_up_to_a_factor(free_shaft):
+    """K² / R, J and F go together: only 1/R per J and F per J are seen, and K by the speed."""
+    angle = [replace(log, measured={"output_angle": log.measured["output_angle"]}) for log in free_shaft]
+    (item,) = fitted(angle, free=SCALED).unidentifiable
+    assert set(item.parameters) == {SCALED[0], *SCALED[2:]}
+    assert len(item.combinations) == 2
+    assert any("current" in text for text in item.remedies)
+    assert "would separate them" in str(item)
+
+
+def test_a_current_that_is_sampled_between_pulses_misleads_no_search(free_shaft):
+    """Beside the angle a pulsed current, noise and all: the delay is found as well as from the angle alone."""
+    rng = np.random.default_rng(6)
+    logs = [replace(log, measured={**log.measured, "supply_current": log.measured["supply_current"]
+                                   + 0.02 * rng.normal(size=len(log))}) for log in free_shaft]
+    found = fitted(logs, free=SCALED)
+    assert found.estimates["delay"] == pytest.approx(0.05, abs=1e-3)
+    assert found.noise["output_angle"] < 2.0 * STD
 
 
 def test_a_sensor_that_is_named_as_a_remedy_is_one(free_shaft):
     angle = [replace(log, measured={"output_angle": log.measured["output_angle"]}) for log in free_shaft]
-    found = fitted(angle, free=SCALED)
-    (item,) = found.unidentifiable
-    assert set(item.parameters) == set(SCALED)
-    assert any("current" in text for text in item.remedies)
-    assert "would separate them" in str(item)
-    assert fitted(free_shaft, free=SCALED).unidentifiable == ()
+    (item,) = fitted(angle, free=SCALED).unidentifiable
+    sensor = {"a motor current measurement": "armature_current", "a supply current measurement": "supply_current"}
+    for text in item.remedies:
+        logs = some(load=None, motions=("step", "prbs"), signals=("output_angle", sensor[text]), delay=0.0)
+        rng = np.random.default_rng(1)
+        logs = [replace(log, measured={**log.measured, sensor[text]: log.measured[sensor[text]]
+                                       + 0.02 * rng.normal(size=len(log))}) for log in logs]
+        found = fitted(logs, free=SCALED, nuisance=("angle_offset", "initial_state"))
+        assert found.unidentifiable == ()
+        near(found)
 
 
 def test_a_load_that_is_named_as_a_remedy_is_one(free_shaft):

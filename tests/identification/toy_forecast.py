@@ -26,7 +26,7 @@ class Toy:
         return np.full(self.own, self.belief[0]), np.full(self.own, self.belief[1])
 
     def at(self, point: Point, *, derivatives: bool = True, cases: Sequence[int] | None = None, **_: Any,
-           ) -> list[Part]:
+           ) -> list[LogPart]:
         self.calls += 1
         found = []
         for k in self.cases if cases is None else cases:
@@ -42,5 +42,5 @@ class Toy:
             found.append(LogPart(residual, shared, own))
         return found
 
-    def at_all(self, points: Sequence[Point], *, cases: Sequence[int] | None = None, **_: Any) -> list[list[Part]]:
+    def at_all(self, points: Sequence[Point], *, cases: Sequence[int] | None = None, **_: Any) -> list[list[LogPart]]:
         return [self.at(point, derivatives=False, cases=cases) for point in points]

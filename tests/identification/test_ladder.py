@@ -1,0 +1,153 @@
+"""The friction laws one after the other: the simplest that predicts, and what happens beyond."""
+
+import math
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from identification.synthetic_logs import TRUTH, noisy, run
+from servotwin.errors import InputError
+from servotwin.identification import RUNGS, friction_ladder
+from servotwin.identification.ladder import Rung, _choice
+
+FREE = ["motor.armature_resistance", "output_inertia", "electronics.stretcher_gain"]
+PLAIN = {"starts": 1, "priors": None, "nuisance": ("delay", "angle_offset", "initial_state")}
+LOADED = TRUTH.replace({"friction.load_friction": 0.35})
+
+
+def logs(servo, std=1e-3, count=12, noise=0, duration=1.0):
+    """Return logs under loads that push either way: load friction shows where the load changes."""
+    some = []
+    for k in range(count):
+        load = st.loads.Inertia(5e-3) + st.loads.Constant((0.0, 0.3, -0.3, 0.5)[k % 4])
+        log = run(servo, ("step", "prbs", "triangle")[k % 3], seed=k, load=load, delay=0.03, duration=duration,
+                  kind="pulse_width", name=f"{k}")
+        some.append(noisy(log, std, seed=(noise, k)))
+    return some
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return friction_ladder(logs(TRUTH), TRUTH, free=FREE, rungs=("M1", "M3"), **PLAIN)
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return friction_ladder(logs(LOADED), TRUTH, free=FREE, rungs=("M1", "M3"), **PLAIN)
+
+
+def test_coulomb_and_viscous_friction_is_enough_where_there_is_no_more(plain):
+    assert plain.chosen == "M1"
+    assert "simplest" in plain.reason or "smallest" in plain.reason
+    assert plain.fit is plain["M1"].fit
+
+
+def test_load_friction_is_found_where_there_is_some(loaded):
+    assert loaded.chosen == "M3"
+    assert loaded["M1"].holdout > 2.0 * loaded["M3"].holdout
+    interval = loaded["M3"].fit.intervals()["friction.load_friction"]
+    assert interval.lower < 0.35 < interval.upper or abs(
+        loaded["M3"].fit.estimates["friction.load_friction"] - 0.35) < 0.02
+
+
+def test_the_criterion_chooses_the_same_here():
+    rungs = ("M1", "M3")
+    for servo, expected in ((TRUTH, "M1"), (LOADED, "M3")):
+        ladder = friction_ladder(logs(servo, count=6), TRUTH, free=FREE, rungs=rungs, select="criterion", holdout=0,
+                                 **PLAIN)
+        assert ladder.chosen == expected
+        assert ladder.reason == "smallest information criterion"
+        assert all(math.isnan(rung.holdout) for rung in ladder.rungs)
+
+
+def test_more_terms_fit_what_is_fitted_at_least_as_well(plain, loaded):
+    for ladder in (plain, loaded):
+        assert ladder["M3"].training < 1.001 * ladder["M1"].training
+
+
+def test_each_rung_searches_its_own_terms(plain, loaded):
+    for ladder in (plain, loaded):
+        for rung in ladder.rungs:
+            assert set(rung.fit.names) == {*FREE, *RUNGS[rung.name], "delay", "angle_offset"}
+            servo = rung.fit.servo
+            for term in ("friction.load_friction", "friction.stribeck_speed", "friction.load_friction_stribeck"):
+                assert (servo.get(term) is not None) == (term in RUNGS[rung.name]), (rung.name, term)
+
+
+def test_errors_are_those_of_the_fits(plain):
+    for rung in plain.rungs:
+        assert rung.training == rung.fit.training.total()["PulseServo"]
+        assert rung.holdout == rung.fit.holdout.total()["PulseServo"]
+    assert plain["M1"].fit.holdout.logs == plain["M3"].fit.holdout.logs
+
+
+@pytest.mark.slow
+def test_all_rungs_on_few_logs():
+    """Six laws on four short logs: each begins where a simpler one ended, and the noise is all that is left to fit."""
+    ladder = friction_ladder(logs(LOADED, count=6, duration=0.6), TRUTH, free=FREE, intervals=False,
+                             holdout=["4", "5"], **PLAIN)
+    assert [rung.name for rung in ladder.rungs] == list(RUNGS)
+    for rung in ladder.rungs:
+        assert set(rung.fit.names) == {*FREE, *RUNGS[rung.name], "delay", "angle_offset"}
+        for inner in ladder.rungs:
+            if set(RUNGS[inner.name]) <= set(RUNGS[rung.name]):
+                assert rung.training < 1.02 * inner.training
+    assert ladder.chosen not in ("M1", "M2")
+    assert ladder["M6"].training < 1.02 * ladder["M3"].training < 0.6 * ladder["M1"].training
+
+
+# --------------------------------------------------------------------------- the choice among given errors
+
+class _Fit:
+    """As much of a fit as a choice reads."""
+
+    def __init__(self, errors):
+        from servotwin.identification import ErrorTable, LogError
+
+        self.model = st.PulseServo(TRUTH)
+        self.holdout = ErrorTable(("PulseServo",), {"PulseServo": tuple(
+            LogError(f"{k}", "step", {}, e, e, 100) for k, e in enumerate(errors))})
+
+
+def rung(name, holdout, training=0.01, criterion=0.0):
+    return Rung(name, _Fit(holdout), training, float(np.sqrt(np.mean(np.square(holdout)))) if holdout else math.nan,
+                criterion)
+
+
+def test_the_simplest_within_one_standard_error_of_the_best_is_chosen():
+    """M3 is better by far, M4 a little and not on every log: M3."""
+    rungs = [rung("M1", [0.03, 0.04, 0.05, 0.03]), rung("M3", [0.010, 0.012, 0.011, 0.013]),
+             rung("M4", [0.0101, 0.0119, 0.0112, 0.0126])]
+    assert _choice(rungs, "holdout")[0] == "M3"
+    assert "M4" in _choice(rungs, "holdout")[1]
+
+
+def test_a_small_gain_on_every_log_is_one():
+    rungs = [rung("M1", [0.0120, 0.0221, 0.0319, 0.0420]), rung("M2", [0.0110, 0.0211, 0.0310, 0.0411])]
+    assert _choice(rungs, "holdout") == ("M2", "smallest error on logs that were held out")
+
+
+def test_overfitting_is_shown_and_not_chosen():
+    """M6 is best on what it was fitted to, and worse on others."""
+    rungs = [rung("M1", [0.011, 0.012, 0.010], training=0.010), rung("M6", [0.030, 0.020, 0.025], training=0.002)]
+    assert [r.overfits for r in rungs] == [False, True]
+    assert _choice(rungs, "holdout")[0] == "M1"
+
+
+def test_without_logs_held_out_the_criterion_decides():
+    rungs = [rung("M1", [], criterion=-10.0), rung("M2", [], criterion=-12.0)]
+    assert _choice(rungs, "holdout") == ("M2", "smallest information criterion")
+
+
+@pytest.mark.parametrize(("more", "words"), [({"rungs": ("M7",)}, "rungs"), ({"rungs": ()}, "at least one rung"),
+                                             ({"select": "best"}, "criterion"), ({"rungs": "M1"}, "rungs")],
+                         ids=["unknown", "none", "select", "text"])
+def test_what_makes_no_sense_is_refused(more, words):
+    with pytest.raises(InputError, match=words):
+        friction_ladder(logs(TRUTH, count=1), TRUTH, **more)
+
+
+def test_a_rung_that_is_not_there_is_named(plain):
+    with pytest.raises(InputError, match="M1, M3"):
+        plain["M6"]
