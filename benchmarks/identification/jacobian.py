@@ -13,9 +13,9 @@ from common import best
 
 import servotwin as st
 from servotwin.identification import Log
-from servotwin.identification.forecast import Forecast
-from servotwin.identification.free import Space
-from servotwin.identification.point import Point
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.point import Point
 from servotwin.loads import Load
 from servotwin.models import Model
 

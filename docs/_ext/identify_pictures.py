@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import servotwin as st
-from servotwin.identification.baselines import fit_slew_lag
+from servotwin.identification.fitting.baselines import fit_slew_lag
 from servotwin.units.look import COLOURS, LINES, WIDTH, context, finished, new_figure
 
 DOCS = Path(__file__).resolve().parents[1]

@@ -19,7 +19,6 @@ from servotwin.identification import friction_ladder as friction_ladder
 from servotwin.identification import identify as identify
 from servotwin.identification import read_logs as read_logs
 from servotwin.identification import servo_from_sheet as servo_from_sheet
-from servotwin.identification import validate as validate
 from servotwin.models import AveragedServo as AveragedServo
 from servotwin.models import AveragedServoInductive as AveragedServoInductive
 from servotwin.models import BoundedServo as BoundedServo

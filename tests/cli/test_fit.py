@@ -138,7 +138,7 @@ def test_a_bench_table(cli, tmp_path):
 
 
 def test_an_interrupt_keeps_the_best_so_far(fit, tmp_path, monkeypatch):
-    from servotwin.identification.arrow import Search
+    from servotwin.identification.fitting.arrow import Search
 
     run, steps = Search.run, []
 
@@ -164,7 +164,7 @@ def test_an_interrupt_keeps_the_best_so_far(fit, tmp_path, monkeypatch):
 
 
 def test_an_interrupt_before_the_first_step_leaves_nothing(fit, tmp_path, monkeypatch):
-    from servotwin.identification.arrow import Search
+    from servotwin.identification.fitting.arrow import Search
 
     def interrupted(self, *arguments, **more):
         raise KeyboardInterrupt
@@ -211,7 +211,7 @@ def test_bad_words(fit, tmp_path, words, said):
 
 
 def test_files_are_checked_before_anything_runs(fit, tmp_path, monkeypatch):
-    monkeypatch.setattr("servotwin.identification.identify", None)
+    monkeypatch.setattr("servotwin.identification.fitting.identify", None)
     (tmp_path / "my.toml").write_text("mine")
     for words in (["--out", "my.toml"], ["--report", "my.html", "--out", "my.toml"]):
         assert "exists already" in fit(*QUICK, *words).error

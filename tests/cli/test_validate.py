@@ -8,7 +8,7 @@ import pytest
 import servotwin as st
 from cli import fit_logs
 from servotwin.identification import read_logs
-from servotwin.identification.validate import validate
+from servotwin.identification.fitting.validate import validate
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from identification.toy_forecast import Toy
-from servotwin.identification.arrow import _LEAST_GAIN, Block, Loss, Normal, Prior, Search, block
-from servotwin.identification.point import LogPart, Point
+from servotwin.identification.fitting.arrow import _LEAST_GAIN, Block, Loss, Normal, Prior, Search, block
+from servotwin.identification.fitting.point import LogPart, Point
 
 T = np.linspace(0.0, 4.0, 31)
 WAVE = np.cos(7.0 * T)

@@ -7,10 +7,10 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from identification.toy_forecast import Toy
-from servotwin.identification.arrow import Loss, Prior, Search
-from servotwin.identification.intervals import ends
-from servotwin.identification.point import Point
-from servotwin.identification.uncertainty import Uncertainty, rows_of, uncertainty
+from servotwin.identification.fitting.arrow import Loss, Prior, Search
+from servotwin.identification.fitting.intervals import ends
+from servotwin.identification.fitting.point import Point
+from servotwin.identification.fitting.uncertainty import Uncertainty, rows_of, uncertainty
 
 T = np.linspace(0.05, 1.0, 12)
 LEVEL = 0.95

@@ -9,7 +9,7 @@ import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.errors import InputError
 from servotwin.identification import RUNGS, friction_ladder
-from servotwin.identification.ladder import Rung, _choice
+from servotwin.identification.fitting.ladder import Rung, _choice
 
 FREE = ["motor.armature_resistance", "output_inertia", "electronics.stretcher_gain"]
 PLAIN = {"starts": 1, "priors": None, "nuisance": ("delay", "angle_offset", "initial_state")}

@@ -11,9 +11,12 @@ import pytest
 import servotwin as st
 from cli import fit_logs
 from servotwin.errors import OutputExistsError
-from servotwin.identification import identify, report, report_pictures, report_traces
-from servotwin.identification.shown import dimension_of_free, error_rows, estimate_lines, nominal_of, tables_of
-from servotwin.identification.words import Unidentifiable
+from servotwin.identification import identify
+from servotwin.identification.fitting.words import Unidentifiable
+from servotwin.identification.report import page as report
+from servotwin.identification.report import pictures as report_pictures
+from servotwin.identification.report import traces as report_traces
+from servotwin.identification.report.shown import dimension_of_free, error_rows, estimate_lines, nominal_of, tables_of
 from servotwin.units import from_si
 from servotwin.units.look import figure_in, unit_for
 

@@ -6,9 +6,9 @@ import re
 import numpy as np
 import pytest
 
-from servotwin.identification.arrow import Loss, Prior
-from servotwin.identification.point import LogPart
-from servotwin.identification.uncertainty import Rows, rows_of, uncertainty
+from servotwin.identification.fitting.arrow import Loss, Prior
+from servotwin.identification.fitting.point import LogPart
+from servotwin.identification.fitting.uncertainty import Rows, rows_of, uncertainty
 
 NONE = Prior(np.zeros(1), np.zeros(1))
 

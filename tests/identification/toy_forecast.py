@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from servotwin.identification.point import LogPart, Point
+from servotwin.identification.fitting.point import LogPart, Point
 
 Array = Any
 

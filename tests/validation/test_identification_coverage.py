@@ -11,7 +11,7 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import ENCODER, PENDULUM, TRUTH, noisy, run
 from servotwin.identification import identify
-from servotwin.identification.free import nominal
+from servotwin.identification.fitting.free import nominal
 
 FREE = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
         "electronics.stretcher_gain")

@@ -166,7 +166,7 @@ def _search(servo: str, model: str, change: list[str], free: list[str] | None, b
             priors: bool) -> _Search:
     from servotwin.cli import fit_words
     from servotwin.cli.settings import settings
-    from servotwin.identification.checks import usual_free
+    from servotwin.identification.fitting.checks import usual_free
     from servotwin.parameters import load_servo
 
     kind = fit_words.model_of(model)
@@ -189,7 +189,7 @@ def _read(paths: list[Path], file_format: str, leave_out: list[str]) -> list[Log
 def _options(given: dict[str, Any]) -> dict[str, Any]:
     """Return the options of `identify` that words say."""
     from servotwin.cli import fit_words
-    from servotwin.identification.identify import NUISANCE
+    from servotwin.identification.fitting.identify import NUISANCE
 
     return {
         "holdout": fit_words.held_out(given["holdout"]), "sensors": fit_words.names(given["sensors"]),

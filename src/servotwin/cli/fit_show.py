@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from servotwin.cli.terminal import pairs, table
-from servotwin.identification.shown import (
+from servotwin.identification.report.shown import (
     MODELS,
     error_rows,
     error_shown,
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from servotwin.identification import Advice, Fit, Ladder
-    from servotwin.identification.fit import Trace
-    from servotwin.identification.holdout import ErrorTable
+    from servotwin.identification.fitting.fit import Trace
+    from servotwin.identification.fitting.holdout import ErrorTable
 
 _MOST_EXPERIMENTS = 8
 

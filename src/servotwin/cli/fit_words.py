@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 from servotwin import units
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
-from servotwin.identification.free import Space, nominal
-from servotwin.identification.shown import dimension_of_free
+from servotwin.identification.fitting.free import Space, nominal
+from servotwin.identification.report.shown import dimension_of_free
 from servotwin.simulation.sweep.distributions import Distribution, Normal, Offset, Relative, Uniform
 from servotwin.simulation.sweep.words import distribution_of
 

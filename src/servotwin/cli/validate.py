@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from servotwin.cli.outputs import Target
-    from servotwin.identification.validate import Validation
+    from servotwin.identification.fitting.validate import Validation
     from servotwin.models import Model
 
 _EXCEEDED = 1  # exit code
@@ -75,7 +75,7 @@ def _run(servo: str, model: str | None, change: list[str], logs: list[Path], fil
          nuisance: list[str] | None, sensors: list[str] | None) -> Validation:
     from servotwin.cli import fit_words
     from servotwin.cli.settings import settings
-    from servotwin.identification.validate import validate as run
+    from servotwin.identification.fitting.validate import validate as run
     from servotwin.parameters import load_servo
 
     kind: type[Model] | None = None if model is None else fit_words.model_of(model)
@@ -142,7 +142,7 @@ def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str |
 def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str | None, float],
               files: list[str]) -> list[RenderableType]:
     from servotwin.cli import fit_show
-    from servotwin.identification.shown import error_shown, rig_text
+    from servotwin.identification.report.shown import error_shown, rig_text
 
     tables = {"": found.errors}
     rig = [rig_text(name, value) + (" (fitted)" if name in found.fitted else "")
@@ -162,7 +162,7 @@ def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str
 
 
 def _log_table(found: Validation) -> Any:
-    from servotwin.identification.shown import error_unit
+    from servotwin.identification.report.shown import error_unit
 
     errors = found.errors.errors[found.errors.models[0]]
     signals = {trace.log.name: trace.signal for trace in found.traces}

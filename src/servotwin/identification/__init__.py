@@ -1,29 +1,29 @@
 """What a servo is, from logs of what it did: parameters with intervals."""
 
-from servotwin.identification.advise import Advice, Experiment, advise
-from servotwin.identification.bam_convention import BamConvention
-from servotwin.identification.bam_logs import read_bam_log, write_bam_log
-from servotwin.identification.bam_parameters import read_bam_parameters, write_bam_parameters
-from servotwin.identification.csv_logs import read_csv_log, write_log
-from servotwin.identification.fit import Fit, Interval, Start, Trace
-from servotwin.identification.forecast import Forecast
-from servotwin.identification.free import LUMPED, FreeParameter, Space
-from servotwin.identification.holdout import ErrorTable, LogError
-from servotwin.identification.identify import identify
-from servotwin.identification.ladder import RUNGS, Ladder, Rung, friction_ladder
-from servotwin.identification.log import Log
-from servotwin.identification.miuzei import read_miuzei_logs
-from servotwin.identification.point import LogPart, Point
-from servotwin.identification.readers import read_logs
-from servotwin.identification.sheet import Sheet, SheetPoint
-from servotwin.identification.sheet_csv import SheetList, read_sheets
-from servotwin.identification.sheet_file import servo_file_text, sheet_of, sheet_table, write_servo_text
-from servotwin.identification.sheet_motor import MotorRange, Range, motor_range
-from servotwin.identification.sheet_servo import servo_from_sheet
-from servotwin.identification.sheet_words import Contradiction, sheet_contradictions, sheet_flags
-from servotwin.identification.uncertainty import Uncertainty
-from servotwin.identification.validate import Validation, validate
-from servotwin.identification.words import Unidentifiable
+from servotwin.identification.fitting.advise import Advice, Experiment, advise
+from servotwin.identification.fitting.fit import Fit, Interval, Start, Trace
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
+from servotwin.identification.fitting.holdout import ErrorTable, LogError
+from servotwin.identification.fitting.identify import identify
+from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder
+from servotwin.identification.fitting.point import LogPart, Point
+from servotwin.identification.fitting.uncertainty import Uncertainty
+from servotwin.identification.fitting.validate import Validation, validate
+from servotwin.identification.fitting.words import Unidentifiable
+from servotwin.identification.logs.bam_convention import BamConvention
+from servotwin.identification.logs.bam_logs import read_bam_log, write_bam_log
+from servotwin.identification.logs.bam_parameters import read_bam_parameters, write_bam_parameters
+from servotwin.identification.logs.csv_logs import read_csv_log, write_log
+from servotwin.identification.logs.log import Log
+from servotwin.identification.logs.miuzei import read_miuzei_logs
+from servotwin.identification.logs.readers import read_logs
+from servotwin.identification.sheets.contradictions import Contradiction, sheet_contradictions, sheet_flags
+from servotwin.identification.sheets.csv_sheets import SheetList, read_sheets
+from servotwin.identification.sheets.motor_range import MotorRange, Range, motor_range
+from servotwin.identification.sheets.servo_of_sheet import servo_from_sheet
+from servotwin.identification.sheets.sheet import Sheet, SheetPoint
+from servotwin.identification.sheets.sheet_file import servo_file_text, sheet_of, sheet_table, write_servo_text
 
 __all__ = [
     "LUMPED",

@@ -1,0 +1,229 @@
+"""Bounded nonlinear least squares whose normal matrix is an arrow: a few shared numbers, and a few of each log alone.
+
+Levenberg-Marquardt after Moré (1978) with bounds by projection. The numbers of each log are eliminated first (Schur
+complement), so that memory and time grow with the number of logs and not with its cube; no library in use here does.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.point import LogPart, Point
+
+Array = NDArray[np.float64]
+
+_LEAST_STEP = 1e-7  # of a searched number
+_LEAST_GAIN = 1e-3  # of the cost, half a sum of squares in units of noise: a twentieth of a standard error
+
+
+@dataclass(frozen=True)
+class Loss:
+    """How large residuals count: squared, or beyond `limit` times the noise only in proportion (Huber 1964).
+
+    Parameters
+    ----------
+    limit : float
+        inf for plain least squares.
+    """
+
+    limit: float = math.inf
+
+    def cost(self, residual: Array) -> float:
+        """Return half the sum of squares, or what stands for it."""
+        a = np.abs(residual)
+        beyond = a > self.limit
+        if not beyond.any():
+            return 0.5 * float(residual @ residual)
+        return float(0.5 * (a[~beyond] ** 2).sum() + (self.limit * (a[beyond] - 0.5 * self.limit)).sum())
+
+    def weight(self, residual: Array) -> Array:
+        """Return the weight of each squared residual."""
+        return np.asarray(np.minimum(1.0, self.limit / np.maximum(np.abs(residual), 1e-300)))
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Normal beliefs about some numbers: mean, and one over the standard deviation (0: none)."""
+
+    mean: Array
+    weight: Array
+
+    def cost(self, numbers: Array) -> float:
+        """Return half the sum of squares."""
+        return 0.5 * float((((numbers - self.mean) * self.weight) ** 2).sum())
+
+
+class Block(NamedTuple):
+    """Normal equations of one log: gradient g and matrix H, of the shared numbers (s) and of its own (o)."""
+
+    g_s: Array
+    g_o: Array
+    H_ss: Array
+    H_so: Array
+    H_oo: Array
+
+
+class Normal(NamedTuple):
+    """The normal equations of all logs; priors included in the shared ones."""
+
+    blocks: tuple[Block, ...]
+    g: Array
+    H: Array
+
+    def reduced(self) -> tuple[Array, Array]:
+        """Return gradient and matrix of the shared numbers, with each log's own eliminated."""
+        g, H = self.g.copy(), self.H.copy()
+        for b in self.blocks:
+            if b.g_o.size:
+                part = np.linalg.solve(_safe(b.H_oo), np.column_stack([b.H_so.T, b.g_o]))
+                H -= b.H_so @ part[:, :-1]
+                g -= b.H_so @ part[:, -1]
+        return g, H
+
+
+def _safe(H: Array) -> Array:
+    """Return a matrix with a hair on its diagonal: a number that a log says nothing about stays where it is."""
+    return np.asarray(H + np.diag(np.maximum(1e-12 * np.diag(H), 1e-12)))
+
+
+def block(part: LogPart, loss: Loss, own: Prior | None = None, at: Array | None = None) -> Block:
+    """Return the normal equations of one log, with the beliefs about its own numbers.
+
+    Examples
+    --------
+    >>> one = LogPart(np.array([1.0, 2.0]), np.array([[1.0], [1.0]]), np.zeros((2, 0)))
+    >>> block(one, Loss()).g_s.tolist()
+    [3.0]
+    """
+    weight = loss.weight(part.residual)
+    shared, alone = part.shared * weight[:, None], part.own * weight[:, None]
+    g_o, H_oo = alone.T @ part.residual, alone.T @ part.own
+    if own is not None and at is not None:
+        g_o, H_oo = g_o + (at - own.mean) * own.weight**2, H_oo + np.diag(own.weight**2)
+    return Block(shared.T @ part.residual, g_o, shared.T @ part.shared, shared.T @ part.own, H_oo)
+
+@dataclass(frozen=True)
+class Outcome:
+    """Where a search ended: the best point, its cost, and whether it converged there."""
+
+    point: Point
+    cost: float
+    converged: bool
+    steps: int
+
+
+Tell = Callable[[int, Outcome], None]
+
+
+class Search:
+    """A least-squares problem over a forecast.
+
+    Parameters
+    ----------
+    forecast : Forecast
+    loss : Loss
+    prior : Prior
+    lower, upper : ndarray, shape (p,)
+        Bounds of the shared numbers.
+    cases : sequence of int, optional
+        Which logs count; all unless given.
+    held : ndarray of bool, shape (p,), optional
+        Shared numbers that stay where they are.
+    """
+
+    def __init__(self, forecast: Forecast, loss: Loss, prior: Prior, lower: Array, upper: Array,
+                 cases: Sequence[int] | None = None, held: NDArray[np.bool_] | None = None) -> None:
+        self.forecast, self.loss, self.prior = forecast, loss, prior
+        self.lower, self.upper = lower, upper
+        self.cases = tuple(range(len(forecast.cases)) if cases is None else cases)
+        beliefs = [forecast.own_belief(forecast.cases[k]) for k in self.cases]
+        self.own = [Prior(mean, weight) for mean, weight in beliefs]
+        self.held = np.zeros(forecast.size, np.bool_) if held is None else held
+
+    def cost_of(self, point: Point, parts: Sequence[LogPart]) -> float:
+        """Return the cost of a point; inf where a simulation failed."""
+        total = sum(self.loss.cost(part.residual) for part in parts) + self.prior.cost(point.shared)
+        total += sum(own.cost(point.own[k]) for k, own in zip(self.cases, self.own, strict=True))
+        return total if math.isfinite(total) else math.inf
+
+    def costs(self, points: Sequence[Point]) -> list[float]:
+        """Return the costs of several points, run in one batch."""
+        return [self.cost_of(point, parts)
+                for point, parts in zip(points, self.forecast.at_all(points, cases=self.cases), strict=True)]
+
+    def normal(self, point: Point, parts: Sequence[LogPart]) -> Normal:
+        """Return the normal equations at a point."""
+        blocks = tuple(block(part, self.loss, own, point.own[k])
+                       for k, part, own in zip(self.cases, parts, self.own, strict=True))
+        off = (point.shared - self.prior.mean) * self.prior.weight**2
+        g = off + np.sum([b.g_s for b in blocks], axis=0)
+        H = np.diag(self.prior.weight**2) + np.sum([b.H_ss for b in blocks], axis=0)
+        return Normal(blocks, g, H)
+
+    def run(self, start: Point, *, most: int = 60, tell: Tell | None = None,
+            least_gain: float = _LEAST_GAIN) -> Outcome:
+        """Search from a point; the best so far is told after each step."""
+        point = Point(np.clip(start.shared, self.lower, self.upper), start.own)
+        parts = self.forecast.at(point, cases=self.cases)
+        best = Outcome(point, self.cost_of(point, parts), False, 0)
+        if not math.isfinite(best.cost):
+            return best
+        damping = 1e-3
+        scale = np.zeros(self.forecast.size)
+        for k in range(1, most + 1):
+            normal = self.normal(best.point, parts)
+            scale = np.maximum(0.5 * scale, np.diag(normal.H))
+            while True:
+                trial, step = self._step(best.point, normal, damping, scale)
+                if step < _LEAST_STEP:
+                    return Outcome(best.point, best.cost, True, k)
+                parts_there = self.forecast.at(trial, cases=self.cases, derivatives=False)
+                cost = self.cost_of(trial, parts_there)
+                if cost <= best.cost:
+                    break
+                damping = max(damping, 1e-6) * 6.0
+                if damping > 1e9:
+                    return Outcome(best.point, best.cost, True, k)
+            damping = max(damping / 8.0, 1e-9)
+            best = Outcome(trial, cost, best.cost - cost < least_gain, k)
+            if tell is not None:
+                tell(k, best)
+            if best.converged:
+                return best
+            parts = self.forecast.at(trial, cases=self.cases)
+        return best
+
+    def _step(self, point: Point, normal: Normal, damping: float, scale: Array) -> tuple[Point, float]:
+        """Return the next point, and the largest change of a number."""
+        damped = Normal(tuple(b._replace(H_oo=b.H_oo + damping * np.diag(np.diag(b.H_oo))) for b in normal.blocks),
+                        normal.g, normal.H + damping * np.diag(scale))
+        g, H = damped.reduced()
+        x = point.shared
+        stays = self.held | ((x <= self.lower) & (g > 0.0)) | ((x >= self.upper) & (g < 0.0))
+        change = np.zeros(len(x))
+        for _ in range(len(x) + 1):  # what a step would push over its bound goes to it, and the rest is solved again
+            moves = ~stays
+            if not moves.any():
+                break
+            of_fixed = H[np.ix_(moves, stays)] @ change[stays]
+            change[moves] = -np.linalg.lstsq(H[np.ix_(moves, moves)], g[moves] + of_fixed, rcond=1e-14)[0]
+            over = moves & ((x + change < self.lower) | (x + change > self.upper))
+            if not over.any():
+                break
+            change[over] = np.clip(x + change, self.lower, self.upper)[over] - x[over]
+            stays = stays | over
+        own = list(point.own)
+        largest = float(np.abs(change).max(initial=0.0))
+        for k, b in zip(self.cases, damped.blocks, strict=True):
+            if b.g_o.size:
+                step = -np.linalg.solve(_safe(b.H_oo), b.g_o + b.H_so.T @ change)
+                own[k] = point.own[k] + step
+                largest = max(largest, float(np.abs(step).max()))
+        return Point(x + change, tuple(own)), largest

@@ -1,0 +1,128 @@
+"""One log, made ready to be compared with a simulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.identification.fitting.free import Space
+from servotwin.identification.logs.log import Log
+from servotwin.models import BoundedServo, Model
+
+if TYPE_CHECKING:
+    from servotwin.signals import Signal
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One log, ready to be compared.
+
+    Parameters
+    ----------
+    log : Log
+    signal : Signal
+        Its command.
+    times : ndarray, shape (k,)
+        Instants that count for any sensor, from the first sample of the log [s].
+    places : mapping of str to ndarray of int
+        Which of them count for a sensor.
+    values : mapping of str to ndarray
+        What that sensor measured there (SI).
+    start : tuple of float
+        Angle [rad] and speed [rad/s] at the first sample as measured.
+    scatter : float
+        How far that angle may be off [rad].
+    moving : bool
+        Whether the start speed differs from 0 visibly.
+    key : tuple
+        Cases of one key run in one batch.
+    """
+
+    log: Log
+    signal: Signal
+    times: Array
+    places: dict[str, NDArray[np.int64]]
+    values: dict[str, Array]
+    start: tuple[float, float]
+    scatter: float
+    moving: bool
+    key: tuple[Any, ...] = field(repr=False)
+
+    @property
+    def count(self) -> int:
+        """Number of measured values that count."""
+        return sum(len(place) for place in self.places.values())
+
+
+def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str]) -> Case:
+    """Return a log ready to be compared.
+
+    Raises
+    ------
+    InputError
+        If the model cannot follow it, or it sets a parameter that is searched.
+    """
+    for name in log.parameters:
+        if name in space.columns(space.start[None, :]):
+            raise InputError(f"free: {name}", got=f"searched, but log {log.name!r} says what it is",
+                             allowed="one of both")
+    time = log.time - log.time[0]
+    used = {name: _usable(log, model, name) for name in sensors if name in log.measured and log.used(name).any()}
+    used = {name: mask for name, mask in used.items() if mask.any()}
+    if not used:
+        raise InputError(f"log {log.name!r}", got="no value of " + ", ".join(sensors) + " that counts",
+                         allowed="measured values outside the windows that are left out")
+    any_used = np.logical_or.reduce(list(used.values()))
+    index = np.cumsum(any_used) - 1
+    places = {name: index[mask] for name, mask in used.items()}
+    values = {name: log.measured[name][mask] for name, mask in used.items()}
+    angle, speed, scatter, moving = _start(log, model)
+    times = time[any_used]
+    overridden = tuple(sorted(name for name in log.parameters))
+    key = (times.tobytes(), log.duration, log.command_kind, overridden, tuple(sorted(places)),
+           log.torque_on is None or bool(log.torque_on.all()))
+    return Case(log=log, signal=_signal(log, model), times=times, places=places, values=values, start=(angle, speed),
+                scatter=scatter, moving=moving, key=key)
+
+
+def _usable(log: Log, model: Model, name: str) -> NDArray[np.bool_]:
+    """Return where a sensor counts; a model without pulses says nothing once the torque was off."""
+    used = log.used(name)
+    if isinstance(model, BoundedServo) and log.torque_on is not None and not log.torque_on.all():
+        used = used & (np.arange(len(log.time)) < int(np.argmin(log.torque_on)))
+    return used
+
+
+def _start(log: Log, model: Model) -> tuple[float, float, float, bool]:
+    """Return angle and speed at the first sample, how far the angle may be off, and whether it moves visibly."""
+    name = log.angle_name
+    used = np.flatnonzero(log.used(name))
+    time, values = log.time[used] - log.time[0], log.measured[name][used]
+    if name == "feedback_voltage":
+        gain, offset = (model.value_or(f"potentiometer.{key}", default) for key, default in
+                        (("feedback_gain", 1.0), ("feedback_offset", 0.0)))
+        values = (values - offset) / gain
+    few = min(5, len(values))
+    slope = float(np.polyfit(time[:few], values[:few], 1)[0]) if few > 2 else 0.0
+    steps = np.abs(np.diff(values))
+    resolution = float(steps[steps > 0.0].min(initial=math.inf)) if len(steps) else 0.0
+    noise = float(np.median(np.abs(np.diff(values, n=2)))) if len(values) > 4 else 0.0
+    moving = abs(slope) * float(time[few - 1] - time[0]) > 6.0 * noise + 2e-3
+    scatter = max(noise, 0.5 * resolution if math.isfinite(resolution) else 0.0, 1e-6)
+    if moving:
+        return float(values[0] - slope * time[0]), slope, 3.0 * scatter, True
+    return float(values[0]), 0.0, scatter, False
+
+
+def _signal(log: Log, model: Model) -> Signal:
+    """Return the command as a model takes it; only a pulse servo knows missing pulses."""
+    made = log.signal(log.parameters.get("electronics.frame_period", getattr(model, "frame_period", None)))
+    return replace(made, edges=None) if made.edges is not None and isinstance(model, BoundedServo) else made

@@ -1,0 +1,193 @@
+"""The arguments of `identify`, checked before anything runs, and what a reader has to know afterwards."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.identification.fitting.arrow import Prior
+from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.point import Point
+from servotwin.identification.logs.log import Log
+from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive
+from servotwin.parameters import Servo
+from servotwin.simulation.lane_loads import LOAD_NAMES
+
+if TYPE_CHECKING:
+    from servotwin.identification.fitting.comparison import Tables
+    from servotwin.identification.fitting.uncertainty import Uncertainty
+
+Array = NDArray[np.float64]
+
+_KINDS = (PulseServo, PulseServoInductive, BoundedServo)
+_FITTED = ("output_angle", "feedback_voltage", "armature_current", "supply_current")
+_TOO_FAST = 4.0  # times the speed without load
+_CONTRADICTS = 3.5  # standard errors between sheet and logs
+_OVERFITTED = 1.6  # error of new logs over that of the fitted ones
+
+
+def checked_logs(logs: Any) -> tuple[Log, ...]:
+    """Return logs, at least one of which moves."""
+    from servotwin.identification.logs.readers import read_logs
+
+    found = read_logs(logs) if isinstance(logs, str | Path) else [logs] if isinstance(logs, Log) else logs
+    if not isinstance(found, Sequence) or not found or not all(isinstance(log, Log) for log in found):
+        raise InputError("logs", got=found, allowed="a list of at least one Log, or a path of logs")
+    names = [log.name for log in found]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"logs: {twice!r}", got=f"{names.count(twice)} logs of this name", allowed="one")
+    if all(log.is_constant for log in found):
+        raise InputError(f"log {names[0]!r}" if len(found) == 1 else f"all {len(found)} logs",
+                         got="an angle that never changes", allowed="a log in which the servo moves")
+    return tuple(found)
+
+
+def checked_servo(servo: Any, kind: Any) -> Model:
+    """Return the model that is fitted."""
+    if kind not in _KINDS:
+        raise InputError("model of a fit", got=getattr(kind, "__name__", kind),
+                         allowed=", ".join(k.__name__ for k in _KINDS))
+    if not isinstance(servo, Servo):
+        raise InputError("servo of a fit", got=servo, allowed="a servo, such as load_servo(...)")
+    model: Model = kind(servo)
+    return model
+
+
+def usual_free(model: Model) -> tuple[str, ...]:
+    """Return what is searched unless the caller says: what an angle under command and load can tell."""
+    gain, deadband = (("electronics.bridge_gain", "electronics.voltage_deadband") if isinstance(model, BoundedServo)
+                      else ("electronics.stretcher_gain", "electronics.deadband"))
+    return ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque", gain,
+            deadband, "potentiometer.feedback_gain")
+
+
+def checked_sensors(logs: Sequence[Log], sensors: Sequence[str] | None, model: Model) -> tuple[str, ...]:
+    """Return the names of measured signals that are compared."""
+    there = dict.fromkeys(name for log in logs for name in log.measured)
+    if sensors is not None:
+        for name in sensors:
+            if name not in there or name not in model.available:
+                raise InputError("sensors", got=name, allowed=", ".join(n for n in there if n in model.available))
+        if not any(name in ("output_angle", "feedback_voltage") for name in sensors):
+            raise InputError("sensors", got=", ".join(sensors), allowed="output_angle or feedback_voltage among them")
+        return tuple(dict.fromkeys(sensors))
+    found = [name for name in _FITTED if name in there and name in model.available]
+    without_angle = any("output_angle" not in log.measured for log in logs)
+    return tuple(name for name in found if name != "feedback_voltage" or without_angle or "output_angle" not in found)
+
+
+def shared_load(logs: Sequence[Log], free: Sequence[str]) -> dict[str, float]:
+    """Return what the logs' loads give for the load parameters that are searched; it has to be the same in all."""
+    found = {}
+    for name in free:
+        if name not in LOAD_NAMES:
+            continue
+        values = {_of_load(log, name) for log in logs}
+        if len(values) > 1:
+            raise InputError(f"free: {name}", got=f"{len(values)} different values in the logs",
+                             allowed="one and the same load in all logs")
+        value = values.pop()
+        if value is None:
+            raise InputError(f"free: {name}", got=f"a load without it in log {logs[0].name!r}",
+                             allowed="a load that has it")
+        found[name] = value
+    return found
+
+
+def _of_load(log: Log, name: str) -> float | None:
+    _, *part, key = name.split(".")
+    if not part:
+        return float(getattr(log.load, key))
+    parts = getattr(log.load, f"{part[0]}s")
+    value = getattr(parts[0], key) if len(parts) == 1 else None
+    return None if value is None else float(value)
+
+
+def check_speeds(logs: Sequence[Log], model: Model) -> None:
+    """Raise if a log shows the shaft faster than the servo could be by far: another servo, or another unit."""
+    gain = model.value("gear.gear_reduction") * model.value("motor.back_emf_constant")
+    for log in logs:
+        if log.angle_name != "output_angle":
+            continue
+        voltage = log.parameters.get("supply.open_circuit_voltage", model.value("supply.open_circuit_voltage"))
+        used = log.used("output_angle")
+        time, angle = log.time[used], log.measured["output_angle"][used]
+        if len(time) < 5:
+            continue
+        speed = float(np.quantile(np.abs((angle[4:] - angle[:-4]) / (time[4:] - time[:-4])), 0.98))
+        limit = voltage / gain
+        if speed > _TOO_FAST * limit:
+            raise InputError(
+                f"log {log.name!r} contradicts the servo", got=f"a shaft at {speed:.3g} rad/s",
+                allowed=f"about {limit:.3g} rad/s, the speed of {model.servo.name} without load at {voltage:g} V; "
+                        "check the unit of the angle, and the servo")
+
+
+def checked_loss(loss: str, huber: float) -> float:
+    """Return the limit beyond which residuals count in proportion."""
+    if loss not in ("huber", "squares"):
+        raise InputError("loss", got=loss, allowed='"huber" or "squares"')
+    return huber if loss == "huber" else math.inf
+
+
+def checked_count(what: str, number: Any, *, least: int) -> int:
+    """Return a whole number."""
+    if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
+        raise InputError(what, got=number, allowed=f"a whole number of at least {least}")
+    return int(number)
+
+
+def warnings_of(prior: Prior, point: Point, doubt: Uncertainty | None, space: Space,
+                tables: Tables) -> tuple[str, ...]:
+    """Return what a reader has to know of a fit, a line each."""
+    found = []
+    if doubt is not None:
+        for k, p in enumerate(space.parameters):
+            weight = prior.weight[k]
+            if weight == 0.0 or p.prior is None:
+                continue
+            # The sheet's belief is in the estimate; what the logs alone would say lies further off
+            left = 1.0 / weight**2 - min(doubt.std[k] ** 2, 0.96 / weight**2)
+            off = (point.shared[k] - prior.mean[k]) / math.sqrt(left)
+            if abs(off) > _CONTRADICTS:
+                value = float(p.value(point.shared[k]))
+                found.append(f"the logs contradict the servo file: {p.name} is {value:.4g} {p.unit}, it says "
+                             f"{p.prior[0]:.4g} ± {p.prior[1]:.2g} ({abs(off):.0f} standard errors apart)")
+    if tables.holdout and tables.training:
+        model = tables.holdout.models[0]
+        new, old = tables.holdout.by(), tables.training.by()
+        for motion in new:
+            if motion in old and new[motion][model] > _OVERFITTED * old[motion][model]:
+                ratio = new[motion][model] / old[motion][model]
+                found.append(f"{motion}: logs that were held out are off {ratio:.2g} times as far as fitted ones: the "
+                             "fit follows what does not repeat")
+    return tuple(found)
+
+
+@contextmanager
+def shown(progress: Any) -> Iterator[Callable[[float, str], None]]:
+    """Give a function that is told the share that is done and what goes on."""
+    if callable(progress):
+        yield lambda share, text: (progress(share, text), None)[1]
+        return
+    if not isinstance(progress, bool):
+        raise InputError("progress", got=progress, allowed="True, False or a function of the share done and a text")
+    if not progress:
+        yield lambda share, text: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    bar = Progress(TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("left"),
+                   TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+    task = bar.add_task("fit", total=1.0)
+    with bar:
+        yield lambda share, text: bar.update(task, completed=share, description=text)

@@ -1,0 +1,111 @@
+"""Simpler models beside a fit, fitted to the same logs: delay, slew and lag; Coulomb and viscous friction only."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.identification.fitting.arrow import Loss
+from servotwin.identification.fitting.baselines import fit_slew_lag
+from servotwin.identification.fitting.fit import Trace
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.free import LUMPED, Space
+from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
+from servotwin.identification.fitting.task import Task, by_sensor
+from servotwin.identification.logs.log import Log
+from servotwin.models import Model
+
+Array = NDArray[np.float64]
+
+BESIDE = ("slew", "M1")
+SLEW = "delay + slew + lag"
+M1 = "M1"
+_BEYOND_M1 = ("breakaway_ratio", "stribeck_speed", "stribeck_exponent", "load_friction", "load_friction_stribeck",
+              "load_friction_motor", "load_friction_external", "load_friction_motor_stribeck",
+              "load_friction_external_stribeck", "load_friction_motor_quad", "load_friction_external_quad")
+_VISCOUS = "motor.motor_viscous_friction"
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Errors of the fitted servo and of the models beside it."""
+
+    training: ErrorTable
+    holdout: ErrorTable
+
+
+def compare(logs: Sequence[Log], fitted: Sequence[int], held_out: Sequence[int], traces: Sequence[Trace], model: Model,
+            space: Space, nuisance: tuple[str, ...], beside: tuple[str, ...], *, loss: float, seed: int,
+            noise: Mapping[str, float]) -> Tables:
+    """Return the errors of the fitted servo, log by log, and of the models beside it.
+
+    Raises
+    ------
+    InputError
+        If there is no such model.
+    """
+    for name in beside:
+        if name not in BESIDE:
+            raise InputError("compare_with", got=name, allowed=", ".join(BESIDE))
+    own = type(model).__name__
+    errors: dict[str, dict[int, LogError]] = {own: {k: log_error(t.log, t.residual) for k, t in enumerate(traces)}}
+    if "slew" in beside:
+        slew = _of_slew(logs, fitted, traces, loss)
+        if slew:
+            errors[SLEW] = slew
+    if "M1" in beside:
+        simple = _of_m1(logs, fitted, traces, model, space, nuisance, loss, seed, noise)
+        if simple:
+            errors[M1] = simple
+    models = tuple(errors)
+    return Tables(*(ErrorTable(models if which else (), {m: tuple(errors[m][k] for k in which) for m in models})
+                    for which in (fitted, held_out)))
+
+
+def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace], loss: float) -> dict[int, LogError]:
+    try:
+        simple = fit_slew_lag([logs[k] for k in fitted], loss="linear" if math.isinf(loss) else "huber")
+    except InputError:  # logs of several kinds of command or signal, or too few samples: there is no such model
+        return {}
+    found = {}
+    for k, trace in enumerate(traces):
+        log = logs[k]
+        if simple.signal != trace.signal or simple.command_kind != log.command_kind:
+            return {}
+        predicted = np.asarray(simple.predict(log))
+        at = np.searchsorted(log.time, trace.time)
+        difference = predicted[at] - trace.measured
+        known = np.isfinite(difference)
+        found[k] = log_error(log, difference[known] if known.any() else np.array([math.nan]))
+    return found
+
+
+def _of_m1(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace], model: Model, space: Space,
+           nuisance: tuple[str, ...], loss: float, seed: int, noise: Mapping[str, float]) -> dict[int, LogError]:
+    """Return the errors of the servo with Coulomb and viscous friction; none where it is that already."""
+    beyond = [f"friction.{name}" for name in _BEYOND_M1]
+    free = [name for name in space.names if name not in beyond]
+    coulomb = LUMPED["output_coulomb_torque"][0]
+    more = [] if any(name in free for name in ("output_coulomb_torque", *coulomb)) else ["output_coulomb_torque"]
+    more += [] if _VISCOUS in free else [_VISCOUS]
+    given = [name for name in beyond if model.servo.get(name) is not None and name in model.optional]
+    if not more and not given and len(free) == len(space.names):
+        return {}
+    plain = type(model)(model.servo.replace(dict.fromkeys(given)))
+    own_bounds = {p.name: (p.lower, p.upper) for p in space.parameters if p.bounded and p.name in free}
+    beliefs = {p.name: p.prior for p in space.parameters if p.prior is not None and p.name in free}
+    load = {p.name: p.start for p in space.parameters if p.name.startswith("load.")}
+    simple = Space(plain, [*free, *more], bounds=own_bounds, priors=beliefs or None, load=load)
+    forecast = Forecast(logs, plain, simple, nuisance, tuple(noise))
+    task = Task(forecast, Loss(loss), list(fitted), seed, 1, None)
+    found, _ = task.search(lambda share, text: None)
+    errors = {}
+    for k, part in enumerate(forecast.at(found.point, derivatives=False)):
+        residual = by_sensor(forecast, k, part)[traces[k].signal]
+        errors[k] = log_error(logs[k], residual)
+    return errors

@@ -1,0 +1,236 @@
+"""What a fit found: values with intervals, what the logs cannot say, and the errors on logs that it has not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.holdout import ErrorTable
+from servotwin.identification.fitting.words import Unidentifiable
+from servotwin.identification.logs.log import Log
+from servotwin.models import Model
+from servotwin.parameters import Servo
+
+if TYPE_CHECKING:
+    from servotwin.identification.fitting.intervals import Ends
+    from servotwin.identification.fitting.uncertainty import Uncertainty
+
+Array = NDArray[np.float64]
+
+
+class Interval(NamedTuple):
+    """Where a value lies (SI), and how that was found.
+
+    Parameters
+    ----------
+    lower, upper : float
+        nan where the logs do not determine the value.
+    method : str
+        "normal", "profile", "at bound", "undetermined", or "not sought".
+    """
+
+    lower: float
+    upper: float
+    method: str
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One log beside the fitted servo.
+
+    Parameters
+    ----------
+    log : Log
+    held_out : bool
+    signal : str
+        The measured signal that is compared.
+    time, measured, simulated : ndarray, shape (n,)
+        Where it counts [s], SI.
+    """
+
+    log: Log
+    held_out: bool
+    signal: str
+    time: Array = field(repr=False)
+    measured: Array = field(repr=False)
+    simulated: Array = field(repr=False)
+
+    @property
+    def residual(self) -> Array:
+        """Simulated less measured."""
+        return self.simulated - self.measured
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where one of the searches from random starts ended: its cost, half a sum of squares in units of noise."""
+
+    cost: float
+    converged: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """The outcome of `identify`.
+
+    Parameters
+    ----------
+    servo : Servo
+        With the fitted values, their origin "identified", their spread, and the record of the fit.
+    model : Model
+        Over that servo.
+    names : tuple of str
+        Searched parameters, then the nuisances that all logs share; the order of `covariance`.
+    estimates : mapping of str to float
+        Values of all names (SI).
+    units : mapping of str to str
+    covariance : ndarray, shape (p, p)
+        Of the estimates (SI); rows of what is undetermined or at a bound are nan.
+    unidentifiable : tuple of Unidentifiable
+        What the logs cannot say, in words.
+    at_bound : tuple of str
+        Parameters that ended at a bound of the search.
+    holdout, training : ErrorTable
+        Errors by log of the fitted servo, of the simpler models beside it.
+    traces : tuple of Trace
+        Every log beside the fitted servo.
+    starts : tuple of Start
+        Where the searches from all starts ended, the best first.
+    noise : mapping of str to float
+        Standard deviation of the residuals of each sensor, robust (SI).
+    warnings : tuple of str
+        What a reader has to know, a line each.
+    doubt : Uncertainty
+    interrupted : bool
+        Whether it was stopped before its end: then this is the best so far, without intervals.
+    """
+
+    servo: Servo
+    model: Model
+    names: tuple[str, ...]
+    estimates: Mapping[str, float]
+    units: Mapping[str, str]
+    covariance: Array = field(repr=False)
+    unidentifiable: tuple[Unidentifiable, ...]
+    at_bound: tuple[str, ...]
+    holdout: ErrorTable = field(repr=False)
+    training: ErrorTable = field(repr=False)
+    traces: tuple[Trace, ...] = field(repr=False)
+    starts: tuple[Start, ...] = field(repr=False)
+    noise: Mapping[str, float]
+    cost: float
+    warnings: tuple[str, ...]
+    space: Space = field(repr=False)
+    best: Array = field(repr=False)
+    doubt: Uncertainty | None = field(repr=False)
+    ends: Mapping[int, Ends] = field(repr=False)
+    scales: Mapping[str, float] = field(repr=False)
+    level: float = 0.95
+    seconds: float = 0.0
+    interrupted: bool = False
+
+    def intervals(self, level: float | None = None) -> dict[str, Interval]:
+        """Return the interval of every name (SI).
+
+        Parameters
+        ----------
+        level : float, optional
+            Such as 0.95; that of the fit unless given. Of a profile, other levels are in proportion.
+
+        Raises
+        ------
+        InputError
+            If the level is not between 0 and 1.
+        """
+        wanted = self.level if level is None else level
+        if not 0.0 < wanted < 1.0:
+            raise InputError("level", got=level, allowed="a number between 0 and 1, such as 0.95")
+        return {name: self._interval(k, name, wanted) for k, name in enumerate(self.names)}
+
+    def __str__(self) -> str:
+        """Return a line for each estimate, and what the logs cannot say."""
+        lines = []
+        for name, (lower, upper, method) in self.intervals().items():
+            spread = f"{lower:.4g} to {upper:.4g} ({method})" if lower == lower else method
+            lines.append(f"{name} = {self.estimates[name]:.4g} {self.units[name]}, {100 * self.level:g} %: {spread}")
+        return "\n".join((*lines, *map(str, self.unidentifiable), *self.warnings))
+
+    def _interval(self, k: int, name: str, level: float) -> Interval:
+        nowhere = float("nan")
+        if name in self.undetermined:
+            return Interval(nowhere, nowhere, "undetermined")
+        if name in self.at_bound:
+            return Interval(nowhere, nowhere, "at bound")
+        if self.doubt is None or k not in self.ends:
+            return Interval(nowhere, nowhere, "not sought")
+        ends, std = self.ends[k], float(self.doubt.std[k])
+        factor = self.doubt.quantile(level) / self.doubt.quantile(self.level)
+        values = [self._value(k, self.best[k] + factor * end * std) for end in (ends.lower, ends.upper)]
+        return Interval(min(values), max(values), ends.method)
+
+    def _value(self, k: int, x: float) -> float:
+        if k < len(self.space):
+            p = self.space.parameters[k]
+            return float(np.clip(p.value(x), p.lower, p.upper))
+        return float(x * self.scales[self.names[k]])
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Names that the logs do not determine."""
+        return tuple(dict.fromkeys(name for item in self.unidentifiable for name in item.parameters))
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation of the estimates, shape (p, p); nan where there is no covariance."""
+        std = np.sqrt(np.diag(self.covariance))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self.covariance / np.outer(std, std))
+
+    def draw(self, number: int, seed: int = 0) -> dict[str, Array]:
+        """Return servos that the logs allow, as arrays for `parameters=` of `simulate_many`.
+
+        Drawn from the normal approximation on the scale of the search, within its bounds; what is undetermined or at a
+        bound keeps its value.
+
+        Parameters
+        ----------
+        number : int
+            How many.
+        seed : int
+
+        Returns
+        -------
+        dict
+            Arrays (number,) by dotted name (SI); lumped names as their members.
+        """
+        if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < 1:
+            raise InputError("draw", got=number, allowed="a whole number of at least 1")
+        p = len(self.space)
+        x = np.repeat(self.best[None, :p], int(number), axis=0)
+        if self.doubt is not None:
+            free = [k for k in range(p) if k in self.ends]
+            part = self.doubt.covariance[np.ix_(free, free)]
+            values, vectors = np.linalg.eigh(part)
+            normal = np.random.default_rng(seed).standard_normal((int(number), len(free)))
+            x[:, free] += normal * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+        x = np.clip(x, self.space.lower, self.space.upper)
+        return self.space.columns(x)
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write an HTML page: estimates, what is undetermined, errors, measured over simulated, residuals.
+
+        Raises
+        ------
+        OutputExistsError, OutputError
+            If the file exists and `overwrite` is false, or it cannot be written.
+        """
+        from servotwin.identification.report.page import write_report
+
+        return write_report(self, Path(path), overwrite=overwrite)

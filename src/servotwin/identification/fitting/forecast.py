@@ -1,0 +1,230 @@
+"""What a model says that logs should show, and how that changes with every searched number.
+
+All copies of a servo that differ a little in one number run beside the nominal one, in one batch: the Jacobian costs
+little more than a simulation, and it is that of the same exact solution.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.identification.fitting.case import Case, make_case
+from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.lanes import LogLanes
+from servotwin.identification.fitting.point import (
+    DELAY_SCALE,
+    LATER,
+    NUISANCES,
+    OFFSET_SCALE,
+    SHARED,
+    SPEED_SCALE,
+    STEP,
+    LogPart,
+    Point,
+)
+from servotwin.identification.logs.log import Log
+from servotwin.models import Model
+from servotwin.simulation import simulate_many
+from servotwin.simulation.lane_loads import LOAD_NAMES
+
+if TYPE_CHECKING:
+    pass
+
+Array = NDArray[np.float64]
+
+_VOLTAGE = "supply.open_circuit_voltage"
+
+
+class _Here:
+    """An executor that does its work at once, where it is asked."""
+
+    def submit(self, work: Any, *arguments: Any) -> Future[Any]:
+        done: Future[Any] = Future()
+        done.set_result(work(*arguments))
+        return done
+
+
+_HERE = _Here()
+
+
+class Forecast:
+    """The simulation of all logs at a point of the search.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+    model : Model
+    space : Space
+    nuisance : sequence of str
+        Of "delay" (one for all logs), "log_delay" (what each log adds to it), "angle_offset" (measured less true
+        angle), "angle_sag" (how far the measured angle moves with the bus voltage) and "initial_state" (of each log).
+    sensors : sequence of str
+        Names of measured signals that are compared.
+
+    Raises
+    ------
+    InputError
+        If a nuisance is unknown, the model cannot follow a log, or a log sets what is searched.
+    """
+
+    def __init__(self, logs: Sequence[Log], model: Model, space: Space, nuisance: Sequence[str],
+                 sensors: Sequence[str]) -> None:
+        for name in nuisance:
+            if name not in NUISANCES:
+                raise InputError("nuisance", got=name, allowed=", ".join(NUISANCES))
+        self.model, self.space, self.nuisance = model, space, tuple(nuisance)
+        self.sensors = tuple(sensors)
+        self.extra = tuple(name for name in SHARED if name in nuisance)
+        if "angle_sag" in nuisance and ("bus_voltage" not in model.available
+                                        or not model.value_or("supply.internal_resistance", 0.0) > 0.0):
+            raise InputError("nuisance: angle_sag", got=f"{model!r} whose bus voltage stays",
+                             allowed="a pulse servo with supply.internal_resistance")
+        self.noise = dict.fromkeys(self.sensors, 1.0)
+        self.cases = tuple(make_case(log, model, space, self.sensors) for log in logs)
+        self.runs = 0
+        self.strict = True
+
+    @property
+    def size(self) -> int:
+        """Number of shared numbers."""
+        return len(self.space) + len(self.extra)
+
+    def names_of_own(self, case: Case) -> tuple[str, ...]:
+        """Return which numbers a log has for itself."""
+        names = []
+        if "initial_state" in self.nuisance:
+            names += ["output_angle", "output_speed"] if case.moving else ["output_angle"]
+        return (*names, "log_delay") if "log_delay" in self.nuisance else tuple(names)
+
+    def own_start(self, case: Case) -> Array:
+        """Return a log's own numbers as measured."""
+        first = {"output_angle": case.start[0] / OFFSET_SCALE, "output_speed": case.start[1] / SPEED_SCALE,
+                 "log_delay": 0.0}
+        return np.array([first[name] for name in self.names_of_own(case)])
+
+    def own_belief(self, case: Case) -> tuple[Array, Array]:
+        """Return mean and one over the standard deviation of a log's own numbers (scaled).
+
+        The start is believed to be where it was measured, within what the first samples scatter; a log's own delay to
+        be within half a frame or a sample.
+        """
+        spread = {"output_angle": case.scatter / OFFSET_SCALE, "output_speed": math.inf,
+                  "log_delay": 0.5 * float(np.median(np.diff(case.log.time))) / DELAY_SCALE}
+        return self.own_start(case), np.array([1.0 / spread[name] for name in self.names_of_own(case)])
+
+    def nuisance_of(self, shared: Array, name: str) -> float:
+        """Return delay [s], angle offset [rad] or sag [rad/V] of a point; 0 where it is none of its numbers."""
+        if name not in self.extra:
+            return 0.0
+        return float(shared[len(self.space) + self.extra.index(name)]) * SHARED[name][0]
+
+    def at(self, point: Point, *, derivatives: bool = True, central: bool = False, step: float = STEP,
+           cases: Sequence[int] | None = None) -> list[LogPart]:
+        """Return what the logs say at a point, log by log; nan where a simulation failed.
+
+        Derivatives are forward differences over `step`, or central ones at twice the lanes.
+        """
+        return self.at_all([point], derivatives=derivatives, central=central, step=step, cases=cases)[0]
+
+    def at_all(self, points: Sequence[Point], *, derivatives: bool = False, central: bool = False,
+               step: float = STEP, cases: Sequence[int] | None = None) -> list[list[LogPart]]:
+        """Return what the logs say at several points, in one batch; for each point, log by log."""
+        which = range(len(self.cases)) if cases is None else cases
+        sides = (1 + central) * derivatives
+        lanes = [LogLanes(self, k, at, point, sides=sides, step=step) for k in which for at, point in enumerate(points)]
+        groups: dict[tuple[Any, ...], list[LogLanes]] = {}
+        for lane in lanes:
+            groups.setdefault((lane.case.key, lane.delay), []).append(lane)
+        jobs = [job for group in groups.values() for job in _split(group)]
+        jobs.sort(key=lambda job: -sum(lane.cost for lane in job))
+        self.runs += sum(lane.count for lane in lanes)
+        if len(jobs) == 1 or _workers() == 1:
+            for job in jobs:
+                self._try(job)
+        else:
+            list(_pool().map(self._try, jobs))
+        found: list[list[LogPart]] = [[] for _ in points]
+        for lane in lanes:
+            found[lane.at].append(lane.part)
+        return found
+
+    def _try(self, job: list[LogLanes]) -> None:
+        """Run some lanes; where a search went to what no servo is, they count as failed."""
+        try:
+            self._run(job)
+        except InputError:
+            if self.strict:
+                raise
+            if len(job) == 1:
+                job[0].fail()
+                return
+            for lane in job:
+                self._try([lane])
+
+    def _run(self, job: list[LogLanes]) -> None:
+        case, delay = job[0].case, job[0].delay
+        x = np.concatenate([lane.x for lane in job])
+        columns: dict[str, Any] = dict(self.space.columns(x))
+        for name in case.log.parameters:
+            if name not in LOAD_NAMES and name not in (*self.model.requires, *self.model.optional):
+                continue
+            columns[name] = np.concatenate([np.full(lane.count, lane.case.log.parameters[name]) for lane in job])
+        if "potentiometer.noise" in self.model.optional and self.model.servo.get("potentiometer.noise"):
+            columns["potentiometer.noise"] = 0.0
+        initial = {}
+        if "initial_state" in self.nuisance:
+            initial = {"output_angle": np.concatenate([lane.angle for lane in job]),
+                       "output_speed": np.concatenate([lane.speed for lane in job])}
+        later = LATER if job[0].needs_rate else 0.0
+        times = case.times - delay
+        asked = np.maximum(times if not later else np.concatenate([times, times + later]), 0.0)
+        order = np.argsort(asked, kind="stable") if later else np.arange(len(asked))
+        sags = "angle_sag" in self.extra
+        names = dict.fromkeys((*(name for name in self.sensors if name in case.places), "output_speed",
+                               *(["bus_voltage"] if sags else [])))
+        lanes = sum(lane.count for lane in job)
+        batch = simulate_many(
+            self.model, [signal for lane in job for signal in [lane.signal] * lane.count],
+            load=[load for lane in job for load in [lane.case.log.load] * lane.count], parameters=columns,
+            duration=max(float(asked.max()), case.log.duration) + 1e-9, output_times=asked[order], outputs=tuple(names),
+            initial=initial or None, seeds=np.zeros(lanes, np.int64), executor=_HERE)
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        signals = {name: np.asarray(batch[name][:, back] if later else batch[name], np.float64) for name in names}
+        if sags:
+            open_circuit = np.asarray(columns.get(_VOLTAGE, self.model.value(_VOLTAGE)))
+            signals["sag"] = signals.pop("bus_voltage") - open_circuit.reshape(-1, 1)
+        early = np.minimum(times, 0.0)
+        first = 0
+        for lane in job:
+            rows = slice(first, first + lane.count)
+            lane.take({name: values[rows] for name, values in signals.items()}, early, later)
+            first += lane.count
+
+
+def _split(group: list[LogLanes]) -> list[list[LogLanes]]:
+    """Return the lanes of a group as jobs, about two a core."""
+    parts = min(len(group), 2 * _workers())
+    return [group[len(group) * k // parts:len(group) * (k + 1) // parts] for k in range(parts)]
+
+
+def _workers() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+_POOL: list[tuple[int, ThreadPoolExecutor]] = []
+
+
+def _pool() -> ThreadPoolExecutor:
+    """Return the threads of this process; a forked child has none of its parent's."""
+    if not _POOL or _POOL[0][0] != os.getpid():
+        _POOL[:] = [(os.getpid(), ThreadPoolExecutor(_workers(), thread_name_prefix="servotwin-fit"))]
+    return _POOL[0][1]

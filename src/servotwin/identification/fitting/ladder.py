@@ -1,0 +1,215 @@
+"""The friction laws M1 to M6 one after the other on the same logs, and which of them the data pay for.
+
+Each rung begins where a simpler one ended. More terms always fit the logs that are fitted at least as well; whether
+they predict others better is what decides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from servotwin.errors import InputError
+from servotwin.identification.fitting import checks
+from servotwin.identification.fitting.fit import Fit
+from servotwin.identification.fitting.free import nominal
+from servotwin.identification.fitting.holdout import LogError
+from servotwin.identification.fitting.identify import identify
+from servotwin.identification.logs.log import Log
+from servotwin.models import PulseServo
+from servotwin.models.base import Model
+from servotwin.parameters import Servo
+
+_BASE = ("output_coulomb_torque", "motor.motor_viscous_friction")
+_STRIBECK = ("friction.breakaway_ratio", "friction.stribeck_speed")
+_DIRECTED = ("friction.load_friction_motor", "friction.load_friction_external")
+_DIRECTED_STRIBECK = ("friction.load_friction_motor_stribeck", "friction.load_friction_external_stribeck")
+_QUAD = ("friction.load_friction_motor_quad", "friction.load_friction_external_quad")
+
+RUNGS: dict[str, tuple[str, ...]] = {
+    "M1": _BASE,
+    "M2": (*_BASE, *_STRIBECK),
+    "M3": (*_BASE, "friction.load_friction"),
+    "M4": (*_BASE, *_STRIBECK, "friction.load_friction", "friction.load_friction_stribeck"),
+    "M5": (*_BASE, *_STRIBECK, *_DIRECTED, *_DIRECTED_STRIBECK),
+    "M6": (*_BASE, *_STRIBECK, *_DIRECTED, *_DIRECTED_STRIBECK, *_QUAD),
+}
+"""Searched friction parameters of each law (Duclusaud et al. 2025)."""
+
+_TERMS = tuple(dict.fromkeys(name for names in RUNGS.values() for name in names if name.startswith("friction.")))
+_FIRST = {  # where a term begins that the rung before does not have: little of it, so that the search is near there
+    "friction.breakaway_ratio": 1.1, "friction.load_friction": 0.05, "friction.load_friction_stribeck": 0.05,
+    "friction.load_friction_motor": 0.05, "friction.load_friction_external": 0.05,
+    "friction.load_friction_motor_stribeck": 0.05, "friction.load_friction_external_stribeck": 0.05,
+    "friction.load_friction_motor_quad": 0.01, "friction.load_friction_external_quad": 0.01,
+}
+_STRIBECK_SPEED = 0.2  # rad/s at the output, where Stribeck friction begins to fade
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One friction law.
+
+    Parameters
+    ----------
+    name : str
+        "M1" to "M6".
+    fit : Fit
+    training, holdout : float
+        Rms error over all samples [rad]; nan without logs that were held out.
+    criterion : float
+        Bayesian information criterion of the fitted logs, with their residuals counted as often as they are
+        independent; smaller is better.
+    """
+
+    name: str
+    fit: Fit
+    training: float
+    holdout: float
+    criterion: float
+
+    @property
+    def overfits(self) -> bool:
+        """Whether it is much better on the logs that it was fitted to than on others."""
+        return self.holdout > 1.3 * self.training
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """All rungs, and the one that is chosen.
+
+    Parameters
+    ----------
+    rungs : tuple of Rung
+    chosen : str
+    reason : str
+    """
+
+    rungs: tuple[Rung, ...]
+    chosen: str
+    reason: str
+
+    @property
+    def fit(self) -> Fit:
+        """That of the chosen rung."""
+        return self[self.chosen].fit
+
+    def __getitem__(self, name: str) -> Rung:
+        for rung in self.rungs:
+            if rung.name == name:
+                return rung
+        raise InputError("rung", got=name, allowed=", ".join(rung.name for rung in self.rungs))
+
+
+def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] = PulseServo,
+                    free: Sequence[str] | None = None, *, rungs: Sequence[str] = tuple(RUNGS),
+                    select: str = "holdout", progress: Any = False, **options: Any) -> Ladder:
+    """Fit friction laws of growing complexity, and choose one.
+
+    Parameters
+    ----------
+    logs : sequence of Log
+    servo : Servo
+    model : type of Model
+        One that reads load friction: `PulseServo` or `PulseServoInductive`; for `BoundedServo` only "M1" makes sense.
+    free : sequence of str, optional
+        What else is searched; friction terms in it are left to the ladder.
+    rungs : sequence of str
+        Of "M1" to "M6".
+    select : {"holdout", "criterion"}
+        "holdout": the simplest law whose error on the logs that were held out is within one standard error of the
+        smallest; "criterion": the smallest information criterion. Without held out logs it is the latter.
+    progress : bool or callable
+        As of `identify`, over all rungs.
+    **options
+        Of `identify`.
+
+    Raises
+    ------
+    InputError
+        If a rung or a way to select is unknown, or as `identify` does.
+    """
+    for name in rungs:
+        if name not in RUNGS:
+            raise InputError("rungs", got=name, allowed=", ".join(RUNGS))
+    if not rungs or select not in ("holdout", "criterion"):
+        raise InputError("ladder", got=f"rungs {list(rungs)}, select {select!r}",
+                         allowed='at least one rung; "holdout" or "criterion"')
+    given = checks.checked_logs(logs)
+    others = [name for name in (free or checks.usual_free(checks.checked_servo(servo, model)))
+              if name not in _TERMS and name not in _BASE and not name.startswith("friction.")]
+    options = {"compare_with": (), **options}
+    found: list[Rung] = []
+    ordered = [name for name in RUNGS if name in rungs]
+    with checks.shown(progress) as show:
+        for k, name in enumerate(ordered):
+            start = _start(servo, name, found)
+            more = dict(options)
+            if found:
+                more["starts"] = 1  # it begins at what a simpler law found
+            fit = identify(given, start, model, [*others, *RUNGS[name]], progress=_share(show, k, len(ordered), name),
+                           **more)
+            found.append(_rung(name, fit))
+            if fit.interrupted:
+                break
+    chosen, reason = _choice(found, select)
+    return Ladder(tuple(found), chosen, reason)
+
+
+def _share(show: Any, k: int, count: int, name: str) -> Any:
+    return lambda share, text: show((k + share) / count, f"{name}: {text}")
+
+
+def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
+    """Return where a rung begins: at the best simpler law whose terms it all has, its own terms small."""
+    inner = [rung for rung in before if set(RUNGS[rung.name]) <= set(RUNGS[name]) and math.isfinite(rung.fit.cost)]
+    base = min(inner, key=lambda rung: rung.training).fit.servo if inner else servo
+    values: dict[str, Any] = {term: None for term in _TERMS if servo.get(term) is not None and term not in RUNGS[name]}
+    reduction = float(nominal(servo, "gear.gear_reduction") or 1.0)
+    own = {**_FIRST, "friction.stribeck_speed": _STRIBECK_SPEED * reduction}
+    values |= {term: own[term] for term in RUNGS[name] if term in own and not base.get(term)}
+    if values.get("friction.breakaway_ratio") is None and base.get("friction.breakaway_ratio") == 1.0 \
+            and "friction.breakaway_ratio" in RUNGS[name]:
+        values["friction.breakaway_ratio"] = own["friction.breakaway_ratio"]
+    return base.replace(values)
+
+
+def _rung(name: str, fit: Fit) -> Rung:
+    own = type(fit.model).__name__
+    training = fit.training.total()[own]
+    holdout = fit.holdout.total()[own] if fit.holdout else math.nan
+    inflation = fit.doubt.inflation if fit.doubt is not None else 1.0
+    samples = sum(e.samples for e in fit.training.errors[own]) / max(inflation, 1.0)**2
+    criterion = samples * math.log(max(training, 1e-300) ** 2) + len(fit.names) * math.log(max(samples, 1.0))
+    return Rung(name, fit, training, holdout, criterion)
+
+
+def _choice(rungs: Sequence[Rung], select: str) -> tuple[str, str]:
+    """Return the chosen rung, and why."""
+    if select == "criterion" or any(math.isnan(rung.holdout) for rung in rungs):
+        best = min(rungs, key=lambda rung: rung.criterion)
+        return best.name, "smallest information criterion"
+    best = min(rungs, key=lambda rung: rung.holdout)
+    for rung in rungs:  # from the simplest on
+        worse, doubt = _difference(rung, best)
+        if worse <= doubt:
+            reason = "smallest error on logs that were held out" if rung is best else (
+                f"simplest law within one standard error of {best.name}, the smallest error on logs that were held out")
+            return rung.name, reason
+    return best.name, "smallest error on logs that were held out"
+
+
+def _difference(rung: Rung, best: Rung) -> tuple[float, float]:
+    """Return by how much a rung's mean square error of held out logs is above the best, and its standard error."""
+    gaps = np.array([a.rms**2 - b.rms**2 for a, b in zip(_errors(rung), _errors(best), strict=True)])
+    if len(gaps) < 2:
+        return float(gaps.sum()), 0.0
+    return float(gaps.mean()), float(gaps.std(ddof=1) / math.sqrt(len(gaps)))
+
+
+def _errors(rung: Rung) -> tuple[LogError, ...]:
+    return rung.fit.holdout.errors[type(rung.fit.model).__name__]

@@ -1,0 +1,185 @@
+"""The search of a fit: random starts, rough searches on some logs, and the last one on all of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.point import DELAY_SCALE, MOST_DELAY, OFFSET_SCALE, SAG_SCALE, LogPart, Point
+
+Array = NDArray[np.float64]
+
+HUBER = 1.345  # of the noise: as good as least squares to 5 % where the noise is normal (Huber 1964)
+_TRIED = 8  # random points for each search that is begun
+_FIRST_LOGS = 8  # of the first, rough searches
+_ROUGH = 0.003  # of the cost: what a step of a rough search has to gain
+_MOST_OFFSET = 0.6  # rad
+_MOST_SAG = 3.0  # rad/V
+_DELAY = 0.02  # s, where the search for it begins
+
+
+@dataclass
+class Task:
+    """The search over one forecast: where it stands, and its stages."""
+
+    forecast: Forecast
+    loss: Loss
+    fitted: list[int]
+    seed: int
+    starts: int
+    noise: Mapping[str, float] | None
+
+    def __post_init__(self) -> None:
+        space, extra = self.forecast.space, self.forecast.extra
+        reach = {"delay": (0.0, MOST_DELAY / DELAY_SCALE),
+                 "angle_offset": (-_MOST_OFFSET / OFFSET_SCALE, _MOST_OFFSET / OFFSET_SCALE),
+                 "angle_sag": (-_MOST_SAG / SAG_SCALE, _MOST_SAG / SAG_SCALE)}
+        self.lower = np.concatenate([space.lower, [reach[name][0] for name in extra]])
+        self.upper = np.concatenate([space.upper, [reach[name][1] for name in extra]])
+        beliefs = [p.scaled_prior for p in space.parameters] + [None] * len(extra)
+        self.prior = Prior(np.array([b[0] if b else 0.0 for b in beliefs]),
+                           np.array([1.0 / b[1] if b else 0.0 for b in beliefs]))
+        self._best: Outcome | None = None
+
+    def nominal(self) -> Point:
+        """Return where the servo's values stand."""
+        first = {"delay": _DELAY / DELAY_SCALE, "angle_offset": 0.0, "angle_sag": 0.0}
+        shared = np.concatenate([self.forecast.space.start, [first[name] for name in self.forecast.extra]])
+        return Point(np.clip(shared, self.lower, self.upper),
+                     tuple(self.forecast.own_start(case) for case in self.forecast.cases))
+
+    def search(self, tell: Callable[[float, str], None]) -> tuple[Outcome, list[Outcome]]:
+        """Return the best point, and where the search from each start ended."""
+        nominal = self.nominal()
+        self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
+        self.forecast.strict = False  # from here on, what no servo is counts as failed
+        few = self._few()
+        ended: list[Outcome] = []
+        if self.starts > 1:
+            for k, start in enumerate(self._candidates(nominal, few)):
+                tell(0.6 * k / self.starts, f"start {k + 1} of {self.starts}")
+                self._set_noise(self.forecast.at(start, derivatives=False, cases=few), few)
+                search = self._search(few)
+                first = search.costs([start])[0]
+                ended.append(search.run(start, most=12, tell=self._keep, least_gain=_ROUGH * first))
+            ended = self._on_one_scale(ended, few)
+            nominal = ended[0].point
+        tell(0.6, "all logs")
+        best = self._refined(nominal, self.fitted, rounds=6, most=25, tell=tell)
+        return best, ended or [best]
+
+    def _search(self, cases: Sequence[int]) -> Search:
+        return Search(self.forecast, self.loss, self.prior, self.lower, self.upper, cases)
+
+    def _refined(self, start: Point, cases: Sequence[int], *, rounds: int, most: int,
+                 tell: Callable[[float, str], None] | None = None) -> Outcome:
+        """Search, estimate the noise anew, and search on until it stays."""
+        best = Outcome(start, math.inf, False, 0)
+        for k in range(rounds):
+            search = self._search(cases)
+            best = search.run(best.point, most=most, tell=self._keep)
+            if not math.isfinite(best.cost):
+                return best
+            if tell is not None:
+                tell(0.6 + 0.4 * (k + 1) / rounds, "all logs")
+            change = self._set_noise(self.forecast.at(best.point, derivatives=False, cases=cases), cases)
+            if change < 0.02 and best.converged:
+                break
+        search = self._search(cases)
+        return replace(best, cost=search.costs([best.point])[0])
+
+    def _keep(self, step: int, outcome: Outcome) -> None:
+        self._best = outcome
+
+    def best_so_far(self) -> Outcome:
+        """Return where an interrupted search stood."""
+        return self._best or Outcome(self.nominal(), math.inf, False, 0)
+
+    def _few(self) -> list[int]:
+        """Return some logs of every kind of motion, for the rough searches."""
+        kinds: dict[str, list[int]] = {}
+        for k in self.fitted:
+            kinds.setdefault(self.forecast.cases[k].log.motion, []).append(k)
+        share = min(1.0, _FIRST_LOGS / len(self.fitted))
+        found = []
+        for members in kinds.values():
+            count = max(1, math.ceil(share * len(members)))
+            found += [members[i * len(members) // count] for i in range(count)]
+        return sorted(found)
+
+    def _candidates(self, nominal: Point, few: Sequence[int]) -> list[Point]:
+        """Return the nominal point, and the best of many random ones."""
+        rng = np.random.default_rng(self.seed)
+        tried = []
+        for _ in range(_TRIED * (self.starts - 1)):
+            extra = {"delay": rng.uniform(0.0, 3.0 * _DELAY / DELAY_SCALE), "angle_offset": 0.0, "angle_sag": 0.0}
+            shared = np.concatenate([self.forecast.space.random(rng), [extra[n] for n in self.forecast.extra]])
+            tried.append(Point(np.clip(shared, self.lower, self.upper), nominal.own))
+        costs = self._search(few).costs(tried)
+        order = np.argsort(costs, kind="stable")
+        return [nominal, *(tried[k] for k in order[:self.starts - 1] if math.isfinite(costs[k]))]
+
+    def _on_one_scale(self, ended: list[Outcome], few: Sequence[int]) -> list[Outcome]:
+        """Return the outcomes with their costs in the noise of the best of them, the best first."""
+        good = [outcome for outcome in ended if math.isfinite(outcome.cost)]
+        if not good:
+            raise InputError("simulation of the logs", got="no start that could be simulated to its end",
+                             allowed="a servo whose parameters can follow the logs; see its values and bounds")
+        spread = []
+        for outcome in good:
+            parts = self.forecast.at(outcome.point, derivatives=False, cases=few)
+            spread.append(math.fsum(math.log(v) for v in self._spread(parts, few).values()))
+        best = good[int(np.argmin(spread))]
+        self._set_noise(self.forecast.at(best.point, derivatives=False, cases=few), few)
+        costs = self._search(few).costs([outcome.point for outcome in good])
+        scaled = [replace(outcome, cost=cost) for outcome, cost in zip(good, costs, strict=True)]
+        return sorted(scaled, key=lambda outcome: outcome.cost)
+
+    def _set_noise(self, parts: Sequence[LogPart], cases: Sequence[int]) -> float:
+        """Take the noise of each sensor from its residuals; return by which share it changed."""
+        if self.noise is not None:
+            new = {name: self.noise.get(name, self.forecast.noise[name]) for name in self.forecast.sensors}
+        else:
+            new = self._spread(parts, cases)
+        change = max(abs(math.log(new[name] / self.forecast.noise[name])) for name in new)
+        self.forecast.noise = self.forecast.noise | new
+        return change
+
+    def _spread(self, parts: Sequence[LogPart], cases: Sequence[int]) -> dict[str, float]:
+        """Return the noise of each sensor: the median magnitude of its residuals, as of a normal law (SI)."""
+        gathered: dict[str, list[Array]] = {}
+        for k, part in zip(cases, parts, strict=True):
+            for name, residual in by_sensor(self.forecast, k, part).items():
+                gathered.setdefault(name, []).append(residual)
+        found = {}
+        for name, pieces in gathered.items():
+            values = np.concatenate(pieces)
+            if not np.isfinite(values).all():
+                found[name] = self.forecast.noise[name]
+                continue
+            middle = 1.4826 * float(np.median(np.abs(values)))
+            plain = float(np.sqrt(np.mean(values**2)))
+            # Where a servo mostly stands still, the median alone would call all motion an outlier
+            found[name] = max(middle, 0.3 * plain, 1e-9)
+        return found
+
+    def at_bound(self, outcome: Outcome) -> NDArray[np.bool_]:
+        """Tell which shared numbers stand at a bound."""
+        x = outcome.point.shared
+        return np.asarray((x <= self.lower + 1e-9) | (x >= self.upper - 1e-9))
+
+
+def by_sensor(forecast: Forecast, k: int, part: LogPart) -> dict[str, Array]:
+    """Return the residuals of a log by sensor (SI)."""
+    found, first = {}, 0
+    for name, place in forecast.cases[k].places.items():
+        found[name] = part.residual[first:first + len(place)] * forecast.noise[name]
+        first += len(place)
+    return found

@@ -1,0 +1,238 @@
+"""`validate`: how far a servo that is known is off logs, without fitting any parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, ServoFileError
+from servotwin.identification.fitting import checks
+from servotwin.identification.fitting.arrow import Loss, Prior, Search
+from servotwin.identification.fitting.fit import Trace
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.holdout import ErrorTable, log_error
+from servotwin.identification.fitting.point import NUISANCES, SHARED, LogPart, Point
+from servotwin.identification.fitting.task import HUBER, Task, by_sensor
+from servotwin.identification.logs.log import ANGLES, Log
+from servotwin.models import MODELS, Model, PulseServo
+from servotwin.parameters import Servo
+from servotwin.simulation.lane_loads import LOAD_NAMES
+from servotwin.units import is_finite
+
+Array = NDArray[np.float64]
+Progress = bool | Callable[[float, str], object]
+
+_ROUNDS = 3  # of noise and search
+_ANY = ("motor.armature_resistance", "motor.rotor_inertia", "motor.torque_constant", "gear.gear_reduction")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Validation:
+    """How far a servo is off some logs.
+
+    Parameters
+    ----------
+    servo : Servo
+    model : Model
+    errors : ErrorTable
+        By log, of this one model.
+    traces : tuple of Trace
+        Every log beside the simulation.
+    nuisance : mapping of str to float
+        Delay [s], angle offset [rad] and sag [rad/V] that were used.
+    fitted : tuple of str
+        Which nuisances were fitted to these logs; the others come from the servo file's record of its fit, or are 0.
+    noise : mapping of str to float
+        How far the residuals of each sensor scatter, robust (SI).
+    """
+
+    servo: Servo
+    model: Model
+    errors: ErrorTable = field(repr=False)
+    traces: tuple[Trace, ...] = field(repr=False)
+    nuisance: Mapping[str, float]
+    fitted: tuple[str, ...]
+    noise: Mapping[str, float]
+
+    @property
+    def total(self) -> float:
+        """Rms error over all samples of all logs [rad, or V where feedback voltages were measured]."""
+        return self.errors.total()[type(self.model).__name__]
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write an HTML page: errors, measured over simulated, residuals.
+
+        Raises
+        ------
+        OutputExistsError, OutputError
+            If the file exists and `overwrite` is false, or it cannot be written.
+        """
+        from servotwin.identification.report.validation import write_validation
+
+        return write_validation(self, Path(path), overwrite=overwrite)
+
+
+def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] | None = None, *,
+             nuisance: Sequence[str] = (), sensors: Sequence[str] | None = None,
+             progress: Progress = False) -> Validation:
+    """Run a servo against logs, and return how far it is off.
+
+    Every log starts at the angle and speed that it shows. Delay and angle offset are those that the servo file's [fit]
+    recorded, where it has any.
+
+    Parameters
+    ----------
+    logs : sequence of Log, or path
+    servo : Servo
+    model : type of Model, optional
+        `PulseServo`, `PulseServoInductive` or `BoundedServo`; that of the servo file's [fit] unless given, else
+        `PulseServo`.
+    nuisance : sequence of str
+        What belongs to the rig and is fitted to these logs: as of `identify`.
+    sensors : sequence of str, optional
+        Measured signals that are compared; the angle and all currents unless given. The errors are those of the angle.
+    progress : bool or callable
+        As of `identify`.
+
+    Raises
+    ------
+    InputError
+        On bad input, as `identify` does.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> servo = st.load_servo("hitec-hs-755hb")
+    >>> run = st.simulate(st.PulseServo(servo), st.signals.step(0.0, 60.0, at=0.1, unit="deg"), duration=1.0,
+    ...                   output_step=0.02)
+    >>> log = Log(name="step", time=run.time, command=run["pulse_width"], command_kind="pulse_width",
+    ...           measured={"output_angle": run["output_angle"]})
+    >>> validate([log], servo).total < 1e-6
+    True
+    """
+    given = checks.checked_logs(logs)
+    plain = checks.checked_servo(servo, recorded_model(servo) if model is None else model)
+    checks.check_speeds(given, plain)
+    seen = checks.checked_sensors(given, sensors, plain)
+    for name in nuisance:
+        if name not in NUISANCES:
+            raise InputError("nuisance", got=name, allowed=", ".join(NUISANCES))
+    known = recorded_nuisance(servo)
+    used = [name for name in NUISANCES if name in known or name in nuisance or name == "initial_state"]
+    forecast = Forecast(given, plain, _space(plain, given), used, seen)
+    with checks.shown(progress) as show:
+        show(0.0, "simulating")
+        point = _point(forecast, known, nuisance, show)
+        parts = forecast.at(point, derivatives=False)
+    _failures(forecast, parts)
+    traces = tuple(_trace(forecast, k, part) for k, part in enumerate(parts))
+    own = type(plain).__name__
+    return Validation(
+        servo=servo, model=plain, traces=traces, fitted=tuple(name for name in NUISANCES if name in nuisance),
+        errors=ErrorTable((own,), {own: tuple(log_error(trace.log, trace.residual) for trace in traces)}),
+        nuisance={name: forecast.nuisance_of(point.shared, name) for name in forecast.extra},
+        noise=_noise(forecast, parts))
+
+
+def recorded_model(servo: Any) -> type[Model]:
+    """Return the model that a servo file's [fit] names; the pulse servo where there is none."""
+    name = servo.fit.get("model") if isinstance(servo, Servo) else None
+    return next((kind for kind in MODELS.values() if kind.__name__ == name), PulseServo)
+
+
+def recorded_nuisance(servo: Servo) -> dict[str, float]:
+    """Return the delay [s], angle offset [rad] and sag [rad/V] that a servo file's [fit] recorded.
+
+    Raises
+    ------
+    ServoFileError
+        If they are no numbers.
+    """
+    found = _recorded(servo, "nuisance")
+    return {name: found[name] for name in SHARED if name in found}
+
+
+def _recorded(servo: Servo, key: str) -> dict[str, float]:
+    table = servo.fit.get(key, {})
+    values = dict(table) if isinstance(table, Mapping) else {key: table}
+    for name, value in values.items():
+        if not is_finite(value):
+            raise ServoFileError(servo.name, "not a number", table="fit", key=f"{key}.{name}", got=value,
+                                 allowed="a finite number (SI)")
+    return {name: float(value) for name, value in values.items()}
+
+
+def _space(model: Model, logs: Sequence[Log]) -> Space:
+    """Return searched numbers that all stay: those of the load that the fit found, or any one."""
+    load = {name: value for name, value in _recorded(model.servo, "load").items() if name in LOAD_NAMES}
+    taken = {name for log in logs for name in log.parameters}
+    free = list(load) or [next(name for name in _ANY if name not in taken)]
+    return Space(model, free, load=load)
+
+
+def _point(forecast: Forecast, known: Mapping[str, float], nuisance: Sequence[str],
+           show: Callable[[float, str], None]) -> Point:
+    """Return where the servo stands: as recorded, or with the nuisances that are fitted."""
+    everything = list(range(len(forecast.cases)))
+    task = Task(forecast, Loss(HUBER), everything, 0, 1, None)
+    start = task.nominal()
+    size = len(forecast.space)
+    shared = start.shared.copy()
+    for k, name in enumerate(forecast.extra):
+        shared[size + k] = known[name] / SHARED[name][0] if name in known else shared[size + k]
+    point = Point(shared, start.own)
+    if not nuisance:
+        return point
+    held = np.array([True] * size + [name not in nuisance for name in forecast.extra])
+    lower, upper = np.minimum(task.lower, shared), np.maximum(task.upper, shared)
+    nothing = Prior(np.zeros(len(shared)), np.zeros(len(shared)))
+    search = Search(forecast, Loss(HUBER), nothing, lower, upper, everything, held)
+    for k in range(_ROUNDS):
+        show(k / (_ROUNDS + 1.0), "fitting " + ", ".join(nuisance))
+        parts = forecast.at(point, derivatives=False)
+        _failures(forecast, parts)
+        forecast.noise = _noise(forecast, parts)
+        point = search.run(point, most=20).point
+    return _as_measured(forecast, point, start) if "initial_state" not in nuisance else point
+
+
+def _as_measured(forecast: Forecast, point: Point, start: Point) -> Point:
+    """Return a point whose logs begin where they were measured, though they keep their own delays."""
+    own = []
+    for case, found, first in zip(forecast.cases, point.own, start.own, strict=True):
+        own.append(np.where([name == "log_delay" for name in forecast.names_of_own(case)], found, first))
+    return Point(point.shared, tuple(own))
+
+
+def _failures(forecast: Forecast, parts: Sequence[LogPart]) -> None:
+    for case, part in zip(forecast.cases, parts, strict=True):
+        if not np.isfinite(part.residual).all():
+            raise InputError(f"log {case.log.name!r}", got="a simulation that does not reach its end",
+                             allowed="a servo and a load that can be simulated")
+
+
+def _noise(forecast: Forecast, parts: Sequence[LogPart]) -> dict[str, float]:
+    """Return how far the residuals of each sensor scatter (SI): their median magnitude, as of a normal law."""
+    gathered: dict[str, list[Array]] = {}
+    for k, part in enumerate(parts):
+        for name, residual in by_sensor(forecast, k, part).items():
+            gathered.setdefault(name, []).append(residual)
+    found = {}
+    for name, pieces in gathered.items():
+        values = np.concatenate(pieces)
+        found[name] = max(1.4826 * float(np.median(np.abs(values))), 0.3 * float(np.sqrt(np.mean(values**2))), 1e-9)
+    return {**forecast.noise, **found}
+
+
+def _trace(forecast: Forecast, k: int, part: LogPart) -> Trace:
+    case = forecast.cases[k]
+    name = next(name for name in ANGLES if name in case.places)
+    measured = case.values[name]
+    return Trace(case.log, True, name, case.log.time[0] + case.times[case.places[name]], measured,
+                 measured + by_sensor(forecast, k, part)[name])

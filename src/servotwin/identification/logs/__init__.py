@@ -1,0 +1,1 @@
+"""Logs of measured runs: what one is, and how files of several formats are read and written."""

@@ -1,0 +1,185 @@
+"""The report of a fit: one HTML page that needs nothing but itself."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from servotwin.identification.report import parts as report_parts
+from servotwin.identification.report import pictures as report_pictures
+from servotwin.identification.report import tables as report_tables
+from servotwin.identification.report.parts import STYLE, figure, space
+from servotwin.identification.report.shown import error_shown, estimate_lines, share_text, tables_of
+from servotwin.parameters import write_file
+from servotwin.units.look import document, escape, number
+
+if TYPE_CHECKING:
+    from servotwin.identification.fitting.fit import Fit
+
+def write_report(fit: Fit, path: Path, *, overwrite: bool = False) -> Path:
+    """Write the report of a fit.
+
+    Parameters
+    ----------
+    fit : Fit
+    path : Path
+        Of the HTML file.
+    overwrite : bool
+        Whether a file that is there may be replaced.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    OutputExistsError, OutputError
+        If the file exists and `overwrite` is false, or it cannot be written.
+    """
+    write_file(path, lambda file: file.write_text(page(fit), encoding="utf-8", newline="\n"), overwrite=overwrite)
+    return Path(path)
+
+
+def page(fit: Fit) -> str:
+    """Return the report as HTML."""
+    sections = (
+        ("summary", "Summary", _summary(fit)), ("estimates", "Parameters", _estimates(fit)),
+        ("unknown", "What the logs cannot say", _unknown(fit)),
+        ("errors", "Errors beside simpler models", _errors(fit)),
+        ("logs", "Measured and simulated", report_parts.trace_grid(fit.traces)),
+        ("residuals", "What is left", _residuals(fit)),
+        ("correlation", "Correlation of the estimates", _correlation(fit)), ("search", "The search", _search(fit)),
+        ("reading", "How to read this page", _reading(fit)),
+    )
+    contents = "".join(f'<li><a href="#{key}">{title}</a></li>' for key, title, _ in sections)
+    body = "".join(f'<section id="{key}"><h2>{title}</h2>\n{text}</section>\n' for key, title, text in sections)
+    name = fit.servo.title or fit.servo.name
+    held = sum(trace.held_out for trace in fit.traces)
+    return document(f"{name}: fit", f"""<h1>{escape(name)}: fitted to {_count(len(fit.traces), "log")}</h1>
+<p class="lead">{escape(type(fit.model).__name__)}, {_count(len(fit.space), "searched parameter")},
+{_count(held, "log")} held out. Everything on this page follows from the data <code>{escape(_short(fit))}</code>.</p>
+<nav aria-label="Contents"><ol>{contents}</ol></nav>
+{body}""", style=STYLE)
+
+
+def _short(fit: Fit) -> str:
+    return str(fit.servo.fit.get("data", ""))[:19]
+
+
+def _count(number_of: int, what: str) -> str:
+    return f"{number_of} {what}{'' if number_of == 1 else 's'}"
+
+
+def _summary(fit: Fit) -> str:
+    factor, unit = error_shown(fit.traces)
+    cards = []
+    for table, words in ((fit.holdout, "rms error on logs that were held out"),
+                         (fit.training, "rms error on fitted logs")):
+        if table:
+            total = table.total()
+            own, *others = table.models
+            beside = "; ".join(f"{escape(name)} {number(total[name] * factor, 3)}{space(unit)}" for name in others)
+            words += f". Beside: {beside}" if beside else ""
+            cards.append((f"{number(total[own] * factor, 3)}{space(unit)}", words))
+    known = [line for line in estimate_lines(fit) if line.interval != line.method and not line.nuisance]
+    cards.append((f"{len(known)} of {len(fit.space)}", "searched parameters have an interval"))
+    widest = _widest(fit)
+    if widest:
+        cards.append((f"± {share_text(widest[1])}", f"widest of these intervals: <code>{escape(widest[0])}</code>"))
+    if len(fit.starts) > 1:
+        best = fit.starts[0].cost
+        same = sum(start.cost <= 1.01 * best + 1e-9 for start in fit.starts)
+        cards.append((f"{same} of {len(fit.starts)}",
+                      "searches from different starts ended within 1 % of the best cost"))
+    listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
+    notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in fit.warnings)
+    if fit.interrupted:
+        notes = ('<div class="note"><p><strong>The fit was interrupted.</strong> This is the best that it had found; '
+                 "there may be better values, and there are no intervals.</p></div>\n") + notes
+    return f'<ul class="numbers">{listed}</ul>\n{notes}'
+
+
+def _widest(fit: Fit) -> tuple[str, float] | None:
+    """Return the parameter with the widest interval, and half of it relative to its value."""
+    found = {}
+    for name in fit.space.names:
+        interval, value = fit.intervals()[name], fit.estimates[name]
+        if math.isfinite(interval.lower) and value:
+            found[name] = 0.5 * (interval.upper - interval.lower) / abs(value)
+    return max(found.items(), key=lambda item: item[1]) if found else None
+
+
+def _estimates(fit: Fit) -> str:
+    forest = report_pictures.forest(fit)
+    drawn = "" if forest is None else figure(
+        forest, f"Estimates and {100 * fit.level:g} % intervals. Grey: what the servo file's own spread allows (95 %). "
+                "An open diamond has no interval.")
+    return drawn + report_tables.estimates(fit)
+
+
+def _unknown(fit: Fit) -> str:
+    parts = []
+    if fit.unidentifiable:
+        items = "".join(f"<li>{escape(str(item))}.</li>" for item in fit.unidentifiable)
+        parts.append("<p>These numbers have no interval. The values shown are one possibility of many: use them "
+                     f"together only, and under conditions like those of the logs.</p><ul>{items}</ul>")
+    stuck = [name for name in fit.at_bound if name in fit.space.names]
+    if "delay" in fit.at_bound and fit.estimates["delay"] == 0.0:
+        parts.append("<p>No delay is seen: it ended at 0.</p>")
+    if stuck:
+        names = ", ".join(f"<code>{escape(name)}</code>" for name in stuck)
+        parts.append(f'<div class="note"><p>At a bound of the search: {names}. The logs want more than '
+                     "the bound allows; widen it, or ask what the model lacks.</p></div>")
+    if fit.doubt is None:
+        parts.append("<p>This fit was made without intervals, so it does not say what is determined.</p>")
+    return "\n".join(parts) or ('<div class="note good"><p>Every searched number is determined, none stands at a '
+                                "bound.</p></div>")
+
+
+def _errors(fit: Fit) -> str:
+    return report_parts.errors(tables_of(fit), fit.traces, "Logs that were held out were simulated with the fitted "
+                               "servo, started where they were measured.")
+
+
+def _residuals(fit: Fit) -> str:
+    drawn = report_parts.residuals(fit.traces, fit.noise)
+    if fit.doubt is None:
+        return drawn
+    if fit.doubt.method == "independent residuals":
+        words = "Neighbouring residuals are independent: what is left looks like noise."
+    else:
+        words = (f"Neighbouring residuals follow each other (correlation {number(fit.doubt.autocorrelation, 2)}): what "
+                 "is left is not noise alone, the model lacks something. The intervals allow for that "
+                 f"({escape(fit.doubt.method)}; {number(fit.doubt.inflation, 2)} times as wide as for independent "
+                 "residuals), but not for a model that is wrong in the mean.")
+    return drawn + f"<p>{words}</p>\n"
+
+
+def _correlation(fit: Fit) -> str:
+    drawn = report_pictures.correlation(fit)
+    if drawn is None:
+        return "<p>Fewer than two numbers have an interval, so there is nothing to correlate.</p>\n"
+    return figure(drawn, "Blue: two estimates are high together. Orange: one is high where the other is low. Near ±1 "
+                          "the logs hardly tell the two apart. Numbers without an interval are left out.")
+
+
+def _search(fit: Fit) -> str:
+    return (report_tables.starts(fit) + "<h3>Bounds and priors</h3>" + report_tables.bounds(fit) + "<h3>Settings</h3>"
+            + report_tables.settings(fit))
+
+
+def _reading(fit: Fit) -> str:
+    level = f"{100 * fit.level:g} %"
+    return f"""<ul>
+<li><b>Interval.</b> If the model is right, {level} of such intervals hold the true value. “Normal law”: the cost is a
+parabola near its minimum. “Profile”: it is not, so the ends were found by fixing the number and fitting all
+others.</li>
+<li><b>Held out.</b> These logs took no part in the fit. Their error is what to expect of the next log of that kind. An
+error that is much smaller on fitted logs means that the fit follows what does not repeat.</li>
+<li><b>Simpler models.</b> “delay + slew + lag” has no physics. “M1” is this servo with Coulomb and viscous friction
+only. What does not beat them is not worth its parameters.</li>
+<li><b>At a bound, not determined.</b> Such a number is not measured by these logs. Do not carry it to another
+servo.</li>
+<li><b>Rig.</b> Delay and angle offset describe how the logs were taken. A start angle belongs to each log.</li></ul>
+"""

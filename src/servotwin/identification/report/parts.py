@@ -1,0 +1,94 @@
+"""What the reports of fits and of validations share: frames of pictures, errors, and logs side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from servotwin.identification.report import pictures as report_pictures
+from servotwin.identification.report import tables as report_tables
+from servotwin.identification.report import traces as report_traces
+from servotwin.identification.report.shown import error_shown, error_unit
+from servotwin.units.look import escape, number, picture, to_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from servotwin.identification.fitting.fit import Trace
+    from servotwin.identification.fitting.holdout import ErrorTable
+
+_MOST_LOGS = 24  # that are drawn
+_MOST_BARS = 12  # groups of one picture
+STYLE = """
+.logs{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,18rem),1fr));gap:.7rem;margin:.8rem 0}
+.logs figure{margin:0;padding:.4rem}.logs figure.held{border-color:#d55e00;background:#fff6ef}
+.logs figcaption{margin:0 0 .2rem;color:var(--ink);font-size:.85rem;overflow-wrap:anywhere}
+.tag{border-radius:4px;padding:0 .35rem;font-size:.8rem;background:#d55e00;color:#fff;white-space:nowrap}
+.key{display:inline-block;width:1.6rem;border-top:3px solid;vertical-align:middle;margin:0 .3rem 0 .8rem}
+figure img.drawing{width:100%;max-width:42rem}.logs figure img{width:100%}
+.good{border-left-color:#009e73;background:#f0faf6}
+details{margin:.8rem 0}summary{cursor:pointer;color:var(--blue)}
+@media print{.logs{grid-template-columns:repeat(3,1fr)}.logs figure{break-inside:avoid}
+figure img.drawing{max-width:27rem}}
+"""
+
+
+def figure(figure: Figure, words: str) -> str:
+    """Return a picture with its caption."""
+    drawn = picture(to_bytes(figure, "svg"), words, kind="drawing")
+    return f'<figure><div>{drawn}</div><figcaption>{words}</figcaption></figure>\n'
+
+
+def space(unit: str) -> str:
+    """Return a unit with the space before it that it needs."""
+    return unit if unit == "°" else f" {unit}"
+
+
+def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], words: str) -> str:
+    """Return pictures and tables of the errors, by motion and by every other label; `words` say how they were found."""
+    factor, unit = error_shown(traces)
+    parts = []
+    for label in dict.fromkeys(label for table in tables.values() for label in table.labels()):
+        values = {value for table in tables.values() for value in table.by(label)}
+        if 1 < len(values) <= _MOST_BARS or label == "motion":
+            parts.append(figure(report_pictures.errors(tables, label, factor, unit),
+                                f"Rms error by {escape(label.replace('_', ' '))}. {words}"))
+        parts.append(report_tables.errors(tables, label, factor, unit))
+    every = report_tables.logs(tables, traces)
+    return f"{''.join(parts)}<details><summary>Log by log</summary>{every}</details>\n"
+
+
+def trace_grid(traces: Sequence[Trace]) -> str:
+    """Return measured and simulated of some logs, side by side, by kind of motion."""
+    shown = report_traces.chosen(traces, _MOST_LOGS)
+    mixed = len({trace.held_out for trace in traces}) > 1
+    note = ""
+    if len(shown) < len(traces):
+        note = (f"<p>{len(shown)} of {len(traces)} logs: of every kind of motion in turn, those that were held out "
+                "and are furthest off first.</p>")
+    lines = (("#999", "measured"), ("#0072b2", "simulated"), ("#d55e00", "simulated − measured, on a scale of its own"))
+    key = ('<p>' + "".join(f'<span class="key" style="border-color:{colour}"></span>{words}' for colour, words in lines)
+           + (' &nbsp; <span class="tag">held out</span> not fitted</p>' if mixed else "</p>"))
+    parts = []
+    for motion in dict.fromkeys(trace.log.motion for trace in shown):
+        drawn = "".join(_small(trace, tagged=mixed and trace.held_out) for trace in shown if trace.log.motion == motion)
+        parts.append(f"<h3>{escape(motion or 'other')}</h3><div class=\"logs\">{drawn}</div>\n")
+    return note + key + "".join(parts)
+
+
+def _small(trace: Trace, *, tagged: bool) -> str:
+    factor, unit = error_unit(trace.signal)
+    rms = math.sqrt(float((trace.residual**2).mean())) * factor
+    tag = ' <span class="tag">held out</span>' if tagged else ""
+    words = f"<b>{escape(trace.log.name)}</b> {number(rms, 3)}{space(unit)} rms"
+    drawn = picture(to_bytes(report_traces.beside(trace), "svg"), f"{trace.log.name}, measured and simulated")
+    kind = ' class="held"' if tagged else ""
+    return f"<figure{kind}><figcaption>{words}{tag}</figcaption><div>{drawn}</div></figure>\n"
+
+
+def residuals(traces: Sequence[Trace], noise: Mapping[str, float]) -> str:
+    """Return the picture of what is left."""
+    return figure(report_traces.residuals(traces, noise),
+                  "Simulated less measured, in units of each sensor's noise σ. Above: over time. Middle: their "
+                  "distribution beside the normal law. Below: how far residuals follow each other.")

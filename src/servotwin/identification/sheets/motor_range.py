@@ -1,0 +1,255 @@
+"""The motor behind a sheet, as far as the sheet says, and the ranges that come from what it does not say.
+
+What a sheet leaves open is assumed within a range: the drop of bridge and brushes, the efficiency of the gear where no
+stall current is printed, the no-load current where that is not. The motor is solved for every combination of their
+ends and some values between, for all voltages together and for each alone; the range of a parameter is from the least
+to the greatest of these, as far as the gear stays possible. Every parameter is monotone in every assumption, so that
+the ends are enough.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from servotwin.identification.sheets.sheet import Sheet, SheetPoint
+from servotwin.physics import SheetMotor, load_share, motor_from_sheet
+from servotwin.physics.sheet import LEAST_EFFICIENCY
+
+# Of several the likelier first. V_d of bridge and brushes [V], η_g, and no-load over stall current ρ, which makes
+# friction of 5 to 30 % of the torque
+DROPS, EFFICIENCIES, CURRENT_RATIOS = (0.4, 0.2, 0.0), (0.8, 0.7, 0.9), (0.12, 0.04, 0.3)
+# Where a stall current tells the efficiency some of them are impossible, and the border has to be found
+FINE_DROPS = tuple(0.01 * n for n in range(40, -1, -5))
+FINE_CURRENT_RATIOS = (0.12, 0.1, 0.08, 0.06, 0.04, *(0.01 * n for n in range(14, 31)))
+_MOST_STEPS = 50
+
+
+@dataclass(frozen=True, kw_only=True)
+class Range:
+    """A value with its range.
+
+    Parameters
+    ----------
+    value, lower, upper : float
+    """
+
+    value: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotorRange:
+    """The motor of a sheet, seen at the output shaft, with ranges.
+
+    Parameters
+    ----------
+    resistance : Range
+        R of the motor's circuit [ohm].
+    output_torque_constant : Range
+        K_out = N k_a [N m/A].
+    gear_efficiency : Range
+        η_g [1].
+    no_load_current : Range
+        I_0 at the nominal voltage [A].
+    no_load_torque : Range
+        K_out I_0, all friction of the unloaded servo [N m].
+    coulomb_torque : Range
+        τ_c = K_out I_0 (1 − μ_m), what of it does not grow with the torque through the gear [N m].
+    drop_voltage : float
+        V_d that the values belong to [V].
+    efficiency_from_sheet, current_from_sheet : bool
+        Whether a stall current gives the efficiency, and whether a no-load current is printed.
+    possible : bool
+        Whether any combination of what is assumed has a possible gear at every voltage.
+    """
+
+    resistance: Range
+    output_torque_constant: Range
+    gear_efficiency: Range
+    no_load_current: Range
+    no_load_torque: Range
+    coulomb_torque: Range
+    drop_voltage: float
+    efficiency_from_sheet: bool
+    current_from_sheet: bool
+    possible: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Assumed:
+    drop: float
+    efficiency: float | None  # None: a stall current tells
+    ratio: float | None  # None: a no-load current is printed
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Solved:
+    joint: SheetMotor
+    alone: tuple[SheetMotor, ...]
+    others: tuple[SheetMotor, ...]
+    drop: float
+    judged: tuple[SheetMotor, ...]  # those whose currents are printed, and not taken from another voltage
+
+    @property
+    def possible(self) -> bool:
+        return self.joint.feasible and all(motor.feasible for motor in self.judged)
+
+    @property
+    def violation(self) -> float:
+        return sum(abs(math.log(motor.gear_efficiency / min(max(motor.gear_efficiency, LEAST_EFFICIENCY), 1.0)))
+                   for motor in (self.joint, *self.judged))
+
+
+def motor_range(sheet: Sheet) -> MotorRange:
+    """Return the motor that a sheet describes, with ranges.
+
+    Examples
+    --------
+    >>> point = SheetPoint(supply_voltage=6.0, stall_torque=1.2945, no_load_speed=4.553, no_load_current=0.285)
+    >>> found = motor_range(Sheet(name="a", points=(point,))).resistance
+    >>> round(found.value, 2), round(found.lower, 2), round(found.upper, 2)
+    (3.04, 2.75, 3.72)
+    """
+    solved = [_solve(sheet, assumed) for assumed in _assumptions(sheet)]
+    possible = [one for one in solved if one.possible]
+    best = possible[0] if possible else min(solved, key=lambda one: one.violation)
+    motors = [motor for one in possible or solved for motor in (one.joint, *one.alone, *one.others)
+              if motor.feasible or not possible]
+
+    def among(of: Callable[[SheetMotor], float]) -> Range:
+        found = [of(motor) for motor in motors]
+        return Range(value=of(best.joint), lower=min(found), upper=max(found))
+
+    return MotorRange(
+        resistance=among(lambda m: m.resistance), output_torque_constant=among(lambda m: m.output_torque_constant),
+        gear_efficiency=among(lambda m: m.gear_efficiency), no_load_torque=among(_no_load_torque),
+        no_load_current=among(lambda m: _no_load_torque(m) / m.output_torque_constant),
+        coulomb_torque=among(lambda m: m.coulomb_torque), drop_voltage=best.drop,
+        efficiency_from_sheet=stall_current_is_known(sheet),
+        current_from_sheet=any(point.no_load_current is not None for point in sheet.main), possible=bool(possible))
+
+
+def _no_load_torque(motor: SheetMotor) -> float:
+    return motor.coulomb_torque / (1.0 - load_share(min(motor.gear_efficiency, 1.0)))
+
+
+def stall_current_is_known(sheet: Sheet) -> bool:
+    """Return whether the main source prints a stall current at any voltage.
+
+    Examples
+    --------
+    >>> point = SheetPoint(supply_voltage=6.0, stall_torque=1.2945, no_load_speed=4.553, no_load_current=0.285)
+    >>> stall_current_is_known(Sheet(name="a", points=(point,)))
+    False
+    """
+    return any(point.stall_current is not None for point in sheet.main)
+
+
+def completed(sheet: Sheet, drop: float, points: Sequence[SheetPoint]) -> tuple[SheetPoint, ...]:
+    """Return points with the currents that are printed at another voltage only.
+
+    The no-load current is taken as it is, for friction makes most of it; the stall current in proportion to V − V_d.
+
+    Examples
+    --------
+    >>> one = SheetPoint(supply_voltage=4.8, stall_torque=1.0, no_load_speed=4.0)
+    >>> two = SheetPoint(supply_voltage=6.0, stall_torque=1.2, no_load_speed=5.0, stall_current=2.0)
+    >>> completed(Sheet(name="a", points=(one, two)), 0.0, (one,))[0].stall_current
+    1.6
+    """
+    filled = []
+    for point in points:
+        I_0 = _nearest(sheet.main, point, "no_load_current")
+        I_s = _nearest(sheet.main, point, "stall_current")
+        new = point
+        if point.stall_current is None and I_s is not None and I_s.stall_current is not None:
+            new = replace(new, stall_current=I_s.stall_current * (point.supply_voltage - drop)
+                          / (I_s.supply_voltage - drop))
+        if point.no_load_current is None and I_0 is not None:
+            new = replace(new, no_load_current=I_0.no_load_current)
+        filled.append(new)
+    return tuple(filled)
+
+
+def _nearest(points: Sequence[SheetPoint], to: SheetPoint, name: str) -> SheetPoint | None:
+    having = [point for point in points if getattr(point, name) is not None]
+    return min(having, key=lambda p: abs(p.supply_voltage - to.supply_voltage)) if having else None
+
+
+def _assumptions(sheet: Sheet) -> Iterator[_Assumed]:
+    """Yield the combinations of what the sheet leaves open, the likelier ones first."""
+    fine = stall_current_is_known(sheet)
+    efficiencies = (None,) if fine else EFFICIENCIES
+    given = any(point.no_load_current is not None for point in sheet.main)
+    ratios = (None,) if given else FINE_CURRENT_RATIOS if fine else CURRENT_RATIOS
+    # A lower drop is the smaller step away from what is likely: it goes before another current
+    for ratio, efficiency, drop in itertools.product(ratios, efficiencies, FINE_DROPS if fine else DROPS):
+        yield _Assumed(drop=drop, efficiency=efficiency, ratio=ratio)
+
+
+def _solve(sheet: Sheet, assumed: _Assumed) -> _Solved:
+    main = completed(sheet, assumed.drop, sheet.main)
+    alone = tuple(_motor(point, assumed) for point in main)
+    others = tuple(_motor(point, assumed) for point in completed(sheet, assumed.drop, sheet.others))
+    joint = _together(main, alone, sheet, assumed) if len(main) > 1 else alone[0]
+    judged = tuple(motor for motor, point in zip(alone, sheet.main, strict=True) if point.stall_current is not None)
+    return _Solved(joint=joint, alone=alone, others=others, drop=assumed.drop, judged=judged)
+
+
+def _motor(point: SheetPoint, assumed: _Assumed) -> SheetMotor:
+    """Return the motor of one point alone."""
+    T_s, w_0, U = float(point.stall_torque or 0.0), float(point.no_load_speed or 0.0), \
+        point.supply_voltage - assumed.drop
+    eta, I_0, I_s = assumed.efficiency or 1.0, point.no_load_current, point.stall_current
+    if I_0 is None:
+        rho = float(assumed.ratio or 0.0)
+        I_0 = rho * (I_s if I_s is not None else T_s * w_0 / (eta * U * (1.0 - rho) ** 2))
+    if I_s is not None and I_s <= I_0:  # figures of two voltages that do not fit; one alone is checked as it is read
+        I_0 = 0.99 * I_s
+    return motor_from_sheet(supply_voltage=point.supply_voltage, stall_torque=T_s, no_load_speed=w_0,
+                            no_load_current=I_0, stall_current=I_s, drop_voltage=assumed.drop, gear_efficiency=eta)
+
+
+def _together(points: Sequence[SheetPoint], alone: Sequence[SheetMotor], sheet: Sheet,
+              assumed: _Assumed) -> SheetMotor:
+    """Return the one motor that fits the figures of all voltages best: least squares of their logarithms."""
+    import numpy as np
+    from numpy.typing import NDArray
+
+    V, T_s, w_0 = (np.array([getattr(point, name) for point in points]) for name in (
+        "supply_voltage", "stall_torque", "no_load_speed"))
+    U, U_n = V - assumed.drop, sheet.nominal.supply_voltage - assumed.drop
+    known = np.array([point.stall_current is not None for point in sheet.main])
+    I_s = np.array([point.stall_current or 1.0 for point in sheet.main])
+    given = [point.no_load_current for point in points]
+
+    def facts(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what R, K_out and η_g, in logarithms, fail to explain."""
+        R, K, eta = math.exp(x[0]), math.exp(x[1]), math.exp(x[2]) if len(x) == 3 else float(assumed.efficiency or 1.0)
+        I_0 = np.array([assumed.ratio * U_n / R if assumed.ratio is not None else i for i in given], dtype=np.float64)
+        left = np.maximum(U - R * I_0, 1e-6 * U)  # a trial step may be too far
+        return np.concatenate([np.log(left / (K * w_0)), np.log(eta * K * left / (R * T_s)),
+                               np.log(U / (R * I_s))[known]])
+
+    names = ("resistance", "output_torque_constant", "gear_efficiency")[:3 if assumed.efficiency is None else 2]
+    x = np.mean([[math.log(getattr(motor, name)) for name in names] for motor in alone], axis=0)
+    r = facts(x)
+    for _ in range(_MOST_STEPS):
+        J = np.stack([(facts(x + h) - facts(x - h)) / 2e-6 for h in 1e-6 * np.eye(len(x))], axis=1)
+        step = np.linalg.lstsq(J, -r, rcond=None)[0]
+        while (new := facts(x + step)) @ new > r @ r and np.abs(step).max() > 1e-12:
+            step = 0.5 * step
+        if np.abs(step).max() <= 1e-12:
+            break
+        x, r = x + step, facts(x + step)
+    eta = math.exp(x[2]) if len(x) == 3 else float(assumed.efficiency or 1.0)
+    R, K = math.exp(x[0]), math.exp(x[1])
+    of_nominal = next(i for i, point in zip(given, points, strict=True)
+                      if point.supply_voltage == sheet.nominal.supply_voltage)
+    I_0 = float(of_nominal or 0.0) if assumed.ratio is None else assumed.ratio * U_n / R
+    return SheetMotor(resistance=R, output_torque_constant=K, stall_current=U_n / R, gear_efficiency=eta,
+                      coulomb_torque=K * I_0 * (1.0 - load_share(min(eta, 1.0))))
