@@ -67,7 +67,7 @@ def test_too_few_samples(logs):
     few = logs[0].part(0.4, 0.46)
     assert len(few) == 3
     refused("sample|changes", [few])
-    refused("sample|value", [few], free=FREE, nuisance=())
+    refused("sample|value|changes", [few], free=FREE, nuisance=())
 
 
 def test_fewer_values_than_numbers(logs):

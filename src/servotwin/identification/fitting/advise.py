@@ -194,7 +194,7 @@ class _Known:
         for k, p in enumerate(fit.space.parameters):
             if p.scaled_prior is not None:
                 weight[k] = 1.0 / p.scaled_prior[1]
-        information = fit.doubt.information / fit.doubt.inflation**2 + np.diag(weight**2)
+        information = _information(fit, weight)
         sensor = "output_angle" if "output_angle" in fit.noise else "feedback_voltage"
         return cls(fit.model, fit.space, fit.names[len(fit.space):], fit.best, information,
                    _scales(fit.space, fit.best), fit.names, fit.noise, sensor,
@@ -217,6 +217,20 @@ class _Known:
         least = np.diag(np.full(len(information), 1.0 / _UNKNOWN**2))
         std = np.sqrt(np.diag(np.linalg.inv(information + least)))
         return {name: 1.96 * float(std[k] * self.scale[k]) for k, name in enumerate(self.space.names)}
+
+
+def _information(fit: Fit, weight: Array) -> Array:
+    """Return what logs and priors say, as surely as the intervals of a fit do."""
+    doubt = fit.doubt
+    if doubt is None:
+        return np.diag(weight**2)
+    known = np.diag(doubt.covariance) > 0.0
+    ratio = np.diag(doubt.curvature)[known] / np.diag(doubt.covariance)[known]
+    information = doubt.information * float(np.median(ratio)) + np.diag(weight**2)
+    if not fit.unidentifiable:
+        inner = np.ix_(known, known)
+        information[inner] = np.linalg.inv(doubt.covariance[inner])
+    return information
 
 
 def _scales(space: Space, x: Array) -> Array:

@@ -20,6 +20,7 @@ from servotwin.identification.fitting.point import LogPart, Point
 Array = NDArray[np.float64]
 
 _LEAST_STEP = 1e-7  # of a searched number
+_PATIENCE = 6  # small gains one after the other
 _LEAST_GAIN = 1e-3  # of the cost, half a sum of squares in units of noise: a twentieth of a standard error
 
 
@@ -175,10 +176,13 @@ class Search:
         best = Outcome(point, self.cost_of(point, parts), False, 0)
         if not math.isfinite(best.cost):
             return best
-        damping = 1e-3
+        damping, small = 1e-3, 0
         scale = np.zeros(self.forecast.size)
         for k in range(1, most + 1):
             normal = self.normal(best.point, parts)
+            # A gain is also small where the damping is high: what counts is what a whole step promises
+            if self._promise(best.point, normal) < least_gain:
+                return Outcome(best.point, best.cost, True, k)
             scale = np.maximum(0.5 * scale, np.diag(normal.H))
             while True:
                 trial, step = self._step(best.point, normal, damping, scale)
@@ -192,13 +196,28 @@ class Search:
                 if damping > 1e9:
                     return Outcome(best.point, best.cost, True, k)
             damping = max(damping / 8.0, 1e-9)
-            best = Outcome(trial, cost, best.cost - cost < least_gain, k)
+            small = small + 1 if best.cost - cost < least_gain else 0
+            best = Outcome(trial, cost, False, k)
             if tell is not None:
                 tell(k, best)
-            if best.converged:
+            if small > _PATIENCE:
                 return best
             parts = self.forecast.at(trial, cases=self.cases)
         return best
+
+    def _stays(self, x: Array, g: Array) -> NDArray[np.bool_]:
+        """Tell which numbers are held, or at a bound over which the cost falls."""
+        return np.asarray(self.held | ((x <= self.lower) & (g > 0.0)) | ((x >= self.upper) & (g < 0.0)))
+
+    def _promise(self, point: Point, normal: Normal) -> float:
+        """Return by how much the cost would fall in a whole step, if it were a parabola."""
+        g, H = normal.reduced()
+        moves = ~self._stays(point.shared, g)
+        gain = 0.5 * float(g[moves] @ np.linalg.lstsq(H[np.ix_(moves, moves)], g[moves], rcond=1e-14)[0])
+        for b in normal.blocks:
+            if b.g_o.size:
+                gain += 0.5 * float(b.g_o @ np.linalg.solve(_safe(b.H_oo), b.g_o))
+        return gain
 
     def _step(self, point: Point, normal: Normal, damping: float, scale: Array) -> tuple[Point, float]:
         """Return the next point, and the largest change of a number."""
@@ -206,7 +225,7 @@ class Search:
                         normal.g, normal.H + damping * np.diag(scale))
         g, H = damped.reduced()
         x = point.shared
-        stays = self.held | ((x <= self.lower) & (g > 0.0)) | ((x >= self.upper) & (g < 0.0))
+        stays = self._stays(x, g)
         change = np.zeros(len(x))
         for _ in range(len(x) + 1):  # what a step would push over its bound goes to it, and the rest is solved again
             moves = ~stays

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.free import Space
+from servotwin.identification.fitting.free import LUMPED, N, Space
 from servotwin.identification.logs.log import Log
 from servotwin.models import BoundedServo, Model
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from servotwin.signals import Signal
 
 Array = NDArray[np.float64]
+
+_UNKNOWN = 0.1  # s, more than the delay of a servo and its bus
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class Case:
         return sum(len(place) for place in self.places.values())
 
 
-def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str]) -> Case:
+def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, delayed: bool = False) -> Case:
     """Return a log ready to be compared.
 
     Raises
@@ -70,12 +72,16 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str]) -> C
     InputError
         If the model cannot follow it, or it sets a parameter that is searched.
     """
+    searched = {*space.columns(space.start[None, :]), *([N] if any(name in LUMPED for name in space.names) else [])}
     for name in log.parameters:
-        if name in space.columns(space.start[None, :]):
+        if name in searched:
             raise InputError(f"free: {name}", got=f"searched, but log {log.name!r} says what it is",
                              allowed="one of both")
     time = log.time - log.time[0]
     used = {name: _usable(log, model, name) for name in sensors if name in log.measured and log.used(name).any()}
+    angle, speed, scatter, moving = _start(log, model)
+    if moving and delayed:  # until the first command acts the servo follows earlier ones, which no log tells
+        used = {name: mask & (time >= _UNKNOWN) for name, mask in used.items()}
     used = {name: mask for name, mask in used.items() if mask.any()}
     if not used:
         raise InputError(f"log {log.name!r}", got="no value of " + ", ".join(sensors) + " that counts",
@@ -84,7 +90,6 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str]) -> C
     index = np.cumsum(any_used) - 1
     places = {name: index[mask] for name, mask in used.items()}
     values = {name: log.measured[name][mask] for name, mask in used.items()}
-    angle, speed, scatter, moving = _start(log, model)
     times = time[any_used]
     overridden = tuple(sorted(name for name in log.parameters))
     key = (times.tobytes(), log.duration, log.command_kind, overridden, tuple(sorted(places)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from servotwin.identification.logs.log import Log
 from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES
+from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.comparison import Tables
@@ -73,6 +74,8 @@ def checked_sensors(logs: Sequence[Log], sensors: Sequence[str] | None, model: M
     """Return the names of measured signals that are compared."""
     there = dict.fromkeys(name for log in logs for name in log.measured)
     if sensors is not None:
+        if isinstance(sensors, str) or not isinstance(sensors, Sequence):
+            raise InputError("sensors", got=sensors, allowed="a list of " + ", ".join(there))
         for name in sensors:
             if name not in there or name not in model.available:
                 raise InputError("sensors", got=name, allowed=", ".join(n for n in there if n in model.available))
@@ -118,7 +121,7 @@ def check_speeds(logs: Sequence[Log], model: Model) -> None:
         if log.angle_name != "output_angle":
             continue
         voltage = log.parameters.get("supply.open_circuit_voltage", model.value("supply.open_circuit_voltage"))
-        used = log.used("output_angle")
+        used = log.used("output_angle") if log.torque_on is None else log.used("output_angle") & log.torque_on
         time, angle = log.time[used], log.measured["output_angle"][used]
         if len(time) < 5:
             continue
@@ -136,6 +139,49 @@ def checked_loss(loss: str, huber: float) -> float:
     if loss not in ("huber", "squares"):
         raise InputError("loss", got=loss, allowed='"huber" or "squares"')
     return huber if loss == "huber" else math.inf
+
+
+def checked_words(what: str, words: Any, allowed: Sequence[str]) -> tuple[str, ...]:
+    """Return a list of words out of some, none of them twice."""
+    if isinstance(words, str) or not isinstance(words, Sequence) or not all(isinstance(w, str) for w in words):
+        raise InputError(what, got=words, allowed="a list of " + ", ".join(allowed))
+    for word in words:
+        if word not in allowed or list(words).count(word) > 1:
+            raise InputError(what, got=word if word not in allowed else f"{word} twice", allowed=", ".join(allowed))
+    return tuple(words)
+
+
+def checked_level(level: Any) -> float:
+    """Return the level of intervals."""
+    if isinstance(level, bool) or not isinstance(level, int | float) or not 0.0 < level < 1.0:
+        raise InputError("level", got=level, allowed="a number between 0 and 1, such as 0.95")
+    return float(level)
+
+
+def checked_noise(noise: Any, sensors: Sequence[str]) -> dict[str, float] | None:
+    """Return the noise of sensors [SI], as far as it is given."""
+    if noise is None:
+        return None
+    if not isinstance(noise, Mapping):
+        raise InputError("noise", got=noise, allowed="a mapping of sensors to standard deviations (SI)")
+    for name, value in noise.items():
+        if name not in sensors:
+            raise InputError("noise", got=name, allowed=", ".join(sensors))
+        if not (is_finite(value) and value > 0.0):
+            raise InputError(f"noise of {name}", got=value, allowed="a positive number (SI)")
+    return {name: float(value) for name, value in noise.items()}
+
+
+def check_fitted(logs: Sequence[Log], fitted: Sequence[int], sensors: Sequence[str], numbers: int) -> None:
+    """Raise if the logs that are fitted are too little for what is searched."""
+    some = [logs[k] for k in fitted]
+    if all(log.is_constant for log in some):
+        raise InputError("logs that are fitted", got="an angle that never changes", allowed="a log in which the servo "
+                         "moves; hold out others")
+    values = sum(int(log.used(name).sum()) for log in some for name in sensors if name in log.measured)
+    if values <= numbers:
+        raise InputError("logs that are fitted", got=f"{values} samples with a value",
+                         allowed=f"more than the {numbers} numbers that are searched")
 
 
 def checked_count(what: str, number: Any, *, least: int) -> int:

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _VOLTAGE = "supply.open_circuit_voltage"
+_POTENTIOMETER = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")
 
 
 class _Here:
@@ -88,7 +89,8 @@ class Forecast:
             raise InputError("nuisance: angle_sag", got=f"{model!r} whose bus voltage stays",
                              allowed="a pulse servo with supply.internal_resistance")
         self.noise = dict.fromkeys(self.sensors, 1.0)
-        self.cases = tuple(make_case(log, model, space, self.sensors) for log in logs)
+        delayed = "delay" in nuisance or "log_delay" in nuisance
+        self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
         self.runs = 0
         self.strict = True
 
@@ -116,7 +118,11 @@ class Forecast:
         The start is believed to be where it was measured, within what the first samples scatter; a log's own delay to
         be within half a frame or a sample.
         """
-        spread = {"output_angle": case.scatter / OFFSET_SCALE, "output_speed": math.inf,
+        # The start angle is that of when the first command acts: a shaft in motion is elsewhere by then. And what a
+        # potentiometer reads is no angle while its gain is searched
+        unsure = case.moving or (case.log.angle_name == "feedback_voltage"
+                                 and any(name in self.space.names for name in _POTENTIOMETER))
+        spread = {"output_angle": math.inf if unsure else case.scatter / OFFSET_SCALE, "output_speed": math.inf,
                   "log_delay": 0.5 * float(np.median(np.diff(case.log.time))) / DELAY_SCALE}
         return self.own_start(case), np.array([1.0 / spread[name] for name in self.names_of_own(case)])
 
@@ -194,7 +200,7 @@ class Forecast:
         batch = simulate_many(
             self.model, [signal for lane in job for signal in [lane.signal] * lane.count],
             load=[load for lane in job for load in [lane.case.log.load] * lane.count], parameters=columns,
-            duration=max(float(asked.max()), case.log.duration) + 1e-9, output_times=asked[order], outputs=tuple(names),
+            duration=max(float(asked.max()), case.log.duration), output_times=asked[order], outputs=tuple(names),
             initial=initial or None, seeds=np.zeros(lanes, np.int64), executor=_HERE)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))

@@ -134,6 +134,8 @@ class Space:
             raise InputError("free", got=free, allowed="a list of at least one name")
         _check_names(model, free)
         self.servo = model.servo
+        if not isinstance(bounds or {}, Mapping):
+            raise InputError("bounds", got=bounds, allowed="a mapping of names to (lowest, highest)")
         limits, beliefs = dict(bounds or {}), _beliefs(model.servo, free, priors)
         for what, names in (("bounds", limits), ("priors", beliefs)):
             for name in names:
@@ -263,10 +265,9 @@ def nominal(servo: Servo, name: str) -> float | None:
 def _parameter(servo: Servo, name: str, limits: tuple[float, float] | None, belief: tuple[float, float] | None,
                load: Mapping[str, float]) -> FreeParameter:
     value = load.get(name, 0.0) if name in LOAD_NAMES else nominal(servo, name)
-    typical = _TYPICAL.get(name, 0.0)
-    if name == "friction.stribeck_speed":
-        typical = 0.2 * (nominal(servo, N) or 1.0)  # rad/s at the output shaft
-    start = value if value is not None else typical
+    typical = _typical(servo, name)
+    there = name in _TYPICAL or name == "friction.stribeck_speed"  # else what is absent is 0
+    start = value if value is not None else typical if there else 0.0
     scale = max(abs(start), typical if start == 0.0 else 0.0) or 1.0
     rule = _rule(name)
     logarithmic = rule == "a positive number" and start > 0.0
@@ -282,8 +283,30 @@ def _parameter(servo: Servo, name: str, limits: tuple[float, float] | None, beli
         start = min(max(start, lower), upper)
     if name == N:
         lower = max(lower, 1.0)
+    if belief is not None and logarithmic and belief[0] <= 0.0:
+        raise InputError(f"prior of {name}", got=belief[0], allowed="a positive mean")
     return FreeParameter(name=name, unit=unit_of_free(name), start=start, scale=scale, logarithmic=logarithmic,
                          lower=lower, upper=upper, prior=belief, bounded=limits is not None)
+
+
+def _typical(servo: Servo, name: str) -> float:
+    """Return the size at which a parameter begins to matter beside what the servo has; 0 where none is known."""
+    if name in _TYPICAL:
+        return _TYPICAL[name]
+    reduction = nominal(servo, N) or 1.0
+    gain, resistance = nominal(servo, "output_torque_constant"), nominal(servo, "motor.armature_resistance")
+    inertia, voltage = nominal(servo, "output_inertia"), nominal(servo, "supply.open_circuit_voltage")
+    if name == "friction.stribeck_speed":
+        return 0.2 * reduction  # 0.2 rad/s at the output shaft
+    if name in ("load.inertia", "gear.output_inertia", "load.pendulum.inertia"):
+        return 0.5 * (inertia or 0.0)
+    if not gain or not resistance:
+        return 0.0
+    damping, stall = gain**2 / resistance, gain * (voltage or 6.0) / resistance
+    sizes = {"motor.motor_viscous_friction": 0.1 * damping / reduction**2, "load.viscous_friction": 0.1 * damping,
+             "load.torque": 0.1 * stall, "load.coulomb_torque": 0.05 * stall, "output_coulomb_torque": 0.05 * stall}
+    sizes |= {member: 0.05 * stall / reduction for member in LUMPED["output_coulomb_torque"][0]}
+    return sizes.get(name, 0.0)
 
 
 def _rule(name: str) -> str:

@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
-from servotwin.identification.fitting.comparison import compare
+from servotwin.identification.fitting.comparison import BESIDE, Tables, compare
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.holdout import split
 from servotwin.identification.fitting.intervals import Ends, ends
-from servotwin.identification.fitting.point import FINE, SHARED, Point
+from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, Point
 from servotwin.identification.fitting.record import identified_servo, with_record
 from servotwin.identification.fitting.remedies import with_remedies
 from servotwin.identification.fitting.task import HUBER, Task, by_sensor
@@ -117,14 +118,21 @@ def identify(
     given = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, model)
     checks.check_speeds(given, plain)
+    if free is not None and (isinstance(free, str) or not isinstance(free, Sequence)):
+        raise InputError("free", got=free, allowed="a list of names")
     names = tuple(free) if free is not None else checks.usual_free(plain)
+    nuisance = checks.checked_words("nuisance", nuisance, NUISANCES)
+    beside = checks.checked_words("compare_with", compare_with, BESIDE)
+    level, seed = checks.checked_level(level), checks.checked_count("seed", seed, least=0)
     seen = checks.checked_sensors(given, sensors, plain)
     shared_load = checks.shared_load(given, names)
     space = Space(plain, names, bounds=bounds, priors=priors, load=shared_load)
     fitted, held_out = split(given, holdout, seed)
+    checks.check_fitted(given, fitted, seen, len(names) + len(nuisance))
+    known = checks.checked_noise(noise, seen)
     limit = checks.checked_loss(loss, HUBER)
     forecast = Forecast(given, plain, space, nuisance, seen)
-    task = Task(forecast, Loss(limit), fitted, seed, checks.checked_count("starts", starts, least=1), noise)
+    task = Task(forecast, Loss(limit), fitted, seed, checks.checked_count("starts", starts, least=1), known)
     with checks.shown(progress) as show:
         try:
             found, ended = task.search(lambda share, text: show(0.75 * share, text))
@@ -141,11 +149,18 @@ def identify(
                 doubt, reaching, vague = _doubts(task, found, level, show)
         except KeyboardInterrupt:
             interrupted = True
-        show(0.95, "errors")
         traces = _traces(forecast, found.point, held_out)
         final = identified_servo(plain.servo, space, found.point.shared, doubt, reaching, level)
-        tables = compare(given, fitted, held_out, traces, type(plain)(final), space, tuple(nuisance),
-                         () if interrupted else tuple(compare_with), loss=limit, seed=seed, noise=forecast.noise)
+
+        def tables_beside(models: tuple[str, ...]) -> Tables:
+            return compare(given, fitted, held_out, traces, type(plain)(final), space, nuisance, models, loss=limit,
+                           seed=seed, noise=forecast.noise)
+
+        try:
+            show(0.95, "errors")
+            tables = tables_beside(() if interrupted else beside)
+        except KeyboardInterrupt:
+            interrupted, tables = True, tables_beside(())
     fit = _fit(task, found, doubt, reaching, vague, stuck, final, traces, tables, ended)
     fit = replace(fit, level=level, seconds=clock.monotonic() - began, interrupted=interrupted)
     return with_record(fit, given, fitted)
@@ -173,7 +188,8 @@ def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str
     which = [k for k in range(len(names)) if not flags[k] and not stuck[k]]
     search = Search(forecast, task.loss, task.prior, task.lower, task.upper, task.fitted, held=stuck)
     count = max(len(which), 1)
-    reaching = ends(search, found, doubt, which, level, tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
+    reaching = ends(search, found, doubt, which, level, rows=rows,
+                    tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
     return doubt, reaching, with_remedies(forecast, found.point, vague, names)
 
 

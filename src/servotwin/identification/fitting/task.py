@@ -13,6 +13,7 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.point import DELAY_SCALE, MOST_DELAY, OFFSET_SCALE, SAG_SCALE, LogPart, Point
+from servotwin.identification.logs.log import ANGLES
 
 Array = NDArray[np.float64]
 
@@ -20,6 +21,7 @@ HUBER = 1.345  # of the noise: as good as least squares to 5 % where the noise i
 _TRIED = 8  # random points for each search that is begun
 _FIRST_LOGS = 8  # of the first, rough searches
 _ROUGH = 0.003  # of the cost: what a step of a rough search has to gain
+_BLIND = 1e3  # times the noise: a sensor that does not count yet
 _MOST_OFFSET = 0.6  # rad
 _MOST_SAG = 3.0  # rad/V
 _DELAY = 0.02  # s, where the search for it begins
@@ -65,13 +67,17 @@ class Task:
         if self.starts > 1:
             for k, start in enumerate(self._candidates(nominal, few)):
                 tell(0.6 * k / self.starts, f"start {k + 1} of {self.starts}")
-                self._set_noise(self.forecast.at(start, derivatives=False, cases=few), few)
+                self._set_noise(self.forecast.at(start, derivatives=False, cases=few), few, rough=True)
                 search = self._search(few)
                 first = search.costs([start])[0]
                 ended.append(search.run(start, most=12, tell=self._keep, least_gain=_ROUGH * first))
             ended = self._on_one_scale(ended, few)
             nominal = ended[0].point
         tell(0.6, "all logs")
+        if len(self.forecast.sensors) > 1 and self.noise is None:
+            self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted, rough=True)
+            nominal = self._search(self.fitted).run(nominal, most=25, tell=self._keep).point
+            self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
         best = self._refined(nominal, self.fitted, rounds=6, most=25, tell=tell)
         return best, ended or [best]
 
@@ -142,12 +148,15 @@ class Task:
         scaled = [replace(outcome, cost=cost) for outcome, cost in zip(good, costs, strict=True)]
         return sorted(scaled, key=lambda outcome: outcome.cost)
 
-    def _set_noise(self, parts: Sequence[LogPart], cases: Sequence[int]) -> float:
+    def _set_noise(self, parts: Sequence[LogPart], cases: Sequence[int], *, rough: bool = False) -> float:
         """Take the noise of each sensor from its residuals; return by which share it changed."""
         if self.noise is not None:
             new = {name: self.noise.get(name, self.forecast.noise[name]) for name in self.forecast.sensors}
         else:
             new = self._spread(parts, cases)
+        if rough and len(new) > 1:
+            # Sampled between pulses a current is jagged over the delay: the angle alone leads near first
+            new = {name: value if name in ANGLES else _BLIND * value for name, value in new.items()}
         change = max(abs(math.log(new[name] / self.forecast.noise[name])) for name in new)
         self.forecast.noise = self.forecast.noise | new
         return change

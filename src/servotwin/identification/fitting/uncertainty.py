@@ -1,7 +1,8 @@
 """How surely a fit knows its numbers: covariance from the curvature of the cost and from how the residuals scatter.
 
 Where the residuals of a log follow each other (a model never fits perfectly), their number overstates what they say.
-The covariance is then that of Newey & West (1987), or between logs where there are many; else the ordinary one.
+The covariance is then that of first-order autoregressive residuals, widened to that of Newey & West (1987) where these
+remember longer; with many logs it is what varies between them.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from servotwin.identification.fitting.point import LogPart
 Array = NDArray[np.float64]
 
 _MANY_LOGS = 5  # as many logs for each number
-_WHITE = 3.0  # standard errors of a correlation of 0
+_HARDLY, _SURELY = 1.5, 3.0  # standard errors of a correlation of 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +35,22 @@ class Rows:
         Derivatives, with the part that the log's own numbers can imitate taken away.
     inside : ndarray of float, shape (m,)
         1 within the limit of the loss, else 0.
+    own : int
+        How many of the last rows are beliefs about the log's own numbers.
+    follow : ndarray, shape (own, p), optional
+        How the own numbers follow when the shared ones move.
     """
 
     score: Array
     slope: Array
     inside: Array
+    own: int = 0
+    follow: Array | None = None
+
+    @property
+    def residual(self) -> Array:
+        """The score of measurements alone."""
+        return self.score[:len(self.score) - self.own]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +63,8 @@ class Uncertainty:
         Of the data alone, per unit of noise.
     covariance : ndarray, shape (p, p)
         With priors.
+    curvature : ndarray, shape (p, p)
+        Inverse curvature of the cost, priors included.
     inflation : float
         By how much the correlation of residuals widens the standard errors, in the mean.
     method : str
@@ -63,6 +77,7 @@ class Uncertainty:
 
     information: Array
     covariance: Array
+    curvature: Array
     inflation: float
     method: str
     freedom: float
@@ -105,7 +120,8 @@ def rows_of(part: LogPart, loss: Loss, own: Prior, at: Array) -> Rows:
         alone = np.concatenate([part.own, belief])
         weighted = alone * inside[:, None]
         H = weighted.T @ alone
-        slope = slope - alone @ np.linalg.solve(H + 1e-12 * np.eye(len(at)) * max(H.max(), 1.0), weighted.T @ slope)
+        follow = np.linalg.solve(H + 1e-12 * np.eye(len(at)) * max(H.max(), 1.0), weighted.T @ slope)
+        return Rows(score, slope - alone @ follow, inside, len(at), -follow)
     return Rows(score, slope, inside)
 
 
@@ -133,34 +149,63 @@ def uncertainty(rows: Sequence[Rows], prior: Prior, held: NDArray[np.bool_],
     """
     p = rows[0].slope.shape[1]
     information = np.sum([(r.slope * r.inside[:, None]).T @ r.slope for r in rows], axis=0)
-    correlation, lag = _correlation([r.score for r in rows])
-    count = sum(len(r.score) for r in rows)
-    white = abs(correlation) < _WHITE / math.sqrt(count)
+    count = sum(len(r.residual) for r in rows)
+    correlation, lag = _correlation([r.residual for r in rows])
     plain = _meat(rows, 0)
     freedom = math.inf
-    if white:
-        meat, method = plain, "independent residuals"
-    elif len(rows) >= _MANY_LOGS * p:
+    if len(rows) >= _MANY_LOGS * p:
+        # Whatever varies within logs or from log to log is in this
         scores = np.array([r.slope.T @ r.score for r in rows])
         meat, method = scores.T @ scores * len(rows) / (len(rows) - 1.0), "between logs"
         freedom = len(rows) - 1.0
+    elif abs(correlation) < _HARDLY / math.sqrt(count):
+        meat, method = plain, "independent residuals"
     else:
-        meat, method = _meat(rows, lag), "correlated residuals"
+        meat, freedom = _first_order(rows, correlation)
+        if abs(correlation) > _SURELY / math.sqrt(count):  # perhaps a longer memory than that
+            longer = _meat(rows, lag)
+            more = np.sqrt(np.maximum(np.diag(longer) / np.maximum(np.diag(meat), 1e-300), 1.0))
+            meat = meat * np.outer(more, more)
+        method = "correlated residuals"
     meat = meat * count / max(count - p, 1)
     free = ~held
     stiff = np.zeros((p, p))
     if vague is not None and vague.shape[1]:
         stiff = 1e6 * max(float(np.diag(information).max()), 1.0) * vague @ vague.T
-    H = (information + stiff + np.diag(prior.weight**2))[np.ix_(free, free)]
-    M = (meat + np.diag(prior.weight**2))[np.ix_(free, free)]
-    inverse = _inverse(H)
-    covariance, simple = np.zeros((p, p)), np.zeros((p, p))
-    covariance[np.ix_(free, free)] = _sandwich(inverse, M)
-    simple[np.ix_(free, free)] = _sandwich(inverse, (plain + np.diag(prior.weight**2))[np.ix_(free, free)])
+    beliefs = np.diag(prior.weight**2)
+    curvature, covariance, simple = (np.zeros((p, p)) for _ in range(3))
+    inner = np.ix_(free, free)
+    curvature[inner] = _inverse((information + stiff + beliefs)[inner])
+    covariance[inner] = _sandwich(curvature[inner], (meat + beliefs)[inner])
+    simple[inner] = _sandwich(curvature[inner], (plain + beliefs)[inner])
     known = np.diag(simple) > 0.0
     ratio = np.sqrt(np.diag(covariance)[known] / np.diag(simple)[known])
-    inflation = max(float(np.median(ratio)), 0.1) if known.any() else 1.0
-    return Uncertainty(information, covariance, inflation, method, freedom, correlation)
+    inflation = max(float(np.median(ratio)), 1.0) if known.any() else 1.0
+    return Uncertainty(information, covariance, curvature, inflation, method, freedom, correlation)
+
+
+def _first_order(rows: Sequence[Rows], correlation: float) -> tuple[Array, float]:
+    """Return the covariance of the gradient if residuals are first-order autoregressive, and degrees of freedom.
+
+    The fit itself takes slow residuals away; their correlation is corrected for that (Kendall 1954), and so is their
+    size.
+    """
+    from scipy.signal import lfilter
+
+    p, own = rows[0].slope.shape[1], float(np.mean([r.own for r in rows]))
+    sizes = [len(r.residual) for r in rows]
+    fitted, mean = own + p / len(rows), float(np.mean(sizes))
+    rho = min(max(correlation + (1.0 + 3.0 * max(correlation, 0.0)) * fitted / mean, 0.0), 0.98)
+    apart = (1.0 - rho) / (1.0 + rho)  # independent residuals for each that there is
+    power = sum(float(r.residual @ r.residual) for r in rows) / sum(sizes)
+    power /= max(1.0 - fitted / (apart * mean), 0.3)
+    total = np.zeros((p, p))
+    for r in rows:
+        m = len(r.residual)
+        g = (r.slope * r.inside[:, None])[:m]
+        echo = lfilter([1.0], [1.0, -rho], g, axis=0)
+        total += power * (echo.T @ g + g.T @ echo - g.T @ g) + r.slope[m:].T @ r.slope[m:]
+    return total, max(sum(sizes) * apart - p - own * len(rows), 3.0)
 
 
 def _sandwich(bread: Array, meat: Array) -> Array:
