@@ -20,7 +20,8 @@ STAMP = ENVIRONMENT / "installed"
 TASKS = {
     "setup": "make .venv and install servotwin with all tools",
     "paper": "set up, then write the report of the paper to paper-report/ (main job)",
-    "test": "set up, then run all tests",
+    "test": "set up, then run the tests (10 minutes)",
+    "validation": "set up, then run the slow tests: validation and coverage (10 minutes more)",
     "check": "set up, then lint, types, import rules",
     "examples": "set up, then run every script of examples/",
     "docs": "set up, then build the documentation to docs/_build/",
@@ -59,8 +60,14 @@ def install(extra: str) -> None:
 
 
 def test(arguments: list[str]) -> None:
-    """Run the tests on two processes."""
-    run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", *arguments)
+    """Run the tests on two processes; the slow ones only where they are asked for by `-m` or by name."""
+    chosen = any(a == "-m" or not a.startswith("-") for a in arguments)
+    run("python", "-m", "pytest", "-n", "2", "--dist", "worksteal", *([] if chosen else ["-m", "not slow"]), *arguments)
+
+
+def validation(arguments: list[str]) -> None:
+    """Run the slow tests on two processes."""
+    test(["-m", "slow", *arguments])
 
 
 def check(arguments: list[str]) -> None:
@@ -87,7 +94,7 @@ def main(arguments: list[str]) -> None:
         sys.exit(f"dev.py: servotwin needs Python 3.11 or newer, this is {sys.version.split()[0]}")
     task = arguments[0] if arguments else ""
     if task not in TASKS:
-        print("usage: python3 dev.py TASK\n\n" + "\n".join(f"  {name:9} {what}" for name, what in TASKS.items()))
+        print("usage: python3 dev.py TASK\n\n" + "\n".join(f"  {name:11} {what}" for name, what in TASKS.items()))
         sys.exit(0 if task in ("-h", "--help") else 2)
     setup()
     rest = arguments[1:]
@@ -101,7 +108,7 @@ def main(arguments: list[str]) -> None:
         for script in sorted((ROOT / "benchmarks").glob("*/run.py")):
             run("python", str(script), *rest)
     elif task != "setup":
-        {"test": test, "check": check, "examples": examples}[task](rest)
+        {"test": test, "validation": validation, "check": check, "examples": examples}[task](rest)
 
 
 if __name__ == "__main__":

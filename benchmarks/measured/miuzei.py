@@ -1,4 +1,4 @@
-"""The Miuzei 25 kg servo with an arm: four folds, each fitted on three quarters of the runs and held against the rest."""
+"""The Miuzei 25 kg servo with an arm: folds by run, each fitted on the others and held against its own."""
 
 import time
 from pathlib import Path
@@ -26,9 +26,9 @@ EXTERNAL, LEAST = "friction.load_friction_external", "electronics.minimum_drive_
 TERMS = {EXTERNAL: 0.4, LEAST: 4e-4}
 MODELS = {  # label -> terms beyond Coulomb friction
     "Coulomb friction (M1)": (),
-    "+ least drive time": (LEAST,),
-    "+ friction of the load outside": (EXTERNAL,),
-    "+ both": (EXTERNAL, LEAST),
+    "+ outside load friction, least drive": (EXTERNAL, LEAST),
+    "+ outside load friction": (EXTERNAL,),
+    "+ least drive": (LEAST,),
 }
 FOLDS = 4
 NOISE = {"output_angle": 0.02}  # rad, what of a residual counts in full: what the models leave open, not the encoder
@@ -37,8 +37,8 @@ NOISE = {"output_angle": 0.02}  # rad, what of a residual counts in full: what t
 def main(folder: Path) -> None:
     logs = [log for log in st.read_logs(folder / "miuzei_25kg" / "runs.json") if log.motion != "drop"]
     servo = st.servo_from_values("miuzei-25kg", START)
-    print(f"Miuzei 25 kg: {len(logs)} runs, {FOLDS} folds by run; rms error of runs that were not fitted [deg], over all "
-          "samples (mean of the runs)")
+    print(f"Miuzei 25 kg: {len(logs)} runs, {FOLDS} folds by run; rms error of runs that were not fitted [deg], over "
+          "all samples (mean of the runs)")
     for label, terms in MODELS.items():
         began = time.perf_counter()
         errors, slew, fitted = [], [], []
@@ -55,4 +55,4 @@ def main(folder: Path) -> None:
             row("delay + slew + lag", slew)
         row(label, errors)
         row("  on the runs it was fitted to", fitted)
-        print(f"  {'':34} {(time.perf_counter() - began) / FOLDS:.0f} s a fit", flush=True)
+        print(f"  {'':36} {(time.perf_counter() - began) / FOLDS:.0f} s a fit", flush=True)

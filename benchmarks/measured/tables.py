@@ -26,4 +26,4 @@ def row(label: str, errors: Iterable[LogError], by: str = "motion") -> None:
         pooled = math.sqrt(sum(e.rms**2 * e.samples for e in items) / sum(e.samples for e in items))
         mean = sum(e.rms for e in items) / len(items)
         cells.append(f"{kind} {math.degrees(pooled):5.2f} ({math.degrees(mean):5.2f})")
-    print(f"  {label:34} {'   '.join(cells)}", flush=True)
+    print(f"  {label:36} {'   '.join(cells)}", flush=True)
