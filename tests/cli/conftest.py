@@ -34,6 +34,7 @@ class Ended:
 @pytest.fixture
 def cli(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("COLUMNS", raising=False)  # as in a pipe; a runner may set its own
 
     def run(*words):
         code = main([str(word) for word in words])
