@@ -25,7 +25,7 @@ PUBLISHED = {
 }
 FREE = ["motor.armature_resistance", "output_torque_constant", "output_inertia"]
 HELD_OUT = (0, 6, 11)  # one run of each gain, each of another trajectory
-RUNGS = ("M1", "M3", "M4", "M5")
+RUNGS = ("M1", "M3")
 FITTED = BamConvention(frame_period=4e-3)  # a quarter of the frames, for time; errors of all are told at 1 ms
 TOLD = BamConvention()
 

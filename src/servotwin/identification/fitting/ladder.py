@@ -47,6 +47,7 @@ _FIRST = {  # where a term begins that the rung before does not have: little of 
     "friction.load_friction_motor_stribeck": 0.05, "friction.load_friction_external_stribeck": 0.05,
     "friction.load_friction_motor_quad": 0.01, "friction.load_friction_external_quad": 0.01,
 }
+_ALIKE = {"friction.load_friction": _DIRECTED, "friction.load_friction_stribeck": _DIRECTED_STRIBECK}
 _STRIBECK_SPEED = 0.2  # rad/s at the output, where Stribeck friction begins to fade
 
 
@@ -165,15 +166,24 @@ def _share(show: Any, k: int, count: int, name: str) -> Any:
 
 
 def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
-    """Return where a rung begins: at the best simpler law whose terms it all has, its own terms small."""
-    inner = [rung for rung in before if set(RUNGS[rung.name]) <= set(RUNGS[name]) and math.isfinite(rung.fit.cost)]
+    """Return where a rung begins: at the best simpler law that it contains, its further terms small.
+
+    M5 and M6 contain M3 and M4 too: there motor and load outside count alike.
+    """
+    alike = {"M5": ("M1", "M2", "M3", "M4", "M5"), "M6": tuple(RUNGS)}.get(name, ())
+    inner = [rung for rung in before if math.isfinite(rung.fit.cost)
+             and (rung.name in alike or set(RUNGS[rung.name]) <= set(RUNGS[name]))]
     base = min(inner, key=lambda rung: rung.training).fit.servo if inner else servo
-    values: dict[str, Any] = {term: None for term in _TERMS if servo.get(term) is not None and term not in RUNGS[name]}
+    values: dict[str, Any] = {}
+    for share, both in _ALIKE.items():
+        if base.get(share) is not None and share not in RUNGS[name]:
+            values |= {term: base.get(share) for term in both if term in RUNGS[name]}
+    values |= {term: None for term in _TERMS if base.get(term) is not None and term not in RUNGS[name]}
     reduction = float(nominal(servo, "gear.gear_reduction") or 1.0)
     own = {**_FIRST, "friction.stribeck_speed": _STRIBECK_SPEED * reduction}
-    values |= {term: own[term] for term in RUNGS[name] if term in own and not base.get(term)}
-    if values.get("friction.breakaway_ratio") is None and base.get("friction.breakaway_ratio") == 1.0 \
-            and "friction.breakaway_ratio" in RUNGS[name]:
+    values |= {term: own[term] for term in RUNGS[name]
+               if term in own and not base.get(term) and not values.get(term)}
+    if base.get("friction.breakaway_ratio") == 1.0 and "friction.breakaway_ratio" in RUNGS[name]:
         values["friction.breakaway_ratio"] = own["friction.breakaway_ratio"]
     return base.replace(values)
 
