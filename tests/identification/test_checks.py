@@ -101,7 +101,16 @@ def test_a_good_servo_is_not_contradicted(logs):
 
 
 def test_a_log_that_starts_where_the_servo_cannot_be(logs):
-    refused("stops", [with_angle(logs[0], logs[0].measured["output_angle"] + 3.0)])
+    off = with_angle(logs[0], logs[0].measured["output_angle"] + 3.0)
+    refused("stops", [off], nuisance=("delay", "initial_state"))
+
+
+def test_the_zero_of_an_encoder_may_be_anywhere(logs):
+    """3 rad off: the search begins where the commands are followed in the middle."""
+    off = with_angle(logs[0], logs[0].measured["output_angle"] + 3.0)
+    fit = identify([off], TRUTH, free=FREE, priors=None, starts=1, compare_with=(), holdout=0)
+    assert fit.estimates["angle_offset"] == pytest.approx(3.0, abs=0.01)
+    assert fit.training.total()["PulseServo"] < 0.01
 
 
 def test_no_torque_at_all(logs):

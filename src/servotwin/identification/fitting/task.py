@@ -22,7 +22,9 @@ _TRIED = 8  # random points for each search that is begun
 _FIRST_LOGS = 8  # of the first, rough searches
 _ROUGH = 0.003  # of the cost: what a step of a rough search has to gain
 _BLIND = 1e3  # times the noise: a sensor that does not count yet
-_MOST_OFFSET = 0.6  # rad
+_MOST_OFFSET = 12.0  # rad, nearly two turns: an encoder's zero may be anywhere
+_NEAR = 0.3  # rad, an offset that the search finds by itself
+_LOOKS = 25  # of each log, for a first offset
 _MOST_SAG = 3.0  # rad/V
 _DELAY = 0.02  # s, where the search for it begins
 
@@ -52,10 +54,25 @@ class Task:
 
     def nominal(self) -> Point:
         """Return where the servo's values stand."""
-        first = {"delay": _DELAY / DELAY_SCALE, "angle_offset": 0.0, "angle_sag": 0.0}
+        first = {"delay": _DELAY / DELAY_SCALE, "angle_offset": self._offset() / OFFSET_SCALE, "angle_sag": 0.0}
         shared = np.concatenate([self.forecast.space.start, [first[name] for name in self.forecast.extra]])
         return Point(np.clip(shared, self.lower, self.upper),
                      tuple(self.forecast.own_start(case) for case in self.forecast.cases))
+
+    def _offset(self) -> float:
+        """Return how far the measured angles lie from the commanded ones in the middle; 0 where that is near [rad]."""
+        if "angle_offset" not in self.forecast.extra:
+            return 0.0
+        model, gaps = self.forecast.model, []
+        for k in self.fitted:
+            case = self.forecast.cases[k]
+            drive = model.command(case.signal)
+            for i in range(0, len(case.times), max(1, len(case.times) // _LOOKS)):
+                if "output_angle" in case.places and i < len(case.places["output_angle"]):
+                    asked = model.start_angle(float(drive(case.times[case.places["output_angle"][i]])))
+                    gaps.append(float(case.values["output_angle"][i]) - asked)
+        middle = float(np.median(gaps)) if gaps else 0.0
+        return middle if abs(middle) > _NEAR else 0.0
 
     def search(self, tell: Callable[[float, str], None]) -> tuple[Outcome, list[Outcome]]:
         """Return the best point, and where the search from each start ended."""
@@ -123,9 +140,9 @@ class Task:
     def _candidates(self, nominal: Point, few: Sequence[int]) -> list[Point]:
         """Return the nominal point, and the best of many random ones."""
         rng = np.random.default_rng(self.seed)
-        tried = []
+        tried, offset = [], self._offset() / OFFSET_SCALE
         for _ in range(_TRIED * (self.starts - 1)):
-            extra = {"delay": rng.uniform(0.0, 3.0 * _DELAY / DELAY_SCALE), "angle_offset": 0.0, "angle_sag": 0.0}
+            extra = {"delay": rng.uniform(0.0, 3.0 * _DELAY / DELAY_SCALE), "angle_offset": offset, "angle_sag": 0.0}
             shared = np.concatenate([self.forecast.space.random(rng), [extra[n] for n in self.forecast.extra]])
             tried.append(Point(np.clip(shared, self.lower, self.upper), nominal.own))
         costs = self._search(few).costs(tried)
