@@ -91,7 +91,6 @@ class Forecast:
         self.noise = dict.fromkeys(self.sensors, 1.0)
         delayed = "delay" in nuisance or "log_delay" in nuisance
         self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
-        self.runs = 0
         self.strict = True
 
     @property
@@ -151,7 +150,6 @@ class Forecast:
             groups.setdefault((lane.case.key, lane.delay), []).append(lane)
         jobs = [job for group in groups.values() for job in _split(group)]
         jobs.sort(key=lambda job: -sum(lane.cost for lane in job))
-        self.runs += sum(lane.count for lane in lanes)
         if len(jobs) == 1 or _workers() == 1:
             for job in jobs:
                 self._try(job)
