@@ -141,6 +141,13 @@ def checked_loss(loss: str, huber: float) -> float:
     return huber if loss == "huber" else math.inf
 
 
+def checked_list(what: str, names: Any) -> tuple[str, ...]:
+    """Return a list of names."""
+    if isinstance(names, str) or not isinstance(names, Sequence) or not all(isinstance(n, str) for n in names):
+        raise InputError(what, got=names, allowed="a list of names")
+    return tuple(names)
+
+
 def checked_words(what: str, words: Any, allowed: Sequence[str]) -> tuple[str, ...]:
     """Return a list of words out of some, none of them twice."""
     if isinstance(words, str) or not isinstance(words, Sequence) or not all(isinstance(w, str) for w in words):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.arrow import Loss
 from servotwin.identification.fitting.baselines import fit_slew_lag
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
@@ -19,6 +18,7 @@ from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_e
 from servotwin.identification.fitting.task import Task, by_sensor
 from servotwin.identification.logs.log import Log
 from servotwin.models import Model
+from servotwin.parameters import Servo
 
 Array = NDArray[np.float64]
 
@@ -39,27 +39,32 @@ class Tables:
     holdout: ErrorTable
 
 
-def compare(logs: Sequence[Log], fitted: Sequence[int], held_out: Sequence[int], traces: Sequence[Trace], model: Model,
-            space: Space, nuisance: tuple[str, ...], beside: tuple[str, ...], *, loss: float, seed: int,
-            noise: Mapping[str, float]) -> Tables:
+def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo: Servo,
+            beside: tuple[str, ...]) -> Tables:
     """Return the errors of the fitted servo, log by log, and of the models beside it.
 
-    Raises
-    ------
-    InputError
-        If there is no such model.
+    Parameters
+    ----------
+    task : Task
+        Of the fit.
+    held_out : sequence of int
+        Logs that it has not seen.
+    traces : sequence of Trace
+        Of all logs.
+    servo : Servo
+        The fitted one, where the simpler models begin.
+    beside : tuple of str
+        Of `BESIDE`.
     """
-    for name in beside:
-        if name not in BESIDE:
-            raise InputError("compare_with", got=name, allowed=", ".join(BESIDE))
+    model, fitted = task.forecast.model, task.fitted
     own = type(model).__name__
     errors: dict[str, dict[int, LogError]] = {own: {k: log_error(t.log, t.residual) for k, t in enumerate(traces)}}
     if "slew" in beside:
-        slew = _of_slew(logs, fitted, traces, loss)
+        slew = _of_slew([trace.log for trace in traces], fitted, traces, task.loss.limit)
         if slew:
             errors[SLEW] = slew
     if "M1" in beside:
-        simple = _of_m1(logs, fitted, traces, model, space, nuisance, loss, seed, noise)
+        simple = _of_m1(task, traces, type(model)(servo))
         if simple:
             errors[M1] = simple
     models = tuple(errors)
@@ -85,9 +90,9 @@ def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace]
     return found
 
 
-def _of_m1(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace], model: Model, space: Space,
-           nuisance: tuple[str, ...], loss: float, seed: int, noise: Mapping[str, float]) -> dict[int, LogError]:
+def _of_m1(whole: Task, traces: Sequence[Trace], model: Model) -> dict[int, LogError]:
     """Return the errors of the servo with Coulomb and viscous friction; none where it is that already."""
+    space, logs = whole.forecast.space, [trace.log for trace in traces]
     beyond = [f"friction.{name}" for name in _BEYOND_M1]
     free = [name for name in space.names if name not in beyond]
     coulomb = LUMPED["output_coulomb_torque"][0]
@@ -101,8 +106,8 @@ def _of_m1(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace], 
     beliefs = {p.name: p.prior for p in space.parameters if p.prior is not None and p.name in free}
     load = {p.name: p.start for p in space.parameters if p.name.startswith("load.")}
     simple = Space(plain, [*free, *more], bounds=own_bounds, priors=beliefs or None, load=load)
-    forecast = Forecast(logs, plain, simple, nuisance, tuple(noise))
-    task = Task(forecast, Loss(loss), list(fitted), seed, 1, None)
+    forecast = Forecast(logs, plain, simple, whole.forecast.nuisance, whole.forecast.sensors)
+    task = Task(forecast, whole.loss, whole.fitted, whole.seed, 1, whole.noise)
     found, _ = task.search(lambda share, text: None)
     errors = {}
     for k, part in enumerate(forecast.at(found.point, derivatives=False)):

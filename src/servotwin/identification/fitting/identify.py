@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
-from servotwin.identification.fitting.comparison import BESIDE, Tables, compare
+from servotwin.identification.fitting.comparison import BESIDE, compare
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Bounds, Priors, Space
@@ -118,52 +117,47 @@ def identify(
     given = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, model)
     checks.check_speeds(given, plain)
-    if free is not None and (isinstance(free, str) or not isinstance(free, Sequence)):
-        raise InputError("free", got=free, allowed="a list of names")
-    names = tuple(free) if free is not None else checks.usual_free(plain)
-    nuisance = checks.checked_words("nuisance", nuisance, NUISANCES)
+    names = checks.usual_free(plain) if free is None else checks.checked_list("free", free)
     beside = checks.checked_words("compare_with", compare_with, BESIDE)
     level, seed = checks.checked_level(level), checks.checked_count("seed", seed, least=0)
     seen = checks.checked_sensors(given, sensors, plain)
-    shared_load = checks.shared_load(given, names)
-    space = Space(plain, names, bounds=bounds, priors=priors, load=shared_load)
+    space = Space(plain, names, bounds=bounds, priors=priors, load=checks.shared_load(given, names))
     fitted, held_out = split(given, holdout, seed)
+    forecast = Forecast(given, plain, space, checks.checked_words("nuisance", nuisance, NUISANCES), seen)
     checks.check_fitted(given, fitted, seen, len(names) + len(nuisance))
-    known = checks.checked_noise(noise, seen)
-    limit = checks.checked_loss(loss, HUBER)
-    forecast = Forecast(given, plain, space, nuisance, seen)
-    task = Task(forecast, Loss(limit), fitted, seed, checks.checked_count("starts", starts, least=1), known)
+    task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed,
+                checks.checked_count("starts", starts, least=1), checks.checked_noise(noise, seen))
     with checks.shown(progress) as show:
-        try:
-            found, ended = task.search(lambda share, text: show(0.75 * share, text))
-            interrupted = False
-        except KeyboardInterrupt:
-            found, ended, interrupted = task.best_so_far(), [], True
-        doubt = None
-        reaching: dict[int, Ends] = {}
-        vague: tuple[Unidentifiable, ...] = ()
-        stuck = task.at_bound(found)
-        try:
-            if intervals and not interrupted:
-                show(0.76, "intervals")
-                doubt, reaching, vague = _doubts(task, found, level, show)
-        except KeyboardInterrupt:
-            interrupted = True
-        traces = _traces(forecast, found.point, held_out)
-        final = identified_servo(plain.servo, space, found.point.shared, doubt, reaching, level)
+        fit = _run(task, held_out, beside, level, show, intervals=intervals)
+    return with_record(replace(fit, seconds=clock.monotonic() - began), given, fitted)
 
-        def tables_beside(models: tuple[str, ...]) -> Tables:
-            return compare(given, fitted, held_out, traces, type(plain)(final), space, nuisance, models, loss=limit,
-                           seed=seed, noise=forecast.noise)
 
-        try:
-            show(0.95, "errors")
-            tables = tables_beside(() if interrupted else beside)
-        except KeyboardInterrupt:
-            interrupted, tables = True, tables_beside(())
-    fit = _fit(task, found, doubt, reaching, vague, stuck, final, traces, tables, ended)
-    fit = replace(fit, level=level, seconds=clock.monotonic() - began, interrupted=interrupted)
-    return with_record(fit, given, fitted)
+def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: float, show: Callable[[float, str], None],
+         *, intervals: bool) -> Fit:
+    """Search, doubt, and compare; an interrupt ends the stage that it meets and leaves the others out."""
+    forecast, interrupted = task.forecast, False
+    try:
+        found, ended = task.search(lambda share, text: show(0.75 * share, text))
+    except KeyboardInterrupt:
+        found, ended, interrupted = task.best_so_far(), [], True
+    doubt = None
+    reaching: dict[int, Ends] = {}
+    vague: tuple[Unidentifiable, ...] = ()
+    try:
+        if intervals and not interrupted:
+            show(0.76, "intervals")
+            doubt, reaching, vague = _doubts(task, found, level, show)
+    except KeyboardInterrupt:
+        interrupted = True
+    traces = _traces(forecast, found.point, held_out)
+    final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubt, reaching, level)
+    try:
+        show(0.95, "errors")
+        tables = compare(task, held_out, traces, final, () if interrupted else beside)
+    except KeyboardInterrupt:
+        interrupted, tables = True, compare(task, held_out, traces, final, ())
+    fit = _fit(task, found, doubt, reaching, vague, task.at_bound(found), final, traces, tables, ended)
+    return replace(fit, level=level, interrupted=interrupted)
 
 
 def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str], None],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,9 +12,11 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
+from servotwin.identification.fitting.case import Case
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.point import DELAY_SCALE, MOST_DELAY, OFFSET_SCALE, SAG_SCALE, LogPart, Point
 from servotwin.identification.logs.log import ANGLES
+from servotwin.models import Model
 
 Array = NDArray[np.float64]
 
@@ -63,16 +66,27 @@ class Task:
         """Return how far the measured angles lie from the commanded ones in the middle; 0 where that is near [rad]."""
         if "angle_offset" not in self.forecast.extra:
             return 0.0
-        model, gaps = self.forecast.model, []
-        for k in self.fitted:
-            case = self.forecast.cases[k]
+        gaps: list[float] = []
+        for case in (self.forecast.cases[k] for k in self.fitted):
+            place = case.places.get("output_angle", np.zeros(0, np.int64))
+            model = self._model_of(case)
             drive = model.command(case.signal)
-            for i in range(0, len(case.times), max(1, len(case.times) // _LOOKS)):
-                if "output_angle" in case.places and i < len(case.places["output_angle"]):
-                    asked = model.start_angle(float(drive(case.times[case.places["output_angle"][i]])))
-                    gaps.append(float(case.values["output_angle"][i]) - asked)
+            for i in range(0, len(place), max(1, len(place) // _LOOKS)):
+                asked = model.start_angle(float(drive(case.times[place[i]])))
+                gaps.append(float(case.values["output_angle"][i]) - asked)
         middle = float(np.median(gaps)) if gaps else 0.0
         return middle if abs(middle) > _NEAR else 0.0
+
+    def _model_of(self, case: Case) -> Model:
+        """Return the model with what a log says of its servo."""
+        model = self.forecast.model
+        own = {name: value for name, value in case.log.parameters.items()
+               if name in (*model.requires, *model.optional)}
+        if not own:
+            return model
+        with warnings.catch_warnings():  # of two calibrations that differ: it was said of the servo itself
+            warnings.simplefilter("ignore")
+            return type(model)(model.servo.replace(own))
 
     def search(self, tell: Callable[[float, str], None]) -> tuple[Outcome, list[Outcome]]:
         """Return the best point, and where the search from each start ended."""

@@ -209,7 +209,8 @@ def _since_first(table: _Table, column: Column) -> NDArray[np.float64]:
     except (InvalidOperation, OverflowError):
         # not all are plain numbers: the ordinary way names the line
         values = _numbers(table, column)
-        return np.asarray(values - values[0])
+        with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused with its line
+            return np.asarray(values - values[0])
 
 
 def _numbers(table: _Table, column: Column, *, empty: float | None = None) -> NDArray[np.float64]:
