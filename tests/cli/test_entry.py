@@ -97,11 +97,15 @@ def test_text_that_the_terminal_cannot_show(child_environment, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def _heed_interrupts():
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore them
+
+
 def test_an_interrupt_is_one_line_and_130(child_environment, tmp_path):
     os.mkfifo(tmp_path / "command.csv")  # the program waits here for a command that never comes
     with subprocess.Popen([*COMMAND, "simulate", SERVO, "--command", "command.csv", "--out", "run.csv"],
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=child_environment,
-                          cwd=tmp_path) as child:
+                          cwd=tmp_path, preexec_fn=_heed_interrupts) as child:
         with open(tmp_path / "command.csv", "w") as command:  # opens when the program has opened its end
             command.flush()
             child.send_signal(signal.SIGINT)
