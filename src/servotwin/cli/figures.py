@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 
 from servotwin.errors import InputError
+from servotwin.units import DIMENSIONS
 
 _DEG = math.pi / 180.0
 _G = 9.80665
@@ -17,7 +18,7 @@ VOLTAGE = {"v": 1.0, "mv": 1e-3}
 CURRENT = {"a": 1.0, "ma": 1e-3}
 TIME = {"us": 1e-6, "usec": 1e-6, "ms": 1e-3, "s": 1.0}
 ANGLE = {"deg": _DEG, "degree": _DEG, "degrees": _DEG, "rad": 1.0}
-MASS = {"g": 1e-3, "kg": 1.0, "oz": 0.028349523}
+MASS, LENGTH = DIMENSIONS["mass"], DIMENSIONS["length"]
 SPEED = {"deg/s": _DEG, "rad/s": 1.0, "rpm": math.pi / 30.0}
 _SHOWN = {"nm": "N m", "mnm": "mN m", "ncm": "N cm", "kgfcm": "kgf.cm", "ozfin": "oz.in", "v": "V", "mv": "mV",
           "a": "A", "ma": "mA"}

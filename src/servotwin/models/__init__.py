@@ -5,6 +5,7 @@ from servotwin.models.base import Model
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.motors import DCMotor, GearedMotor
 from servotwin.models.pulse import PulseServo, PulseServoInductive
+from servotwin.models.travel import mid_travel
 
 MODELS: dict[str, type[Model]] = {
     "dc-motor": DCMotor,
@@ -17,4 +18,4 @@ MODELS: dict[str, type[Model]] = {
 }
 
 __all__ = ["MODELS", "AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "Model",
-           "PulseServo", "PulseServoInductive"]
+           "PulseServo", "PulseServoInductive", "mid_travel"]

@@ -138,6 +138,12 @@ class Result:
         """Return the largest magnitude of a signal (SI) over the whole continuous solution."""
         return peak(self.trajectory, lambda samples: self.model.output(name, samples, self.drive, self.load))
 
+    def mean(self, name: str, since: float = 0.0) -> float:
+        """Return the mean over time of a signal (SI), from `since` [s] to the end of the continuous solution."""
+        part = self.trajectory.since(since)
+        whole = part.integral(lambda samples: self.model.output(name, samples, self.drive, self.load)[None, :])
+        return float(whole[0]) / (self.ended - since)
+
     def step_metrics(self) -> StepMetrics:
         """Return rise time, settling time, overshoot, steady error, slew rate and peak current of a step.
 
