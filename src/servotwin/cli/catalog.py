@@ -15,7 +15,7 @@ from servotwin.cli.terminal import emit_help, emit_json, pairs, show, table
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
-_TELLING = ("impossible", "sources disagree", "digital", "currents unknown", "stall current unknown",
+_TELLING = ("impossible", "sources disagree", "currents unknown", "stall current unknown",
             "running current unknown")  # what a list has room for
 _Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
@@ -41,10 +41,10 @@ def list_servos(as_json: _Json = False) -> None:
     if as_json:
         emit_json(found)
         return
-    rows = [(servo["id"], servo["title"], _number(servo["supply_voltage"], "{:.3g} V"),
+    rows = [(servo["id"], servo["title"], servo["kind"], _number(servo["supply_voltage"], "{:.3g} V"),
              _number(servo["stall_torque"], "{:.3g} N m"), _number(servo["speed"], "{:.0f} deg/s"),
              _brief(servo["flags"])) for servo in found]
-    show(table(("id", "title", "at", "torque", "speed", "flags"), rows, wraps="flags"))
+    show(table(("id", "title", "kind", "at", "torque", "speed", "flags"), rows, wraps="flags"))
 
 
 @catalog.command("show", help="Show every parameter of a servo and its source.",
@@ -81,7 +81,7 @@ def check(
         warnings.simplefilter("always", UserWarning)
         models = readiness(servo)
     found = {
-        "file": str(file), "id": servo.name, "title": servo.title, "parameters": len(servo.names()),
+        "file": str(file), "id": servo.name, "title": servo.title, "kind": servo.kind, "parameters": len(servo.names()),
         "origins": dict(Counter(servo.source(name).origin for name in servo.names())), "models": models,
         "warnings": list(dict.fromkeys(str(warning.message) for warning in caught)),
     }
@@ -98,7 +98,7 @@ def _show_check(servo: Servo, found: dict[str, Any]) -> None:
     for name in servo.names():
         group, _, key = name.partition(".")
         given.setdefault(group, []).append(key)
-    show(f"{found['file']}: {servo.title} ({servo.name}), a valid servo file",
+    show(f"{found['file']}: {servo.title} ({servo.name}), a valid file of a servo of kind {servo.kind}",
          pairs([("parameters", f"{found['parameters']} ({origins})"),
                 *[(group, ", ".join(keys)) for group, keys in given.items()]]),
          "models",

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def headline(servo: Servo) -> dict[str, Any]:
-    """Return id, title, supply voltage [V], stall torque [N m] and speed [deg/s] of its data sheet, and flags.
+    """Return id, title, kind, supply voltage [V], stall torque [N m] and speed [deg/s] of its data sheet, and flags.
 
     Examples
     --------
@@ -23,7 +23,7 @@ def headline(servo: Servo) -> dict[str, Any]:
     """
     printed = printed_points(servo)[0]
     return {
-        "id": servo.name, "title": servo.title,
+        "id": servo.name, "title": servo.title, "kind": servo.kind,
         "supply_voltage": printed.supply_voltage,
         "stall_torque": printed.stall_torque,
         "speed": 60.0 / printed.time_60 if printed.time_60 else None,
