@@ -30,9 +30,10 @@ Array = NDArray[np.float64]
 _NEUTRAL = 1.5e-3  # s, the pulse in the middle of what transmitters send
 _SAMPLES = 64  # of a period
 _PER_FRAME = 16.618  # samples of a frame: incommensurable, so that no ripple of the frames looks like the sine
+_FRAMES = 50  # that are evaluated at least: sine and frames beat
 _MOST_SAMPLES = 5_000_000
 _LEFT = math.log(1e5)  # what is left of the transient when evaluation begins: 1e-5
-_SETTLED = 1e-3  # a larger change between the halves asks for a later start
+_SETTLED = 1e-3  # a larger change between the halves asks for a longer run
 
 
 class _Window(NamedTuple):
@@ -97,10 +98,10 @@ def frequency_response(model: Model, frequencies: ArrayLike, *, amplitude: Array
     Notes
     -----
     The run begins at rest at the mean. It is evaluated from one period on, or later, until the slowest pole of the
-    small-signal loop has decayed to 1e-5; for at least four whole periods, and long enough to tell the sine from its
-    mirror image at the frame rate less its own. The fundamental is that of a Fourier integral under a Hann window,
-    which is a weighted least-squares fit. Where the two halves differ by more than 1e-3 it is done once more with
-    four times the settling time; `change` says what is left.
+    small-signal loop has decayed to 1e-5; for at least four whole periods and 50 frames, and long enough to tell the
+    sine from its mirror image at the frame rate less its own. The fundamental is that of a Fourier integral under a
+    Hann window, which is a weighted least-squares fit. Where the two halves differ by more than 1e-3 the run is made
+    once more, four times as long; `change` says what is left.
 
     Examples
     --------
@@ -137,11 +138,11 @@ def _at(model: Model, load: Load, omega: float, sizes: Array, name: str, mean: f
     settling = _LEFT / slowest_decay(model, load)
     commands = [signals.sine(mean=mean, amplitude=size, frequency=omega / (2.0 * math.pi), unit=INPUT_UNITS[name])
                 for size in sizes.tolist()]
-    window = _window(model, omega, settling)
-    found = _evaluated(omega, sizes, window, _run(model, load, commands, output, window, seed))
-    if np.any(found[2] > _SETTLED):
-        window = _window(model, omega, 4.0 * settling + 4.0 * window.start)
+    for longer in (1, 4):
+        window = _window(model, omega, settling, longer)
         found = _evaluated(omega, sizes, window, _run(model, load, commands, output, window, seed))
+        if np.all(found[2] < _SETTLED):
+            break
     return found
 
 
@@ -176,19 +177,19 @@ def _fundamental(values: Array, turning: NDArray[np.complex128]) -> NDArray[np.c
     return found
 
 
-def _window(model: Model, omega: float, settling: float) -> _Window:
+def _window(model: Model, omega: float, settling: float, longer: int) -> _Window:
     period = 2.0 * math.pi / omega
     least, rate = 4.0 * period, _SAMPLES / period
     if isinstance(model, PulseServo | PulseServoInductive):
         T_f = model.frame_period
         mirror = max(1.0 / T_f - 2.0 / period, 1e-3 / T_f)  # from the sine to its image [Hz]
-        least, rate = max(least, 5.0 / mirror), max(rate, _PER_FRAME / T_f)
-    length = 2.0 * math.ceil(0.5 * least / period - 1e-9) * period
+        least, rate = max(least, 5.0 / mirror, _FRAMES * T_f), max(rate, _PER_FRAME / T_f)
+    length = 2.0 * math.ceil(0.5 * longer * least / period - 1e-9) * period
     samples = 2 * math.ceil(0.5 * rate * length)
     if samples > _MOST_SAMPLES:
         raise InputError("frequency", got=f"{omega:g} rad/s, a run of {length:.3g} s",
                          allowed=f"at least {omega * samples / _MOST_SAMPLES:.2g} rad/s")
-    return _Window(math.ceil(max(settling, period) / period) * period, length, samples)
+    return _Window(longer * math.ceil(max(settling, period) / period) * period, length, samples)
 
 
 def _frequencies(model: Model, frequencies: ArrayLike) -> Array:
