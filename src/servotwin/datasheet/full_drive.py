@@ -67,7 +67,7 @@ class FullDrive:
     >>> import servotwin as st
     >>> drive = FullDrive(st.PulseServo(st.load_servo("hitec-hs-755hb")))
     >>> round(drive.no_load_speed, 3), round(drive.stall_torque, 3)
-    (4.553, 1.651)
+    (4.646, 1.651)
     """
 
     model: Model

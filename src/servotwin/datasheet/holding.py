@@ -91,7 +91,7 @@ def _moves(model: Model, start: float, step: float) -> bool:
     result = simulate(model, signals.step(start, start + step, at=0.0, unit="rad"), duration=_WAIT,
                       output_times=[0.0, _WAIT])
     before, after = result["output_angle"].tolist()
-    return abs(after - before) > _MOVED
+    return bool(abs(after - before) > _MOVED)
 
 
 def _without_stops(model: Model) -> Model:

@@ -117,7 +117,7 @@ def lift_of(model: Model, mass: float, arm: float) -> Lift:
     blocked = math.acos(most / torque) if most < torque else 0.0
     masses = thermal_masses(model.servo)
     with warned_once():
-        held = hold(model, torque, inertia=inertia)
-        warming = None if masses is None or not held.stands else warmed(model, masses, torque, inertia=inertia)
+        warming = None if masses is None else warmed(model, masses, torque, inertia=inertia)
+        held = hold(model, torque, inertia=inertia) if warming is None else warming.cold
     return Lift(mass=mass, arm=arm, torque=torque, most_torque=most, blocked=blocked,
                 swing=swing_up(drive, mass, arm), held=held, warming=warming)

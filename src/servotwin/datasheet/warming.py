@@ -22,7 +22,7 @@ WIRE_LIMIT = 403.15  # K, 130 °C, class B of IEC 60085; assumed, as the class o
 # their time constants go as the cube root of mass; these are the middles of 10 to 30 s and 5 to 15 min, at 45 g.
 _COPPER_SHARE, _COPPER, _BODY = 0.05, 385.0, 800.0  # 1, J/(kg K), J/(kg K)
 _MIDDLE_MASS, _WINDING_TIME, _HOUSING_TIME = 0.045, math.sqrt(10.0 * 30.0), 60.0 * math.sqrt(5.0 * 15.0)  # kg, s, s
-_LOOKS = 20
+_LOOKS = 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +129,7 @@ def masses_by_mass(mass: float) -> Masses:
 def warmed(model: Model, masses: Masses, torque: float, *, inertia: float = 0.0, duration: float = 600.0) -> Warming:
     """Return how warm a servo gets while it holds a torque [N m], from one look at its pulses to the next.
 
-    Heat is slow beside the pulses, so what two seconds of them say holds for the next half minute.
+    Heat is slow beside the pulses, so what two seconds of them say holds for the next minute.
     """
     step = duration / _LOOKS
     now = Temperatures(masses.ambient, masses.ambient)
@@ -150,4 +150,4 @@ def _passing(masses: Masses, heat: float, now: Temperatures, step: float) -> flo
     """Return when within a step [s] the winding passes the limit of its wire."""
     from scipy.optimize import brentq
 
-    return float(brentq(lambda t: masses.after(t, heat, now).winding - WIRE_LIMIT, 0.0, step))
+    return float(brentq(lambda t: float(masses.after(t, heat, now).winding) - WIRE_LIMIT, 0.0, step))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from servotwin import signals
@@ -34,12 +33,13 @@ def mid_travel(model: Model) -> float:
 
     Examples
     --------
-    >>> import servotwin as st
+    >>> import math, servotwin as st
     >>> round(math.degrees(mid_travel(st.PulseServo(st.load_servo("hitec-hs-755hb")))), 9)
     90.0
     """
     if "command_angle" not in model.signals:
-        raise InputError(f"middle of the travel of {type(model).__name__}", allowed="a model of a servo, not of a motor")
+        raise InputError(f"middle of the travel of {type(model).__name__}",
+                         allowed="a model of a servo, not of a motor")
     lower, upper = model.servo.stops.lower_angle, model.servo.stops.upper_angle
     if lower is not None and upper is not None:
         return 0.5 * (lower + upper)
