@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -101,7 +102,9 @@ def _computed(servos: list[str], model: str | None, change: list[str], options: 
     from servotwin.cli.model_words import model_of
     from servotwin.datasheet import curves as compute
 
-    models = [model_of(servo, model, change, _MODELS) for servo in servos]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # which model stands for which kind is said in the notes
+        models = [model_of(servo, model, change, _MODELS) for servo in servos]
     found = []
     for each in models:
         with patience(f"computing {each.servo.name}"):

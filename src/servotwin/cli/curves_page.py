@@ -45,7 +45,7 @@ def _contents(sheets: Sequence[DataSheet], names: Sequence[str]) -> str:
     drawn = ""
     if len(sheets) <= _MOST_COMPARED:
         drawn = _figure(plotting.compared_curves(sheets), "Torque and current over speed at full drive, cold, each "
-                        "servo at the first of its voltages.")
+                        "servo at the first of its voltages. Open marks are what the sheets print for it.", wide=True)
     return f'<nav aria-label="Contents"><ol>{items}</ol></nav>\n{drawn}'
 
 
@@ -68,8 +68,8 @@ def _servo(sheet: DataSheet, torque: float | None, *, alone: bool) -> str:
         small += _figure(plotting.lift_curve(lifts), "What the mass takes over the angle of its arm, and the most "
                          "that the servo lifts.")
     facts = f"<code>{escape(servo.name)}</code>, {escape(servo.kind)}, computed by {type(sheet.model).__name__}"
-    return (f'<section class="servo" id="{escape(servo.name)}">{heading}<p class="lead">{facts}</p>\n{said}{parts}'
-            f'{drawn}<div class="figures">{small}</div></section>\n')
+    return (f'<section class="servo" id="{escape(servo.name)}">{heading}<p class="lead">{facts}</p>\n{said}{drawn}'
+            f'{parts}<div class="figures">{small}</div></section>\n')
 
 
 def _voltage(sheet: DataSheet, part: VoltageSheet, torque: float | None) -> str:
@@ -93,11 +93,12 @@ def _cards(part: VoltageSheet) -> str:
 def _lift(part: VoltageSheet) -> str:
     if part.lift is None:
         return ""
-    said = table(["", "lifting"], [[escape(label), escape(_degrees(text))] for label, text in lift_pairs(part.lift)],
+    said = table(["Lifting", ""], [[escape(_degrees(words)) for words in pair] for pair in lift_pairs(part.lift)],
                  text_columns=2)
     verdict = "lifts it" if part.lift.lifts else "does not lift it at all angles"
     kind = "note yes" if part.lift.lifts else "note"
-    return f'<div class="{kind}"><p>At {part.voltage:g} V the servo {verdict}.</p></div>\n<div class="pairs">{said}</div>\n'
+    return (f'<div class="{kind}"><p>At {part.voltage:g} V the servo {verdict}.</p></div>\n'
+            f'<div class="pairs">{said}</div>\n')
 
 
 def _minus(row: Row) -> list[str]:

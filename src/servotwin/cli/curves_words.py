@@ -140,7 +140,7 @@ def _lifts(lift: Lift) -> str:
     if lift.lifts:
         return f"yes, at all angles: it could lift {lift.margin:.2g} times as much ({lift.most_torque:.3g} N m)"
     angle = math.degrees(lift.blocked)
-    return (f"no: it lifts {lift.most_torque:.3g} N m, {lift.margin:.0%} of that. From hanging it comes up to "
+    return (f"no: it lifts {lift.most_torque:.3g} N m, {100.0 * lift.margin:.0f} % of that. From hanging it comes up to "
             f"{angle:.0f} deg below the horizontal; {angle:.0f} deg above, it lifts again")
 
 
@@ -168,6 +168,7 @@ def _while(seconds: float) -> str:
 def notes(sheet: DataSheet) -> list[str]:
     """Return what one has to know to read a sheet: flags of what the maker prints, and what the model is."""
     from servotwin.datasheet.conditions import highest_voltage
+    from servotwin.models import BoundedServo
     from servotwin.parameters import printed_flags
 
     servo, most = sheet.servo, highest_voltage(sheet.servo)
@@ -175,7 +176,9 @@ def notes(sheet: DataSheet) -> list[str]:
              if 0.0 < most < part.voltage]
     if servo.kind != "analog":
         found.append(f"a {servo.kind} servo, computed as an analog one: its firmware is not modelled")
-    return found + [f"its sheet: {flag}" for flag in printed_flags(servo)]
+    if isinstance(sheet.model, BoundedServo):
+        found.append("computed as a bounded servo, with the mean voltage of its pulses")
+    return found + [f"its sheet: {flag}" for flag in printed_flags(servo) if flag != servo.kind]
 
 
 def hot_words(part: VoltageSheet) -> str:

@@ -60,13 +60,8 @@ def speed_curves(sheet: DataSheet, *, width: float = 8.4, height: float = 5.6) -
                 _curve(axes, curve, k, f"{part.voltage:g} V{', hot' if hot else ''}", hot=hot)
             for point in part.printed:
                 _printed(axes, point, k)
-        for ax, label in zip(axes, _PANELS, strict=True):
-            ax.set_ylabel(label)
-            ax.set_ylim(bottom=0.0)
-            ax.set_xlim(left=0.0)
-            ax.margins(y=0.12)
-        for ax in axes[2:]:
-            ax.set_xlabel("speed (°/s)")
+            _name(axes[0], part.cold, f"{part.voltage:g} V", k)
+        _finish(axes, _PANELS, axes[2:])
         if any(part.printed for part in sheet.voltages):
             axes[0].plot([], [], color="none", marker="D", markeredgecolor=COLOURS["black"], label="printed")
         axes[0].legend(loc="upper right", handlelength=3.2)
@@ -78,6 +73,8 @@ def speed_curves(sheet: DataSheet, *, width: float = 8.4, height: float = 5.6) -
 def compared_curves(sheets: Sequence[DataSheet]) -> Figure:
     """Return torque and current over speed of several servos, cold, each at the first of its voltages.
 
+    What a sheet prints for that voltage stands beside as open marks.
+
     Raises
     ------
     InputError
@@ -85,13 +82,19 @@ def compared_curves(sheets: Sequence[DataSheet]) -> Figure:
     """
     if not 1 <= len(sheets) <= _MOST:
         raise InputError("servos in one picture", got=len(sheets), allowed=f"1 to {_MOST}")
-    parts = [sheet.voltages[0] for sheet in sheets]
-    labels = [f"{sheet.servo.title or sheet.servo.name}, {part.voltage:g} V"
-              for sheet, part in zip(sheets, parts, strict=True)]
-    torque, current = ([Curve(label, _degrees(part.cold.speed), values(part.cold)) for label, part in zip(
-        labels, parts, strict=True)] for values in (_torque, _current))
-    return curves(torque, x_label="speed (°/s)", y_label="torque (N m)", below=current, below_label="current (A)",
-                  height=4.4)
+    with context():
+        figure = new_figure(8.4, 3.4)
+        axes = list(figure.subplots(1, 2))
+        for k, sheet in enumerate(sheets):
+            part, (colour, dash) = sheet.voltages[0], LINES[k]
+            for ax, values in zip(axes, (part.cold.torque, part.cold.current), strict=True):
+                ax.plot(_degrees(part.cold.speed), values, color=colour, linestyle=dash,
+                        label=f"{sheet.servo.title or sheet.servo.name}, {part.voltage:g} V")
+            for point in part.printed:
+                _printed(axes, point, k)
+        _finish(axes, _PANELS[:2], axes)
+        axes[0].legend(loc="upper right", handlelength=3.2)
+    return finished(figure)
 
 
 def holding_curves(sheet: DataSheet) -> Figure:
@@ -146,6 +149,22 @@ def _curve(axes: Sequence[Axes], curve: SpeedCurve, k: int, label: str, *, hot: 
         ax.plot(_degrees(curve.speed), values, label=label, **style)
 
 
+def _name(ax: Axes, curve: SpeedCurve, words: str, k: int) -> None:
+    """Write words at a curve: in grey print the colour does not tell it from the others."""
+    at = len(curve.speed) // 3 + 6 * k
+    ax.annotate(words, xy=(float(_degrees(curve.speed)[at]), float(curve.torque[at])), xytext=(4.0, 3.0),
+                textcoords="offset points", fontsize=8.0, color=LINES[k][0])
+
+
+def _finish(axes: Sequence[Axes], labels: Sequence[str], lowest: Sequence[Axes]) -> None:
+    for ax, label in zip(axes, labels, strict=True):
+        ax.set_ylabel(label)
+        ax.set_ylim(bottom=0.0)
+        ax.set_xlim(left=0.0)
+    for ax in lowest:
+        ax.set_xlabel("speed (°/s)")
+
+
 def _printed(axes: Sequence[Axes], point: PrintedPoint, k: int) -> None:
     """Draw what is printed: torque and current of the standing shaft at the left, of the free one where it ends."""
     free = 60.0 / point.time_60 if point.time_60 else None
@@ -159,11 +178,3 @@ def _printed(axes: Sequence[Axes], point: PrintedPoint, k: int) -> None:
 
 def _degrees(speed: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(units.from_si(speed, "deg/s", "speed"))
-
-
-def _torque(curve: SpeedCurve) -> NDArray[np.float64]:
-    return curve.torque
-
-
-def _current(curve: SpeedCurve) -> NDArray[np.float64]:
-    return curve.current
