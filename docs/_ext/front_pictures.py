@@ -1,4 +1,4 @@
-"""Draw the pictures of README and of the front page's questions again, but for that of identification: run this file."""
+"""Draw the pictures of README and front page again, but for that of identification: run this file."""
 
 import math
 from pathlib import Path
@@ -39,7 +39,7 @@ def loop():
 
 
 def _held(simulator, gain):
-    """Time [s] and angle [deg] of a servo that holds 60 degrees against a weight; an integrator corrects its command."""
+    """Time [s] and angle [deg] of a servo at 60 degrees under a weight; an integrator corrects its command."""
     asked = target = math.radians(60.0)
     state = simulator.initial(st.signals.constant(asked, unit="rad"))
     time, angle = [0.0], [target]
