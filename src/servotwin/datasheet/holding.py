@@ -25,7 +25,7 @@ _STANDS = math.radians(2.0)  # rad/s: what goes faster at the end does not stand
 _FURTHEST_STEP = math.radians(20.0)
 _WAIT = 0.2  # s, in which a command either moves the shaft or does not
 _MOVED = 1e-9  # rad
-_HALVINGS = 22
+_HALVINGS = 18
 
 
 class Held(NamedTuple):
@@ -62,8 +62,8 @@ def hold(model: Model, torque: float, *, inertia: float = 0.0) -> Held:
     before, after = result["output_angle"].tolist()
     if not (result.status.ok and abs(after - before) <= _STANDS * LOOK):
         return Held(torque, math.nan, math.nan, math.nan)
-    drawn = "supply_current" if "supply_current" in model.available else "armature_current"
-    return Held(torque, asked - result.mean("output_angle", SETTLE), result.mean(drawn, SETTLE), _heat(result, SETTLE))
+    angle, current, heat = _means(result, SETTLE)
+    return Held(torque, asked - angle, current, heat)
 
 
 def holding_errors(model: Model, stall_torque: float, shares: tuple[float, ...] = (0.1, 0.25, 0.5, 0.75, 0.9)
@@ -100,12 +100,15 @@ def _without_stops(model: Model) -> Model:
     return changed(model, {name: None for name in gone if model.servo.get(name) is not None})
 
 
-def _heat(result: Result, start: float) -> float:
-    """Return the mean heat of the winding [W] from `start` [s] on."""
+def _means(result: Result, start: float) -> tuple[float, float, float]:
+    """Return the means of angle [rad], supply current [A] and heat of the winding [W] from `start` [s] on."""
     model, drive, load = result.model, result.drive, result.load
+    drawn = "supply_current" if "supply_current" in model.available else "armature_current"
 
-    def power(samples: Samples) -> NDArray[np.float64]:
+    def looked_at(samples: Samples) -> NDArray[np.float64]:
         i = model.output("armature_current", samples, drive, load)
-        return np.array([warm_plant(model, samples, load).R * i * i])
+        return np.array([samples.angle, model.output(drawn, samples, drive, load),
+                         warm_plant(model, samples, load).R * i * i])
 
-    return float(result.trajectory.since(start).integral(power)[0]) / (result.ended - start)
+    angle, current, heat = (result.trajectory.since(start).integral(looked_at) / (result.ended - start)).tolist()
+    return angle, current, heat

@@ -205,14 +205,18 @@ def _as_pulse(model: Model, angle: float) -> float:
     return math.nan if slope is None or p is None or "pulse_width" not in model.available else slope * p * angle
 
 
-def bandwidths(model: Model) -> tuple[Bandwidth, ...]:
-    """Return up to which frequency a free servo follows sines of 2 to 45 degrees within 3 dB, from 1 to 20 Hz."""
+def bandwidths(model: Model, amplitudes: tuple[float, ...] = AMPLITUDES,
+               frequencies: tuple[float, ...] = FREQUENCIES) -> tuple[Bandwidth, ...]:
+    """Return up to which frequency a free servo follows sines of some amplitudes [rad] within 3 dB.
+
+    `frequencies` [rad/s] are those that are tried, from 1 to 20 Hz unless given.
+    """
     middle, stops = mid_travel(model), model.servo.stops
     room = min((abs(stop - middle) for stop in (stops.lower_angle, stops.upper_angle) if stop is not None),
                default=math.inf)
-    sizes = [size for size in AMPLITUDES if size <= _ROOM * room]
+    sizes = [size for size in amplitudes if size <= _ROOM * room]
     period = model.value_or("electronics.frame_period", 0.02)
-    below = [w for w in FREQUENCIES if w < 0.9 * math.pi / period]
+    below = [w for w in frequencies if w < 0.9 * math.pi / period]
     seen = frequency_response(model, below, amplitude=sizes)
     return tuple(Bandwidth(size, 0.0 if math.isnan(w) else w / (2.0 * math.pi))
                  for size, w in zip(sizes, seen.bandwidth(reference=1.0).tolist(), strict=True))
