@@ -88,6 +88,9 @@ def transfer_function(model: Model, *, input: str | None = None, output: str | N
     import control
 
     load = as_load(load)
+    check_frames(model, frame_period)
+    if isinstance(model, PulseServo | PulseServoInductive):
+        model.check_mean("the transfer function", ("motor.brush_drop_voltage",))
     plant = _linear_plant(model, load, frame_period)
     name_in = input_name(model, input) if input else "armature_voltage" if is_motor(model) else "pulse_width"
     outputs = _numerators(model, plant, _stiffness(plant, load))
@@ -123,19 +126,14 @@ def check_frames(model: Model, frame_period: float | None) -> None:
 
 def _linear_plant(model: Model, load: Load, frame_period: float | None) -> Plant:
     """Return the model's plant, with the mean gain of its pulses where it has any."""
-    check_frames(model, frame_period)
-    if not isinstance(model, PulseServo | PulseServoInductive):
-        return model.pack(load)
-    gain = model.mean_gain(frame_period)
-    model.check_mean("the transfer function", ("motor.brush_drop_voltage",))
-    return model.pack(load)._replace(gain=gain)
+    plant = model.pack(load)
+    pulsed = isinstance(model, PulseServo | PulseServoInductive)
+    return plant._replace(gain=model.mean_gain(frame_period)) if pulsed else plant
 
 
 def slowest_decay(model: Model, load: Load) -> float:
     """Return by how much the slowest mode of the small-signal loop decays [1/s], an integrator apart."""
-    plant = model.pack(load)
-    if isinstance(model, PulseServo | PulseServoInductive):
-        plant = plant._replace(gain=model.mean_gain())
+    plant = _linear_plant(model, load, None)
     poles = np.roots(np.trim_zeros(_denominator(plant, plant.stiffness), "f"))
     decay = -poles.real[np.abs(poles) > 0.0]
     return float(decay.min())
