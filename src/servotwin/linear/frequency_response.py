@@ -126,7 +126,7 @@ def frequency_response(model: Model, frequencies: ArrayLike, *, amplitude: Array
     --------
     >>> import servotwin as st
     >>> model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
-    >>> seen = frequency_response(model, [3.0, 12.0, 48.0], amplitude=np.radians([5.0, 40.0]))
+    >>> seen = frequency_response(model, [3.0, 12.0, 48.0], amplitude=np.radians([15.0, 40.0]))
     >>> bool(seen.gain[1, 1] < seen.gain[0, 1])  # the supply ends
     True
     """
