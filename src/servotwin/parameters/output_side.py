@@ -41,7 +41,7 @@ OUTPUT_SIDE: dict[str, OutputSide] = {
         ("friction.coulomb_torque_forward", "friction.coulomb_torque_backward"), 1, "torque", "N F_c, both ways"),
     "output_coulomb_torque_forward": OutputSide(("friction.coulomb_torque_forward",), 1, "torque", "N F_ec1"),
     "output_coulomb_torque_backward": OutputSide(("friction.coulomb_torque_backward",), 1, "torque", "N F_ec2"),
-    "output_stribeck_speed": OutputSide(("friction.stribeck_speed",), -1, "speed", "v_s/N"),
+    "output_stribeck_speed": OutputSide(("friction.stribeck_speed",), -1, "output speed", "v_s/N"),
 }
 """By name. What moves at the output stays the same when N changes and these do not."""
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError
 from servotwin.simulation.progress import Progress, shown
-from servotwin.simulation.sweep.distributions import Distribution
 from servotwin.simulation.sweep.folder import Folder
 from servotwin.simulation.sweep.jobs import run_chunk
+from servotwin.simulation.sweep.kinds import Distribution
 from servotwin.simulation.sweep.plan import planned
 from servotwin.simulation.sweep.running import run_plan
 from servotwin.simulation.sweep.study import Study
