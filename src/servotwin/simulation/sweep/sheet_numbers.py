@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from servotwin.parameters import Servo
 from servotwin.parameters.output_side import N, output_value
@@ -18,13 +18,13 @@ from servotwin.physics import (
     sheet_torque_constant,
     stall_current_for,
 )
-from servotwin.simulation.sweep.joint import TINY, Column, Coordinate, number
+from servotwin.physics.sheet import LEAST_EFFICIENCY
+from servotwin.simulation.sweep.joint import DIMENSIONS, TINY, Column, Coordinate, number
 from servotwin.simulation.sweep.kinds import Distribution, Normal, Uniform
 
 # Assumed: how far servos of one kind, and what different sellers print of it, lie from the sheet where it says nothing
 TOLERANCES = {"no_load_speed": 0.10, "stall_torque": 0.15, "no_load_current": 0.15}
 EFFICIENCY_TOLERANCE = 0.1  # assumed, where the gear's efficiency is
-_LEAST_EFFICIENCY = 0.5
 _KEYS = {"no_load_speed": "speed_per_60deg", "stall_torque": "stall_torque", "no_load_current": "no_load_current",
          "stall_current": "stall_current"}
 _MOTOR = ("motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant",
@@ -97,46 +97,56 @@ def sheet_numbers(servo: Servo) -> SheetNumbers | None:
     printed = dict(_figures(servo, servo.sheet, ("supply_voltage", "stall_torque", "speed_per_60deg")))
     if len(printed) < 3 or not _as_made(servo):
         return None
+    V, plain = printed["supply_voltage"].value, servo.get(_SHARES[0]) is None
+    twin = _twin(servo, V, printed["stall_torque"].value)
+    if twin is None:
+        return None
+    spreads = {**{name: _tolerance(servo, name, getattr(twin, name)) for name in TOLERANCES},
+               "gear_efficiency": _efficiency(servo, twin.gear_efficiency, plain=plain),
+               "viscous_share": _viscous(servo, twin.viscous_share, twin.no_load_speed / twin.friction)}
+    coordinates = {f"sheet.{name}": Coordinate(
+        dimension=DIMENSIONS[f"sheet.{name}"], lower=0.0 if name == "viscous_share" else TINY,
+        upper=math.inf if name in TOLERANCES else 1.0, nominal=getattr(twin, name), spread=spread)
+        for name, spread in spreads.items()}
+    return SheetNumbers(servo=servo, voltage=V, left=twin.left if plain else None, coordinates=coordinates,
+                        covers=frozenset((*_MOTOR, _VISCOUS, *(() if plain else _SHARES))))
+
+
+class _Twin(NamedTuple):
+    """What the servo of the file has at the sheet's voltage; friction [N m] and what of it no load changes [1]."""
+
+    no_load_speed: float
+    stall_torque: float
+    no_load_current: float
+    gear_efficiency: float
+    viscous_share: float
+    friction: float
+    left: float
+
+
+def _twin(servo: Servo, V: float, printed_torque: float) -> _Twin | None:
+    """Return the sheet of the file's own motor: that of which `SheetNumbers.solved` makes it again."""
     K_out, tau = output_value(servo, "output_torque_constant"), output_value(servo, "output_coulomb_torque")
-    b = output_value(servo, "output_viscous_friction") or 0.0
     if not K_out or not tau:
         return None
-    V, V_d = printed["supply_voltage"].value, number(servo, _DROP, 0.0) + number(servo, _BRUSH, 0.0)
-    R = number(servo, "motor.armature_resistance") + number(servo, _BRIDGE, 0.0)
-    I_s = (V - V_d) / R
-    found, motor_share = _gear(servo)
-    left: float | None = None
-    plain = found is None
-    I_0: Any = None
-    if plain:
-        given = _anywhere(servo, "no_load_current")
-        I_0 = given[0].value if given else None
-    if I_0 is None:
-        I_0 = no_load_current_of(V, R, K_out, tau, b, motor_share, V_d)
+    b, V_d = output_value(servo, "output_viscous_friction") or 0.0, sum(number(servo, x, 0.0) for x in (_DROP, _BRUSH))
+    R, mu = number(servo, _MOTOR[0]) + number(servo, _BRIDGE, 0.0), servo.get(_SHARES[0])
+    printed = [] if isinstance(mu, float) else _anywhere(servo, "no_load_current")
+    I_s: Any = (V - V_d) / R
+    I_0: Any = printed[0].value if printed else no_load_current_of(
+        V, R, K_out, tau, b, 1.0 - mu if isinstance(mu, float) else 1.0, V_d)
     w_0 = (V - V_d - R * I_0) / K_out
-    friction = tau + b * w_0
-    s = b * w_0 / friction
     if not (0.0 < I_0 < I_s and w_0 > 0.0):
         return None
-    if found is not None:
-        eta = found
-    else:
-        eta = printed["stall_torque"].value / float(sheet_stall_torque(K_out, I_s, I_0, 1.0, s))
-        eta = min(max(eta, _LEAST_EFFICIENCY), 1.0)
-        left = friction / (K_out * I_0)
+    friction = tau + b * w_0
+    s = b * w_0 / friction
+    if isinstance(mu, float):
+        eta = load_share(mu)
+    else:  # the file's friction does not tell; the torque of the sheet does
+        eta = printed_torque / float(sheet_stall_torque(K_out, I_s, I_0, 1.0, s))
+        eta = min(max(eta, LEAST_EFFICIENCY), 1.0)
     T_s = float(sheet_stall_torque(K_out, I_s, I_0, eta, s))
-    nominal = {"no_load_speed": w_0, "stall_torque": T_s, "no_load_current": I_0, "gear_efficiency": eta,
-               "viscous_share": s}
-    spreads = {**{name: _tolerance(servo, name, nominal[name]) for name in TOLERANCES},
-               "gear_efficiency": _efficiency(servo, eta, plain=plain),
-               "viscous_share": _viscous(servo, s, w_0 / friction)}
-    dimensions = {"no_load_speed": "output speed", "stall_torque": "torque", "no_load_current": "current"}
-    coordinates = {f"sheet.{name}": Coordinate(
-        dimension=dimensions.get(name, "number"), lower=TINY if name != "viscous_share" else 0.0,
-        upper=math.inf if name in dimensions else 1.0, nominal=value, spread=spreads[name])
-        for name, value in nominal.items()}
-    return SheetNumbers(servo=servo, voltage=V, left=left, coordinates=coordinates,
-                        covers=frozenset((*_MOTOR, _VISCOUS, *(() if plain else _SHARES))))
+    return _Twin(w_0, T_s, I_0, eta, s, friction, friction / (K_out * I_0))
 
 
 def _figures(servo: Servo, table: Mapping[str, Any], keys: tuple[str, ...]) -> Iterator[tuple[str, Figure]]:
@@ -146,11 +156,23 @@ def _figures(servo: Servo, table: Mapping[str, Any], keys: tuple[str, ...]) -> I
             yield key, found
 
 
+def _rows(servo: Servo) -> list[Mapping[str, Any]]:
+    rows = servo.sheet.get(ELSE, [])
+    return [row for row in rows if isinstance(row, Mapping)] if isinstance(rows, list) else []
+
+
 def _anywhere(servo: Servo, name: str) -> list[Figure]:
     """Return a figure wherever the table has it, that at the sheet's own voltage first."""
-    key, rows = _KEYS[name], servo.sheet.get(ELSE, [])
-    tables = [servo.sheet, *(row for row in rows if isinstance(row, Mapping))] if isinstance(rows, list) else []
-    return [found for table in tables for _, found in _figures(servo, table, (key,))]
+    return [found for table in (servo.sheet, *_rows(servo)) for _, found in _figures(servo, table, (_KEYS[name],))]
+
+
+def _at_same_voltage(servo: Servo, name: str) -> Iterator[Figure]:
+    """Yield what other sources print at the sheet's own voltage."""
+    own = dict(_figures(servo, servo.sheet, ("supply_voltage",)))["supply_voltage"].value
+    for row in _rows(servo):
+        found = dict(_figures(servo, row, ("supply_voltage", _KEYS[name])))
+        if len(found) == 2 and found["supply_voltage"].value == own:
+            yield found[_KEYS[name]]
 
 
 def _as_made(servo: Servo) -> bool:
@@ -162,12 +184,6 @@ def _as_made(servo: Servo) -> bool:
     return (made and number(servo, _MOTOR[1]) == number(servo, _MOTOR[2])
             and number(servo, _MOTOR[3]) == number(servo, _MOTOR[4]) and shares[0] == shares[1]
             and all(servo.get(name) is None for name in _OTHER_SHARES))
-
-
-def _gear(servo: Servo) -> tuple[float | None, float]:
-    """Return the efficiency of the gear, and 1 − μ_m; None and 1 where no friction grows with the load."""
-    mu = servo.get(_SHARES[0])
-    return (load_share(mu), 1.0 - mu) if isinstance(mu, float) else (None, 1.0)
 
 
 def _tolerance(servo: Servo, name: str, nominal: float) -> Distribution:
@@ -182,21 +198,11 @@ def _tolerance(servo: Servo, name: str, nominal: float) -> Distribution:
             return Uniform(nominal * low / own.value, nominal * high / own.value)
     ends = [1.0 - TOLERANCES[name], 1.0 + TOLERANCES[name]]
     if own is None:  # assumed within a range, which is that of the friction
-        quantity = servo.source(_MOTOR[3])
-        value, low, high = number(servo, _MOTOR[3]), quantity.lower, quantity.upper
-        ends += [end / value for end in (low, high) if end is not None]
+        quantity, value = servo.source(_MOTOR[3]), number(servo, _MOTOR[3])
+        ends += [end / value for end in (quantity.lower, quantity.upper) if end is not None]
     else:
         ends += [other.value / own.value for other in _at_same_voltage(servo, name)]
     return Uniform(nominal * min(ends), nominal * max(ends))
-
-
-def _at_same_voltage(servo: Servo, name: str) -> Iterator[Figure]:
-    rows, own = servo.sheet.get(ELSE, []), servo.sheet["supply_voltage"]
-    for row in rows if isinstance(rows, list) else []:
-        found = dict(_figures(servo, row, ("supply_voltage", _KEYS[name])))
-        if len(found) == 2 and found["supply_voltage"].value == dict(_figures(
-                servo, {"supply_voltage": own}, ("supply_voltage",)))["supply_voltage"].value:
-            yield found[_KEYS[name]]
 
 
 def _efficiency(servo: Servo, eta: float, *, plain: bool) -> Distribution | None:
@@ -204,7 +210,7 @@ def _efficiency(servo: Servo, eta: float, *, plain: bool) -> Distribution | None
     if plain:
         if _anywhere(servo, "stall_current"):  # which tells it
             return None
-        return Uniform(max(eta - EFFICIENCY_TOLERANCE, _LEAST_EFFICIENCY), min(eta + EFFICIENCY_TOLERANCE, 1.0))
+        return Uniform(max(eta - EFFICIENCY_TOLERANCE, LEAST_EFFICIENCY), min(eta + EFFICIENCY_TOLERANCE, 1.0))
     quantity = servo.source(_SHARES[0])
     if quantity.std:
         slope = 2.0 / (1.0 + number(servo, _SHARES[0])) ** 2
