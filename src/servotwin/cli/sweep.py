@@ -160,7 +160,7 @@ def _report(study: Study, metric: list[str], out: Path | None, *, plot: bool, as
 
     chosen = metric[0] if metric else study.metrics[0]
     files = [] if out is None else [str(out)]
-    if plot and out is not None:
+    if plot and out is not None and study.tornado(chosen).bars:
         from servotwin import plotting
 
         with patience("drawing"):

@@ -60,7 +60,7 @@ def _tornado(study: Study, metric: str) -> list[RenderableType]:
         ("more move it less", [bar.name for bar in found.bars[_MOST_BARS:]]),
         ("of those varied do not move it", found.still)) if names]
     if not rows:
-        return ["nothing that varies moves it"]
+        return ["nothing that varies moves it, so there is no tornado"]
     return [table(["parameter", "from (5 %)", "to (95 %)", f"gives{unit}", "and", "share"], rows), *left]
 
 
