@@ -9,11 +9,11 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError, ParameterError, UnknownNameError
 from servotwin.parameters import Quantity
-from servotwin.simulation.sweep import chance_share, tornado_of, variance_share
+from servotwin.simulation.sweep import variance_share
 from servotwin.simulation.sweep.distributions import Choice, Normal, Uniform, stated
 from servotwin.simulation.sweep.joint import own_spread, scaled_spread
 from servotwin.simulation.sweep.stated import Together
-from servotwin.simulation.sweep.tornado import Bar
+from servotwin.simulation.sweep.tornado import Bar, chance_share, tornado_of
 
 STEP = st.signals.step(0.0, 60.0, at=0.0, unit="deg")
 STEP_LATER = st.signals.step(0.0, 60.0, at=0.1, unit="deg")
@@ -75,8 +75,9 @@ def test_each_lane_has_the_speed_and_the_torque_that_were_drawn(name):
     lanes, far = lane_parameters(study), st.signals.step(-45.0, 45.0, at=0.0, unit="deg")
 
     def at_the_end(signal, **load):
-        return st.simulate_many(st.PulseServo(servo), far, duration=0.09, parameters={**lanes, **{
-            f"load.{key}": column for key, column in load.items()}}, output_times=[0.09], outputs=[signal])[signal][:, 0]
+        loads = {f"load.{key}": column for key, column in load.items()}
+        return st.simulate_many(st.PulseServo(servo), far, duration=0.09, parameters={**lanes, **loads},
+                                output_times=[0.09], outputs=[signal])[signal][:, 0]
 
     np.testing.assert_allclose(at_the_end("output_speed"), speed, rtol=1e-6)
     assert np.all(at_the_end("output_speed", torque=torque * (1.0 - 1e-4)) > 0.0)

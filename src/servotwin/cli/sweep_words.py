@@ -56,9 +56,8 @@ def _tornado(study: Study, metric: str) -> list[RenderableType]:
         low, high = (plotting.readable(value, dimension_of(bar.name)) for value in (bar.low, bar.high))
         share = "" if math.isnan(bar.share) else f"{100.0 * bar.share:.1f} %"
         rows.append([bar.name, low, high, _text(bar.at_low, metric), _text(bar.at_high, metric), share])
-    left = [f"{len(names)} {words}: {', '.join(names)}" for words, names in (
-        ("more move it less", [bar.name for bar in found.bars[_MOST_BARS:]]),
-        ("of those varied do not move it", found.still)) if names]
+    left = [f"{len(names)} {words}" for words, names in (
+        ("more move it less", found.bars[_MOST_BARS:]), ("others that vary do not move it", found.still)) if names]
     if not rows:
         return ["nothing that varies moves it, so there is no tornado"]
     return [table(["parameter", "from (5 %)", "to (95 %)", f"gives{unit}", "and", "share"], rows), *left]

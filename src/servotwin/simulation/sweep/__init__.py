@@ -17,8 +17,8 @@ from servotwin.simulation.sweep.metrics import METRICS
 from servotwin.simulation.sweep.names import dimension_of
 from servotwin.simulation.sweep.study import LaneFailure, Study
 from servotwin.simulation.sweep.tables import read_columns
-from servotwin.simulation.sweep.tornado import Bar, Tornado, chance_share, tornado_of, variance_share
+from servotwin.simulation.sweep.tornado import Bar, Tornado, variance_share
 
 __all__ = ["METRICS", "Bar", "Choice", "Distribution", "LaneFailure", "LogNormal", "Normal", "Offset", "Relative",
-           "Study", "Tornado", "Triangular", "Uniform", "chance_share", "dimension_of", "distributions", "read_columns",
-           "stated", "sweep", "tornado_of", "variance_share"]
+           "Study", "Tornado", "Triangular", "Uniform", "dimension_of", "distributions", "read_columns", "stated",
+           "sweep", "variance_share"]
