@@ -10,7 +10,7 @@ from typing import Any
 from servotwin import units
 from servotwin.errors import InputError
 from servotwin.identification.sheets.sheet import Sheet, SheetPoint
-from servotwin.parameters import GROUPS, Quantity, Servo, unit_of, write_file
+from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, unit_of, write_file
 from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE, figure, printed
 
 _FLAGS, _NOTE = "flags", "note"
@@ -125,6 +125,8 @@ def servo_file_text(servo: Servo) -> str:
     <BLANKLINE>
     """
     lines = [f"name = {_text(servo.name)}", f"title = {_text(servo.title)}"]
+    if servo.kind != KINDS[0]:
+        lines += [f"kind = {_text(servo.kind)}"]
     if servo.notes:
         body = servo.notes.strip("\n").replace("\\", "\\\\").replace('"""', '""\\"')
         lines += [f'notes = """\n{body}\n"""']
