@@ -31,7 +31,7 @@ def test_what_is_assumed_is_not_printed():
 
 @pytest.mark.parametrize(("entry", "said"), [
     (3.0, "[sheet] stall_torque of 'mine'"), ({"value": 3.0}, "unit = \"N m\""),
-    ({"value": "x", "unit": "N m"}, "value"),
+    ({"value": "x", "unit": "N m"}, "value"), ({"value": math.nan, "unit": "N m"}, "value"),
     ({"value": 3.0, "unit": "V"}, "unit"), ({"value": 3.0, "unit": "N m", "std": "x"}, "value"),
     ({"value": 3.0, "unit": "N m", "std": -1.0}, "std: got -1.0"),
     ({"value": 3.0, "unit": "N m", "std": float("nan")}, "std: got nan"),

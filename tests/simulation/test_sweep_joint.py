@@ -213,7 +213,7 @@ def test_a_single_number_of_the_sheet_can_be_varied():
 @pytest.mark.parametrize(("name", "kind", "said"), [
     ("sheet.stal_torque", UnknownNameError, "did you mean 'sheet.stall_torque'"),
     ("output_inertias", UnknownNameError, "did you mean 'output_inertia'"),
-    ("output_stribeck_speed", ParameterError, "of which it does not follow"),
+    ("output_stribeck_speed", ParameterError, "from which nothing of 'hitec-hs-485hb' follows"),
 ])
 def test_names_that_cannot_be_drawn(name, kind, said):
     model = st.PulseServo(st.load_servo("hitec-hs-485hb"))

@@ -85,6 +85,8 @@ def figure(servo: str, key: str, entry: Any) -> Figure | None:
         value = units.to_si(float(entry["value"]), str(entry["unit"]), dimension)
         spread = {name: units.to_si(float(entry[name]), str(entry["unit"]), dimension)
                   for name in _SPREADS if name in entry}
+        if not math.isfinite(value):
+            raise ValueError
     except (KeyError, TypeError, ValueError, ServotwinError):
         raise InputError(f"[sheet] {key} of {servo!r}", got=entry,
                          allowed=f'{{ value = ..., unit = "{unit}", source = "..." }}') from None

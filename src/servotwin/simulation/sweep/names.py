@@ -104,7 +104,7 @@ def _of_joint(name: str, together: Together, model: Model) -> Parameter:
     if name not in DIMENSIONS:
         raise UnknownNameError("number to draw", name, DIMENSIONS)
     if name not in together.coordinates:
-        raise ParameterError(f"vary {name}", got=f"servo {model.servo.name!r}, of which it does not follow",
+        raise ParameterError(f"vary {name}", got=f"a number from which nothing of {model.servo.name!r} follows",
                              allowed=", ".join(together.coordinates) or "parameters of servo and load")
     one = together.coordinates[name]
     rule = POSITIVE if one.lower > 0.0 else NOT_NEGATIVE
