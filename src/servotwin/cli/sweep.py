@@ -52,8 +52,8 @@ def sweep(
         "uniform:4us..8us, normal:3ohm±0.3ohm, lognormal:10%, triangular:4us..6us..8us, choice:brake,coast. A single "
         "number is a spread about the nominal value.", rich_help_panel=_VARIED)] = None,
     from_file: Annotated[bool, typer.Option(
-        "--from-file", help="Draw what the servo file states a spread of; what is fixed together is drawn together: of a servo "
-        "made of a sheet the figures of the sheet.",
+        "--from-file", help="Draw what the servo file states a spread of. What is fixed together is drawn together: "
+        "of a servo made of a sheet the figures of the sheet.",
         rich_help_panel=_VARIED)] = False,
     draws: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Take draws from a table: .csv or .parquet, a column for each dotted name, SI.",
