@@ -52,7 +52,7 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     >>> import pathlib, tempfile
     >>> folder = pathlib.Path(tempfile.mkdtemp())
     >>> for name in ("a", "b"):
-    ...     _ = (folder / f"{name}.csv").write_text("time,pulse_width_us,output_angle\n0,1500,0\n1,1600,2\n2,1600,3")
+    ...     _ = (folder / f"{name}.csv").write_text("time,pulse_width_us,output_angle\n0,1500,0\n1,1600,2\n2,1600,3\n")
     >>> [log.name for log in read_logs(folder)]
     ['a', 'b']
     """
