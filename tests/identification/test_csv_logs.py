@@ -266,7 +266,7 @@ ANGLE = {"column": "output_angle_deg", "unit": "deg"}
     ({"load": {"pendulum": {"mass": 0.1, "lenght": 0.1}}}, ("lenght", "did you mean 'length'")),
     ({"load": {"pendulum": 3}}, ("load.pendulum", "its fields")),
     ({"load": {"recorded": {"time": [0], "torque": [0]}}}, ("length of at least 2",)),
-    ({"columns": {}}, ("no time among",)), ({"columns": []}, ("columns", "an object")),
+    ({"columns": {}}, ("no time, no command and no measured angle", "of the sidecar")), ({"columns": []}, ("columns", "an object")),
     ({"columns": {"output_angel": ANGLE}}, ("output_angel", "did you mean 'output_angle'")),
     ({"columns": {"output_angle": "output_angle_deg"}}, ("columns, output_angle", "an object, such as")),
     ({"columns": {"output_angle": {**ANGLE, "unit": "us"}}}, ("output_angle, unit", "'us'", "rad, deg")),

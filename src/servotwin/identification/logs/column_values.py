@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.logs import column_names as names
-from servotwin.identification.logs.stamps import CLOCKS, stamps_of
+from servotwin.identification.logs.stamps import stamps_of
 from servotwin.tables import TextTable
 
 _SINCE_1970 = 1e8  # s; times that are larger count from no start of a run
@@ -55,7 +55,7 @@ def guess(table: TextTable, column: str, role: str) -> Guess | None:
 def _time(table: TextTable, column: str) -> Guess | None:
     stamps = stamps_of(table, column)
     if stamps is not None:
-        return Guess(stamps.unit, "time", CLOCKS[stamps.unit], from_first=True)
+        return Guess(stamps.unit, "time", f"its values, {stamps.form}", from_first=True)
     values = _values(table, column)
     if values is None or values.size < 2:
         return None
@@ -80,13 +80,21 @@ def is_increasing(table: TextTable, column: str) -> bool:
 
 
 def range_of(table: TextTable, column: str) -> str:
-    """Return what the values of a column are, for a message."""
-    values = _values(table, column)
-    return "its values are no numbers" if values is None else f"values {_shown(values)}"
+    """Return what the values of a column are, for a message.
+
+    Raises
+    ------
+    InputError
+        If a cell holds no number.
+    """
+    values = table.numbers(column, missing=np.nan)
+    finite = values[np.isfinite(values)]
+    return f"values {_shown(finite)}" if finite.size else "without values"
 
 
 def _shown(values: NDArray[np.float64]) -> str:
-    return f"{values.min():.6g} to {values.max():.6g}"
+    low, high = float(values.min()), float(values.max())
+    return f"{low:.6g} to {high:.6g}" if low < high else f"{low:.6g} throughout"
 
 
 def _values(table: TextTable, column: str) -> NDArray[np.float64] | None:

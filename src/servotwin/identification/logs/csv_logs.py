@@ -74,8 +74,8 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
     values = of[command].to_si(table.numbers(of[command].column), command)
     switch = _switch(table, of[SWITCH]) if SWITCH in of else None
     used = {column.column for column in layout.shown}
-    reading = Reading(columns=layout.shown, remarks=table.remarks,
-                      unread=tuple(name for name in table.header if name and name not in used))
+    reading = Reading(file=str(path), columns=layout.shown, remarks=table.remarks,
+                      layout=of, unread=tuple(name for name in table.header if name and name not in used))
     given = {"name": path.stem, "source": str(path), **said.log}
     with in_file(path, str(given["name"])):
         return Log(time=time, command=values, command_kind=COMMANDS[command], measured=measured, torque_on=switch,

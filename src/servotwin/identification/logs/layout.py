@@ -89,7 +89,8 @@ def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Ma
         _guess_rest(table, made)
     _check(table, made)
     shown = tuple(ReadColumn(column.column, signal, "" if signal == SWITCH else unit_shown(
-        column.unit, column.scale, column.offset), known) for signal, (column, known) in made.items())
+        column.unit, column.scale, column.offset), known)
+        for signal, (column, known) in sorted(made.items(), key=lambda one: table.header.index(one[1][0].column)))
     return Layout({signal: column for signal, (column, _) in made.items()}, shown)
 
 
@@ -154,9 +155,10 @@ def _guess_rest(table: TextTable, made: dict[str, tuple[Column, str]]) -> None:
     """Add what is not known yet and can be guessed."""
     taken = {column.column for column, _ in made.values()}
     found: list[tuple[str, names.Meaning]] = []
-    for name in table.header if table.has_header else ():
+    for name in dict.fromkeys(table.header if table.has_header else ()):
         meaning = names.meaning_of(name, _below(table, name))
-        if name not in taken and meaning is not None and table.header.count(name) == 1:
+        if name not in taken and meaning is not None:
+            table.cells(name)  # raises where the header has it twice
             found.append((name, meaning))
     needs = {TIME: TIME not in made, COMMAND: not any(name in made for name in COMMANDS),
              "angle": not any(name in made for name in ANGLES)}
@@ -259,15 +261,16 @@ def _no_unit(table: TextTable, signal: str, column: str, meaning: names.Meaning 
     else:
         example, more = {TIME: ("ms", "s, ms or us"), "output_angle": ("deg", "deg or rad")}.get(
             signal, (si_unit_of(signal), units_written(dimension_of(signal))))
+    values = range_of(table, column)  # raises where they are no numbers
     if meaning is not None and COUNTS in (meaning.role, meaning.dimension):
         example = "0.3deg-90" if short == "angle" else f"0.3{example}"
-        return InputError(f"{table.path}: column {column} holds counts ({range_of(table, column)})",
+        return InputError(f"{table.path}: column {column} holds counts ({values})",
                           allowed=f'{SAID} "{short}={column}:{example}", with what one of them is')
     said = f'{SAID} "{short}={column}:{example}"' if ":" not in column and "=" not in column else (
         f'{SAID} "{short}=\'{column}\':{example}"')
     if meaning is not None and meaning.unit:
         return UnitError(f"{table.path}: unit of column {column}", got=meaning.unit, allowed=f"{more}, said by {said}")
-    return InputError(f"{table.path}: unit of column {column} is not known ({range_of(table, column)})",
+    return InputError(f"{table.path}: unit of column {column} is not known ({values})",
                       allowed=f"{more}, said by {said}")
 
 

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from servotwin.identification.logs.columns import Column
 
 
 @dataclass(frozen=True)
@@ -37,11 +42,14 @@ class Reading:
 
     Parameters
     ----------
+    file : str
     columns : tuple of ReadColumn
     remarks : tuple of str
         What was passed over, each in one line.
     unread : tuple of str
         Columns that are none of these.
+    layout : mapping of str to Column
+        Of a CSV file: what its sidecar would say.
 
     Examples
     --------
@@ -51,9 +59,11 @@ class Reading:
     not read: note
     """
 
+    file: str = ""
     columns: tuple[ReadColumn, ...] = ()
     remarks: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
+    layout: Mapping[str, Column] = field(default_factory=dict, repr=False)
 
     def __str__(self) -> str:
         rows = [("column", "signal", "unit", "known"),

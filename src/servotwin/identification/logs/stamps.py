@@ -24,6 +24,11 @@ class Stamps(NamedTuple):
     unit: str
     time: NDArray[np.float64]
 
+    @property
+    def form(self) -> str:
+        """What they are, in words."""
+        return "dates" if self.unit == "iso" else "times of day"
+
 
 def stamps_of(table: TextTable, column: str) -> Stamps | None:
     """Return the times of a column of ISO 8601 dates or times of day, None where its first cell is neither.
