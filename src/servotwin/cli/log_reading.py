@@ -60,9 +60,11 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
                 raise
             except OutputError as error:  # such as logs on a medium that cannot be written to
                 written.append(f"--columns is not kept: {error}")
-    parts = [*_parts(logs), *written]
-    if parts and not quiet:
-        show(*parts, "")
+    parts = _parts(logs)
+    if (parts or written) and not quiet:
+        show(*parts, *written, "")
+    for line in written if quiet else ():
+        typer.echo(line, err=True)
     return logs
 
 

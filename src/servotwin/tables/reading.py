@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.tables.dialect import (
     MISSING,
+    SEPARATORS,
     Row,
     has_decimal_commas,
     is_comment,
@@ -104,7 +105,7 @@ class TextTable:
             cells = [cell if "." in cell else cell.replace(",", ".", 1) for cell in cells]
         try:
             values = np.array([float(cell) for cell in cells])
-            if not (np.isnan(values).any() or any("_" in cell for cell in cells)
+            if not (any("_" in cell for cell in cells)
                     or (self.decimal == "," and any("." in cell for cell in self.cells(name)))):
                 return values
         except ValueError:
@@ -121,11 +122,9 @@ class TextTable:
             If it holds none.
         """
         allowed = "a number"
-        if cell.lower() in MISSING:
-            if missing is not None:
-                return missing
-            allowed = "a number in every row"
-        elif self.decimal == "," and "." in cell:
+        if cell.lower() in MISSING and missing is not None:
+            return missing
+        if self.decimal == "," and "." in cell:
             allowed = "a number with a decimal comma, as other cells have it"
         elif self.decimal == "." and cell.count(",") == 1 and self.separator != ",":
             allowed = "a number with a decimal point, as other cells have it"
@@ -135,6 +134,28 @@ class TextTable:
             except ValueError:
                 pass
         raise InputError(f"{self.path}: line {line}, {name}", got=cell or "nothing", allowed=allowed)
+
+    def check_lengths(self, *, shorter: bool = False) -> None:
+        """Raise unless every row has as many cells as the header; empty ones behind do not count.
+
+        Parameters
+        ----------
+        shorter : bool
+            Whether a row may have fewer, the last ones being empty.
+
+        Raises
+        ------
+        InputError
+            Names the line.
+        """
+        n = len(self.header)
+        for line, cells in self.rows:
+            count = len(cells)
+            if count != n and ((count < n and not shorter) or any(cells[n:])):
+                commas = " (decimal commas need another separator, such as ;)" if (
+                    self.separator == "," and count > n) else ""
+                raise InputError(f"{self.path}: line {line}", got=f"{count} cell{'s' * (count != 1)}",
+                                 allowed=f"{n}, as the header, with {SEPARATORS[self.separator]} between{commas}")
 
     def without(self, drop: NDArray[np.bool_]) -> TextTable:
         """Return the table without some rows."""

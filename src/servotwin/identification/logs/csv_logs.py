@@ -23,7 +23,7 @@ from servotwin.identification.logs.reading import Reading
 from servotwin.identification.logs.sidecar import FOLDER_FILE, Sidecar, sidecar_of, sidecar_path, sidecar_words
 from servotwin.identification.logs.stamps import CLOCKS, stamps_of
 from servotwin.parameters import write_file
-from servotwin.tables import SEPARATORS, TextTable, read_table
+from servotwin.tables import TextTable, read_table
 
 
 def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
@@ -64,7 +64,7 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
     asked = {one.column for one in wanted.values()}
     table = read_table(path, lambda name: name in asked or is_known_name(name), unended=False)
     said = sidecar_of(path, None if sidecar is None else Path(sidecar))
-    _check_lengths(table)
+    table.check_lengths()
     layout = layout_of(table, said.columns, wanted)
     of = layout.columns
     command = _command_of(table, of, said)
@@ -137,17 +137,6 @@ def _exists(path: Path) -> bool:
 
 def _cell(value: float) -> str:
     return "" if math.isnan(value) else repr(value)
-
-
-def _check_lengths(table: TextTable) -> None:
-    """Raise unless every row has as many cells as the header; empty ones behind do not count."""
-    n = len(table.header)
-    for line, cells in table.rows:
-        if len(cells) != n and (len(cells) < n or any(cells[n:])):
-            commas = " (decimal commas need another separator, such as ;)" if table.separator == "," and len(
-                cells) > n else ""
-            raise InputError(f"{table.path}: line {line}", got=f"{len(cells)} cell{'s' * (len(cells) != 1)}",
-                             allowed=f"{n}, as the header, with {SEPARATORS[table.separator]} between{commas}")
 
 
 def _command_of(table: TextTable, columns: Mapping[str, Column], said: Sidecar) -> str:

@@ -34,6 +34,7 @@ _INFO = Path("meta") / "info.json"
 _RANGE = 100.0  # of normalised positions
 _ROUNDING = 1e-3  # of float32 at its end
 _SERVO_ROBOTS = ("so100", "so101", "so_", "koch", "lekiwi", "moss", "bi_so")  # beginnings of `robot_type`
+_NO_POSITIONS = (".vel", ".torque", ".effort", ".current")
 _OPTION = "--joint"
 
 
@@ -126,7 +127,7 @@ def _joints(folder: Path, info: object) -> list[_Joint]:
                              allowed="names of the joints, or equal shapes")
         action = state = [str(k) for k in range(sizes[0])]
     found = [_Joint(name.removesuffix(".pos").removeprefix("main_"), name, action.index(name), k)
-             for k, name in enumerate(state) if name in action and not name.endswith((".vel", ".torque", ".effort", ".current"))]
+             for k, name in enumerate(state) if name in action and not name.endswith(_NO_POSITIONS)]
     if not found:
         raise InputError(f"{folder / _INFO}: names", got=f"{', '.join(action)}; {', '.join(state)}",
                          allowed=f"joints that {ACTION} and {STATE} have in common")
