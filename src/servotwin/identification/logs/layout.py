@@ -221,13 +221,13 @@ def _chosen(table: TextTable, what: str, candidates: list[_Candidate]) -> _Candi
     """Return the column that is known best; raise where two are known equally well, or its unit is not."""
     if not candidates:
         return None
+    if what == "angle":  # the horn's angle before a potentiometer's voltage
+        candidates = [one for one in candidates if one.meaning.role == names.ANGLE and one.found] or candidates
     best = [one for one in candidates if one.rank == max(other.rank for other in candidates)]
     if what == COMMAND:  # as among the names of servotwin
         order = list(COMMANDS)
         first = min((order.index(_signal_of(one)) for one in best if one.found is not None), default=0)
         best = [one for one in best if one.found is None or order.index(_signal_of(one)) == first]
-    if what == "angle" and best[0].rank:
-        best = [one for one in best if one.meaning.role == names.ANGLE] or best
     if len(best) > 1:
         said = f"{what}={best[0].column}" + (f":{best[0].found.unit}" if best[0].found else "")
         raise InputError(f"{table.path}: column of {'the ' * (what != TIME)}{what}", allowed=f'one, said by {SAID} '

@@ -13,8 +13,9 @@ from servotwin.errors import InputError
 from servotwin.tables import TextTable
 
 _ISO = re.compile(r"(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?)(Z|[+-]\d\d:?\d\d)?", re.IGNORECASE)
-_CLOCK = re.compile(r"(\d{1,2}):(\d\d):(\d\d(?:[.,]\d+)?)")
-_DAY = 86400.0  # s
+_CLOCK = re.compile(r"(\d{1,2}):(\d\d):(\d\d)(?:[.,](\d{1,9}))?")
+_SECOND = 1_000_000_000  # ns
+_DAY = 86400 * _SECOND
 CLOCKS = {"iso": "dates such as 2024-05-03T12:00:01.250", "clock": "times such as 12:00:01.250"}
 
 
@@ -60,9 +61,9 @@ def _iso(table: TextTable, column: str, cells: Sequence[str]) -> NDArray[np.floa
             k = zones.index("") if zones[0] else next(k for k, zone in enumerate(zones) if zone)
             raise InputError(f"{table.path}: line {table.rows[k].line}, {column}", got=cells[k],
                              allowed="a time zone in all rows, or in none")
-        shift = np.array([_zone(zone) for zone in zones], dtype=np.int64) * 60_000_000_000
+        shift = np.array([_zone(zone) for zone in zones], dtype=np.int64) * 60 * _SECOND
         nanoseconds = nanoseconds - (shift - shift[0])
-    return np.asarray(nanoseconds / 1e9)
+    return np.asarray(nanoseconds / _SECOND)
 
 
 def _zone(text: str) -> int:
@@ -74,9 +75,10 @@ def _zone(text: str) -> int:
 
 def _clock(table: TextTable, column: str, cells: Sequence[str]) -> NDArray[np.float64]:
     found = [_matched(_CLOCK, table, k, column, cell, "clock") for k, cell in enumerate(cells)]
-    times = np.array([3600.0 * int(m[1]) + 60.0 * int(m[2]) + float(m[3].replace(",", ".")) for m in found])
-    days = np.cumsum(np.append(0.0, np.diff(times) < -0.5 * _DAY))  # past midnight
-    return np.asarray(times + _DAY * days - times[0])
+    times = np.array([(3600 * int(m[1]) + 60 * int(m[2]) + int(m[3])) * _SECOND + int((m[4] or "0").ljust(9, "0"))
+                      for m in found], dtype=np.int64)
+    days = np.cumsum(np.append(0, np.diff(times) < -_DAY // 2))  # past midnight
+    return np.asarray((times + _DAY * days - times[0]) / _SECOND)
 
 
 def _matched(form: re.Pattern[str], table: TextTable, k: int, column: str, cell: str, unit: str) -> re.Match[str]:
