@@ -102,7 +102,7 @@ def test_every_dialect_is_the_same_fit(tmp_path):
         if bits not in fits:  # what is the same to the last bit is the same fit
             fits[bits] = identify([log], st.load_servo("hitec-hs-755hb"), st.BoundedServo,
                                   ["output_inertia", "output_coulomb_torque"], nuisance=(), priors=None, starts=1,
-                                  compare_with=(), holdout=0.0, intervals=False), name
+                                  compare_with=(), holdout=0.0), name
     assert len(fits) > 1
     first, _ = next(iter(fits.values()))
     for fit, name in fits.values():

@@ -83,19 +83,16 @@ def rows(lines: Sequence[str], separator: str) -> Iterator[Row]:
         reader = csv.reader((f"{line.strip() if blank else line}\n" for line in lines), delimiter=separator,
                             skipinitialspace=True)
         for found in reader:
-            yield from _filled(reader.line_num, found)
-    elif separator == " ":
-        for k, line in enumerate(lines, 1):
-            yield from _filled(k, line.split())
-    else:
-        for k, line in enumerate(lines, 1):
-            yield from _filled(k, line.split(separator))
-
-
-def _filled(line: int, cells: list[str]) -> Iterator[Row]:
-    stripped = [cell.strip() for cell in cells]
-    if any(stripped):
-        yield Row(line, stripped)
+            stripped = [cell.strip() for cell in found]
+            if any(stripped):
+                yield Row(reader.line_num, stripped)
+        return
+    for k, line in enumerate(lines, 1):
+        cells = line.split() if separator == " " else line.split(separator)
+        if separator != " " and (" " in line or "\t" in line or "\xa0" in line):
+            cells = [cell.strip() for cell in cells]
+        if any(cells):
+            yield Row(k, cells)
 
 
 def is_comment(cells: Sequence[str], separator: str) -> bool:

@@ -60,6 +60,9 @@ class TextTable:
     encoding: str
     remarks: tuple[str, ...] = ()
     also: dict[str, str] = field(default_factory=dict)
+    _cells: dict[str, list[str]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _numbers: dict[tuple[str, bool], NDArray[np.float64]] = field(default_factory=dict, init=False, repr=False,
+                                                                  compare=False)
 
     def name_of(self, name: str) -> str | None:
         """Return how the header calls a column; large and small letters count alike where that leaves no doubt."""
@@ -78,13 +81,15 @@ class TextTable:
         InputError
             If there is no such column, or it comes twice.
         """
-        own = self.name_of(name)
-        if own is None:
-            raise UnknownNameError(f"column of {self.path}", name, self.header)
-        if self.header.count(own) > 1:
-            raise InputError(f"{self.path}: column", got=f"{own} {self.header.count(own)} times", allowed="once")
-        k = self.header.index(own)
-        return [row.cells[k] if k < len(row.cells) else "" for row in self.rows]
+        if name not in self._cells:
+            own = self.name_of(name)
+            if own is None:
+                raise UnknownNameError(f"column of {self.path}", name, self.header)
+            if self.header.count(own) > 1:
+                raise InputError(f"{self.path}: column", got=f"{own} {self.header.count(own)} times", allowed="once")
+            k = self.header.index(own)
+            self._cells[name] = [row.cells[k] if k < len(row.cells) else "" for row in self.rows]
+        return self._cells[name]
 
     def numbers(self, name: str, *, missing: float | None = None) -> NDArray[np.float64]:
         """Return the numbers of a column.
@@ -100,18 +105,23 @@ class TextTable:
         InputError
             If a cell holds no number: names file, line and column.
         """
+        key = name, missing is None
+        if key not in self._numbers:
+            self._numbers[key] = self._converted(name, missing)
+        return self._numbers[key]
+
+    def _converted(self, name: str, missing: float | None) -> NDArray[np.float64]:
         cells = self.cells(name)
-        if self.decimal == ",":
-            cells = [cell if "." in cell else cell.replace(",", ".", 1) for cell in cells]
-        try:
-            values = np.array([float(cell) for cell in cells])
-            if not (any("_" in cell for cell in cells)
-                    or (self.decimal == "," and any("." in cell for cell in self.cells(name)))):
-                return values
-        except ValueError:
-            pass
-        return np.array([self.number(row.line, name, cell, missing=missing)
-                         for row, cell in zip(self.rows, self.cells(name), strict=True)])
+        text = "\n".join(cells)  # at once is faster than cell by cell
+        if not ("_" in text or (self.decimal == "," and "." in text)):
+            words = text.replace(",", ".").split("\n") if self.decimal == "," else cells
+            try:
+                if len(words) == len(cells):
+                    return _frozen([float(word) for word in words])
+            except ValueError:
+                pass
+        return _frozen([self.number(row.line, name, cell, missing=missing)
+                        for row, cell in zip(self.rows, cells, strict=True)])
 
     def number(self, line: int, name: str, cell: str, *, missing: float | None = None) -> float:
         """Return the number of one cell.
@@ -160,6 +170,12 @@ class TextTable:
     def without(self, drop: NDArray[np.bool_]) -> TextTable:
         """Return the table without some rows."""
         return replace(self, rows=[self.rows[k] for k in np.flatnonzero(~drop).tolist()])
+
+
+def _frozen(values: list[float]) -> NDArray[np.float64]:
+    made = np.array(values, dtype=np.float64)
+    made.setflags(write=False)
+    return made
 
 
 def read_table(path: str | Path, known: Callable[[str], bool] = lambda name: False, *,
