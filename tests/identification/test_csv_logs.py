@@ -209,7 +209,7 @@ def test_nothing_is_overwritten_unasked(tmp_path, run):
 @pytest.mark.parametrize(("content", "words"), [
     ("", ("empty file",)), (HEADER, ("header without rows",)),
     (HEADER + "0,1500,0\n0.02,1500,1\n", ("2 samples", "at least 3")),
-    ("pulse_width_us,output_angle\n1500,0\n", ("no time among", "pulse_width_us, output_angle", "time_s", '--columns "time=')),
+    ("pulse_width_us,output_angle\n1500,0\n", ("no time among", "pulse_width_us, output_angle", '--columns "time=')),
     ("time_s,output_angle\n0,0\n", ("no command among", "pulse_width_us, command_angle_deg or command_voltage_V")),
     ("time_s,pulse_width_us,bus_voltage\n0,1500,0\n", ("no measured angle", "output_angle_deg or feedback_voltage_V")),
     ("time_s,pulse_width_us,output_angle_kg\n0,1500,0\n", ("output_angle_kg", "'kg'", "deg, rad")),
@@ -266,7 +266,8 @@ ANGLE = {"column": "output_angle_deg", "unit": "deg"}
     ({"load": {"pendulum": {"mass": 0.1, "lenght": 0.1}}}, ("lenght", "did you mean 'length'")),
     ({"load": {"pendulum": 3}}, ("load.pendulum", "its fields")),
     ({"load": {"recorded": {"time": [0], "torque": [0]}}}, ("length of at least 2",)),
-    ({"columns": {}}, ("no time, no command and no measured angle", "of the sidecar")), ({"columns": []}, ("columns", "an object")),
+    ({"columns": {}}, ("no time, no command and no measured angle", "of the sidecar")),
+    ({"columns": []}, ("columns", "an object")),
     ({"columns": {"output_angel": ANGLE}}, ("output_angel", "did you mean 'output_angle'")),
     ({"columns": {"output_angle": "output_angle_deg"}}, ("columns, output_angle", "an object, such as")),
     ({"columns": {"output_angle": {**ANGLE, "unit": "us"}}}, ("output_angle, unit", "'us'", "rad, deg")),

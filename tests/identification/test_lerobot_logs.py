@@ -92,7 +92,8 @@ def test_names_that_are_not_given_are_numbers(tmp_path):
     ({"robot": "aloha", "scale": 10.0}, None, ("is not known",)),  # another robot's numbers may be anything
     ({}, "wrist:deg", ("unknown joint", "'wrist'", "shoulder_pan, elbow_flex, gripper")),
     ({}, "elbow_flex:kg", ("--joint elbow_flex", "'kg'", "deg, rad")),
-    ({}, "elbow_flex:deg,elbow_flex:rad", ("elbow_flex twice",)), ({}, "", ("--joint", "such as")), ({}, 3, ("--joint",)),
+    ({}, "elbow_flex:deg,elbow_flex:rad", ("elbow_flex twice",)),
+    ({}, "", ("--joint", "such as")), ({}, 3, ("--joint",)),
     ({"size": 4}, "shoulder_pan:deg", ()),  # more values than names: no harm
     ({"names": [*JOINTS, "wrist.pos"]}, "wrist:deg", ("action", "4 in every row")),
 ])
@@ -109,7 +110,7 @@ def test_what_cannot_be_known_is_asked_for(tmp_path, options, joints, words):
 def test_what_is_no_dataset_is_said_in_one_line(tmp_path, monkeypatch):
     folder = dataset(tmp_path / "set")
     file = next((folder / "data").rglob("*.parquet"))
-    with pytest.raises(InputError, match="--columns for .*--joint"):
+    with pytest.raises(InputError, match=r"--columns for .*--joint"):
         read_logs(folder, columns="time=t:s")
     with pytest.raises(InputError, match="no dataset of LeRobot"):
         read_logs(tmp_path, "lerobot")
@@ -121,7 +122,7 @@ def test_what_is_no_dataset_is_said_in_one_line(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="not readable as Parquet"):
         read_logs(folder, joints="*:deg")
     parquet.write_table(arrow.table({"action": [[1.0]], "timestamp": [0.0]}), file)
-    with pytest.raises(InputError, match="also observation.state"):
+    with pytest.raises(InputError, match=r"also observation\.state"):
         read_logs(folder, joints="*:deg")
     file.unlink()
     with pytest.raises(InputError, match="no data"):

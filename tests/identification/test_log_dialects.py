@@ -121,7 +121,8 @@ def body(angle="9.5", pwm="1500", time=lambda k: str(20 * k)):
     ("time_ms,pulse_width_us,output_angle_deg", body(), None, ["named", "named", "named"]),
     ("millis,pwm,angle", body(), None, ["guessed from its name", "guessed from its values, 1500 throughout",
                                         "guessed from its values, 9.5 throughout"]),
-    ("time,pwm,angle", body(), None, ["guessed from its values, steps of 20", "guessed from its values, 1500 throughout",
+    ("time,pwm,angle", body(), None, ["guessed from its values, steps of 20",
+                                      "guessed from its values, 1500 throughout",
                                       "guessed from its values, 9.5 throughout"]),
     ("t,pwm,adc", body("512"), "angle=adc:0.3deg-90", ["guessed from its values, steps of 20",
                                                        "guessed from its values, 1500 throughout", "--columns"]),
@@ -133,7 +134,8 @@ def test_how_it_was_known_is_kept(tmp_path, header, rows, columns, known):
 
 
 @pytest.mark.parametrize(("column", "values", "signal", "factor"), [
-    ("current", "500", "supply_current", 1e-3), ("mA", "500", "supply_current", 1e-3), ("amps", "0.5", "supply_current", 1),
+    ("current", "500", "supply_current", 1e-3), ("mA", "500", "supply_current", 1e-3),
+    ("amps", "0.5", "supply_current", 1),
     ("Strom (mA)", "500", "supply_current", 1e-3), ("i", "0.25", "supply_current", 1),
     ("motor_current_mA", "500", "armature_current", 1e-3), ("voltage", "6.1", "bus_voltage", 1),
     ("vbat", "6100", "bus_voltage", 1e-3), ("Spannung [V]", "6.1", "bus_voltage", 1),
@@ -179,8 +181,8 @@ def test_a_row_that_does_not_end_is_left_out_and_that_is_said(tmp_path):
     ("t,pwm,angle\n" + body(time=lambda k: str(300 * k)), None, ("unit of column t is not known", "s, ms or us")),
     ("millis,pwm,angle_kg\n" + body(), None, ("unit of column angle_kg", "'kg'", "deg or rad")),
     ("millis,pwm,angle [furlong]\n" + body(), None, ("angle [furlong]", "'furlong'")),
-    ("millis,pwm,angle,pos\n" + "".join(f"{20 * k},1500,9,8\n" for k in range(5)), None, ("angle and pos", "angle=angle")),
-    ("millis,pwm,angle,angle\n" + "".join(f"{20 * k},1500,9,8\n" for k in range(5)), None, ("angle 2 times", "once")),
+    ("millis,pwm,angle,pos\n" + body("9,8"), None, ("angle and pos", "angle=angle")),
+    ("millis,pwm,angle,angle\n" + body("9,8"), None, ("angle 2 times", "once")),
     ("millis,pwm\n" + "0,1500\n20,1500\n", None, ("no measured angle",)),
     ("t,pwm,angle\n0,00,1500,12,5\n0,02,1500,13,5\n", None, ("line 2", "5 cells", "decimal commas need another")),
     ("t;pwm;angle\n0,00;1500;12.5\n0,02;1500;13,5\n", None, ("line 2, angle", "'12.5'", "decimal comma")),
@@ -235,7 +237,7 @@ def test_what_was_said_is_kept_and_need_not_be_said_again(tmp_path):
     before = (tmp_path / "run.json").read_bytes()
     assert keep_columns(read_logs(path, columns={"time": "x:ms"})) == []
     other = read_logs(path, columns={"angle": "adc:0.3deg"})
-    with pytest.raises(InputError, match="output_angle: got 'adc:0.29.*deg-150 there, adc:0.3deg here'.*--force"):
+    with pytest.raises(InputError, match=r"output_angle: got 'adc:0.29.*deg-150 there, adc:0.3deg here'.*--force"):
         keep_columns(other)
     assert (tmp_path / "run.json").read_bytes() == before
     assert keep_columns(other, overwrite=True) == [tmp_path / "run.json"]

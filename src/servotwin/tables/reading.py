@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.tables.dialect import (
+    COMMENTS,
     MISSING,
     SEPARATORS,
     Row,
@@ -24,6 +25,7 @@ from servotwin.tables.dialect import (
 from servotwin.tables.text import Text, read_text
 from servotwin.units.words import is_unit
 
+_MARKS = frozenset(comment[0] for comment in COMMENTS)
 _SEARCHED = 200  # lines in which the header stands
 
 
@@ -243,12 +245,15 @@ def _table(path: Path, text: Text, found: list[Row], separator: str, known: Call
         bare = [names]
     units: list[str] = []
     data: list[Row] = []
+    heads = {cells[0] for cells in bare if cells}
     for row in below:
-        if row.cells in bare or is_comment(row.cells, separator):
+        first = row.cells[0]
+        if (first in heads and row.cells in bare) or (first[:1] in _MARKS and is_comment(row.cells, separator)):
             continue
         if not data and header is not None and _is_units(row.cells, len(names)):
             units = row.cells
             bare.append(units)
+            heads.add(units[0])
             continue
         data.append(row)
     if not data:
