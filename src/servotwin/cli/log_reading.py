@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from servotwin.identification import Log
 
 _MOST_REMARKS = 5
-_OWN = "named"
+_QUIET = ("named", "sidecar")  # someone said so before
 
 PANEL = "Logs and servo"
 HELP = "Files or folders of logs: tables (CSV) with or without a sidecar, JSON of BAM or Miuzei, LeRobot datasets."
@@ -87,10 +87,10 @@ def _alike(logs: Sequence[Log]) -> list[list[Log]]:
 
 
 def _parts(logs: Sequence[Log]) -> list[RenderableType]:
-    """Return a table of the columns that are not named as `servotwin` names them, and what was passed over."""
+    """Return a table of the columns that were guessed or said just now, and what was passed over."""
     groups = _alike(logs)
     shown = [some for some in groups if some[0].reading is not None
-             and any(one.known != _OWN for one in some[0].reading.columns)]
+             and any(one.known not in _QUIET for one in some[0].reading.columns)]
     rows = [(_file(some), one.column, one.signal, one.unit, one.known) for some in shown if some[0].reading is not None
             for one in some[0].reading.columns]
     parts: list[RenderableType] = []
