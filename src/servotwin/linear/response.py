@@ -117,6 +117,11 @@ class FrequencyResponse:
     def system(self, index: int = 0) -> control.FrequencyResponseData:
         """Return the response at one amplitude, by its index, as a named python-control system.
 
+        Raises
+        ------
+        InputError
+            If there is no such amplitude.
+
         Examples
         --------
         >>> import servotwin as st
@@ -126,6 +131,8 @@ class FrequencyResponse:
         """
         import control
 
+        if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(self.amplitude):
+            raise InputError("system(index)", got=index, allowed=f"0 to {len(self.amplitude) - 1}")
         found: Any = control.FrequencyResponseData(
             self.response[index], self.frequency, inputs=[self.input], outputs=[self.output])
         return found

@@ -8,7 +8,7 @@ import numpy as np
 
 from servotwin.errors import InputError, LoadError, UnknownNameError
 from servotwin.loads import as_load
-from servotwin.models import DCMotor, GearedMotor, PulseServo, PulseServoInductive
+from servotwin.models import DCMotor, GearedMotor, Model, PulseServo, PulseServoInductive
 from servotwin.models.kernels.plant import Plant
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load, Part
-    from servotwin.models import Model
 
 INPUT_UNITS = {"armature_voltage": "V", "command_voltage": "V", "pulse_width": "s", "command_angle": "rad"}
 
@@ -60,8 +59,8 @@ def transfer_function(model: Model, *, input: str | None = None, output: str | N
     LoadError
         If the load holds several pendulums that do not hang the same way.
     InputError
-        If the bridge of a pulse servo coasts between drives, which leaves no mean voltage; if `frame_period` is not
-        positive, or given for a model without frames.
+        If the bridge of a pulse servo coasts between drives, which leaves no mean voltage that follows the error; if
+        `frame_period` is not positive, or given for a model without frames.
 
     Warns
     -----
@@ -88,6 +87,9 @@ def transfer_function(model: Model, *, input: str | None = None, output: str | N
     import control
 
     load = as_load(load)
+    check_model(model, frame_period)
+    if isinstance(model, PulseServo | PulseServoInductive):
+        model.check_mean("the transfer function", ("motor.brush_drop_voltage",))
     plant = _linear_plant(model, load, frame_period)
     name_in = input_name(model, input) if input else "armature_voltage" if is_motor(model) else "pulse_width"
     outputs = _numerators(model, plant, _stiffness(plant, load))
@@ -114,8 +116,10 @@ def input_name(model: Model, name: str) -> str:
     return name
 
 
-def check_frames(model: Model, frame_period: float | None) -> None:
-    """Raise InputError if a frame period is given for a model without frames."""
+def check_model(model: Model, frame_period: float | None) -> None:
+    """Raise InputError unless it is a model, and one with frames where a frame period is given."""
+    if not isinstance(model, Model):
+        raise InputError("model", got=model, allowed="a model of a servo, such as PulseServo(load_servo(...))")
     if frame_period is not None and not isinstance(model, PulseServo | PulseServoInductive):
         raise InputError(f"frame_period of {type(model).__name__}", got=frame_period,
                          allowed="none: only the pulse servos have frames")
@@ -123,19 +127,15 @@ def check_frames(model: Model, frame_period: float | None) -> None:
 
 def _linear_plant(model: Model, load: Load, frame_period: float | None) -> Plant:
     """Return the model's plant, with the mean gain of its pulses where it has any."""
-    check_frames(model, frame_period)
-    if not isinstance(model, PulseServo | PulseServoInductive):
-        return model.pack(load)
-    gain = model.mean_gain(frame_period)
-    model.check_mean("the transfer function", ("motor.brush_drop_voltage",))
-    return model.pack(load)._replace(gain=gain)
+    plant = model.pack(load)
+    if isinstance(model, PulseServo | PulseServoInductive):
+        return plant._replace(gain=model.mean_gain(frame_period))
+    return plant
 
 
 def slowest_decay(model: Model, load: Load) -> float:
     """Return by how much the slowest mode of the small-signal loop decays [1/s], an integrator apart."""
-    plant = model.pack(load)
-    if isinstance(model, PulseServo | PulseServoInductive):
-        plant = plant._replace(gain=model.mean_gain())
+    plant = _linear_plant(model, load, None)
     poles = np.roots(np.trim_zeros(_denominator(plant, plant.stiffness), "f"))
     decay = -poles.real[np.abs(poles) > 0.0]
     return float(decay.min())
@@ -172,6 +172,6 @@ def _input_gain(model: Model, name: str) -> float:
     """Return the gain from a command to the voltage that the model compares with its feedback."""
     if is_motor(model):
         return 1.0
-    zero, one = model.command_signal(name, np.array([0.0, 1.0])).tolist()  # the conversion is a straight line
+    zero, one = model.command_signal(name, np.array([0.0, 1.0]))  # the conversion is a straight line
     pulsed = isinstance(model, PulseServo | PulseServoInductive)  # they follow a width, which stands for a voltage
-    return 1.0 / (one - zero) / (model.value("electronics.one_shot_slope") if pulsed else 1.0)
+    return 1.0 / float(one - zero) / (model.value("electronics.one_shot_slope") if pulsed else 1.0)

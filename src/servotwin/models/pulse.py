@@ -163,7 +163,8 @@ class _Pulsed(Model):
         left_out = [name for name in ("electronics.minimum_drive_time", "electronics.stretcher_time_constant",
                                       "electronics.back_emf_injection", *more) if self.value_or(name, 0.0) != 0.0]
         if left_out:
-            warnings.warn(f"{self.servo.name}: {what} leaves out {', '.join(left_out)}", stacklevel=3)
+            warnings.warn(f"{self.servo.name}: {what} leaves out {', '.join(left_out)}: the gain that its pulses have "
+                          "in the mean does not hold with it", stacklevel=3)
 
     def mean_gain(self, frame_period: float | None = None) -> float:
         """Return A k_s [V/V]: the mean voltage behind R_a, at standstill, per volt of error beyond the deadband.

@@ -27,6 +27,8 @@ DIMENSIONS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
     "angle": {"rad": 1.0, "deg": _DEG},
     "speed": {"rad/s": 1.0, "deg/s": _DEG, "rpm": math.pi / 30.0},
+    "output speed": {"rad/s": 1.0, "deg/s": _DEG},
+    "angle per pulse": {"rad/s": 1.0, "deg/us": _DEG * 1e6},
     "inverse speed": {"s/rad": 1.0, "s/deg": 1.0 / _DEG},
     "voltage": {"V": 1.0, "mV": 1e-3},
     "current": {"A": 1.0, "mA": 1e-3},
