@@ -144,7 +144,7 @@ def lift_curve(lifts: Sequence[tuple[float, Lift]]) -> Figure:
 
 def _curve(axes: Sequence[Axes], curve: SpeedCurve, k: int, label: str, *, hot: bool) -> None:
     colour = LINES[k][0]
-    style: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.1} if hot else {"linestyle": "-", "linewidth": 1.8}
+    style: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.1} if hot else {"linewidth": 1.8}
     for ax, values in zip(axes, (curve.torque, curve.current, curve.power, 100.0 * curve.efficiency), strict=True):
         ax.plot(_degrees(curve.speed), values, label=label, color=colour, **style)
 
