@@ -101,14 +101,20 @@ def test_bad_input_is_one_line(cli, tmp_path, words, said):
 
 def test_which_lists_the_lightest_first_and_says_why_others_cannot(cli):
     words = ["catalog", "which", "--lift", "0.5kg", "--arm", "10cm", "--voltage", "5", "--time", "0.3"]
-    ended = cli(*words)
-    listed = [line.split()[0] for line in ended.out.splitlines()[3:] if line][:-1]
+    lines = cli(*words, "--why").out.splitlines()
+    listed = [line.split()[0] for line in lines[3:lines.index("", 3)]]
     found = st.servos_that_lift(0.5, 0.1, voltage=5.0, time=0.3)
     assert listed == [each.servo.name for each in found.found]
-    assert ended.out.splitlines()[-1] == "43 cannot: 29 lack the torque, 14 are too slow"
-    assert "takes 0.41 s" in next(line for line in cli(*words, "--why").out.splitlines() if "mg996r" in line)
-    assert [each["id"] for each in cli(*words, "--json").data["found"]] == listed
+    assert "43 cannot: 29 lack the torque, 14 are too slow" in lines
+    assert "takes 0.41 s" in next(line for line in lines if "mg996r" in line)
     assert "no servo of the catalog can" in cli("catalog", "which", "--lift", "50kg", "--arm", "1m").out
+
+
+def test_which_has_the_same_in_json(cli):
+    found = cli("catalog", "which", "--lift", "2kg", "--arm", "8cm", "--json").data
+    assert [each["id"] for each in found["found"]] == [
+        each.servo.name for each in st.servos_that_lift(2.0, 0.08, voltage=6.0).found]
+    assert {each["kind"] for each in found["refused"]} == {"torque"}
 
 
 @pytest.mark.parametrize(("words", "said"), [

@@ -141,8 +141,8 @@ def _lifts(lift: Lift) -> str:
     if lift.lifts:
         return f"yes, at all angles, with a margin of {lift.margin:.3g}: it lifts {lift.most_torque:.3g} N m"
     angle = math.degrees(lift.blocked)
-    return (f"no: it lifts {lift.most_torque:.3g} N m, {100.0 * lift.margin:.0f} % of that. From hanging it comes up to "
-            f"{angle:.0f} deg below the horizontal; {angle:.0f} deg above, it lifts again")
+    return (f"no: it lifts {lift.most_torque:.3g} N m, {100.0 * lift.margin:.0f} % of that. From hanging it comes up "
+            f"to {angle:.0f} deg below the horizontal; {angle:.0f} deg above, it lifts again")
 
 
 def _warm(lift: Lift) -> str:
