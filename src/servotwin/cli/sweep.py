@@ -152,7 +152,7 @@ def _run(model: Model, words: Any, load: list[str], metric: list[str], options: 
     metrics = tuple(dict.fromkeys([*metric, *checked_metrics(None, model, signal, duration)]))
     with executor_at(scheduler) as executor:
         try:
-            return run(model, signal, load=load_from(load), metrics=metrics, executor=executor,
+            return run(model, signal, load=load_from(load, model), metrics=metrics, executor=executor,
                        progress=sys.stderr is not None and sys.stderr.isatty(), **options)
         except KeyboardInterrupt:
             if options["directory"] is not None and sys.stderr is not None:
