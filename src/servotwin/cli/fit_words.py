@@ -12,7 +12,7 @@ from servotwin import units
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.report.shown import dimension_of_free
-from servotwin.simulation.sweep.distributions import Distribution, Normal, Offset, Relative, Uniform
+from servotwin.simulation.sweep.kinds import Distribution, Normal, Offset, Relative, Uniform
 from servotwin.simulation.sweep.words import distribution_of
 
 if TYPE_CHECKING:
