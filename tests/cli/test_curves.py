@@ -54,7 +54,8 @@ def test_page_picture_and_points(cli, sheet, tmp_path):
     assert "http" not in page.replace("http://www.w3.org", "").split("<footer>")[0].split("</style>")[1][:2000]
     assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
     with (tmp_path / "points.csv").open(newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["servo"] == SERVO and row["winding_temperature_K"] == "298.15"]
+        rows = [row for row in csv.DictReader(file)
+                if (row["servo"], row["winding_temperature_K"]) == (SERVO, "298.15")]
     torque = np.array([float(row["load_torque_Nm"]) for row in rows])
     np.testing.assert_allclose(torque, sheet.at(4.8).cold.torque, rtol=1e-10)
     assert "exists already" in cli("curves", SERVO, "--quick", "--out", "page.html").error

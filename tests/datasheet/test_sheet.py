@@ -1,5 +1,6 @@
 """`st.curves` and `st.servos_that_lift`: contracts, and what they say of known servos."""
 
+import itertools
 import math
 
 import numpy as np
@@ -51,7 +52,7 @@ def test_holding_errors_grow_with_the_load(sheet):
     for part in sheet.voltages:
         errors = [held.error for held in part.holding]
         assert len(errors) == 5
-        assert all(a <= b for a, b in zip(errors, errors[1:], strict=False))
+        assert all(a <= b for a, b in itertools.pairwise(errors))
         assert errors[0] < errors[-1]
 
 

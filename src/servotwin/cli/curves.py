@@ -137,13 +137,13 @@ def _write_points(sheets: list[DataSheet], path: Path) -> None:
 
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("servo", "supply_voltage_V", "winding_temperature_K", "output_speed_deg_per_s", "load_torque_Nm",
-                         "supply_current_A", "load_power_W", "efficiency"))
+        writer.writerow(("servo", "supply_voltage_V", "winding_temperature_K", "output_speed_deg_per_s",
+                         "load_torque_Nm", "supply_current_A", "load_power_W", "efficiency"))
         for sheet in sheets:
             for part in sheet.voltages:
                 for curve in (part.cold, part.hot):
-                    speed = from_si(curve.speed, "deg/s", "speed")
-                    for point in zip(speed, curve.torque, curve.current, curve.power, curve.efficiency, strict=True):
+                    speeds = [from_si(speed, "deg/s", "speed") for speed in curve.speed.tolist()]
+                    for point in zip(speeds, curve.torque, curve.current, curve.power, curve.efficiency, strict=True):
                         writer.writerow((sheet.servo.name, f"{part.voltage:.12g}",
                                          f"{curve.temperatures.winding:.12g}", *(f"{x:.12g}" for x in point)))
 

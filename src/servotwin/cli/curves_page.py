@@ -116,8 +116,8 @@ def _figure(figure: Figure, words: str, *, wide: bool = False) -> str:
 
 
 _READING = """<ul>
-<li><b>Full drive.</b> Far from its goal a servo drives without a pause. Speed, torque and current are the steady motion
-then: motor, bridge, source, current limit and the friction of the gear, which grows with the load.</li>
+<li><b>Full drive.</b> Far from its goal a servo drives without a pause. Speed, torque and current are those
+of steady motion: motor, bridge, source, current limit and the friction of the gear, which grows with the load.</li>
 <li><b>Stall torque.</b> Where the shaft just stands. Sheets print the same, often rounded up, sometimes impossible.</li>
 <li><b>Time for 60°.</b> At the speed without load, as sheets print it; a real step also speeds up and settles.</li>
 <li><b>Hot.</b> Copper gains 0.385 % of resistance per kelvin; magnets lose 0.15 %, assumed, where the file does not

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from servotwin.datasheet import DataSheet, Lift, OperatingPoint, SpeedCurve, VoltageSheet
     from servotwin.parameters import PrintedPoint
+    from servotwin.physics._typing import Real
 
 _SHARES = (0.25, 0.5, 0.75)  # of the stall torque, whose errors of holding a table shows
 NEVER = "–"
@@ -138,7 +139,7 @@ def lift_pairs(lift: Lift) -> list[tuple[str, str]]:
 
 def _lifts(lift: Lift) -> str:
     if lift.lifts:
-        return f"yes, at all angles: it could lift {lift.margin:.2g} times as much ({lift.most_torque:.3g} N m)"
+        return f"yes, at all angles, with a margin of {lift.margin:.3g}: it lifts {lift.most_torque:.3g} N m"
     angle = math.degrees(lift.blocked)
     return (f"no: it lifts {lift.most_torque:.3g} N m, {100.0 * lift.margin:.0f} % of that. From hanging it comes up to "
             f"{angle:.0f} deg below the horizontal; {angle:.0f} deg above, it lifts again")
@@ -157,8 +158,8 @@ def _warm(lift: Lift) -> str:
            f"{_celsius(warming.masses.ambient)}{limit}{assumed}"
 
 
-def _celsius(kelvin: float) -> str:
-    return f"{kelvin - 273.15:.0f} deg C"
+def _celsius(kelvin: Real) -> str:
+    return f"{float(kelvin) - 273.15:.0f} deg C"
 
 
 def _while(seconds: float) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -144,9 +144,9 @@ def lift_curve(lifts: Sequence[tuple[float, Lift]]) -> Figure:
 
 def _curve(axes: Sequence[Axes], curve: SpeedCurve, k: int, label: str, *, hot: bool) -> None:
     colour = LINES[k][0]
-    style = {"color": colour, "linestyle": (0, (4, 2)) if hot else "-", "linewidth": 1.1 if hot else 1.8}
+    style: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.1} if hot else {"linewidth": 1.8}
     for ax, values in zip(axes, (curve.torque, curve.current, curve.power, 100.0 * curve.efficiency), strict=True):
-        ax.plot(_degrees(curve.speed), values, label=label, **style)
+        ax.plot(_degrees(curve.speed), values, label=label, color=colour, **style)
 
 
 def _name(ax: Axes, curve: SpeedCurve, words: str, k: int) -> None:
