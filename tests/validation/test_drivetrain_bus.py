@@ -10,7 +10,7 @@ from reference.drivetrain import simulate_bus
 from reference.drivetrain_cases import command_of, load_of, random_case, servo_of
 from reference.drivetrain_circuit import Source
 
-SHORT = 0.15  # s: each servo has started, and most are on their way
+SHORT = 0.1  # s: each servo has started, and most are on their way
 BATTERY, REGULATOR = (6.0, 0.4, None), (6.0, 0.4, 1.2)
 FEW = [(terms, supply, 7) for terms in ((), ("coast",), ("inductance",), ("backlash", "stribeck"), ("heat", "m5"))
        for supply in (BATTERY, REGULATOR)]
