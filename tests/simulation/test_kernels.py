@@ -11,7 +11,7 @@ import servotwin as st
 from servotwin.simulation import lane_runs
 
 STEP = st.signals.step(10.0, 50.0, at=0.02, unit="deg")
-# Each compiled form, what leads to it, and how far it may be off; in an order that halves the work between two processes
+# Each compiled form, what leads to it and how far it may be off; the order halves the work between two processes
 FORMS = {
     "pendulum_walks": ({}, st.loads.Pendulum(mass=0.1, length=0.1), "float64", 1e-9),
     "walks": ({"supply.current_limit": 1.0}, None, "float64", 1e-9),

@@ -48,7 +48,7 @@ def test_failures_keep_their_lanes_and_times_in_every_chunk():
         assert np.flatnonzero(batch.status).tolist() == [3, 7]
         assert np.flatnonzero(np.isnan(batch["output_angle"][:, -1])).tolist() == [3, 7]
         assert [failure.time for failure in batch.failures] == [failure.time for failure in runs[0].failures]
-        with pytest.raises(st.errors.SimulationError, match="lane 3"):
+        with pytest.raises(st.errors.SimulationError, match=r"lane 3: .* \(and 1 more of 9 lanes\)$"):
             batch.raise_if_failed()
 
 
