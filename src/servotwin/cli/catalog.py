@@ -15,7 +15,7 @@ from servotwin.cli.terminal import emit_help, emit_json, pairs, show, table
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
-_TELLING = ("impossible", "sources disagree", "currents unknown", "stall current unknown",
+_TELLING = ("impossible", "sources disagree", "digital", "currents unknown", "stall current unknown",
             "running current unknown")  # what a list has room for
 _Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
@@ -41,10 +41,10 @@ def list_servos(as_json: _Json = False) -> None:
     if as_json:
         emit_json(found)
         return
-    rows = [(servo["id"], servo["title"], servo["kind"], _number(servo["supply_voltage"], "{:.3g} V"),
+    rows = [(servo["id"], servo["title"], _number(servo["supply_voltage"], "{:.3g} V"),
              _number(servo["stall_torque"], "{:.3g} N m"), _number(servo["speed"], "{:.0f} deg/s"),
              _brief(servo["flags"])) for servo in found]
-    show(table(("id", "title", "kind", "at", "torque", "speed", "flags"), rows, wraps="flags"))
+    show(table(("id", "title", "at", "torque", "speed", "flags"), rows, wraps="flags"))
 
 
 @catalog.command("show", help="Show every parameter of a servo and its source.",
