@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin import units
 from servotwin.errors import MissingParameterError, ServotwinError
 from servotwin.models import MODELS
+from servotwin.parameters import printed_flags, printed_points
 
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
@@ -22,27 +21,14 @@ def headline(servo: Servo) -> dict[str, Any]:
     >>> headline(load_servo("hitec-hs-755hb"))["title"]
     'Hitec HS-755HB'
     """
-    seconds = _fact(servo, "speed_per_60deg", "time")
+    printed = printed_points(servo)[0]
     return {
         "id": servo.name, "title": servo.title, "kind": servo.kind,
-        "supply_voltage": _fact(servo, "supply_voltage", "voltage"),
-        "stall_torque": _fact(servo, "stall_torque", "torque"),
-        "speed": 60.0 / seconds if seconds else None,
-        "flags": flags(servo),
+        "supply_voltage": printed.supply_voltage,
+        "stall_torque": printed.stall_torque,
+        "speed": 60.0 / printed.time_60 if printed.time_60 else None,
+        "flags": list(printed_flags(servo)),
     }
-
-
-def flags(servo: Servo) -> list[str]:
-    """Return what the file's [sheet] says of itself: what it lacks, and where it contradicts itself.
-
-    Examples
-    --------
-    >>> from servotwin.parameters import servo_from_values
-    >>> flags(servo_from_values("mine", {}))
-    []
-    """
-    found = servo.sheet.get("flags")
-    return [flag for flag in found if isinstance(flag, str)] if isinstance(found, list) else []
 
 
 def parameters(servo: Servo) -> list[dict[str, Any]]:
@@ -85,14 +71,3 @@ def readiness(servo: Servo) -> dict[str, dict[str, Any]]:
             problem = str(error)
         found[name] = {"runs": not lacks and problem is None, "lacks": lacks, "problem": problem, "ignored": ignored}
     return found
-
-
-def _fact(servo: Servo, name: str, dimension: str) -> float | None:
-    entry = servo.sheet.get(name)
-    if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
-        return None
-    try:
-        value = units.to_si(entry["value"], str(entry.get("unit")), dimension)
-    except ServotwinError:
-        return None  # a person's own [sheet] may hold anything
-    return value if math.isfinite(value) else None
