@@ -106,3 +106,23 @@ def test_the_bus_gives_no_more_than_all_take_and_nothing_at_rest(servo):
         parts = [getattr(result.energy, field) for result in moving.values()]
         assert getattr(moving.energy, field) == pytest.approx(sum(parts), rel=1e-12)
         assert parts[0] == 0.0
+
+
+def test_a_regulator_takes_nothing_back_in_the_middle_of_a_drive(servo):
+    """One motor returns what another takes; where that is more, a regulator keeps its voltage, and no energy is lost."""
+    turning = st.PulseServo(servo.replace({"electronics.off_state": "coast"}))
+    quiet = st.signals.pulse_train([1.0], [1500.0])
+    fleet = st.simulate_bus(
+        {"turns": (turning, quiet, st.loads.Inertia(8e-2)),
+         "pulls": (st.PulseServo(servo), st.signals.step(0.0, 120.0, unit="deg"))},
+        supply=st.Supply(open_circuit_voltage=V_OC, internal_resistance=R_B, current_limit=1.3), duration=0.15,
+        initial={"turns": {"output_speed": 8.5}}, output_step=2e-4)
+    total, V = fleet.supply_current, fleet.bus_voltage
+    driven = fleet["pulls"]["drive"] == 1.0
+    returned = driven & (total < -1e-3)
+    assert np.count_nonzero(np.diff(returned[driven].astype(int)) == 1) >= 1  # while it drives, not when it begins
+    np.testing.assert_allclose(V[total < -1e-9], V_OC, rtol=1e-14)
+    follows = (total > 1e-9) & (total < 1.3 - 1e-6)
+    np.testing.assert_allclose(V[follows], V_OC - R_B * total[follows], rtol=0.0, atol=1e-9)
+    assert total.max() <= 1.3 + 1e-9
+    assert abs(fleet.energy.residual) <= 1e-9 * fleet.energy.winding
