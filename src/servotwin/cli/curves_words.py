@@ -116,7 +116,7 @@ def _standing(part: VoltageSheet) -> list[Row]:
             said = f"{math.degrees(each.error):.1f} deg, {each.current:.2f} A" if each.stands else "does not hold"
             found.append(Row(f"holding {each.torque:.2g} N m, error", said))
     for band in part.bandwidth:
-        said = ("does not follow at 1 Hz" if band.frequency == 0.0 else
+        said = ("below 1 Hz" if band.frequency == 0.0 else
                 "20 Hz and more" if math.isinf(band.frequency) else f"{band.frequency:.1f} Hz")
         found.append(Row(f"bandwidth at {math.degrees(band.amplitude):.0f} deg", said))
     return found

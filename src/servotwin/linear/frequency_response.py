@@ -14,7 +14,7 @@ from servotwin.errors import InputError
 from servotwin.linear.response import FrequencyResponse
 from servotwin.linear.transfer_function import INPUT_UNITS, check_model, input_name, is_motor, slowest_decay
 from servotwin.loads import as_load
-from servotwin.models import PulseServo, PulseServoInductive
+from servotwin.models import PulseServo, PulseServoInductive, mid_travel
 from servotwin.simulation import simulate, simulate_many
 from servotwin.simulation.lane_inputs import LAWS
 from servotwin.units import is_finite
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_NEUTRAL = 1.5e-3  # s, the pulse in the middle of what transmitters send
 _SAMPLES = 64  # of a period
 _PER_FRAME = 16.618  # samples of a frame: incommensurable, so that no ripple of the frames looks like the sine
 _FRAMES = 50  # that are evaluated at least: sine and frames beat
@@ -252,11 +251,7 @@ def _mean(model: Model, name: str, mean: float | None) -> float:
         return float(mean)
     if is_motor(model):
         return 0.0
-    lower, upper = (model.servo.get(f"stops.{end}_angle") for end in ("lower", "upper"))
-    if isinstance(lower, float) and isinstance(upper, float):
-        drive = model.command(signals.constant(0.5 * (lower + upper), unit="rad")).table[0].value
-    else:
-        drive = model.command(signals.constant(_NEUTRAL, unit="s")).table[0].value
+    drive = model.command(signals.constant(mid_travel(model), unit="rad")).table[0].value
     return float(model.command_signal(name, np.array([drive]))[0])
 
 
