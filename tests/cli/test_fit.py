@@ -172,7 +172,7 @@ def test_an_interrupt_before_the_first_step_leaves_nothing(fit, tmp_path, monkey
     monkeypatch.setattr(Search, "run", interrupted)
     ended = fit(*QUICK, "--out", "my.toml")
     assert (ended.code, ended.out) == (130, "")
-    assert ended.err == "servotwin: error: interrupted\n"
+    assert ended.err == "servotwin: interrupted\n"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -132,6 +132,7 @@ def _draws(path: Path | None) -> dict[str, Any] | None:
 
 def _run(model: Model, words: Any, load: list[str], metric: list[str], options: dict[str, Any],
          scheduler: str | None) -> Study:
+    from servotwin.cli.interrupts import last_words
     from servotwin.cli.load_words import load_from
     from servotwin.cli.scheduler import executor_at
     from servotwin.errors import InputError
@@ -144,15 +145,17 @@ def _run(model: Model, words: Any, load: list[str], metric: list[str], options: 
         raise InputError("--duration", got=duration, allowed="a positive number of seconds")
     signal = words.signal(duration)
     metrics = tuple(dict.fromkeys([*metric, *checked_metrics(None, model, signal, duration)]))
-    with executor_at(scheduler) as executor:
-        try:
-            return run(model, signal, load=load_from(load), metrics=metrics, executor=executor,
-                       progress=sys.stderr is not None and sys.stderr.isatty(), **options)
-        except KeyboardInterrupt:
-            if options["directory"] is not None and sys.stderr is not None:
-                sys.stderr.write(f"servotwin: what is finished is in {options['directory']}; the same command with "
-                                 "--resume goes on\n")
-            raise
+    with executor_at(scheduler) as executor, last_words(lambda: _how_to_go_on(options["directory"])):
+        return run(model, signal, load=load_from(load), metrics=metrics, executor=executor,
+                   progress=sys.stderr is not None and sys.stderr.isatty(), **options)
+
+
+def _how_to_go_on(folder: Path | None) -> str | None:
+    from servotwin.simulation.sweep.folder import STUDY
+
+    if folder is None or not (folder / STUDY).exists():
+        return None
+    return f"what is finished is in {folder}; the same command with --resume goes on"
 
 
 def _report(study: Study, metric: list[str], out: Path | None, *, plot: bool, as_json: bool) -> None:

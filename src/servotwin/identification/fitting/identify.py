@@ -93,7 +93,7 @@ def identify(
     Returns
     -------
     Fit
-        After an interrupt (Ctrl-C) the best so far, without intervals.
+        After an interrupt (Ctrl-C, or a KeyboardInterrupt out of `progress`) the best so far, without intervals.
 
     Raises
     ------
@@ -153,7 +153,8 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubt, reaching, level)
     try:
         show(0.95, "errors")
-        tables = compare(task, held_out, traces, final, () if interrupted else beside)
+        tables = compare(task, held_out, traces, final, () if interrupted else beside,
+                         lambda: show(0.95, "errors of simpler models"))
     except KeyboardInterrupt:
         interrupted, tables = True, compare(task, held_out, traces, final, ())
     fit = _fit(task, found, doubt, reaching, vague, task.at_bound(found), final, traces, tables, ended)

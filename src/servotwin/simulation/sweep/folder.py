@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import platform
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from servotwin import __version__
 from servotwin.errors import InputError, OutputError
 from servotwin.parameters import write_file
+from servotwin.parameters.output_file import undone
 from servotwin.simulation.sweep.tables import check_format, encoded, read_columns
 
 Column = NDArray[Any]
@@ -48,14 +50,20 @@ class Folder:
         check_format(file_format)
         self.path, self._format = Path(path), file_format
         own = {**definition, "servotwin": __version__, "format": file_format}
-        self._make()
-        if not self._empty():
-            if not resume:
-                raise OutputError(f"{self.path} is not empty; resume=True (--resume) goes on with the study there")
-            self._check_same(own)
-            return
-        versions = {"python": platform.python_version(), **{name: metadata.version(name) for name in _LIBRARIES}}
-        self._write(STUDY, _json({"sha256": _fingerprint(own), "definition": own, "versions": versions}))
+        new = not self.path.exists()
+        with undone(self._remove_empty if new else lambda: None):
+            self._make()
+            if not self._empty():
+                if not resume:
+                    raise OutputError(f"{self.path} is not empty; resume=True (--resume) goes on with the study there")
+                self._check_same(own)
+                return
+            versions = {"python": platform.python_version(), **{name: metadata.version(name) for name in _LIBRARIES}}
+            self._write(STUDY, _json({"sha256": _fingerprint(own), "definition": own, "versions": versions}))
+
+    def _remove_empty(self) -> None:
+        with contextlib.suppress(OSError, ValueError):  # it has the study, or never was
+            self.path.rmdir()
 
     def _make(self) -> None:
         if "\0" in str(self.path):
