@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 
 def heading(servo: Servo) -> list[RenderableType]:
-    """Return title, notes and flags of a servo."""
+    """Return title, kind, notes and flags of a servo."""
     from servotwin.cli.servo_facts import flags
 
     said = flags(servo)
-    return [f"{servo.title} ({servo.name})", " ".join(servo.notes.split()),
+    return [f"{servo.title} ({servo.name}), {servo.kind}", " ".join(servo.notes.split()),
             *([f"flags: {'; '.join(said)}"] if said else [])]
 
 
