@@ -97,7 +97,7 @@ def sweep(
         "duration": duration, "vary": _varied(nominal, vary or [], from_file=from_file), "draws": _draws(draws),
         "lanes": lanes, "seed": seed, "sampling": sampling, "truncate": truncate, "output_step": output_step,
         "directory": out, "resume": resume, "file_format": file_format}, scheduler)
-    _report(study, metric or [], out, plot=plot, as_json=as_json)
+    _report(study, nominal, metric or [], out, plot=plot, as_json=as_json)
 
 
 def _check_options(out: Path | None, *, resume: bool, plot: bool, varies: bool) -> None:
@@ -159,7 +159,8 @@ def _how_to_go_on(folder: Path | None) -> str | None:
     return f"what is finished is in {folder}; the same command with --resume goes on"
 
 
-def _report(study: Study, metric: list[str], out: Path | None, *, plot: bool, as_json: bool) -> None:
+def _report(study: Study, nominal: Model, metric: list[str], out: Path | None, *, plot: bool, as_json: bool) -> None:
+    from servotwin.cli.summary import was_set
     from servotwin.cli.sweep_words import sections
 
     chosen = metric[0] if metric else study.metrics[0]
@@ -170,6 +171,6 @@ def _report(study: Study, metric: list[str], out: Path | None, *, plot: bool, as
         with patience("drawing"):
             plotting.save(plotting.tornado(study.tornado(chosen)), out / "tornado.png", overwrite=True)
     if as_json:
-        emit_json({"definition": dict(study.definition), **study.summary(), "files": files})
+        emit_json({"definition": dict(study.definition), "set": was_set(nominal), **study.summary(), "files": files})
         return
-    show(*sections(study, chosen, files))
+    show(*sections(study, chosen, files, was_set(nominal)))

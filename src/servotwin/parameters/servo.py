@@ -21,7 +21,7 @@ from servotwin.parameters.groups import (
     Supply,
     Thermal,
 )
-from servotwin.parameters.quantity import Quantity
+from servotwin.parameters.quantity import SET_BY_USER, Quantity
 from servotwin.units import si_unit
 
 Value = float | tuple[float, ...] | str
@@ -134,10 +134,15 @@ class Servo:
             raise ParameterError(f"{name} is not given by servo {self.name!r}")
         return self.quantities[name]
 
-    def replace(self, values: Mapping[str, Value | None]) -> Servo:
-        """Return a servo with some values replaced (dotted name to SI number); their origin becomes assumed.
+    def replace(self, values: Mapping[str, Value | None], *, source: str = SET_BY_USER) -> Servo:
+        """Return a servo with some values replaced; their origin becomes assumed.
 
-        None takes a value away.
+        Parameters
+        ----------
+        values : mapping
+            Dotted name to SI number; None takes a value away.
+        source : str
+            Who says so; what begins with "set by" is listed under `set` in summaries.
 
         Raises
         ------
@@ -154,7 +159,7 @@ class Servo:
             group, key = check_name(name)
             value = getattr(groups[group], key)
             if value is not None:
-                quantities[name] = _replaced(name, value)
+                quantities[name] = _replaced(name, value, source)
         return replace(self, quantities=quantities, **groups)
 
     def with_checked(self, values: Mapping[str, Value | None]) -> Servo:
@@ -169,7 +174,7 @@ class Servo:
                 made.__dict__[group] = object.__new__(GROUPS[group])
                 made.__dict__[group].__dict__.update(self.__dict__[group].__dict__)
             made.__dict__[group].__dict__[key] = value
-        changed = {name: _replaced(name, value) for name, value in values.items() if value is not None}
+        changed = {name: _replaced(name, value, SET_BY_USER) for name, value in values.items() if value is not None}
         made.__dict__["quantities"] = MappingProxyType({**self.quantities, **changed})
         return made
 
@@ -255,8 +260,8 @@ def unit_of(name: str) -> str:
     return "" if dimension == "word" else si_unit(dimension)
 
 
-def _replaced(name: str, value: Value) -> Quantity:
-    return Quantity(value=value, unit=unit_of(name), origin="assumed", source="replaced")
+def _replaced(name: str, value: Value, source: str) -> Quantity:
+    return Quantity(value=value, unit=unit_of(name), origin="assumed", source=source)
 
 
 def _rebuild(state: dict[str, Any]) -> Servo:

@@ -21,7 +21,7 @@ from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.holdout import split
 from servotwin.identification.fitting.intervals import Ends, ends
 from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, Point
-from servotwin.identification.fitting.record import identified_servo, with_record
+from servotwin.identification.fitting.record import identified_servo, with_record, with_what_logs_say
 from servotwin.identification.fitting.remedies import with_remedies
 from servotwin.identification.fitting.task import HUBER, Task, by_sensor
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
@@ -152,6 +152,7 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
         interrupted = True
     traces = _traces(forecast, found.point, held_out)
     final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubt, reaching, level)
+    final = with_what_logs_say(final, [forecast.cases[k].log for k in task.fitted], forecast.space.names)
     try:
         show(0.95, "errors")
         tables = compare(task, held_out, traces, final, () if interrupted else beside,
