@@ -23,7 +23,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Words after `servotwin`; those of the process unless given, and then Ctrl-C ends the process.
+        Words after `servotwin`. Without them those of the process are run, and the process ends here: after the last
+        line, or by Ctrl-C at any time before.
 
     Returns
     -------
@@ -37,9 +38,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     servotwin 0.1.0
     0
     """
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    if arguments is None:
-        interrupts.watch(words)
+    if arguments is not None:
+        return _ran(list(arguments))
+    words = sys.argv[1:]
+    interrupts.watch(words)
+    interrupts.leave(_ran(words))
+
+
+def _ran(words: Sequence[str]) -> int:
     try:
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):

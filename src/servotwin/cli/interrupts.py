@@ -16,6 +16,7 @@ TYPE_CHECKING = False  # typing and dataclasses would take longer to load than a
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from types import FrameType
+    from typing import NoReturn
 
 CODE = 130  # of a process that was interrupted
 _CLEAR_LINE_SHOW_CURSOR = b"\r\x1b[2K\x1b[?25h"  # a bar may be there, which hides the cursor
@@ -47,6 +48,14 @@ def watch(words: Sequence[str]) -> None:
     if threading.current_thread() is threading.main_thread() and (
             signal.getsignal(signal.SIGINT) is signal.default_int_handler):
         signal.signal(signal.SIGINT, _interrupted)
+
+
+def leave(code: int) -> NoReturn:
+    """End the process without taking apart what the system frees anyway: an interrupt meanwhile would come too late."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.flush()
+    os._exit(code)
 
 
 def noted() -> bool:
@@ -121,7 +130,7 @@ def _interrupted(number: int, frame: FrameType | None) -> None:
         _end()
 
 
-def _end() -> None:
+def _end() -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     files = sys.modules.get("servotwin.parameters.output_file")
     undo_all = getattr(files, "undo_all", None)  # absent before it is imported

@@ -153,8 +153,8 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
             more = dict(options)
             if found:
                 more["starts"] = 1  # it begins at what a simpler law found
-            fit = identify(given, start, type(plain), [*others, *RUNGS[name]], progress=_share(show, k, len(ordered), name),
-                           **more)
+            fit = identify(given, start, type(plain), [*others, *RUNGS[name]],
+                           progress=_share(show, k, len(ordered), name), **more)
             found.append(_rung(name, fit))
             if fit.interrupted:
                 break
