@@ -30,8 +30,8 @@ def fit(
     file_format: Annotated[str, typer.Option(
         "--format", metavar="FORMAT", help="Of the logs: auto, csv, bam or miuzei.", rich_help_panel=_LOGS)] = "auto",
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable, SI.",
-        rich_help_panel=_LOGS)] = None,
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
+        "in SI.", rich_help_panel=_LOGS)] = None,
     holdout: Annotated[str | None, typer.Option(
         metavar="SHARE|NAMES", help="Logs that are predicted and not fitted: a share of each kind of motion such as "
         "0.25, or names with commas; 0 for none (default: a fourth of each kind with four logs or more).",

@@ -48,7 +48,7 @@ def simulate(
         "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, or give one that the servo lacks, such as "
-        "supply.current_limit=1; repeatable, SI.",
+        "supply.current_limit=1A; repeatable; with a unit, or in SI.",
         rich_help_panel=shared.PLANT)] = None,
     seed: Annotated[int, typer.Option(
         metavar="NUMBER", help="Seed of a pulse servo's noise.", rich_help_panel=shared.PLANT)] = 0,

@@ -45,7 +45,7 @@ def sweep(
         rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE",
-        help="Change a nominal parameter, or give one that the servo lacks; repeatable, SI.",
+        help="Change a nominal parameter, or give one that the servo lacks; repeatable; with a unit, or in SI.",
         rich_help_panel=shared.PLANT)] = None,
     vary: Annotated[list[str] | None, typer.Option(
         metavar="NAME=DISTRIBUTION", help="Draw a parameter of servo or load, repeatable: normal:10%, uniform:10%, "

@@ -26,6 +26,13 @@ from servotwin.units import si_unit
 
 Value = float | tuple[float, ...] | str
 KINDS = ("analog", "digital", "bus")
+_USUAL = {  # what people call it -> its name
+    "voltage": "supply.open_circuit_voltage", "supply_voltage": "supply.open_circuit_voltage",
+    "resistance": "motor.armature_resistance", "inductance": "motor.armature_inductance",
+    "inertia": "motor.rotor_inertia", "viscous_friction": "motor.motor_viscous_friction",
+    "ratio": "gear.gear_reduction", "gear_ratio": "gear.gear_reduction", "reduction": "gear.gear_reduction",
+    "play": "gear.backlash", "coulomb_torque": "friction.coulomb_torque_forward",
+    "dead_band": "electronics.deadband", "frame": "electronics.frame_period", "gain": "electronics.stretcher_gain"}
 _PLACES = {f"{group}.{f.name}": (group, f.name) for group, kind in GROUPS.items() for f in fields(kind)}
 
 
@@ -241,10 +248,26 @@ def check_name(name: str) -> tuple[str, str]:
     """
     place = _PLACES.get(name)
     if place is None:
-        group = name.partition(".")[0]
-        near = [n for n in _PLACES if n.startswith(f"{group}.")] or list(_PLACES)
-        raise UnknownNameError("parameter", name, near)
+        group, _, key = str(name).partition(".")
+        meant = _USUAL.get(key or group)
+        if group in GROUPS:
+            near = [n for n in _PLACES if n.startswith(f"{group}.")]
+            raise UnknownNameError("parameter", name, near, meant=meant if meant in near else None)
+        raise UnknownNameError("parameter", name, _PLACES, meant=meant,
+                               allowed=f"GROUP.NAME, with a group of {', '.join(GROUPS)}")
     return place
+
+
+def dimension_of(name: str) -> str:
+    """Return what a parameter measures, in the words of `servotwin.units`; "word" for words.
+
+    Examples
+    --------
+    >>> dimension_of("motor.rotor_inertia")
+    'inertia'
+    """
+    group, key = check_name(name)
+    return str(GROUPS[group].__dataclass_fields__[key].metadata["dimension"])
 
 
 def unit_of(name: str) -> str:
@@ -255,8 +278,7 @@ def unit_of(name: str) -> str:
     >>> unit_of("motor.rotor_inertia")
     'kg m2'
     """
-    group, key = check_name(name)
-    dimension = GROUPS[group].__dataclass_fields__[key].metadata["dimension"]
+    dimension = dimension_of(name)
     return "" if dimension == "word" else si_unit(dimension)
 
 
