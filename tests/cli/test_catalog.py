@@ -10,7 +10,8 @@ SERVO = "hitec-hs-755hb"
 
 def test_list_has_every_servo(cli):
     ended = cli("catalog", "list")
-    assert [line.split()[0] for line in ended.out.splitlines() if not line.startswith(" ")] == ["id", *st.catalog_names()]
+    rows = [line for line in ended.out.splitlines() if not line.startswith(" ")]
+    assert [line.split()[0] for line in rows] == ["id", *st.catalog_names()]
     found = {servo["id"]: servo for servo in cli("catalog", "list", "--json").data}
     assert set(found) == set(st.catalog_names())
     assert found[SERVO]["stall_torque"] == pytest.approx(1.2945, abs=1e-3)
