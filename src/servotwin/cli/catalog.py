@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli.from_sheet import from_sheet
-from servotwin.cli.terminal import emit_help, emit_json, pairs, show, table
+from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
@@ -37,7 +37,8 @@ def list_servos(as_json: _Json = False) -> None:
     from servotwin.cli.servo_facts import headline
     from servotwin.parameters import catalog_names, load_servo
 
-    found = [headline(load_servo(name)) for name in catalog_names()]
+    with patience("reading the catalog"):
+        found = [headline(load_servo(name)) for name in catalog_names()]
     if as_json:
         emit_json(found)
         return

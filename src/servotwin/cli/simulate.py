@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -109,8 +110,8 @@ def _run(model: Model, words: CommandWords, load: list[str], duration: float, ou
     if chip is not None and signal.edges is None and duration > _MOST_FRAMES * chip.frame_period:
         raise InputError("--duration", got=duration,
                          allowed=f"at most {_MOST_FRAMES:g} frames of {1e3 * chip.frame_period:g} ms")
-    with patience("simulating"):
-        result = run(model, signal, duration=duration, load=load_from(load), output_step=output_step, seed=seed)
+    result = run(model, signal, duration=duration, load=load_from(load), output_step=output_step, seed=seed,
+                 progress=sys.stderr is not None and sys.stderr.isatty())
     return result.raise_if_failed()
 
 
