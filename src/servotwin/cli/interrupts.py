@@ -28,6 +28,7 @@ class _State:
     def __init__(self) -> None:
         self.words: Sequence[str] = ()
         self.held = False  # it waits until a few files stand in their places
+        self.waiting = False
         self.finishing = False  # the first one is noted: there is something to keep
         self.noted = False
         self.last_words: list[Callable[[], str | None]] = []
@@ -78,7 +79,7 @@ def held() -> Iterator[None]:
         yield
     finally:
         _state.held = False
-        if _state.noted and not _state.finishing:
+        if _state.waiting:
             _end()
 
 
@@ -121,12 +122,12 @@ def _check() -> None:
 
 
 def _interrupted(number: int, frame: FrameType | None) -> None:
-    if (_state.held or _state.finishing) and not _state.noted:
+    if _state.held:
+        _state.waiting = True
+    elif _state.finishing and not _state.noted:
         _state.noted = True
-        if _state.finishing:
-            _write(2, "servotwin: interrupted; keeping the best so far (Ctrl-C again: end at once)\n")
-        return
-    if not _state.held:
+        _write(2, "servotwin: interrupted; keeping the best so far (Ctrl-C again: end at once)\n")
+    else:
         _end()
 
 
