@@ -5,7 +5,7 @@ A message is one line made of three parts: what was looked at, what was got, and
 
 from __future__ import annotations
 
-from difflib import SequenceMatcher
+import difflib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -190,7 +190,7 @@ def _nearest(name: str, known: tuple[str, ...]) -> list[str]:
         if len(asked) > 2 and asked in letters:
             scores[one] = (3.0 if letters.startswith(asked) else 2.0) + len(asked) / len(letters)
         else:
-            scores[one] = max(SequenceMatcher(None, part, asked).ratio() for part in parts)
+            scores[one] = max(difflib.SequenceMatcher(None, part, asked).ratio() for part in parts)
     return sorted((one for one in scores if scores[one] >= _NEAR), key=lambda one: -scores[one])
 
 
