@@ -119,7 +119,7 @@ def tried(words: list[str], logs: Path, after: float | None) -> tuple[str, float
 
 
 def main() -> None:
-    first = max(FIRST, 2.0 * start_up())
+    first = max(FIRST, 4.0 * start_up())
     print(f"the first interrupt comes {first:.2f} s after the start of the process")
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     chosen = sys.argv[2:] or list(COMMANDS)

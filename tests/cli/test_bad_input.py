@@ -35,7 +35,7 @@ def nothing_new(folder, before):
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    (["hitec-hs-755", *STEP], "did you mean 'hitec-hs-755hb'?"),
+    (["hitec-hs-755", *STEP], "did you mean 'hitec-hs-755hb', "),
     (["none.toml", *STEP], "none.toml: no such file"),
     ([".", *STEP], "unknown servo '.'"),
     (["./", *STEP], "folder"),
@@ -143,7 +143,7 @@ def test_loads(simulate, tmp_path, load, said):
 @pytest.mark.parametrize(("change", "said"), [
     ("motor.x=1", "unknown parameter 'motor.x'"),
     ("motor.armature_resistence=1", "did you mean 'motor.armature_resistance'?"),
-    ("motor.armature_resistance=nan", "motor.armature_resistance: got nan, allowed: a positive number [ohm]"),
+    ("motor.armature_resistance=nan", "--set motor.armature_resistance: got 'nan', allowed: a number in SI"),
     ("motor.armature_resistance=-1", "got -1.0"),
     ("motor.armature_resistance=a", "got 'a'"),
     ("motor.armature_resistance=1,2", "got (1.0, 2.0)"),

@@ -111,5 +111,5 @@ def test_interrupts_spread_over_a_command(command, tmp_path):
     run.tried(words, tmp_path, None)  # everything compiled
     error, lasts = run.tried(words, tmp_path, None)
     assert not error
-    for after in np.linspace(max(run.FIRST, 2.0 * run.start_up()), 0.9 * lasts, 4):
+    for after in np.linspace(max(run.FIRST, 4.0 * run.start_up()), 0.9 * lasts, 4):
         assert run.tried(words, tmp_path, float(after))[0] in ("", "ended before")
