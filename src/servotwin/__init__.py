@@ -20,12 +20,13 @@ _LAZY = {
          "PulseServoInductive"), "models"),
     **dict.fromkeys(("Batch", "Fleet", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_bus",
                      "simulate_many"), "simulation"),
+    **dict.fromkeys(("DataSheet", "curves", "servos_that_lift"), "datasheet"),
     **dict.fromkeys(("Study", "distributions", "sweep"), "simulation.sweep"),
     **dict.fromkeys(("Fit", "Log", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "read_logs",
                      "servo_from_sheet", "validate"), "identification"),
 }
-_MODULES = ("bench", "errors", "identification", "linear", "loads", "models", "parameters", "physics", "plotting",
-            "signals", "simulation", "units")
+_MODULES = ("bench", "datasheet", "errors", "identification", "linear", "loads", "models", "parameters", "physics",
+            "plotting", "signals", "simulation", "units")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 

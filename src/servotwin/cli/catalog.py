@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli.catalog_which import which
 from servotwin.cli.from_sheet import from_sheet
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
 
@@ -129,3 +130,5 @@ catalog.command("from-sheet", help="Make a servo file out of what a maker prints
     'Example: servotwin catalog from-sheet --name my-servo --torque "13.2 kgf.cm" --speed "0.23 s/60deg" '
     '--running-current "285 mA" --at 6V --deadband "8 us" --out my-servo.toml\n\n'
     "Example: servotwin catalog from-sheet --csv sheets.csv --out my-catalog"))(from_sheet)
+catalog.command("which", help="List the servos that lift a mass on an arm, lightest first.", epilog=(
+    "Example: servotwin catalog which --lift 0.5kg --arm 10cm --voltage 5 --time 0.3"))(which)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli import log_reading
 from servotwin.cli.terminal import emit_json, patience, show
 
 if TYPE_CHECKING:
@@ -18,17 +19,18 @@ if TYPE_CHECKING:
     from servotwin.identification import Advice, Fit, Ladder, Log
     from servotwin.models import Model
 
-_LOGS, _SEARCH, _OUTPUT = "Logs and servo", "What is searched, and how", "Output"
+_LOGS, _SEARCH, _OUTPUT = log_reading.PANEL, "What is searched, and how", "Output"
 
 
 def fit(
     logs: Annotated[list[Path] | None, typer.Argument(
-        metavar="LOGS", help="Files or folders of logs: CSV with or without a sidecar, JSON of BAM or Miuzei.")] = None,
+        metavar="LOGS", help=log_reading.HELP)] = None,
     servo: Annotated[str | None, typer.Option(
         metavar="SERVO", help="Where the search begins, and what is not searched: id in the catalog, or path of a "
         "servo file (.toml).", rich_help_panel=_LOGS)] = None,
-    file_format: Annotated[str, typer.Option(
-        "--format", metavar="FORMAT", help="Of the logs: auto, csv, bam or miuzei.", rich_help_panel=_LOGS)] = "auto",
+    file_format: log_reading.FormatOption = "auto",
+    columns: log_reading.ColumnsOption = None,
+    joint: log_reading.JointOption = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI.", rich_help_panel=_LOGS)] = None,
@@ -102,7 +104,9 @@ def fit(
     _check_ladder(search.model, ladder=ladder)
     options = {"holdout": holdout, "nuisance": nuisance, "sensors": sensors, "starts": starts, "loss": loss,
                "level": level, "intervals": intervals, "seed": seed, "compare": compare}
-    found = _run(search, _read(logs, file_format, leave_out or []), _options(options), ladder=ladder)
+    chosen = _options(options)
+    given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json)
+    found = _run(search, given, chosen, ladder=ladder)
     files = _write(found.fit, targets, force=force)
     if advise and not found.fit.interrupted and found.fit.doubt is not None:
         found = _Found(found.fit, found.ladder, _advice(found.fit))
@@ -178,14 +182,6 @@ def _search(servo: str, model: str | None, change: list[str], free: list[str] | 
     fit_words.check_free(names, nominal)
     return _Search(nominal, names, fit_words.bounds_of(bounds, names),
                    fit_words.priors_of(prior, names, nominal, of_servo=priors))
-
-
-def _read(paths: list[Path], file_format: str, leave_out: list[str]) -> list[Log]:
-    from servotwin.cli import fit_words
-
-    windows = fit_words.left_out(leave_out)
-    with patience("reading"):
-        return fit_words.without(fit_words.read_all(paths, file_format), windows)
 
 
 def _options(given: dict[str, Any]) -> dict[str, Any]:
@@ -286,7 +282,7 @@ def _report(found: _Found, files: list[str], *, as_json: bool) -> None:
     from servotwin.cli import fit_show
 
     if as_json:
-        more: dict[str, Any] = {}
+        more: dict[str, Any] = {"reading": log_reading.facts([trace.log for trace in found.fit.traces])}
         if found.ladder is not None:
             more["ladder"] = fit_show.ladder_facts(found.ladder)
         if found.advice is not None:

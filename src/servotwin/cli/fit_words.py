@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from servotwin.cli.numbers import quantity
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.report.shown import dimension_of_free
-from servotwin.simulation.sweep.distributions import Distribution, Normal, Offset, Relative, Uniform
+from servotwin.simulation.sweep.kinds import Distribution, Normal, Offset, Relative, Uniform
 from servotwin.simulation.sweep.words import distribution_of
 
 if TYPE_CHECKING:
@@ -260,18 +259,3 @@ def limits_of(words: Sequence[str], angle: bool) -> Mapping[str | None, float]:
             raise InputError("--max-error", got=word, allowed="a positive number with a unit, such as 3deg")
         found[name.strip() or None] = value
     return found
-
-
-def read_all(paths: Sequence[Path], file_format: str) -> list[Log]:
-    """Return the logs of several files and folders.
-
-    Raises
-    ------
-    InputError
-        If one cannot be read.
-    """
-    from servotwin.identification import read_logs
-
-    return [log for path in paths for log in read_logs(path, file_format)]
-
-

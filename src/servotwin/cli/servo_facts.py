@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from typing import TYPE_CHECKING, Any
 
-from servotwin import units
 from servotwin.errors import MissingParameterError, ServotwinError
 from servotwin.loads import as_load
 from servotwin.models import MODELS, default_model
+from servotwin.parameters import printed_flags, printed_points
 from servotwin.physics import stall_torque
 
 if TYPE_CHECKING:
@@ -25,14 +24,14 @@ def headline(servo: Servo) -> dict[str, Any]:
     >>> headline(load_servo("hitec-hs-755hb"))["title"]
     'Hitec HS-755HB'
     """
-    seconds = _fact(servo, "speed_per_60deg", "time")
+    printed = printed_points(servo)[0]
     return {
         "id": servo.name, "title": servo.title, "kind": servo.kind,
-        "supply_voltage": _fact(servo, "supply_voltage", "voltage"),
-        "stall_torque": _fact(servo, "stall_torque", "torque"),
+        "supply_voltage": printed.supply_voltage,
+        "stall_torque": printed.stall_torque,
         "twin_stall_torque": twin_torque(servo),
-        "speed": 60.0 / seconds if seconds else None,
-        "flags": flags(servo),
+        "speed": 60.0 / printed.time_60 if printed.time_60 else None,
+        "flags": list(printed_flags(servo)),
     }
 
 
@@ -45,7 +44,7 @@ def twin_torque(servo: Servo) -> float | None:
     >>> round(twin_torque(load_servo("hitec-hs-755hb")), 2)
     1.65
     """
-    voltage = _fact(servo, "supply_voltage", "voltage")
+    voltage = printed_points(servo)[0].supply_voltage
     at = servo if voltage is None else servo.replace({"supply.open_circuit_voltage": voltage})
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
@@ -56,19 +55,6 @@ def twin_torque(servo: Servo) -> float | None:
     driving = plant.V - plant.D_drive if plant.V > 0.0 else plant.V_max
     current = min(max(driving, 0.0) / plant.R_drive, plant.I_max)
     return float(stall_torque(current, plant.K, plant.F_forward, plant.K_m, plant.K_e))
-
-
-def flags(servo: Servo) -> list[str]:
-    """Return what the file's [sheet] says of itself: what it lacks, and where it contradicts itself.
-
-    Examples
-    --------
-    >>> from servotwin.parameters import servo_from_values
-    >>> flags(servo_from_values("mine", {}))
-    []
-    """
-    found = servo.sheet.get("flags")
-    return [flag for flag in found if isinstance(flag, str)] if isinstance(found, list) else []
 
 
 def parameters(servo: Servo) -> list[dict[str, Any]]:
@@ -111,14 +97,3 @@ def readiness(servo: Servo) -> dict[str, dict[str, Any]]:
             problem = str(error)
         found[name] = {"runs": not lacks and problem is None, "lacks": lacks, "problem": problem, "ignored": ignored}
     return found
-
-
-def _fact(servo: Servo, name: str, dimension: str) -> float | None:
-    entry = servo.sheet.get(name)
-    if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
-        return None
-    try:
-        value = units.to_si(entry["value"], str(entry.get("unit")), dimension)
-    except ServotwinError:
-        return None  # a person's own [sheet] may hold anything
-    return value if math.isfinite(value) else None

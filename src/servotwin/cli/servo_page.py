@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 def heading(servo: Servo) -> list[RenderableType]:
     """Return title, kind, notes and flags of a servo."""
-    from servotwin.cli.servo_facts import flags
+    from servotwin.parameters import printed_flags
 
-    said = flags(servo)
+    said = printed_flags(servo)
     return [f"{servo.title} ({servo.name}), {servo.kind}", " ".join(servo.notes.split()),
             *([f"flags: {'; '.join(said)}"] if said else [])]
 

@@ -52,7 +52,8 @@ def sweep(
         "uniform:4us..8us, normal:3ohm±0.3ohm, lognormal:10%, triangular:4us..6us..8us, choice:brake,coast. A single "
         "number is a spread about the nominal value.", rich_help_panel=_VARIED)] = None,
     from_file: Annotated[bool, typer.Option(
-        "--from-file", help="Draw every parameter whose spread the servo file states.",
+        "--from-file", help="Draw what the servo file states a spread of. What is fixed together is drawn together: "
+        "of a servo made of a sheet the figures of the sheet.",
         rich_help_panel=_VARIED)] = False,
     draws: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Take draws from a table: .csv or .parquet, a column for each dotted name, SI.",
@@ -122,7 +123,11 @@ def _varied(model: Model, words: list[str], *, from_file: bool) -> dict[str, Any
         if name in given:
             raise InputError(f"--vary {name}", got=f"{given[name]} and {text}", allowed="one distribution")
         given[name] = text
-    return {**(stated(model) if from_file else {}), **given}
+    spreads = stated(model) if from_file else {}
+    if from_file and not spreads:
+        raise InputError("--from-file", got=f"servo {model.servo.name!r}, whose file states no spread",
+                         allowed="std, or lower and upper, of at least one value")
+    return {**spreads, **given}
 
 
 def _draws(path: Path | None) -> dict[str, Any] | None:
@@ -147,7 +152,7 @@ def _run(model: Model, words: Any, load: list[str], metric: list[str], options: 
     signal = words.signal(duration)
     metrics = tuple(dict.fromkeys([*metric, *checked_metrics(None, model, signal, duration)]))
     with executor_at(scheduler) as executor, last_words(lambda: _how_to_go_on(options["directory"])):
-        return run(model, signal, load=load_from(load), metrics=metrics, executor=executor,
+        return run(model, signal, load=load_from(load, model), metrics=metrics, executor=executor,
                    progress=sys.stderr is not None and sys.stderr.isatty(), **options)
 
 
@@ -165,7 +170,7 @@ def _report(study: Study, nominal: Model, metric: list[str], out: Path | None, *
 
     chosen = metric[0] if metric else study.metrics[0]
     files = [] if out is None else [str(out)]
-    if plot and out is not None:
+    if plot and out is not None and study.tornado(chosen).bars:
         from servotwin import plotting
 
         with patience("drawing"):

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.free import LUMPED, N, Space
+from servotwin.identification.fitting.free import LUMPED, Space
 from servotwin.identification.logs.log import Log
 from servotwin.parameters import Servo
+from servotwin.parameters.output_side import N
 from servotwin.parameters.quantity import Quantity
 from servotwin.simulation.lane_loads import LOAD_NAMES
 

@@ -28,7 +28,7 @@ _NAMES = np.array([status.name for status in Status])
 
 def table_names(plan: Plan) -> tuple[str, ...]:
     """Return the names of the columns of the table."""
-    return ("lane", *plan.columns, *plan.job.metrics, "status", "ended")
+    return ("lane", *plan.columns, *plan.followed, *plan.job.metrics, "status", "ended")
 
 
 def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[int], object]) -> Columns:
@@ -43,7 +43,7 @@ def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[i
     show : callable
         Is told how many lanes are done.
     """
-    table: Columns = {"lane": np.arange(plan.lanes), **plan.columns}
+    table: Columns = {"lane": np.arange(plan.lanes), **plan.columns, **plan.followed}
     table |= {name: np.empty(plan.lanes) for name in plan.job.metrics}
     table |= {"status": np.full(plan.lanes, Status.COMPLETED.name, _NAMES.dtype), "ended": np.empty(plan.lanes)}
     names, missing, done = table_names(plan), [], 0
