@@ -4,7 +4,10 @@ Importing the package loads numpy alone; every other part is loaded when its nam
 """
 
 from importlib import import_module
-from typing import Any
+
+TYPE_CHECKING = False  # typing is slow to load
+if TYPE_CHECKING:
+    from typing import Any
 
 __version__ = "0.1.0"
 
@@ -28,7 +31,7 @@ _MODULES = ("bench", "datasheet", "errors", "identification", "linear", "loads",
 __all__ = ["__version__", *_LAZY, *_MODULES]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name in _MODULES:
         return import_module(f"servotwin.{name}")
     if name in _LAZY:

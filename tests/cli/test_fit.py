@@ -172,7 +172,7 @@ def test_an_interrupt_before_the_first_step_leaves_nothing(fit, tmp_path, monkey
     monkeypatch.setattr(Search, "run", interrupted)
     ended = fit(*QUICK, "--out", "my.toml")
     assert (ended.code, ended.out) == (130, "")
-    assert ended.err == "servotwin: error: interrupted\n"
+    assert ended.err == "servotwin: interrupted\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -261,6 +261,24 @@ def test_the_same_words_give_the_same_numbers(fit):
     first.pop("seconds"), second.pop("seconds")
     assert first == second
     assert np.isfinite(first["estimates"]["output_inertia"]["value"])
+
+
+def test_the_supply_of_the_logs_is_that_of_the_servo_that_is_saved(cli, tmp_path):
+    """Logs at 5 V gave a servo of 6 V, that of the sheet."""
+    logs = fit_logs.write_logs(tmp_path / "runs", count=2)
+    for file in logs.glob("*.json"):
+        said = json.loads(file.read_text())
+        file.write_text(json.dumps({**said, "parameters": {"supply.open_circuit_voltage": 5.0}}))
+    words = [logs, *QUICK, "--no-intervals", "--holdout", "0", "--set", "motor.armature_resistance=3.1ohm", "--force"]
+    assert cli("fit", *words, "--out", "my.toml", "--json").data["set"] == ["motor.armature_resistance"]
+    servo = st.load_servo(tmp_path / "my.toml")
+    voltage, resistance = servo.source("supply.open_circuit_voltage"), servo.source("motor.armature_resistance")
+    assert (voltage.value, voltage.origin) == (5.0, "measured")
+    assert "logs" in voltage.source
+    assert (resistance.origin, resistance.source) == ("assumed", "set by --set")
+    file.write_text(json.dumps({**said, "parameters": {"supply.open_circuit_voltage": 6.5}}))  # they disagree
+    cli("fit", *words, "--out", "my.toml")
+    assert st.load_servo(tmp_path / "my.toml").supply.open_circuit_voltage == 6.0
 
 
 # ---------------------------------------------------------------------------------------- tables of other loggers

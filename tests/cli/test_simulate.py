@@ -118,9 +118,12 @@ def test_loads_add_up(simulate, tmp_path):
 
 def test_set_replaces_a_parameter(simulate):
     words = ["--step", "0:90", "--json"]
-    plain, changed = (simulate(*words, *more).data for more in ([], ["--set", "supply.open_circuit_voltage=4.8"]))
+    plain, changed, again = (simulate(*words, *more).data for more in (
+        [], ["--set", "supply.open_circuit_voltage=4.8"], ["--set", "supply.open_circuit_voltage=4800mV"]))
     assert changed["peak_current"] < plain["peak_current"]
-    assert "supply.open_circuit_voltage" in changed["assumed"]
+    assert again == changed
+    assert (plain["set"], changed["set"]) == ([], ["supply.open_circuit_voltage"])
+    assert "supply.open_circuit_voltage" not in changed["assumed"]
     assert simulate(*words, "--set", "electronics.off_state=coast").code == 0
 
 

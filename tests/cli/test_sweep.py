@@ -176,6 +176,6 @@ def test_an_interrupt_says_how_to_go_on(child_environment, tmp_path):
         _, err = child.communicate(timeout=60)
     assert child.returncode == 130
     assert err.splitlines() == ["servotwin: what is finished is in study; the same command with --resume goes on",
-                                "servotwin: error: interrupted"]
+                                "servotwin: interrupted"]
     found = np.genfromtxt(tmp_path / "study" / "lanes-00000.csv", delimiter=",", skip_header=1, usecols=(0, 1, 2))
     assert np.isfinite(found).all()

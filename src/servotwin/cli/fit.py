@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 _LOGS, _SEARCH, _OUTPUT = log_reading.PANEL, "What is searched, and how", "Output"
-_INTERRUPTED = 130  # exit code
 
 
 def fit(
@@ -31,8 +32,8 @@ def fit(
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable, SI.",
-        rich_help_panel=_LOGS)] = None,
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
+        "in SI.", rich_help_panel=_LOGS)] = None,
     holdout: Annotated[str | None, typer.Option(
         metavar="SHARE|NAMES", help="Logs that are predicted and not fitted: a share of each kind of motion such as "
         "0.25, or names with commas; 0 for none (default: a fourth of each kind with four logs or more).",
@@ -111,7 +112,9 @@ def fit(
         found = _Found(found.fit, found.ladder, _advice(found.fit))
     _report(found, files, as_json=as_json)
     if found.fit.interrupted:
-        raise typer.Exit(_INTERRUPTED)
+        from servotwin.cli.interrupts import CODE
+
+        raise typer.Exit(CODE)
 
 
 @dataclass(frozen=True)
@@ -198,17 +201,39 @@ def _run(search: _Search, logs: list[Log], options: dict[str, Any], *, ladder: b
     from servotwin.identification import friction_ladder, identify
 
     servo, kind = search.model.servo, type(search.model)
-    progress = sys.stderr is not None and sys.stderr.isatty()
-    if ladder:
-        climbed = friction_ladder(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
-                                  progress=progress, **options)
-        found = _Found(climbed.fit, climbed)
-    else:
-        found = _Found(identify(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
-                                progress=progress, **options))
+    with _progress() as progress:
+        if ladder:
+            climbed = friction_ladder(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
+                                      progress=progress, **options)
+            found = _Found(climbed.fit, climbed)
+        else:
+            found = _Found(identify(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
+                                    progress=progress, **options))
     if found.fit.interrupted and found.fit.cost == float("inf"):
         raise KeyboardInterrupt  # before the first step: there is nothing to keep
     return found
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[float, str], None]]:
+    """Give what shows the progress on a terminal, and ends the search after an interrupt, with the best so far.
+
+    Before the first step there is no best, and an interrupt ends the process.
+    """
+    from servotwin.cli.interrupts import finishing
+    from servotwin.identification.fitting.checks import shown
+
+    with shown(sys.stderr is not None and sys.stderr.isatty()) as show, contextlib.ExitStack() as stack:
+        checks: list[Callable[[], None]] = []
+
+        def tell(share: float, text: str) -> None:
+            show(share, text)
+            if share > 0.0 and not checks:
+                checks.append(stack.enter_context(finishing()))
+            for check in checks:
+                check()
+
+        yield tell
 
 
 def _first_advice(search: _Search) -> Advice:

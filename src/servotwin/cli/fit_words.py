@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from servotwin import units
+from servotwin.cli.numbers import quantity
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.report.shown import dimension_of_free
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 MODEL_NAMES = ("pulse", "pulse-inductive", "bounded")
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
 def names(words: Sequence[str] | None) -> tuple[str, ...] | None:
@@ -243,38 +241,6 @@ def without(logs: Sequence[Log], windows: Sequence[tuple[str | None, float, floa
     return [replace(log, left_out=(*log.left_out, *((start, stop) for name, start, stop in windows
                                                     if name in (None, log.name)))) if windows else log
             for log in logs]
-
-
-def quantity(option: str, text: str, dimension: str, *, bare: str | None = None) -> float:
-    """Return a number with its unit, in SI.
-
-    Parameters
-    ----------
-    option, text : str
-    dimension : str
-        Of `servotwin.units`.
-    bare : str, optional
-        Unit of a number without one; else a unit is required.
-
-    Raises
-    ------
-    InputError
-        If it is no number, or its unit does not fit.
-
-    Examples
-    --------
-    >>> quantity("--max-error", "180 deg", "angle"), quantity("--leave-out", "3", "time", bare="s")
-    (3.141592653589793, 3.0)
-    """
-    match = _NUMBER.fullmatch(text)
-    unit = (match[2] or bare) if match else None
-    if match is None or unit is None:
-        raise InputError(option, got=text, allowed="a number with a unit: " + ", ".join(units.DIMENSIONS[dimension]))
-    try:
-        return units.to_si(float(match[1]), unit, dimension)
-    except ServotwinError:
-        raise InputError(option, got=text, allowed="a number with a unit: "
-                         + ", ".join(units.DIMENSIONS[dimension])) from None
 
 
 def limits_of(words: Sequence[str], angle: bool) -> Mapping[str | None, float]:

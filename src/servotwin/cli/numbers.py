@@ -2,11 +2,47 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from servotwin.errors import InputError
+from servotwin import units
+from servotwin.errors import InputError, UnitError
 from servotwin.tables import read_table
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+
+
+def quantity(option: str, text: str, dimension: str, *, bare: str | None = None) -> float:
+    """Return a number with its unit, in SI.
+
+    Parameters
+    ----------
+    option, text : str
+    dimension : str
+        Of `servotwin.units`.
+    bare : str, optional
+        Unit of a number without one; else a unit is required.
+
+    Raises
+    ------
+    InputError
+        If it is no number, or its unit does not fit.
+
+    Examples
+    --------
+    >>> quantity("--max-error", "180 deg", "angle"), quantity("--leave-out", "3", "time", bare="s")
+    (3.141592653589793, 3.0)
+    """
+    match = _NUMBER.fullmatch(text)
+    unit = (match[2] or bare) if match else None
+    try:
+        if match is not None and unit is not None:
+            return units.to_si(float(match[1]), unit, dimension)
+    except UnitError:
+        pass
+    raise InputError(option, got=text, allowed=("a number in SI, or " if bare else "") + "a number with a unit: "
+                     + ", ".join(units.DIMENSIONS[dimension]))
 
 
 def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | None = None) -> list[float]:

@@ -13,6 +13,7 @@ from servotwin.models import MODELS
 
 if TYPE_CHECKING:
     from servotwin.models import Model
+    from servotwin.parameters.quantity import Quantity
     from servotwin.simulation import Result
 
 _ENERGY = ("winding", "bridge", "brush", "conversion", "friction", "stops", "load", "stored")
@@ -50,6 +51,7 @@ def facts(result: Result) -> dict[str, Any]:
         "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
         "energy": dataclasses.asdict(result.energy),
         "solution": dataclasses.asdict(result.stats),
+        "set": was_set(result.model),
         "assumed": assumed(result.model),
         "ignored": list(result.model.ignored),
     }
@@ -61,10 +63,26 @@ def model_name(model: Model) -> str:
 
 
 def assumed(model: Model) -> list[str]:
-    """Return the dotted names that a model reads and nobody measured."""
+    """Return the dotted names that a model reads and nobody measured or set."""
+    return [name for name, known in _read(model).items() if known.origin == "assumed" and not known.was_set]
+
+
+def was_set(model: Model) -> list[str]:
+    """Return the dotted names that a model reads and the user set.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> was_set(st.PulseServo(st.load_servo("hitec-hs-755hb").replace({"supply.open_circuit_voltage": 5.0})))
+    ['supply.open_circuit_voltage']
+    """
+    return [name for name, known in _read(model).items() if known.was_set]
+
+
+def _read(model: Model) -> dict[str, Quantity]:
     servo = model.servo
     read = dict.fromkeys((*model.requires, *model.optional))
-    return [name for name in read if servo.get(name) is not None and servo.source(name).origin == "assumed"]
+    return {name: servo.source(name) for name in read if servo.get(name) is not None}
 
 
 def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -93,6 +111,7 @@ def origin_lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         ("status", f"{found['status'].lower()}, {found['duration']:g} s simulated"),
         ("solved", f"{solution['method']}, {solution['motions']} motions, {solution['events']} events"),
+        *([("set", names(found["set"]))] if found["set"] else []),
         ("assumed", names(found["assumed"])),
         ("ignored", names(found["ignored"])),
     ]

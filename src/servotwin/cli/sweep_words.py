@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from servotwin import plotting, units
+from servotwin.cli.summary import names
 from servotwin.cli.terminal import pairs, table
 from servotwin.simulation.sweep import dimension_of
 
@@ -19,13 +20,13 @@ _MOST_BARS = 12
 _MOST_FAILURES = 3
 
 
-def sections(study: Study, metric: str, files: Sequence[str]) -> list[RenderableType]:
-    """Return what is printed of a study; `metric` is that of the tornado."""
+def sections(study: Study, metric: str, files: Sequence[str], given: Sequence[str] = ()) -> list[RenderableType]:
+    """Return what is printed of a study; `metric` is that of the tornado, and `given` what the user set."""
     definition = study.definition
     head = f"{definition['servo']}, {definition['model']}, {len(study)} lanes, {definition['duration']:g} s"
     follow = [("follow", ", ".join(study.followed))] if study.followed else []
     rows = [("varied", ", ".join(study.parameters)), *follow, ("failed", _failed(study)),
-            *(("written", name) for name in files)]
+            *([("set", names(given))] if given else []), *(("written", name) for name in files)]
     return [head, pairs(rows), "", _quantiles(study), "", f"what moves {plotting.metric_shown(metric).words}, one at a "
             "time, and its share of the variance", *_tornado(study, metric)]
 

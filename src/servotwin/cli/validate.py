@@ -36,7 +36,8 @@ def validate(
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable, SI.")] = None,
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
+        "in SI.")] = None,
     nuisance: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="What belongs to the rig and is fitted to these logs: delay, log_delay, angle_offset, "
         "angle_sag, initial_state; repeatable or with commas (default: none; the others are as the servo file's fit "

@@ -316,7 +316,8 @@ class PulseServo(_Pulsed):
         return BoundedServo(self.servo.replace({
             "electronics.bridge_gain": float(gain), "electronics.comparator_gain": 1.0,
             "electronics.pulse_to_voltage_gain": s_r, "electronics.command_offset": s_r * (t_0 - T_0),
-            "electronics.voltage_deadband": s_r * self.value_or("electronics.deadband", 0.0)}))
+            "electronics.voltage_deadband": s_r * self.value_or("electronics.deadband", 0.0)},
+            source="the mean of the pulses"))
 
 
 @final

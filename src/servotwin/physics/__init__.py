@@ -67,6 +67,7 @@ from servotwin.physics.sheet import (
     sheet_stall_torque,
     sheet_torque_constant,
     stall_current_for,
+    stall_torque,
 )
 from servotwin.physics.supply import Conduction, bridge_supply_current, bus_voltage, conduction, source_voltage
 from servotwin.physics.thermal import (
@@ -141,6 +142,7 @@ __all__ = [
     "source_voltage",
     "spindle_torque",
     "stall_current_for",
+    "stall_torque",
     "steady_armature_current",
     "steady_temperatures",
     "sticks",

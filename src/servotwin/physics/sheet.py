@@ -14,6 +14,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, overload
 
+import numpy as np
+
 from servotwin.errors import ParameterError
 from servotwin.physics._typing import Real
 
@@ -260,6 +262,44 @@ def load_share(gear_efficiency: Real) -> Real:
     0.1111
     """
     return (1.0 - gear_efficiency) / (1.0 + gear_efficiency)
+
+
+def stall_torque(stall_current: Real, output_torque_constant: Real, coulomb_torque: Real,
+                 load_friction_motor: Real = 0.0, load_friction_external: Real = 0.0) -> Real:
+    """Return the torque against which a motor with a gear just still turns.
+
+    Parameters
+    ----------
+    stall_current : float or array
+        I_s = (V − V_d)/R, or what the source gives at most [A].
+    output_torque_constant : float or array
+        K_out = N k_a [N m/A].
+    coulomb_torque : float or array
+        τ_c = N F_c of a sliding gear, at the output [N m].
+    load_friction_motor, load_friction_external : float or array
+        K_m and K_e, both K_l for one share [1].
+
+    Returns
+    -------
+    float or array
+        T_s = ((1 − K_m) K_out I_s − τ_c)/(1 + K_e), the balance of motor, load and gear friction (M3, M5); 0 where
+        friction holds the motor [N m].
+
+    Notes
+    -----
+    With K_m = K_e = μ and τ_c = K_out I_0 (1 − μ) it is η_g K_out (I_s − I_0), as of `motor_from_sheet`.
+
+    Examples
+    --------
+    >>> motor = motor_from_sheet(supply_voltage=6.0, stall_torque=1.2945, no_load_speed=math.pi / 3 / 0.23,
+    ...                          no_load_current=0.285)
+    >>> mu = load_share(motor.gear_efficiency)
+    >>> round(float(stall_torque(motor.stall_current, motor.output_torque_constant, motor.coulomb_torque, mu, mu)), 4)
+    1.2945
+    """
+    K_m, K_e = load_friction_motor, load_friction_external
+    T_s: Real = np.maximum(((1.0 - K_m) * output_torque_constant * stall_current - coulomb_torque) / (1.0 + K_e), 0.0)
+    return T_s
 
 
 def sheet_efficiency(supply_voltage: Real, stall_torque: Real, no_load_speed: Real, no_load_current: Real,

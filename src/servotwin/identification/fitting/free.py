@@ -176,7 +176,7 @@ class Space:
     def servo_at(self, x: Array) -> Servo:
         """Return the servo with the values of a point; numbers of the load apart."""
         return self.servo.replace({name: float(column[0]) for name, column in self.columns(x[None, :]).items()
-                                   if name not in LOAD_NAMES})
+                                   if name not in LOAD_NAMES}, source="where a search of a fit stands")
 
     def random(self, rng: np.random.Generator) -> Array:
         """Return a random start: anywhere between bounds that were given, else about the nominal values."""

@@ -10,7 +10,7 @@ from typing import Any
 from servotwin import units
 from servotwin.errors import InputError
 from servotwin.identification.sheets.sheet import Sheet, SheetPoint
-from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, unit_of, write_file
+from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, dimension_of, unit_of, write_file
 from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE, figure, printed
 
 _FLAGS, _NOTE = "flags", "note"
@@ -174,7 +174,7 @@ def _text(text: str) -> str:
 
 
 def _line(name: str, quantity: Quantity) -> str:
-    dimension = GROUPS[name.partition(".")[0]].__dataclass_fields__[name.partition(".")[2]].metadata["dimension"]
+    dimension = dimension_of(name)
     unit = _UNITS.get(name, unit_of(name))
 
     def number(x: Any) -> Any:

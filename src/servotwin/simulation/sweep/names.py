@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from servotwin import parameters
 from servotwin.errors import ParameterError, UnknownNameError
-from servotwin.parameters import GROUPS
 from servotwin.parameters.groups import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
 from servotwin.simulation.lane_inputs import _check_name
 from servotwin.simulation.lane_loads import _PARTS, LOAD_NAMES
@@ -69,8 +69,7 @@ def dimension_of(name: str) -> str:
         return DIMENSIONS[name]
     if name in _OF_LOAD:
         return _OF_LOAD[name]
-    group, _, key = name.partition(".")
-    return str(GROUPS[group].__dataclass_fields__[key].metadata["dimension"])
+    return parameters.dimension_of(name)
 
 
 def parameter(name: str, model: Model, load: Load) -> Parameter:
@@ -90,7 +89,7 @@ def parameter(name: str, model: Model, load: Load) -> Parameter:
         if name not in together.unread:
             _check_name(model, name)
     group, _, key = name.partition(".")
-    metadata = GROUPS[group].__dataclass_fields__[key].metadata
+    metadata = parameters.GROUPS[group].__dataclass_fields__[key].metadata
     rule, dimension, nominal = metadata["rule"], dimension_of(name), model.servo.get(name)
     if rule == "table" or isinstance(nominal, tuple):
         raise ParameterError(f"vary {name}", got="a table", allowed="a number or a word")
