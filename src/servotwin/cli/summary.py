@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin import units
 from servotwin.errors import InputError
 from servotwin.models import MODELS
+from servotwin.simulation.remarks import Remark
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -46,6 +47,7 @@ def facts(result: Result) -> dict[str, Any]:
         "step_metrics": None if metrics is None else dataclasses.asdict(metrics),
         "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
         "energy": dataclasses.asdict(result.energy),
+        "remarks": [remark._asdict() for remark in result.remarks],
         "solution": dataclasses.asdict(result.stats),
         "assumed": assumed(result.model),
         "ignored": list(result.model.ignored),
@@ -88,6 +90,7 @@ def origin_lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     solution = found["solution"]
     return [
         ("status", f"{found['status'].lower()}, {found['duration']:g} s simulated"),
+        *(("remark", Remark(**remark).words) for remark in found["remarks"]),
         ("solved", f"{solution['method']}, {solution['motions']} motions, {solution['events']} events"),
         ("assumed", names(found["assumed"])),
         ("ignored", names(found["ignored"])),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from servotwin import plotting, units
 from servotwin.cli.terminal import pairs, table
+from servotwin.simulation.remarks import words
 from servotwin.simulation.sweep import dimension_of
 
 if TYPE_CHECKING:
@@ -17,13 +18,14 @@ if TYPE_CHECKING:
 
 _MOST_BARS = 12
 _MOST_FAILURES = 3
+_MOST_LANES = 5  # of a kind of remark
 
 
 def sections(study: Study, metric: str, files: Sequence[str]) -> list[RenderableType]:
     """Return what is printed of a study; `metric` is that of the tornado."""
     definition = study.definition
     head = f"{definition['servo']}, {definition['model']}, {len(study)} lanes, {definition['duration']:g} s"
-    rows = [("varied", ", ".join(study.parameters)), ("failed", _failed(study)),
+    rows = [("varied", ", ".join(study.parameters)), ("failed", _failed(study)), *_remarks(study),
             *(("written", name) for name in files)]
     return [head, pairs(rows), "", _quantiles(study), "", f"what moves {plotting.metric_shown(metric).words}, one at a "
             "time, and its share of the variance", _tornado(study, metric)]
@@ -34,6 +36,14 @@ def _failed(study: Study) -> str:
     named = "; ".join(f"lane {f.lane} at {f.time:g} s: {f.cause}" for f in failures[:_MOST_FAILURES])
     more = f"; and {len(failures) - _MOST_FAILURES} more" if len(failures) > _MOST_FAILURES else ""
     return f"{len(failures)}: {named}{more}" if failures else "none"
+
+
+def _remarks(study: Study) -> list[tuple[str, str]]:
+    found = []
+    for kind, lanes in study.remarked().items():
+        first = ", ".join(map(str, lanes[:_MOST_LANES])) + (" ..." if len(lanes) > _MOST_LANES else "")
+        found.append(("remark", f"{words(kind)}: {len(lanes)} of {len(study)} (lane{'s'[:len(lanes) > 1]} {first})"))
+    return found
 
 
 def _quantiles(study: Study) -> RenderableType:

@@ -11,6 +11,7 @@ import numpy as np
 
 from servotwin.errors import MissingExtraError, SimulationError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
+from servotwin.simulation.remarks import LaneRemark
 from servotwin.simulation.simulator import simulate
 from servotwin.simulation.status import Status
 
@@ -42,6 +43,8 @@ class Batch:
         How each lane ended: the code of a `Status`, 0 where it reached the end.
     failures : tuple of Failure
         (lane, time [s], cause) of those that did not; their signals are nan from there on.
+    remarks : tuple of LaneRemark
+        (lane, kind, time [s]) of what is to be said of those that did, as `Result.remarks`.
     duration : float
         [s]
 
@@ -60,13 +63,14 @@ class Batch:
     time: NDArray[np.float64]
     status: NDArray[np.int8]
     failures: tuple[Failure, ...]
+    remarks: tuple[LaneRemark, ...]
     duration: float
     signals: Mapping[str, NDArray[np.floating]]
     lanes: Lanes
 
     def __repr__(self) -> str:
         return (f"Batch({self.lanes.model!r}, lanes={len(self)}, times={len(self.time)}, "
-                f"signals={tuple(self.signals)}, failures={len(self.failures)})")
+                f"signals={tuple(self.signals)}, failures={len(self.failures)}, remarks={len(self.remarks)})")
 
     @property
     def names(self) -> tuple[str, ...]:

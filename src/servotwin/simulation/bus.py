@@ -24,6 +24,7 @@ from servotwin.simulation.bus_engine import Bus, Unit
 from servotwin.simulation.bus_group import Group
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
+from servotwin.simulation.remarks import ServoRemark
 from servotwin.simulation.result import Result
 from servotwin.simulation.simulator import Simulator, _times
 from servotwin.simulation.status import Status
@@ -93,6 +94,11 @@ class Fleet(Mapping[str, Result]):
     def supply_current(self) -> Array:
         """Current that the supply gives to all servos [A], shape (n,); negative where some comes back."""
         return np.asarray(sum(result["supply_current"] for result in self.results.values()))
+
+    @cached_property
+    def remarks(self) -> tuple[ServoRemark, ...]:
+        """What is to be said of each servo, (servo, kind, time [s]), as `Result.remarks`."""
+        return tuple(ServoRemark(name, *remark) for name, result in self.results.items() for remark in result.remarks)
 
     @cached_property
     def energy(self) -> Energy:

@@ -21,6 +21,7 @@ from servotwin.simulation.lane_inputs import Lanes, lanes_of
 from servotwin.simulation.lanes import Raw, Work, run_lanes
 from servotwin.simulation.packing import Asked, Chunk, Commands, groups
 from servotwin.simulation.progress import Progress, shown
+from servotwin.simulation.remarks import lane_remarks
 from servotwin.simulation.simulator import _times
 from servotwin.simulation.status import Status
 from servotwin.units import is_finite
@@ -119,6 +120,7 @@ def simulate_many(
     signals = _space(lanes, asked)
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
+    refused, marks = np.empty(lanes.count), np.empty(lanes.count, dtype=np.int8)
     own = _threads(os.getpid()) if executor is None else executor
     with shown(progress, lanes.count, "simulate_many") as show, closing(_run(packs, asked, own)) as running:
         for which, raw, values in running:
@@ -129,6 +131,7 @@ def simulate_many(
                 for name, column in values.items():
                     signals[name][place] = column
             status[place], ended[place] = raw.status, raw.ended
+            refused[place], marks[place] = raw.refused, raw.marks
             done += len(which)
             show(done)
     arrays: list[NDArray[Any]] = [times, status, *signals.values()]
@@ -136,8 +139,8 @@ def simulate_many(
         array.setflags(write=False)
     failures = tuple(Failure(int(lane), float(ended[lane]), Status.of_code(int(status[lane])).message)
                      for lane in np.flatnonzero(status))
-    return Batch(time=times, status=status, failures=failures, duration=asked.duration, signals=signals,
-                 lanes=lanes)
+    return Batch(time=times, status=status, failures=failures, remarks=lane_remarks(refused, marks, asked.duration),
+                 duration=asked.duration, signals=signals, lanes=lanes)
 
 
 def grid(values: Mapping[str, ArrayLike] | None = None, /, **more: ArrayLike) -> dict[str, NDArray[Any]]:
