@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin import units
 from servotwin.errors import MissingParameterError, ServotwinError
 from servotwin.models import MODELS
 
@@ -28,21 +26,8 @@ def headline(servo: Servo) -> dict[str, Any]:
         "supply_voltage": _fact(servo, "supply_voltage", "voltage"),
         "stall_torque": _fact(servo, "stall_torque", "torque"),
         "speed": 60.0 / seconds if seconds else None,
-        "flags": flags(servo),
+        "flags": list(servo.flags),
     }
-
-
-def flags(servo: Servo) -> list[str]:
-    """Return what the file's [sheet] says of itself: what it lacks, and where it contradicts itself.
-
-    Examples
-    --------
-    >>> from servotwin.parameters import servo_from_values
-    >>> flags(servo_from_values("mine", {}))
-    []
-    """
-    found = servo.sheet.get("flags")
-    return [flag for flag in found if isinstance(flag, str)] if isinstance(found, list) else []
 
 
 def parameters(servo: Servo) -> list[dict[str, Any]]:
@@ -89,10 +74,4 @@ def readiness(servo: Servo) -> dict[str, dict[str, Any]]:
 
 def _fact(servo: Servo, name: str, dimension: str) -> float | None:
     entry = servo.sheet.get(name)
-    if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
-        return None
-    try:
-        value = units.to_si(entry["value"], str(entry.get("unit")), dimension)
-    except ServotwinError:
-        return None  # a person's own [sheet] may hold anything
-    return value if math.isfinite(value) else None
+    return servo.sheet_values(name, dimension)[0] if isinstance(entry, dict) else None

@@ -14,9 +14,7 @@ if TYPE_CHECKING:
 
 def heading(servo: Servo) -> list[RenderableType]:
     """Return title, notes and flags of a servo."""
-    from servotwin.cli.servo_facts import flags
-
-    said = flags(servo)
+    said = servo.flags
     return [f"{servo.title} ({servo.name})", " ".join(servo.notes.split()),
             *([f"flags: {'; '.join(said)}"] if said else [])]
 
@@ -38,5 +36,5 @@ def parameter_table(rows: list[dict[str, Any]]) -> list[RenderableType]:
 
 
 def _value(value: Any) -> str:
-    return ", ".join(f"{x:.5g}" for x in value) if isinstance(value, list) else (
-        value if isinstance(value, str) else f"{value:.5g}")
+    return ", ".join(f"{x:z.5g}" for x in value) if isinstance(value, list) else (
+        value if isinstance(value, str) else f"{value:z.5g}")

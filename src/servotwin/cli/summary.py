@@ -76,12 +76,12 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     [('final angle', '180.00 deg'), ('peak current', '1.800 A')]
     """
     rows = [(label, found[key]) for key, label in (("command", "command"), ("load", "load")) if key in found]
-    rows.append((_angle_label(found), f"{_deg(found['final_angle']):.2f} deg"))
+    rows.append((_angle_label(found), f"{_deg(found['final_angle']):z.2f} deg"))
     rows += _step_rows(found.get("step_metrics"))
-    rows.append(("peak current", f"{found['peak_current']:.3f} A"))
+    rows.append(("peak current", f"{found['peak_current']:z.3f} A"))
     energy = found["energy"]
     parts = [f"{name} {energy[name]:.4g} J" for name in _ENERGY if abs(energy.get(name, 0.0)) > 1e-9]
-    rows.append(("energy", f"{energy['supply']:.4g} J supplied: {', '.join(parts) or 'nothing moved'}"))
+    rows.append(("energy", f"{energy['supply']:z.4g} J supplied: {', '.join(parts) or 'nothing moved'}"))
     return rows
 
 
@@ -122,15 +122,15 @@ def _step_rows(metrics: Mapping[str, float] | None) -> list[tuple[str, str]]:
         return []
     rows = []
     if not math.isnan(metrics["target"]):
-        rows.append(("steady error", f"{_deg(metrics['steady_error']):.2f} deg"))
+        rows.append(("steady error", f"{_deg(metrics['steady_error']):z.2f} deg"))
     if not math.isnan(metrics["rise_time"]):
-        rows.append(("rise time", f"{1e3 * metrics['rise_time']:.1f} ms (10 to 90 %)"))
+        rows.append(("rise time", f"{1e3 * metrics['rise_time']:z.1f} ms (10 to 90 %)"))
     if not math.isnan(metrics["settling_time"]):
-        rows.append(("settling time", f"{1e3 * metrics['settling_time']:.1f} ms (2 %)"))
+        rows.append(("settling time", f"{1e3 * metrics['settling_time']:z.1f} ms (2 %)"))
     if not math.isnan(metrics["overshoot"]):
-        rows.append(("overshoot", f"{100 * metrics['overshoot']:.2f} %"))
+        rows.append(("overshoot", f"{100 * metrics['overshoot']:z.2f} %"))
     speed = units.from_si(metrics["slew_rate"], "deg/s", "speed")
-    return [*rows, ("peak speed", f"{speed:.1f} deg/s")]
+    return [*rows, ("peak speed", f"{speed:z.1f} deg/s")]
 
 
 def _deg(angle: float) -> float:

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from servotwin.errors import ParameterError, UnknownNameError
+from servotwin.errors import ParameterError, ServotwinError, UnknownNameError
 from servotwin.parameters.groups import (
     GROUPS,
     Electronics,
@@ -22,7 +22,7 @@ from servotwin.parameters.groups import (
     Thermal,
 )
 from servotwin.parameters.quantity import Quantity
-from servotwin.units import si_unit
+from servotwin.units import is_finite, si_unit, to_si
 
 Value = float | tuple[float, ...] | str
 _PLACES = {f"{group}.{f.name}": (group, f.name) for group, kind in GROUPS.items() for f in fields(kind)}
@@ -127,6 +127,31 @@ class Servo:
         if self.get(name) is None:
             raise ParameterError(f"{name} is not given by servo {self.name!r}")
         return self.quantities[name]
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What the file's [sheet] says of itself: what it lacks, and where it contradicts itself.
+
+        Examples
+        --------
+        >>> servo_from_values("mine", {}).flags
+        ()
+        """
+        found = self.sheet.get("flags")
+        return tuple(flag for flag in found if isinstance(flag, str)) if isinstance(found, list) else ()
+
+    def sheet_values(self, name: str, dimension: str) -> tuple[float, ...]:
+        """Return the values (SI) that the sheet has for a fact: the main one first, then those of other voltages.
+
+        Examples
+        --------
+        >>> from servotwin.parameters import load_servo
+        >>> load_servo("hitec-hs-755hb").sheet_values("supply_voltage", "voltage")
+        (6.0, 4.8)
+        """
+        tables = [self.sheet, *also] if isinstance(also := self.sheet.get("also_at"), list) else [self.sheet]
+        found = [_si(table.get(name), dimension) for table in tables if isinstance(table, Mapping)]
+        return tuple(value for value in found if value is not None)
 
     def replace(self, values: Mapping[str, Value | None]) -> Servo:
         """Return a servo with some values replaced (dotted name to SI number); their origin becomes assumed.
@@ -247,6 +272,17 @@ def unit_of(name: str) -> str:
 
 def _replaced(name: str, value: Value) -> Quantity:
     return Quantity(value=value, unit=unit_of(name), origin="assumed", source="replaced")
+
+
+def _si(entry: Any, dimension: str) -> float | None:
+    """Return an entry of a sheet in SI; None where it is none: a person's own [sheet] may hold anything."""
+    if not isinstance(entry, Mapping) or not is_finite(entry.get("value")):
+        return None
+    try:
+        value = to_si(entry["value"], str(entry.get("unit")), dimension)
+    except ServotwinError:
+        return None
+    return value if is_finite(value) else None
 
 
 def _rebuild(state: dict[str, Any]) -> Servo:

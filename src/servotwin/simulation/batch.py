@@ -12,7 +12,7 @@ import numpy as np
 from servotwin.errors import MissingExtraError, SimulationError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
 from servotwin.simulation.remarks import LaneRemark
-from servotwin.simulation.simulator import simulate
+from servotwin.simulation.simulator import Simulator, simulated
 from servotwin.simulation.status import Status
 
 if TYPE_CHECKING:
@@ -120,9 +120,9 @@ class Batch:
 
     def _lane(self, lane: int) -> Result:
         lanes = self.lanes
-        result = simulate(
-            lanes.lane_model(lane), lanes.commands[lanes.command_of[lane]], duration=self.duration,
-            load=lanes.load(lane), output_times=self.time, initial=lanes.initial_of(lane), seed=int(lanes.seeds[lane]))
+        simulator = Simulator(lanes.lane_model(lane), lanes.load(lane), int(lanes.seeds[lane]))
+        result = simulated(simulator, lanes.commands[lanes.command_of[lane]], self.duration, self.time,
+                           lanes.initial_of(lane))
         for name, values in self.signals.items():
             own = values[lane].astype(np.float64)
             own.setflags(write=False)

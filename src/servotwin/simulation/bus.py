@@ -24,6 +24,7 @@ from servotwin.simulation.bus_engine import Bus, Unit
 from servotwin.simulation.bus_group import Group
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
+from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.remarks import ServoRemark
 from servotwin.simulation.result import Result
 from servotwin.simulation.simulator import Simulator, _times
@@ -146,12 +147,20 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     ------
     InputError
         On bad input; names the servo.
+
+    Warns
+    -----
+    UserWarning
+        As `simulate` does.
     """
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
     times = _times(duration, output_step, output_times)
     given = _checked(servos, supply, initial)
     sims, units = {}, []
+    for model, command, _ in given.values():
+        if isinstance(command, Signal):
+            warn_of(_on_supply(model, supply).servo, [command], duration)
     for k, (name, (model, command, load)) in enumerate(given.items()):
         sim = Simulator(_on_supply(model, supply), load, int(seed) + k)
         sim.load.check_span(0.0, duration)

@@ -36,6 +36,6 @@ def save_csv(path: str | Path, signals: Mapping[str, NDArray[np.float64]], si_un
         suffix, unit, dimension = _OWN.get(name) or _COLUMNS[si_units[name]]
         names.append(f"{name}_{suffix}" if suffix else name)
         columns.append(np.asarray(units.from_si(values, unit, dimension)))
-    table = np.column_stack(columns)
+    table = np.column_stack(columns) + 0.0  # -0 becomes 0
     write_file(path, lambda file: np.savetxt(file, table, fmt="%.12g", delimiter=",", header=",".join(names),
                                              comments="", encoding="utf-8"), overwrite=overwrite)

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from servotwin.loads import Load
 from servotwin.models import Model
 from servotwin.signals import Signal
-from servotwin.simulation.many import simulate_many
+from servotwin.simulation.lane_inputs import lanes_of
+from servotwin.simulation.many import simulate_lanes
 from servotwin.simulation.remarks import columns
 from servotwin.simulation.sweep.metrics import lane_metrics, signals_of
 
@@ -57,8 +58,8 @@ def run_chunk(job: Job, parameters: Mapping[str, NDArray[Any]], seeds: NDArray[n
 
     A lane that ends early has no metrics: they are nan.
     """
-    batch = simulate_many(
-        job.model, job.command, duration=job.duration, load=job.load, parameters=parameters, seeds=seeds,
+    batch = simulate_lanes(
+        lanes_of(job.model, job.command, job.load, parameters, None, seeds), duration=job.duration,
         output_times=job.times, outputs=signals_of(job.metrics), executor=Here(), chunk=job.block)
     ended = np.full(len(batch), job.duration)
     for failure in batch.failures:
