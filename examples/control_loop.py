@@ -4,7 +4,7 @@ import math
 
 import servotwin as st
 
-sim = st.Simulator(st.BoundedServo(st.load_servo("hitec-hs-755hb")), load=st.loads.Constant(0.1))
+sim = st.Simulator(st.PulseServo(st.load_servo("hitec-hs-755hb")), load=st.loads.Constant(0.1))
 target = math.radians(60.0)
 correction = 0.0
 state = sim.initial(st.signals.constant(0.0, unit="rad"))

@@ -5,7 +5,7 @@ import math
 import servotwin as st
 from servotwin.loads import Constant, Inertia, Pendulum, Spring
 
-model = st.BoundedServo(st.load_servo("hitec-hs-311"))
+model = st.PulseServo(st.load_servo("hitec-hs-311"))
 command = st.signals.step(-45.0, 45.0, at=0.05, unit="deg")
 
 for name, load in {

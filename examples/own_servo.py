@@ -15,6 +15,6 @@ print(f"{servo.title}: {len(servo.names())} parameters, "
       f"{sum(servo.source(name).origin == 'assumed' for name in servo.names())} of them assumed")
 command = st.signals.step(-60.0, 60.0, unit="deg")
 for volts in (4.0, 5.0, 6.0):
-    model = st.BoundedServo(servo.replace({"supply.open_circuit_voltage": volts}))
+    model = st.PulseServo(servo.replace({"supply.open_circuit_voltage": volts}))
     metrics = st.simulate(model, command, duration=1.0).step_metrics()
     print(f"{volts:.0f} V: {math.degrees(metrics.slew_rate):4.0f} deg/s, {metrics.peak_current:.2f} A")

@@ -44,7 +44,7 @@ def nothing_new(folder, before):
     (["negative.toml", *STEP], "got -3.0, allowed: a positive number [ohm]"),
     (["reduction.toml", *STEP], "got 0.5, allowed: a number of at least 1"),
     (["nan.toml", *STEP], "got nan"),
-    (["bare.toml", *STEP], "BoundedServo needs motor.armature_resistance"),
+    (["bare.toml", *STEP], "PulseServo needs motor.armature_resistance"),
 ])
 def test_servos(cli, tmp_path, words, said):
     for name, text in SERVO_FILES.items():
@@ -169,8 +169,9 @@ def test_a_parameter_is_set_once(simulate):
     (["--duration", "nan"], "--duration: got nan"),
     (["--duration", "inf"], "--duration: got inf"),
     (["--duration", "long"], "'--duration'"),
-    (["--duration", "1e9"], "take a larger output_step"),
-    (["--duration", "1e300", "--output-step", "1e-300"], "take a larger output_step"),
+    (["--duration", "1e9"], "at most 1e+06 frames of 20 ms"),
+    (["--model", "bounded", "--duration", "1e9"], "take a larger output_step"),
+    (["--model", "bounded", "--duration", "1e300", "--output-step", "1e-300"], "take a larger output_step"),
     (["--output-step", "0"], "--output-step: got 0.0"),
     (["--output-step", "-1"], "--output-step: got -1.0"),
     (["--output-step", "nan"], "--output-step: got nan"),

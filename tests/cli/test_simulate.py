@@ -37,7 +37,7 @@ def test_the_summary_says_what_matters(simulate):
     labels = [line.split("  ")[1] for line in ended.out.splitlines()[1:] if not line.startswith("    ")]
     assert labels == ["command", "load", "final angle", "steady error", "rise time", "settling time", "overshoot",
                       "peak speed", "peak current", "energy", "status", "solved", "assumed", "ignored"]
-    assert "model bounded" in ended.out
+    assert "model pulse" in ended.out
     assert "step 0 to 180 deg at 0.1 s" in ended.out
     assert "closed form" in ended.out
     assert "rotor_inertia" in ended.out
@@ -46,7 +46,7 @@ def test_the_summary_says_what_matters(simulate):
 
 def test_json_holds_the_numbers_of_the_result(simulate):
     found = simulate("--step", "0:90", "--at", "0.2", "--json", "--duration", "1").data
-    result = st.simulate(st.BoundedServo(st.load_servo(SERVO)), st.signals.step(0.0, 90.0, at=0.2, unit="deg"),
+    result = st.simulate(st.PulseServo(st.load_servo(SERVO)), st.signals.step(0.0, 90.0, at=0.2, unit="deg"),
                          duration=1.0)
     metrics = result.step_metrics()
     assert found["final_angle"] == pytest.approx(metrics.final, rel=1e-12)
@@ -77,7 +77,7 @@ def test_what_is_not_finite_is_null_in_json(cli):
 def test_every_shape_is_the_signal_of_its_name(simulate, tmp_path, words, signal):
     ended = simulate(*words, "--duration", "0.8", "--out", "run.csv", "--output-step", "0.01")
     assert ended.code == 0, ended.err
-    expected = st.simulate(st.BoundedServo(st.load_servo(SERVO)), signal, duration=0.8, output_step=0.01)
+    expected = st.simulate(st.PulseServo(st.load_servo(SERVO)), signal, duration=0.8, output_step=0.01)
     written = columns(tmp_path / "run.csv")
     for name in ("command_voltage", "armature_voltage"):
         np.testing.assert_allclose(written[f"{name}_V"], expected[name], rtol=1e-10, atol=1e-11)
@@ -87,10 +87,11 @@ def test_every_shape_is_the_signal_of_its_name(simulate, tmp_path, words, signal
 
 def test_files_of_samples_and_pulses(simulate, tmp_path):
     (tmp_path / "pulses.csv").write_text("time_s,pulse_width_us\n0,1500\n0.02,1600\n0.04,1600\n")
-    sampled = simulate("--command", "pulses.csv", "--json").data
-    pulses = simulate("--pulses", "pulses.csv", "--json").data
+    sampled = simulate("--command", "pulses.csv", "--json", "--model", "bounded").data
+    pulses = simulate("--pulses", "pulses.csv", "--json", "--model", "bounded").data
     assert sampled["final_angle"] == pytest.approx(pulses["final_angle"], rel=1e-12)
-    held = simulate("--command", "pulses.csv", "--hold", "linear", "--json", "--duration", "0.04").data
+    held = simulate("--command", "pulses.csv", "--hold", "linear", "--json", "--duration", "0.04", "--model",
+                    "bounded").data
     assert held["final_angle"] != sampled["final_angle"]
 
 
@@ -109,7 +110,7 @@ def test_loads_add_up(simulate, tmp_path):
     load = (st.loads.Inertia(1e-3) + st.loads.Viscous(1e-4) + st.loads.Coulomb(0.01)
             + st.loads.Pendulum(mass=0.1, length=0.12, hanging_angle=math.radians(90.0))
             + st.loads.Spring(0.05, math.radians(10.0)) + st.loads.Constant(0.15))
-    result = st.simulate(st.BoundedServo(st.load_servo(SERVO)), st.signals.step(0.0, 90.0, at=0.1, unit="deg"),
+    result = st.simulate(st.PulseServo(st.load_servo(SERVO)), st.signals.step(0.0, 90.0, at=0.1, unit="deg"),
                          duration=1.5, load=load)
     assert together["final_angle"] == pytest.approx(float(result["output_angle"][-1]), rel=1e-8)
 

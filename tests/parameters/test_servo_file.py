@@ -126,6 +126,23 @@ def test_files_of_all_editors_are_read(write, text):
     assert load_servo(write(text)).motor.armature_resistance == 3.0
 
 
+@pytest.mark.parametrize("kind", ["analog", "digital", "bus"])
+def test_the_kind_is_kept_and_analog_unless_given(write, tmp_path, kind):
+    servo = load_servo(write(f'kind = "{kind}"\n{GOOD}'))
+    servo.save(tmp_path / "again.toml")
+    assert load_servo(tmp_path / "again.toml") == servo
+    assert (servo.kind, load_servo(write(GOOD)).kind) == (kind, "analog")
+    assert servo.replace({"motor.armature_resistance": 2.0}).kind == kind
+
+
+@pytest.mark.parametrize(("kind", "said"), [('"brushless"', "kind: not a kind of servo: got 'brushless'"),
+                                            ("1", "kind: not a text: got 1")])
+def test_an_unknown_kind_is_said(write, kind, said):
+    with pytest.raises(ServoFileError, match="allowed: ") as caught:
+        load_servo(write(f"kind = {kind}\n{GOOD}"))
+    assert said in str(caught.value)
+
+
 def test_the_title_is_the_name_unless_given(write):
     assert load_servo(write(GOOD)).title == "mine"
 

@@ -81,7 +81,7 @@ def check(
         warnings.simplefilter("always", UserWarning)
         models = readiness(servo)
     found = {
-        "file": str(file), "id": servo.name, "title": servo.title, "parameters": len(servo.names()),
+        "file": str(file), "id": servo.name, "title": servo.title, "kind": servo.kind, "parameters": len(servo.names()),
         "origins": dict(Counter(servo.source(name).origin for name in servo.names())), "models": models,
         "warnings": list(dict.fromkeys(str(warning.message) for warning in caught)),
     }
@@ -98,7 +98,7 @@ def _show_check(servo: Servo, found: dict[str, Any]) -> None:
     for name in servo.names():
         group, _, key = name.partition(".")
         given.setdefault(group, []).append(key)
-    show(f"{found['file']}: {servo.title} ({servo.name}), a valid servo file",
+    show(f"{found['file']}: {servo.title} ({servo.name}), a valid file of a servo of kind {servo.kind}",
          pairs([("parameters", f"{found['parameters']} ({origins})"),
                 *[(group, ", ".join(keys)) for group, keys in given.items()]]),
          "models",

@@ -43,8 +43,9 @@ def fit(
         "currents).", rich_help_panel=_LOGS)] = None,
     table: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="Calibrate from a bench table instead of logs.", rich_help_panel=_LOGS)] = None,
-    model: Annotated[str, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded.", rich_help_panel=_SEARCH)] = "pulse",
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: pulse; bounded where the servo's file has "
+        "no chip).", rich_help_panel=_SEARCH)] = None,
     free: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="What is searched, repeatable or with commas: names of servo and load, and "
         "output_torque_constant, output_inertia, output_coulomb_torque.", rich_help_panel=_SEARCH)] = None,
@@ -97,7 +98,7 @@ def fit(
     if not logs:
         _show_advice(_first_advice(search), as_json=as_json)
         return
-    _check_ladder(model, ladder=ladder)
+    _check_ladder(search.model, ladder=ladder)
     options = {"holdout": holdout, "nuisance": nuisance, "sensors": sensors, "starts": starts, "loss": loss,
                "level": level, "intervals": intervals, "seed": seed, "compare": compare}
     found = _run(search, _read(logs, file_format, leave_out or []), _options(options), ladder=ladder)
@@ -142,11 +143,12 @@ def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None,
                          "from-sheet makes one from a data sheet")
 
 
-def _check_ladder(model: str, *, ladder: bool) -> None:
+def _check_ladder(model: Model, *, ladder: bool) -> None:
     from servotwin.errors import InputError
+    from servotwin.models import BoundedServo
 
-    if ladder and model == "bounded":
-        raise InputError("--ladder", got="--model bounded",
+    if ladder and isinstance(model, BoundedServo):
+        raise InputError("--ladder", got="a bounded servo",
                          allowed="pulse or pulse-inductive, which know friction that grows with the load")
 
 
@@ -162,16 +164,13 @@ def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force
     return targets
 
 
-def _search(servo: str, model: str, change: list[str], free: list[str] | None, bounds: list[str], prior: list[str], *,
-            priors: bool) -> _Search:
+def _search(servo: str, model: str | None, change: list[str], free: list[str] | None, bounds: list[str],
+            prior: list[str], *, priors: bool) -> _Search:
     from servotwin.cli import fit_words
-    from servotwin.cli.settings import settings
+    from servotwin.cli.model_words import model_of
     from servotwin.identification.fitting.checks import usual_free
-    from servotwin.parameters import load_servo
 
-    kind = fit_words.model_of(model)
-    loaded = load_servo(servo)
-    nominal = kind(loaded.replace(settings(change)) if change else loaded)
+    nominal = model_of(servo, model, change, fit_words.MODEL_NAMES)
     names = fit_words.names(free) or usual_free(nominal)
     fit_words.check_free(names, nominal)
     return _Search(nominal, names, fit_words.bounds_of(bounds, names),

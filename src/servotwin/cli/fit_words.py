@@ -54,21 +54,6 @@ def some_or_none(option: str, words: Sequence[str] | None, usual: tuple[str, ...
     return () if "none" in found else found
 
 
-def model_of(name: str) -> type[Model]:
-    """Return the class of a model that can be fitted.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is none of this name.
-    """
-    from servotwin.models import MODELS
-
-    if name not in MODEL_NAMES:
-        raise UnknownNameError("model of a fit", name, MODEL_NAMES)
-    return MODELS[name]
-
-
 def share(option: str, text: str) -> float:
     """Return a number between 0 and 1, or a percentage.
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def headline(servo: Servo) -> dict[str, Any]:
-    """Return id, title, supply voltage [V], stall torque [N m] and speed [deg/s] of its data sheet, and flags.
+    """Return id, title, kind, supply voltage [V], stall torque [N m] and speed [deg/s] of its data sheet, and flags.
 
     Examples
     --------
@@ -22,7 +22,7 @@ def headline(servo: Servo) -> dict[str, Any]:
     """
     seconds = _fact(servo, "speed_per_60deg", "time")
     return {
-        "id": servo.name, "title": servo.title,
+        "id": servo.name, "title": servo.title, "kind": servo.kind,
         "supply_voltage": _fact(servo, "supply_voltage", "voltage"),
         "stall_torque": _fact(servo, "stall_torque", "torque"),
         "speed": 60.0 / seconds if seconds else None,

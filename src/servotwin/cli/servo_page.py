@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 
 def heading(servo: Servo) -> list[RenderableType]:
-    """Return title, notes and flags of a servo."""
+    """Return title, kind, notes and flags of a servo."""
     said = servo.flags
-    return [f"{servo.title} ({servo.name})", " ".join(servo.notes.split()),
+    return [f"{servo.title} ({servo.name}), {servo.kind}", " ".join(servo.notes.split()),
             *([f"flags: {'; '.join(said)}"] if said else [])]
 
 

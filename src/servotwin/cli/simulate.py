@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.model_words import model_of
 from servotwin.cli.terminal import emit_json, pairs, patience, show
 
 if TYPE_CHECKING:
@@ -37,10 +38,10 @@ def simulate(
     over: shared.OverOption = None,
     hold: shared.HoldOption = None,
     column: shared.ColumnOption = None,
-    model: Annotated[str, typer.Option(
-        metavar="MODEL",
-        help="bounded, pulse, pulse-inductive, averaged, averaged-inductive, geared-motor or dc-motor.",
-        rich_help_panel=shared.PLANT)] = "bounded",
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="pulse, pulse-inductive, bounded, averaged, averaged-inductive, geared-motor or "
+        "dc-motor (default: pulse; bounded where the servo's file has no chip).",
+        rich_help_panel=shared.PLANT)] = None,
     load: Annotated[list[str] | None, typer.Option(
         metavar="PART=VALUE", help="What hangs on the shaft, repeatable or with commas, SI: inertia=, viscous=, "
         "torque=, coulomb=, pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
@@ -70,7 +71,7 @@ def simulate(
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     targets = _checked_targets(out, plot, servo, words, load or [], force=force)
-    result = _run(_model(servo, model, change or []), words, load or [], duration, output_step, seed)
+    result = _run(model_of(servo, model, change or []), words, load or [], duration, output_step, seed)
     found = _write(result, targets, force=force)
     found |= {"command": words.described(duration), "load": load_words.described(load or []),
               "files": [str(target.path) for target in targets]}
@@ -91,16 +92,6 @@ def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: Com
     return targets
 
 
-def _model(servo: str, name: str, change: list[str]) -> Model:
-    from servotwin.cli.settings import settings
-    from servotwin.errors import UnknownNameError
-    from servotwin.models import MODELS
-    from servotwin.parameters import load_servo
-
-    if name not in MODELS:
-        raise UnknownNameError("model", name, MODELS)
-    loaded = load_servo(servo)
-    return MODELS[name](loaded.replace(settings(change)) if change else loaded)
 
 
 def _run(model: Model, words: CommandWords, load: list[str], duration: float, output_step: float | None,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
-from servotwin.cli.simulate import _model
+from servotwin.cli.model_words import model_of
 from servotwin.cli.terminal import emit_json, patience, show
 
 if TYPE_CHECKING:
@@ -37,8 +37,9 @@ def sweep(
     over: shared.OverOption = None,
     hold: shared.HoldOption = None,
     column: shared.ColumnOption = None,
-    model: Annotated[str, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded.", rich_help_panel=shared.PLANT)] = "pulse",
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: pulse; bounded where the servo's file has "
+        "no chip).", rich_help_panel=shared.PLANT)] = None,
     load: Annotated[list[str] | None, typer.Option(
         metavar="PART=VALUE", help="What hangs on the shaft, as in servotwin simulate.",
         rich_help_panel=shared.PLANT)] = None,
@@ -91,7 +92,7 @@ def sweep(
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     _check_options(out, resume=resume, plot=plot, varies=bool(vary or from_file or draws))
-    nominal = _model(servo, model, change or [])
+    nominal = model_of(servo, model, change or [])
     study = _run(nominal, words, load or [], metric or [], {
         "duration": duration, "vary": _varied(nominal, vary or [], from_file=from_file), "draws": _draws(draws),
         "lanes": lanes, "seed": seed, "sampling": sampling, "truncate": truncate, "output_step": output_step,

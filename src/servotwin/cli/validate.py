@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from servotwin.cli.outputs import Target
     from servotwin.identification.fitting.validate import Validation
-    from servotwin.models import Model
 
 _EXCEEDED = 1  # exit code
 _MOST_LOGS = 30
@@ -74,13 +73,11 @@ def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Ta
 def _run(servo: str, model: str | None, change: list[str], logs: list[Path], file_format: str, leave_out: list[str],
          nuisance: list[str] | None, sensors: list[str] | None) -> Validation:
     from servotwin.cli import fit_words
-    from servotwin.cli.settings import settings
+    from servotwin.cli.model_words import class_of, servo_of
     from servotwin.identification.fitting.validate import validate as run
-    from servotwin.parameters import load_servo
 
-    kind: type[Model] | None = None if model is None else fit_words.model_of(model)
-    loaded = load_servo(servo)
-    changed = loaded.replace(settings(change)) if change else loaded
+    kind = None if model is None else class_of(model, fit_words.MODEL_NAMES)
+    changed = servo_of(servo, change)
     fitted = fit_words.some_or_none("--nuisance", nuisance, ())
     windows = fit_words.left_out(leave_out)
     with patience("reading"):

@@ -3,6 +3,7 @@
 from servotwin.models.averaged import AveragedServo, AveragedServoInductive
 from servotwin.models.base import Model
 from servotwin.models.bounded import BoundedServo
+from servotwin.models.default import default_class, default_model
 from servotwin.models.motors import DCMotor, GearedMotor
 from servotwin.models.pulse import PulseServo, PulseServoInductive
 
@@ -17,4 +18,4 @@ MODELS: dict[str, type[Model]] = {
 }
 
 __all__ = ["MODELS", "AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "Model",
-           "PulseServo", "PulseServoInductive"]
+           "PulseServo", "PulseServoInductive", "default_class", "default_model"]

@@ -16,10 +16,10 @@ from servotwin.parameters.groups import (
 )
 from servotwin.parameters.output_file import write_file
 from servotwin.parameters.quantity import ORIGINS, Quantity
-from servotwin.parameters.servo import Servo, servo_from_values, unit_of
+from servotwin.parameters.servo import KINDS, Servo, servo_from_values, unit_of
 
 __all__ = [
-    "GROUPS", "ORIGINS", "Dataset", "Electronics", "Friction", "Gear", "Group", "Motor", "Potentiometer", "Quantity",
-    "Servo", "Stops", "Supply", "Thermal", "catalog_names", "dataset_names", "load_dataset", "load_servo",
+    "GROUPS", "KINDS", "ORIGINS", "Dataset", "Electronics", "Friction", "Gear", "Group", "Motor", "Potentiometer",
+    "Quantity", "Servo", "Stops", "Supply", "Thermal", "catalog_names", "dataset_names", "load_dataset", "load_servo",
     "servo_from_values", "unit_of", "write_file",
 ]

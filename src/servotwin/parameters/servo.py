@@ -25,6 +25,7 @@ from servotwin.parameters.quantity import Quantity
 from servotwin.units import is_finite, si_unit, to_si
 
 Value = float | tuple[float, ...] | str
+KINDS = ("analog", "digital", "bus")
 _PLACES = {f"{group}.{f.name}": (group, f.name) for group, kind in GROUPS.items() for f in fields(kind)}
 
 
@@ -38,6 +39,8 @@ class Servo:
         Short id, such as ``"hitec-hs-755hb"``; not empty.
     title : str
         For people.
+    kind : {"analog", "digital", "bus"}
+        What decides the bridge: an analog chip, or a microcontroller that listens to pulses or to packets on a bus.
     motor, gear, friction, electronics, potentiometer, supply, stops, thermal : Group
         Always there; a field that is None is absent. Plain numbers in SI.
     quantities : mapping of str to Quantity
@@ -49,7 +52,7 @@ class Servo:
     Raises
     ------
     ParameterError
-        If the name is empty or no text.
+        If the name is empty or no text, or the kind is none of the three.
 
     Examples
     --------
@@ -62,6 +65,7 @@ class Servo:
 
     name: str
     title: str = ""
+    kind: str = "analog"
     motor: Motor = field(default_factory=Motor)
     gear: Gear = field(default_factory=Gear)
     friction: Friction = field(default_factory=Friction)
@@ -78,6 +82,8 @@ class Servo:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not self.name:
             raise ParameterError("name of a servo", got=self.name, allowed='a short id, such as "my-servo"')
+        if self.kind not in KINDS:
+            raise ParameterError(f"kind of {self.name!r}", got=self.kind, allowed=", ".join(KINDS))
         object.__setattr__(self, "quantities", {name: self._quantity(name) for name in self.names()})
         for name in ("quantities", "sheet", "fit"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
@@ -205,7 +211,8 @@ class Servo:
         write_servo_file(self, Path(path), overwrite=overwrite)
 
 
-def servo_from_values(name: str, values: Mapping[str, Mapping[str, Value]], *, title: str = "") -> Servo:
+def servo_from_values(name: str, values: Mapping[str, Mapping[str, Value]], *, title: str = "",
+                      kind: str = "analog") -> Servo:
     """Return a servo from plain SI numbers by group; every value counts as assumed.
 
     Parameters
@@ -213,6 +220,9 @@ def servo_from_values(name: str, values: Mapping[str, Mapping[str, Value]], *, t
     name : str
     values : mapping
         Such as ``{"motor": {"armature_resistance": 3.0}}``; groups may be partial or absent.
+    title : str
+        For people.
+    kind : {"analog", "digital", "bus"}
 
     Raises
     ------
@@ -233,7 +243,7 @@ def servo_from_values(name: str, values: Mapping[str, Mapping[str, Value]], *, t
         for key in entries:
             check_name(f"{group}.{key}")
         groups[group] = GROUPS[group](**entries)
-    return Servo(name=name, title=title, **groups)  # type: ignore[arg-type]
+    return Servo(name=name, title=title, kind=kind, **groups)  # type: ignore[arg-type]
 
 
 def check_name(name: str) -> tuple[str, str]:

@@ -14,13 +14,13 @@ from servotwin.errors import OutputError, ParameterError, ServoFileError, UnitEr
 from servotwin.parameters.groups import GROUPS, Group
 from servotwin.parameters.output_file import write_file
 from servotwin.parameters.quantity import ORIGINS, Quantity
-from servotwin.parameters.servo import Servo, unit_of
+from servotwin.parameters.servo import KINDS, Servo, unit_of
 
 if TYPE_CHECKING:
     import tomlkit
 
 _ENTRY_KEYS = ("value", "unit", "origin", "source", "std", "lower", "upper")
-_TOP_KEYS = ("name", "title", "notes", "sheet", "fit", *GROUPS)
+_TOP_KEYS = ("name", "title", "kind", "notes", "sheet", "fit", *GROUPS)
 
 
 def read_servo_file(path: Path, name: str | None = None) -> Servo:
@@ -43,11 +43,13 @@ def read_servo_file(path: Path, name: str | None = None) -> Servo:
         if key not in _TOP_KEYS:
             near = UnknownNameError("table or key", key, _TOP_KEYS)
             raise ServoFileError(label, str(near))
-    for key in ("name", "title", "notes"):
+    for key in ("name", "title", "kind", "notes"):
         if not isinstance(content.get(key, ""), str):
             raise ServoFileError(label, "not a text", key=key, got=content[key], allowed="a text")
     if not content.get("name"):
         raise ServoFileError(label, "missing", key="name", allowed='a short id, such as name = "my-servo"')
+    if (kind_of_servo := content.get("kind", KINDS[0])) not in KINDS:
+        raise ServoFileError(label, "not a kind of servo", key="kind", got=kind_of_servo, allowed=", ".join(KINDS))
     groups: dict[str, Group] = {}
     quantities: dict[str, Quantity] = {}
     for table, kind in GROUPS.items():
@@ -55,7 +57,7 @@ def read_servo_file(path: Path, name: str | None = None) -> Servo:
             groups[table], found = _read_group(label, table, kind, content[table])
             quantities |= found
     return Servo(name=content["name"], title=content.get("title", content["name"]), notes=content.get("notes", ""),
-                 sheet=_table(label, content, "sheet"), fit=_table(label, content, "fit"),
+                 kind=kind_of_servo, sheet=_table(label, content, "sheet"), fit=_table(label, content, "fit"),
                  quantities=quantities, **groups)  # type: ignore[arg-type]
 
 
@@ -168,6 +170,8 @@ def _document(servo: Servo) -> tomlkit.TOMLDocument:
 
     document = tomlkit.document()
     document["name"], document["title"] = servo.name, servo.title
+    if servo.kind != KINDS[0]:
+        document["kind"] = servo.kind
     if servo.notes:
         document["notes"] = servo.notes
     for group in GROUPS:

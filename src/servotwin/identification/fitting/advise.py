@@ -22,7 +22,7 @@ from servotwin.identification.fitting.free import Priors, Space, nominal
 from servotwin.identification.fitting.point import DELAY_SCALE, Point
 from servotwin.identification.logs.log import Log
 from servotwin.loads import Inertia, Load, Pendulum
-from servotwin.models import Model, PulseServo
+from servotwin.models import Model
 from servotwin.parameters import Servo
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def _share(width: float) -> str:
     return "undetermined" if width > 1.96 * _UNKNOWN / 2.0 else f"±{100.0 * width:.3g} %"
 
 
-def advise(known: Fit | Servo, *, model: type[Model] = PulseServo, free: Sequence[str] | None = None,
+def advise(known: Fit | Servo, *, model: type[Model] | None = None, free: Sequence[str] | None = None,
            priors: Priors | str | None = "servo", logs: Sequence[Log] = (),
            sensors: Sequence[str] = ("supply_current",), voltages: Sequence[float] | None = None) -> Advice:
     """Say which experiment would narrow the widest interval most.
@@ -201,7 +201,7 @@ class _Known:
                    tuple(logs) or tuple(trace.log for trace in fit.traces))
 
     @classmethod
-    def of_servo(cls, servo: Servo, kind: type[Model], free: Sequence[str] | None, priors: Priors | str | None,
+    def of_servo(cls, servo: Servo, kind: type[Model] | None, free: Sequence[str] | None, priors: Priors | str | None,
                  logs: Sequence[Log]) -> _Known:
         model = checks.checked_servo(servo, kind)
         space = Space(model, tuple(free) if free is not None else checks.usual_free(model), priors=priors)

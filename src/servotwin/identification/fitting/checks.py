@@ -16,7 +16,7 @@ from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.point import Point
 from servotwin.identification.logs.log import Log
-from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive
+from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive, default_model
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES
 from servotwin.units import is_finite
@@ -52,12 +52,14 @@ def checked_logs(logs: Any) -> tuple[Log, ...]:
 
 
 def checked_servo(servo: Any, kind: Any) -> Model:
-    """Return the model that is fitted."""
+    """Return the model that is fitted: of class `kind`, or where that is None the one that stands for the servo."""
+    if not isinstance(servo, Servo):
+        raise InputError("servo of a fit", got=servo, allowed="a servo, such as load_servo(...)")
+    if kind is None:
+        return default_model(servo)
     if kind not in _KINDS:
         raise InputError("model of a fit", got=getattr(kind, "__name__", kind),
                          allowed=", ".join(k.__name__ for k in _KINDS))
-    if not isinstance(servo, Servo):
-        raise InputError("servo of a fit", got=servo, allowed="a servo, such as load_servo(...)")
     model: Model = kind(servo)
     return model
 

@@ -27,7 +27,7 @@ from servotwin.identification.fitting.task import HUBER, Task, by_sensor
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
 from servotwin.identification.fitting.words import Unidentifiable, explain, vague_directions
 from servotwin.identification.logs.log import Log
-from servotwin.models import Model, PulseServo
+from servotwin.models import Model
 from servotwin.parameters import Servo
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ NUISANCE = ("delay", "angle_offset", "initial_state")
 
 
 def identify(
-    logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] = PulseServo,
+    logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] | None = None,
     free: Sequence[str] | None = None, nuisance: Sequence[str] = NUISANCE, priors: Priors | str | None = "servo",
     *, bounds: Bounds | None = None, holdout: float | Sequence[str] | None = None, sensors: Sequence[str] | None = None,
     starts: int = 3, loss: str = "huber", noise: Mapping[str, float] | None = None, level: float = 0.95,
@@ -54,8 +54,9 @@ def identify(
         A path is read by `read_logs`.
     servo : Servo
         Gives what is not searched, and where the search begins.
-    model : type of Model
-        `PulseServo`, `PulseServoInductive` or `BoundedServo`.
+    model : type of Model, optional
+        `PulseServo`, `PulseServoInductive` or `BoundedServo`; the one that stands for the servo
+        (`models.default_class`) unless given.
     free : sequence of str, optional
         What is searched: dotted names of servo and load, and the lumped names `output_torque_constant` (motor and
         back-EMF constant times the gear reduction), `output_inertia`, `output_coulomb_torque`.

@@ -20,7 +20,6 @@ from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.holdout import LogError
 from servotwin.identification.fitting.identify import identify
 from servotwin.identification.logs.log import Log
-from servotwin.models import PulseServo
 from servotwin.models.base import Model
 from servotwin.parameters import Servo
 
@@ -106,7 +105,7 @@ class Ladder:
         raise InputError("rung", got=name, allowed=", ".join(rung.name for rung in self.rungs))
 
 
-def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] = PulseServo,
+def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None = None,
                     free: Sequence[str] | None = None, *, rungs: Sequence[str] = tuple(RUNGS),
                     select: str = "holdout", progress: Any = False, **options: Any) -> Ladder:
     """Fit friction laws of growing complexity, and choose one.
@@ -115,8 +114,9 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] = Puls
     ----------
     logs : sequence of Log
     servo : Servo
-    model : type of Model
+    model : type of Model, optional
         One that reads load friction: `PulseServo` or `PulseServoInductive`; for `BoundedServo` only "M1" makes sense.
+        The one that stands for the servo (`models.default_class`) unless given.
     free : sequence of str, optional
         What else is searched; friction terms in it are left to the ladder.
     rungs : sequence of str
@@ -141,7 +141,8 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] = Puls
         raise InputError("ladder", got=f"rungs {list(rungs)}, select {select!r}",
                          allowed='at least one rung; "holdout" or "criterion"')
     given = checks.checked_logs(logs)
-    others = [name for name in (free or checks.usual_free(checks.checked_servo(servo, model)))
+    plain = checks.checked_servo(servo, model)
+    others = [name for name in (free or checks.usual_free(plain))
               if name not in _TERMS and name not in _BASE and not name.startswith("friction.")]
     options = {"compare_with": (), **options}
     found: list[Rung] = []
@@ -152,8 +153,8 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] = Puls
             more = dict(options)
             if found:
                 more["starts"] = 1  # it begins at what a simpler law found
-            fit = identify(given, start, model, [*others, *RUNGS[name]], progress=_share(show, k, len(ordered), name),
-                           **more)
+            fit = identify(given, start, type(plain), [*others, *RUNGS[name]],
+                           progress=_share(show, k, len(ordered), name), **more)
             found.append(_rung(name, fit))
             if fit.interrupted:
                 break

@@ -20,7 +20,7 @@ from servotwin.identification.fitting.holdout import ErrorTable, log_error
 from servotwin.identification.fitting.point import NUISANCES, SHARED, LogPart, Point
 from servotwin.identification.fitting.task import HUBER, Task, by_sensor
 from servotwin.identification.logs.log import ANGLES, Log
-from servotwin.models import MODELS, Model, PulseServo
+from servotwin.models import MODELS, Model
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES
 from servotwin.units import is_finite
@@ -92,7 +92,7 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     servo : Servo
     model : type of Model, optional
         `PulseServo`, `PulseServoInductive` or `BoundedServo`; that of the servo file's [fit] unless given, else
-        `PulseServo`.
+        the one that stands for the servo (`models.default_class`).
     nuisance : sequence of str
         What belongs to the rig and is fitted to these logs: as of `identify`.
     sensors : sequence of str, optional
@@ -140,10 +140,10 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
         noise=_noise(forecast, parts))
 
 
-def recorded_model(servo: Any) -> type[Model]:
-    """Return the model that a servo file's [fit] names; the pulse servo where there is none."""
+def recorded_model(servo: Any) -> type[Model] | None:
+    """Return the model that a servo file's [fit] names; None where there is none."""
     name = servo.fit.get("model") if isinstance(servo, Servo) else None
-    return next((kind for kind in MODELS.values() if kind.__name__ == name), PulseServo)
+    return next((kind for kind in MODELS.values() if kind.__name__ == name), None)
 
 
 def recorded_nuisance(servo: Servo) -> dict[str, float]:

@@ -169,7 +169,7 @@ def _servo(name: str, values: Mapping[str, float], loop: Mapping[str, Any], sour
                   for dotted, value in values.items()}
     quantities |= {dotted: Quantity(value=value, unit=unit_of(dotted), origin="assumed",
                                     source="position loop of BAM as pulses") for dotted, value in loop.items()}
-    return Servo(name=name, title=source, quantities=quantities, sheet=sheet, **made)
+    return Servo(name=name, title=source, kind="bus", quantities=quantities, sheet=sheet, **made)
 
 
 def _at_output(servo: Servo) -> dict[str, float]:

@@ -13,7 +13,7 @@ from servotwin.identification.sheets.contradictions import Contradiction, sheet_
 from servotwin.identification.sheets.motor_range import MotorRange, Range, motor_range
 from servotwin.identification.sheets.sheet import Sheet
 from servotwin.identification.sheets.sheet_file import sheet_table
-from servotwin.parameters import GROUPS, Quantity, Servo, unit_of
+from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, unit_of
 from servotwin.physics import averaged_bridge_gain, load_share
 
 _NEUTRAL = 1.5e-3  # s
@@ -107,8 +107,8 @@ def servo_from_sheet(sheet: Sheet, *, load_friction: bool = True, backlash: bool
     for group, kind in GROUPS.items():
         values = {name.partition(".")[2]: q.value for name, q in quantities.items() if name.startswith(f"{group}.")}
         groups[group] = kind(**values)
-    return Servo(name=sheet.name, title=sheet.title, notes=_notes(made, found), quantities=quantities,
-                 sheet=sheet_table(sheet, sheet_flags(sheet)), **groups)
+    return Servo(name=sheet.name, title=sheet.title, kind=sheet.modulation or KINDS[0], notes=_notes(made, found),
+                 quantities=quantities, sheet=sheet_table(sheet, sheet_flags(sheet)), **groups)
 
 
 def _quantity(name: str, value: float | Range | str, origin: str, source: str, *,

@@ -11,7 +11,7 @@ from typing import Any
 from servotwin import units
 from servotwin.errors import InputError, ServotwinError
 from servotwin.identification.sheets.sheet import Sheet, SheetPoint
-from servotwin.parameters import GROUPS, Quantity, Servo, unit_of, write_file
+from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, unit_of, write_file
 
 _FLAGS, _NOTE, _ELSE = "flags", "note", "also_at"
 # key of the file -> field, dimension, unit; a speed is printed as the time for 60 degrees
@@ -150,6 +150,8 @@ def servo_file_text(servo: Servo) -> str:
     <BLANKLINE>
     """
     lines = [f"name = {_text(servo.name)}", f"title = {_text(servo.title)}"]
+    if servo.kind != KINDS[0]:
+        lines += [f"kind = {_text(servo.kind)}"]
     if servo.notes:
         body = servo.notes.strip("\n").replace("\\", "\\\\").replace('"""', '""\\"')
         lines += [f'notes = """\n{body}\n"""']

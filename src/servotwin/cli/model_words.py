@@ -1,0 +1,84 @@
+"""Servo and model out of the words of an argument SERVO and the options `--model` and `--set`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from servotwin.models import Model
+    from servotwin.parameters import Servo
+
+
+def class_of(name: str, among: Sequence[str] | None = None) -> type[Model]:
+    """Return the class of a model by the name that `--model` has for it.
+
+    Parameters
+    ----------
+    name : str
+    among : sequence of str, optional
+        Names that are allowed; all unless given.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of this name.
+
+    Examples
+    --------
+    >>> class_of("pulse").__name__
+    'PulseServo'
+    """
+    from servotwin.errors import UnknownNameError
+    from servotwin.models import MODELS
+
+    if name not in (among or MODELS):
+        raise UnknownNameError("model", name, among or MODELS)
+    return MODELS[name]
+
+
+def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequence[str] | None = None) -> Model:
+    """Return the model of a servo.
+
+    Parameters
+    ----------
+    servo : str
+        Id in the catalog, or path of a servo file.
+    name : str or None
+        Of the model; None: the one that stands for this servo.
+    change : sequence of str
+        Words of `--set`.
+    among : sequence of str, optional
+        Names that are allowed; all unless given.
+
+    Raises
+    ------
+    ServotwinError
+        If servo, model or a changed parameter is not known or not possible.
+
+    Examples
+    --------
+    >>> model_of("hitec-hs-755hb", "bounded", ["motor.armature_resistance=3.1"])
+    BoundedServo('hitec-hs-755hb')
+    """
+    from servotwin.models import default_model
+
+    kind = None if name is None else class_of(name, among)
+    changed = servo_of(servo, change)
+    return default_model(changed) if kind is None else kind(changed)
+
+
+def servo_of(servo: str, change: Sequence[str]) -> Servo:
+    """Return a servo with the parameters that `--set` changes.
+
+    Examples
+    --------
+    >>> servo_of("hitec-hs-755hb", ["motor.armature_resistance=3.1"]).motor.armature_resistance
+    3.1
+    """
+    from servotwin.cli.settings import settings
+    from servotwin.parameters import load_servo
+
+    loaded = load_servo(servo)
+    return loaded.replace(settings(change)) if change else loaded
