@@ -158,9 +158,6 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     times = _times(duration, output_step, output_times)
     given = _checked(servos, supply, initial)
     sims, units = {}, []
-    for model, command, _ in given.values():
-        if isinstance(command, Signal):
-            warn_of(_on_supply(model, supply).servo, [command], duration)
     for k, (name, (model, command, load)) in enumerate(given.items()):
         sim = Simulator(_on_supply(model, supply), load, int(seed) + k)
         sim.load.check_span(0.0, duration)
@@ -170,6 +167,8 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
             raise InputError(f"model of {name}", got=model, allowed="a pulse servo")
         sims[name] = sim
         units.append(Unit(plan, plan.chip, state.point))
+    for name, (_, command, _) in given.items():
+        warn_of(sims[name].model.servo, [command], duration)
     source = _source(supply)
     status, ended, cause = Status.COMPLETED, duration, Status.COMPLETED.message
     try:

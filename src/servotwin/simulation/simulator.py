@@ -193,8 +193,8 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
     times = _times(duration, output_step, output_times)
     simulator = Simulator(model, load, seed)
-    if isinstance(command, Signal):
-        warn_of(model.servo, [command], duration)
+    simulator.drive(command)  # raises if the model cannot follow it
+    warn_of(model.servo, [command], duration)
     return simulated(simulator, command, duration, times, initial)
 
 
