@@ -35,7 +35,7 @@ def save_csv(path: str | Path, signals: Mapping[str, NDArray[np.float64]], si_un
         If it cannot be written.
     """
     shown = shown_columns(signals, si_units)
-    table = np.column_stack(list(shown.values()))
+    table = np.column_stack(list(shown.values())) + 0.0  # -0 becomes 0
     write_file(path, lambda file: np.savetxt(file, table, fmt="%.12g", delimiter=",", header=",".join(shown),
                                              comments="", encoding="utf-8"), overwrite=overwrite)
 
