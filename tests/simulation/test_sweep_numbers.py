@@ -173,3 +173,12 @@ def test_lanes_of_one_chunk_have_seeds_of_their_own(servo):
     errors = runs[0].table["end_error_time"]
     assert len(set(errors.tolist())) == 6
     np.testing.assert_array_equal(errors, runs[1].table["end_error_time"])
+
+
+def test_the_noise_of_the_tornado_is_the_same_in_all_its_lanes(servo):
+    """So that what does not matter moves nothing, and what matters is not mistaken for luck."""
+    noisy = st.PulseServo(servo.replace({"potentiometer.noise": 2e-3}))
+    study = st.sweep(noisy, STEP, duration=0.3, lanes=8, metrics=["end_error_time"], seed=1, vary={
+        "stops.upper_angle": "uniform:3rad..4rad", "stops.lower_angle": "uniform:-2rad..-1rad"})
+    assert np.ptp(study.table["end_error_time"]) > 1e-7
+    assert [bar.reach for bar in study.tornado("end_error_time").bars] == [0.0, 0.0]
