@@ -41,9 +41,13 @@ def test_the_first_lane_that_is_wrong_is_named(options, error, words):
 def test_failures_keep_their_lanes_and_times_in_every_chunk():
     resistance = np.full(9, SERVO.motor.armature_resistance)
     resistance[[3, 7]] = 1e-300
-    runs = [st.simulate_many(st.BoundedServo(SERVO), STEP, duration=0.2, output_step=0.02, chunk=chunk,
+    steps = [signals.step(10.0, 50.0, at=0.05 + 0.01 * lane, unit="deg") for lane in range(9)]
+    runs = [st.simulate_many(st.BoundedServo(SERVO), steps, duration=0.2, output_step=0.02, chunk=chunk,
                              parameters={"motor.armature_resistance": resistance}) for chunk in (2, 4, 9)]
     for batch in runs:
+        for lane, time, _ in batch.failures:  # some time after its own step, and nothing is known from then on
+            assert 0.05 + 0.01 * lane < time < 0.05 + 0.01 * lane + 0.1
+            np.testing.assert_array_equal(np.isnan(batch["output_angle"][lane]), batch.time > time)
         assert [failure.lane for failure in batch.failures] == [3, 7]
         assert np.flatnonzero(batch.status).tolist() == [3, 7]
         assert np.flatnonzero(np.isnan(batch["output_angle"][:, -1])).tolist() == [3, 7]
