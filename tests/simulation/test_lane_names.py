@@ -69,3 +69,13 @@ def test_a_lane_alone_is_that_lane():
         run = result.at("output_angle", result.time)  # simulated again, alone
         np.testing.assert_allclose(run, batch["output_angle"][lane], rtol=0.0, atol=1e-9)
     assert len({float(x) for x in batch["error_time"][:, -1]}) == 4
+
+
+def test_pendulums_with_and_without_an_inertia_of_their_own_stand_side_by_side():
+    """A point mass has the inertia m l²; beside one that says its own, each keeps what it has."""
+    hung = [loads.Pendulum(mass=0.1, length=0.1), loads.Pendulum(mass=0.1, length=0.1, inertia=2e-2),
+            loads.Pendulum(mass=0.1, length=0.1, inertia=5e-3), loads.Pendulum(mass=0.2, length=0.1)]
+    batch = st.simulate_many(st.PulseServo(SERVO), STEP, load=hung, duration=0.2, output_step=0.02)
+    for lane, load in enumerate(hung):
+        alone = st.simulate(st.PulseServo(SERVO), STEP, load=load, duration=0.2, output_step=0.02)
+        np.testing.assert_allclose(batch["output_angle"][lane], alone["output_angle"], rtol=0.0, atol=1e-9)
