@@ -115,3 +115,14 @@ def test_the_tables_of_a_sweep_are_its_numbers(cli):
         assert [float(cell) for cell in cells[-4:-2]] == pytest.approx([1e3 * bar.at_low, 1e3 * bar.at_high], rel=1e-3)
         assert float(cells[-2]) == pytest.approx(100.0 * bar.share, abs=0.06)
         assert cells[-1] == "%"
+
+
+@pytest.mark.parametrize("hold", ["previous", "linear"])
+def test_samples_of_a_file_are_held_as_asked(simulate, tmp_path, hold):
+    (tmp_path / "angles.csv").write_text("time_s,command_angle_deg\n0,10\n0.3,60\n0.6,20\n")
+    words = ["--command", "angles.csv", "--duration", "0.6", "--model", "bounded", "--json"]
+    found = simulate(*words, *(["--hold", hold] if hold == "linear" else [])).data
+    signal = st.signals.samples([0.0, 0.3, 0.6], [10.0, 60.0, 20.0], unit="deg", hold=hold)
+    run = st.simulate(st.BoundedServo(st.load_servo(SERVO)), signal, duration=0.6)
+    assert found["final_angle"] == pytest.approx(float(run["output_angle"][-1]), rel=1e-12)
+    assert found["peak_current"] == pytest.approx(run.peak("armature_current"), rel=1e-12)

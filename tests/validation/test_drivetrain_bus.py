@@ -12,8 +12,8 @@ from reference.drivetrain_circuit import Source
 
 SHORT = 0.1  # s: each servo has started, and most are on their way
 BATTERY, REGULATOR = (6.0, 0.4, None), (6.0, 0.4, 1.2)
-FEW = [(terms, supply, 7) for terms in ((), ("coast",), ("inductance",), ("backlash", "stribeck"), ("heat", "m5"))
-       for supply in (BATTERY, REGULATOR)]
+FEW = [((), BATTERY, 7), ((), REGULATOR, 7), (("coast",), BATTERY, 7), (("inductance",), REGULATOR, 7),
+       (("backlash", "stribeck"), REGULATOR, 7), (("heat", "m5"), BATTERY, 7)]
 ALL = ("inductance", "coast", "heat", "m4", "backlash")
 MANY = [(terms, supply, seed) for seed in range(2) for supply in (BATTERY, REGULATOR)
         for terms in ((), ("coast",), ("inductance",), ("coast", "inductance"), ("backlash", "stribeck"),
