@@ -5,28 +5,18 @@ import numpy as np
 import servotwin as st
 
 model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
-frequencies = np.array([0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0])  # Hz
+frequencies = np.geomspace(0.5, 11.0, 14)  # Hz
+amplitudes = [1.0, 5.0, 20.0, 60.0]  # deg
 
-drawn = []
-for amplitude in (1.0, 5.0, 20.0, 60.0):  # deg
-    gains = []
-    for frequency in frequencies:
-        command = st.signals.sine(mean=90.0, amplitude=amplitude, frequency=frequency, unit="deg")
-        turns = max(6, round(1.5 * frequency))
-        result = st.simulate(model, command, duration=2 * turns / frequency)
-        time = result.time[result.time >= turns / frequency]  # the second half: settled, and whole turns
-        wave = np.exp(-2j * np.pi * frequency * time)
-        angle = np.degrees(result["output_angle"][-len(time):])
-        gains.append(2.0 * abs(np.mean((angle - angle.mean()) * wave)) / amplitude)
-    level = 20.0 * np.log10(gains)
-    if level[0] > -3.0:
-        limit = np.exp(np.interp(3.0, -level, np.log(frequencies)))
-        print(f"{amplitude:4.0f} deg: {limit:.1f} Hz")
-    else:
-        print(f"{amplitude:4.0f} deg: below {frequencies[0]} Hz")
-    drawn.append(st.plotting.Curve(f"±{amplitude:g}°", frequencies, level))
-figure = st.plotting.curves(drawn, x_label="frequency (Hz)", y_label="gain (dB)",
-                            limits=[st.plotting.Limit("−3 dB", -3.0)])
+seen = st.linear.frequency_response(model, 2.0 * np.pi * frequencies, amplitude=np.radians(amplitudes))
+for amplitude, limit in zip(amplitudes, seen.bandwidth(reference=1.0) / (2.0 * np.pi), strict=True):
+    below = np.isnan(limit)  # from the lowest frequency on
+    print(f"{amplitude:4.0f} deg: " + (f"below {frequencies[0]} Hz" if below else f"{limit:.1f} Hz"))
+
+figure = st.plotting.curves(
+    [st.plotting.Curve(f"±{amplitude:g}°", frequencies, 20.0 * np.log10(gain))
+     for amplitude, gain in zip(amplitudes, seen.gain, strict=True)],
+    x_label="frequency (Hz)", y_label="gain (dB)", limits=[st.plotting.Limit("−3 dB", -3.0)])
 figure.axes[0].set_xscale("log")
 figure.axes[0].set_xticks([0.5, 1.0, 2.0, 5.0, 10.0], ["0.5", "1", "2", "5", "10"])
 st.plotting.save(figure, "bandwidth.png", overwrite=True)

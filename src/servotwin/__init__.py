@@ -4,7 +4,10 @@ Importing the package loads numpy alone; every other part is loaded when its nam
 """
 
 from importlib import import_module
-from typing import Any
+
+TYPE_CHECKING = False  # typing is slow to load
+if TYPE_CHECKING:
+    from typing import Any
 
 __version__ = "0.1.0"
 
@@ -17,17 +20,18 @@ _LAZY = {
          "PulseServoInductive"), "models"),
     **dict.fromkeys(("Batch", "Fleet", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_bus",
                      "simulate_many"), "simulation"),
+    **dict.fromkeys(("DataSheet", "curves", "servos_that_lift"), "datasheet"),
     **dict.fromkeys(("Study", "distributions", "sweep"), "simulation.sweep"),
     **dict.fromkeys(("Fit", "Log", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "read_logs",
                      "servo_from_sheet", "validate"), "identification"),
 }
-_MODULES = ("bench", "errors", "identification", "linear", "loads", "models", "parameters", "physics", "plotting",
-            "signals", "simulation", "units")
+_MODULES = ("bench", "datasheet", "errors", "identification", "linear", "loads", "models", "parameters", "physics",
+            "plotting", "signals", "simulation", "units")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name in _MODULES:
         return import_module(f"servotwin.{name}")
     if name in _LAZY:

@@ -1,4 +1,5 @@
 from servotwin import bench as bench
+from servotwin import datasheet as datasheet
 from servotwin import errors as errors
 from servotwin import identification as identification
 from servotwin import linear as linear
@@ -10,6 +11,9 @@ from servotwin import plotting as plotting
 from servotwin import signals as signals
 from servotwin import simulation as simulation
 from servotwin import units as units
+from servotwin.datasheet import DataSheet as DataSheet
+from servotwin.datasheet import curves as curves
+from servotwin.datasheet import servos_that_lift as servos_that_lift
 from servotwin.identification import Fit as Fit
 from servotwin.identification import Log as Log
 from servotwin.identification import Sheet as Sheet

@@ -5,11 +5,16 @@ A message is one line made of three parts: what was looked at, what was got, and
 
 from __future__ import annotations
 
-from difflib import get_close_matches
+import difflib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+
+_SUGGESTIONS = 5
+_NEAR = 0.4  # share of letters that two names have in common, in their order
+_LONGEST_NAME = 200
 
 
 class ServotwinError(Exception):
@@ -85,16 +90,35 @@ class ServoFileError(InputError):
 
 
 class UnknownNameError(InputError, KeyError):
-    """A name that is not in a known set; suggests the nearest one."""
+    """A name that is not in a known set; suggests the nearest one, or of a set too large to be listed the nearest five.
 
-    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+    Parameters
+    ----------
+    kind, name : str
+        What it should be, and what it is.
+    known : iterable of str
+        All that it may be.
+    allowed : str, optional
+        What to say instead of listing them all.
+    meant : str, optional
+        The one of them that people call so.
+
+    Examples
+    --------
+    >>> str(UnknownNameError("servo", "sg90", ["towerpro-sg90", "towerpro-sg92r"], allowed="an id"))
+    "unknown servo 'sg90'; did you mean 'towerpro-sg90' or 'towerpro-sg92r'?: allowed: an id"
+    """
+
+    def __init__(self, kind: str, name: str, known: Iterable[str], *, allowed: str | None = None,
+                 meant: str | None = None) -> None:
         self.name = name
         self.known = tuple(known)
-        begun = [known for known in self.known if len(str(name)) > 2 and str(known).startswith(str(name))]
-        near = begun[:1] or get_close_matches(str(name), self.known, n=1, cutoff=0.4)
-        self.suggestion = near[0] if near else None
-        hint = f"; did you mean {self.suggestion!r}?" if near else ""
-        super().__init__(f"unknown {kind} {_shown(name)}{hint}", allowed=", ".join(self.known) or "none")
+        near = [] if meant is None else [meant]
+        near += [one for one in _nearest(str(name), self.known) if one != meant]
+        self.suggestions = tuple(near[:1 if allowed is None else _SUGGESTIONS])
+        self.suggestion = self.suggestions[0] if near else None
+        hint = f"; did you mean {_either(self.suggestions)}?" if near else ""
+        super().__init__(f"unknown {kind} {_shown(name)}{hint}", allowed=allowed or ", ".join(self.known) or "none")
 
     def __str__(self) -> str:
         return InputError._message(self)  # KeyError would print the repr
@@ -152,6 +176,31 @@ def _rebuild(kind: type[InputError], args: tuple[object, ...], state: dict[str, 
     error.args = args
     error.__dict__.update(state)
     return error
+
+
+def _nearest(name: str, known: tuple[str, ...]) -> list[str]:
+    """Return what is near a name, the nearest first: what begins so, what holds it, what is spelled alike."""
+    asked = _letters(name)
+    if not 0 < len(asked) < _LONGEST_NAME:
+        return []
+    scores: dict[str, float] = {}
+    for one in known:
+        letters = _letters(str(one))
+        parts = (letters, *map(_letters, str(one).replace("-", ".").split(".")))
+        if len(asked) > 2 and asked in letters:
+            scores[one] = (3.0 if letters.startswith(asked) else 2.0) + len(asked) / len(letters)
+        else:
+            scores[one] = max(difflib.SequenceMatcher(None, part, asked).ratio() for part in parts)
+    return sorted((one for one in scores if scores[one] >= _NEAR), key=lambda one: -scores[one])
+
+
+def _letters(name: str) -> str:
+    return "".join(c for c in name.lower() if c.isalnum())
+
+
+def _either(names: tuple[str, ...]) -> str:
+    *most, last = map(repr, names)
+    return f"{', '.join(most)} or {last}" if most else last
 
 
 def _shown(value: object) -> str:

@@ -35,7 +35,7 @@ def nothing_new(folder, before):
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    (["hitec-hs-755", *STEP], "did you mean 'hitec-hs-755hb'?"),
+    (["hitec-hs-755", *STEP], "did you mean 'hitec-hs-755hb', "),
     (["none.toml", *STEP], "none.toml: no such file"),
     ([".", *STEP], "unknown servo '.'"),
     (["./", *STEP], "folder"),
@@ -143,7 +143,7 @@ def test_loads(simulate, tmp_path, load, said):
 @pytest.mark.parametrize(("change", "said"), [
     ("motor.x=1", "unknown parameter 'motor.x'"),
     ("motor.armature_resistence=1", "did you mean 'motor.armature_resistance'?"),
-    ("motor.armature_resistance=nan", "motor.armature_resistance: got nan, allowed: a positive number [ohm]"),
+    ("motor.armature_resistance=nan", "--set motor.armature_resistance: got 'nan', allowed: a number in SI"),
     ("motor.armature_resistance=-1", "got -1.0"),
     ("motor.armature_resistance=a", "got 'a'"),
     ("motor.armature_resistance=1,2", "got (1.0, 2.0)"),
@@ -210,3 +210,26 @@ def test_json_tells_errors_as_json_too(simulate, cli):
 
 def test_a_report_needs_a_folder_with_a_name(cli):
     assert "--out" in cli("paper", "--out", "").error
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    ("supply.open_circuit_voltage=5ohm", "got '5ohm', allowed: a number in SI, or a number with a unit: V, mV"),
+    ("electronics.deadband=8 us us", "got '8 us us'"),
+    ("electronics.deadband=nan", "got 'nan'"),
+    ("motor.armature_resistance=-3ohm", "got -3.0, allowed: a positive number [ohm]"),
+    ("supply.voltage=5V", "unknown parameter 'supply.voltage'; did you mean 'supply.open_circuit_voltage'?"),
+    ("voltage=5V", "did you mean 'supply.open_circuit_voltage', "),
+    ("gear.ratio=200", "did you mean 'gear.gear_reduction'?"),
+])
+def test_units_and_names_of_set(simulate, change, said):
+    assert said in simulate(*STEP, "--set", change).error
+
+
+@pytest.mark.parametrize(("name", "first", "count"), [
+    ("hs755", "hitec-hs-755", 5), ("mg996", "towerpro-mg996r", 5), ("sg90", "towerpro-sg90", 5),
+    ("HS-755HB", "hitec-hs-755hb", 5), ("futaba", "futaba-s", 5), ("zzz", None, 0)])
+def test_an_unknown_servo_gets_suggestions(cli, name, first, count):
+    error = cli("catalog", "show", name).error
+    assert error.count("', '") + error.count("' or '") == max(count - 1, 0)
+    assert first is None or f"did you mean '{first}" in error
+    assert error.endswith("allowed: an id that `servotwin catalog list` shows, or a servo file")

@@ -81,7 +81,7 @@ def test_check_warns_of_calibrations_that_disagree(cli, tmp_path):
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    (["show", "hitec-hs-755"], "did you mean 'hitec-hs-755hb'?"),
+    (["show", "hitec-hs-755"], "did you mean 'hitec-hs-755hb', "),
     (["check", "none.toml"], "none.toml: no such file"),
     (["check", "broken.toml"], "broken.toml: is not valid TOML"),
     (["check", "."], "folder"),
@@ -105,3 +105,19 @@ def test_a_sheet_may_hold_anything(cli, tmp_path):
     found = cli("catalog", "show", "mine.toml", "--json").data
     assert (found["stall_torque"], found["supply_voltage"], found["speed"]) == (None, None, None)
     assert found["parameters"] == []
+
+
+def test_the_twins_torque_stands_beside_the_sheets(cli):
+    found = {servo["id"]: servo for servo in cli("catalog", "list", "--json").data}
+    # K_out (V - V_d)/R - tau_c by hand for the HS-755HB, whose file has no load friction; DF05BB follows its sheet
+    assert found[SERVO]["twin_stall_torque"] == pytest.approx(1.04 * (6.0 - 0.4) / 3.041 - 0.2634, rel=2e-3)
+    other = found["dfrobot-df05bb"]
+    assert other["twin_stall_torque"] == pytest.approx(other["stall_torque"], rel=2e-3)
+    page = cli("catalog", "show", SERVO).out
+    assert "stall torque at 6 V: 1.29 N m by the sheet, 1.65 N m by these parameters" in page
+
+
+def test_a_servo_without_motor_has_no_torque(cli, tmp_path):
+    (tmp_path / "mine.toml").write_text('name = "x"\n')
+    assert cli("catalog", "show", "mine.toml", "--json").data["twin_stall_torque"] is None
+    assert "stall torque" not in cli("catalog", "show", "mine.toml").out

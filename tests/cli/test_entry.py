@@ -110,7 +110,7 @@ def test_an_interrupt_is_one_line_and_130(child_environment, tmp_path):
             command.flush()
             child.send_signal(signal.SIGINT)
         out, err = child.communicate(timeout=30)  # with the end closed no read can block a signal that came just before
-    assert (child.returncode, out, err) == (130, "", "servotwin: error: interrupted\n")
+    assert (child.returncode, out, err) == (130, "", "servotwin: interrupted\n")
     assert [path.name for path in tmp_path.iterdir()] == ["command.csv"]
 
 

@@ -172,7 +172,7 @@ def test_an_interrupt_before_the_first_step_leaves_nothing(fit, tmp_path, monkey
     monkeypatch.setattr(Search, "run", interrupted)
     ended = fit(*QUICK, "--out", "my.toml")
     assert (ended.code, ended.out) == (130, "")
-    assert ended.err == "servotwin: error: interrupted\n"
+    assert ended.err == "servotwin: interrupted\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -261,3 +261,70 @@ def test_the_same_words_give_the_same_numbers(fit):
     first.pop("seconds"), second.pop("seconds")
     assert first == second
     assert np.isfinite(first["estimates"]["output_inertia"]["value"])
+
+
+def test_the_supply_of_the_logs_is_that_of_the_servo_that_is_saved(cli, tmp_path):
+    """Logs at 5 V gave a servo of 6 V, that of the sheet."""
+    logs = fit_logs.write_logs(tmp_path / "runs", count=2)
+    for file in logs.glob("*.json"):
+        said = json.loads(file.read_text())
+        file.write_text(json.dumps({**said, "parameters": {"supply.open_circuit_voltage": 5.0}}))
+    words = [logs, *QUICK, "--no-intervals", "--holdout", "0", "--set", "motor.armature_resistance=3.1ohm", "--force"]
+    assert cli("fit", *words, "--out", "my.toml", "--json").data["set"] == ["motor.armature_resistance"]
+    servo = st.load_servo(tmp_path / "my.toml")
+    voltage, resistance = servo.source("supply.open_circuit_voltage"), servo.source("motor.armature_resistance")
+    assert (voltage.value, voltage.origin) == (5.0, "measured")
+    assert "logs" in voltage.source
+    assert (resistance.origin, resistance.source) == ("assumed", "set by --set")
+    file.write_text(json.dumps({**said, "parameters": {"supply.open_circuit_voltage": 6.5}}))  # they disagree
+    cli("fit", *words, "--out", "my.toml")
+    assert st.load_servo(tmp_path / "my.toml").supply.open_circuit_voltage == 6.0
+
+
+# ---------------------------------------------------------------------------------------- tables of other loggers
+
+def foreign(folder, end="\n"):
+    """Write a log of the known servo as another logger would."""
+    log = fit_logs.made_logs(1)[0]
+    rows = [f"{1e3 * t:.0f};{np.degrees(u):.6f};{90.0 - np.degrees(q):.6f}".replace(".", ",")
+            for t, u, q in zip(log.time, log.command, log.measured["output_angle"], strict=True)]
+    path = folder / "mine.csv"
+    path.write_text("\n".join(["millis;target;pos", *rows]) + end, encoding="utf-8")
+    return path.name
+
+
+def test_columns_are_shown_changed_and_kept(cli, tmp_path):
+    path = foreign(tmp_path, end="\n700;60,0;3")
+    guessed = cli("validate", fit_logs.SERVO, path, "--model", "bounded")
+    assert guessed.code == 0
+    assert guessed.out.splitlines()[:5] == [
+        "column  signal         unit  known",
+        "millis  time           ms    guessed from its name",
+        "target  command_angle  deg   guessed from its values, 0 to 60",
+        guessed.out.splitlines()[3], f"{path}: line 37 does not end in a newline and was left out"]
+    assert re.fullmatch(r"pos +output_angle +deg +guessed from its values, .*", guessed.out.splitlines()[3])
+    assert [file.name for file in tmp_path.iterdir()] == [path]  # nothing is written unasked
+    said = cli("fit", path, *QUICK, "--columns", "angle=pos:-deg+90")
+    assert re.search(r"^pos +output_angle +-deg\+90 +--columns$", said.out, re.MULTILINE)
+    assert "written  mine.json, which keeps --columns" in said.out.splitlines()
+    again = cli("fit", path, *QUICK, "--json")
+    assert {one["known"] for one in again.data["reading"][0]["columns"]} == {"sidecar"}
+    assert again.data["estimates"]["output_inertia"]["value"] == pytest.approx(fit_logs.OUTPUT_INERTIA, rel=0.03)
+    before = (tmp_path / "mine.json").read_bytes()
+    other = cli("validate", fit_logs.SERVO, path, "--columns", "angle=pos:deg")
+    assert (other.code, other.out) == (2, "")
+    assert "pos:-deg+90 there, pos:deg here" in other.error
+    assert "--force" in other.error
+    assert (tmp_path / "mine.json").read_bytes() == before
+
+
+@pytest.mark.parametrize(("words", "said"), [
+    (["--columns", "angle=position:deg"], "column of output_angle: got 'position', allowed: millis, target, pos"),
+    (["--columns", "angle=pos:kg"], "--columns output_angle=pos: got 'kg', allowed: deg, rad"),
+    (["--joint", "elbow:deg"], "no dataset of LeRobot"),
+])
+def test_columns_that_cannot_be(cli, tmp_path, words, said):
+    ended = cli("fit", foreign(tmp_path), *QUICK, *words)
+    assert ended.code == 2
+    assert said in ended.error
+    assert len(list(tmp_path.iterdir())) == 1

@@ -35,8 +35,9 @@ def test_the_example_works_as_documented(cli, tmp_path):
 def test_the_summary_says_what_matters(simulate):
     ended = simulate("--step", "0:180", "--load", "inertia=1e-3")
     labels = [line.split("  ")[1] for line in ended.out.splitlines()[1:] if not line.startswith("    ")]
-    assert labels == ["command", "load", "final angle", "steady error", "rise time", "settling time", "overshoot",
-                      "peak speed", "peak current", "energy", "status", "solved", "assumed", "ignored"]
+    assert labels == ["command", "load", "final angle", "time to get there", "holding error", "rise time",
+                      "settling time", "overshoot", "peak speed", "current",
+                      "energy", "status", "solved", "assumed", "ignored"]
     assert "model pulse" in ended.out
     assert "step 0 to 180 deg at 0.1 s" in ended.out
     assert "closed form" in ended.out
@@ -117,9 +118,12 @@ def test_loads_add_up(simulate, tmp_path):
 
 def test_set_replaces_a_parameter(simulate):
     words = ["--step", "0:90", "--json"]
-    plain, changed = (simulate(*words, *more).data for more in ([], ["--set", "supply.open_circuit_voltage=4.8"]))
+    plain, changed, again = (simulate(*words, *more).data for more in (
+        [], ["--set", "supply.open_circuit_voltage=4.8"], ["--set", "supply.open_circuit_voltage=4800mV"]))
     assert changed["peak_current"] < plain["peak_current"]
-    assert "supply.open_circuit_voltage" in changed["assumed"]
+    assert again == changed
+    assert (plain["set"], changed["set"]) == ([], ["supply.open_circuit_voltage"])
+    assert "supply.open_circuit_voltage" not in changed["assumed"]
     assert simulate(*words, "--set", "electronics.off_state=coast").code == 0
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -62,6 +63,24 @@ def test_the_spread_of_the_file_and_draws_of_a_table(sweep, tmp_path):
     assert found.data["definition"]["draws"] == ["load.inertia", "motor.torque_constant"]
 
 
+def test_what_follows_and_what_does_not_matter_is_said(sweep):
+    found = sweep(*STEP, "--from-file", "--lanes", "60", "--metric", "slew_rate")
+    lines = found.out.splitlines()
+    assert any(line.startswith("  follow") and "friction.coulomb_torque_backward" in line for line in lines)
+    assert any(line.startswith("sheet.no_load_speed  ") and "°/s" in line for line in lines)
+    assert not any(line.startswith("gear.gear_reduction") for line in lines)
+    assert lines[-1].endswith("others that vary do not move it")
+
+
+def test_a_file_without_spreads_has_nothing_to_draw(cli, tmp_path):
+    st.load_servo(SERVO).replace({}).save(tmp_path / "a.toml")
+    text = re.sub(r", (std|lower|upper) = [-0-9.e]+", "", (tmp_path / "a.toml").read_text(encoding="utf-8"))
+    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+    assert "whose file states no spread" in cli("sweep", "a.toml", *STEP, "--from-file").error
+    assert "nothing that varies moves it" in cli("sweep", "a.toml", *STEP, "--vary", "stops.restitution=uniform:0..0.5",
+                                                 "--lanes", "4").out
+
+
 def test_failed_lanes_are_shown(sweep, tmp_path):
     (tmp_path / "draws.csv").write_text("load.spring.stiffness\n0.1\n1e27\n")
     ended = sweep(*STEP, "--draws", "draws.csv", "--load", "spring=0.1")
@@ -109,6 +128,10 @@ def test_truncation(sweep):
     ([*VARY, "--out", "file"], "file is no folder"),
     ([*VARY, "--out", "none/study"], "none/study cannot be made (no folder none)"),
     ([*VARY, "--out", "study", "--format", "xlsx"], "csv, parquet"),
+    (["--from-file", "--set", "motor.armature_resistance=nan"], "motor.armature_resistance: got nan"),
+    (["--vary", "sheet.stall_torque=normal:5V"], "unit of a torque: got 'V'"),
+    (["--vary", "sheet.gear_efficiency=uniform:0.8..1.2"], "allowed: a positive number, at most 1 [1]"),
+    (["--vary", "output_torque_constant=normal:5%"], "from which nothing of 'hitec-hs-755hb' follows"),
     (["--draws", "none.csv"], "none.csv cannot be read (No such file or directory)"),
     (["--draws", "file"], "file: got 'no rows'"),
     (["--draws", "words.csv"], "draws of motor.torque_constant"),
@@ -153,7 +176,7 @@ def test_an_interrupt_says_how_to_go_on(child_environment, tmp_path):
         _, err = child.communicate(timeout=60)
     assert child.returncode == 130
     assert err.splitlines() == ["servotwin: what is finished is in study; the same command with --resume goes on",
-                                "servotwin: error: interrupted"]
+                                "servotwin: interrupted"]
     found = np.genfromtxt(tmp_path / "study" / "lanes-00000.csv", delimiter=",", skip_header=1, usecols=(0, 1, 2))
     assert np.isfinite(found).all()
 

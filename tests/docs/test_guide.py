@@ -28,7 +28,8 @@ def test_python(page, tmp_path, monkeypatch):
 
 def commands():
     return list(dict.fromkeys(
-        line[2:] for page in PAGES for block in blocks(page, "console") for line in block.code.splitlines()
+        line[2:] for page in PAGES for block in blocks(page, "console")
+        for line in re.sub(r"\\\n\s*", "", block.code).splitlines()
         if line.startswith("$ servotwin ")))
 
 

@@ -204,8 +204,7 @@ def test_noise_of_the_potentiometer_is_not_drawn():
 
 # ---------------------------------------------------------------------------------------- Jacobian
 
-@pytest.mark.parametrize("kind", ["pulse", "bounded"])
-@pytest.mark.parametrize("central", [False, True], ids=["forward", "central"])
+@pytest.mark.parametrize(("kind", "central"), [("pulse", True), ("bounded", False)], ids=["central", "forward"])
 def test_jacobian_is_that_of_single_simulations(kind, central):
     """All kinds of numbers: servo, lumps, load, delays, offset, start angle and speed; and of a current beside it."""
     model, free = (st.PulseServo, FREE) if kind == "pulse" else (st.BoundedServo, BOUNDED)

@@ -61,9 +61,9 @@ def test_files_that_are_no_lists(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         read_sheets(tmp_path / "none.csv")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="not readable as CSV"):
+    with pytest.raises(InputError, match="an empty file"):
         read_sheets(tmp_path / "binary.csv")
-    with pytest.raises(InputError, match="not readable as CSV"):
+    with pytest.raises(InputError, match="cannot be read"):
         read_sheets(tmp_path)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from servotwin.errors import InputError
-from servotwin.identification import Sheet, SheetPoint, motor_range
+from servotwin.identification import Sheet, SheetPoint, motor_range, sheet_contradictions
 from servotwin.physics import motor_from_sheet
 
 NAMES = ("resistance", "output_torque_constant", "gear_efficiency", "no_load_current", "no_load_torque",
@@ -190,6 +190,24 @@ def test_bad_figures_are_refused_in_one_line(change, named):
         SheetPoint(**(facts | change))
     assert caught.value.allowed
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("main", [(6.0,), (4.8, 6.0)])
+@pytest.mark.parametrize(("name", "at"), [("stall_current", 7.2), ("no_load_current", 7.2)])
+def test_a_current_at_a_voltage_without_torque_and_speed_counts(main, name, at):
+    """A known motor: what its sheet prints of the other current is given at one more voltage only."""
+    motor = {"R": 3.0, "K": 0.9, "eta": 0.8, "I_0": 0.2, "drop": 0.4}
+    alone = printed(at, **motor)
+    points = [printed(V, **motor, **{name: False}) for V in main]
+    found = motor_range(sheet(*points, SheetPoint(supply_voltage=at, **{name: getattr(alone, name)})))
+    for field, value in (("resistance", 3.0), ("output_torque_constant", 0.9), ("gear_efficiency", 0.8),
+                         ("no_load_current", 0.2)):
+        assert getattr(found, field).value == pytest.approx(value, rel=1e-6)
+
+
+def test_a_stall_current_elsewhere_that_cannot_be_is_found():
+    found = sheet_contradictions(sheet(HS_755HB[1], point(4.8, I_s=0.4)))
+    assert "at 4.8 V and 6 V" in found[0].text
 
 
 @pytest.mark.parametrize(("points", "said"), [

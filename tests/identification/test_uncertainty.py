@@ -179,7 +179,7 @@ def test_intervals_cover_the_truth_with_correlated_noise_and_huber():
 @pytest.mark.parametrize(("rho", "cluster"), [(0.7, 0.0), (0.9, 0.0), (0.0, 0.3)])
 def test_many_logs_speak_for_themselves(rho, cluster):
     """Noise that lasts, or a servo that is a little different in each log: the scatter between logs knows."""
-    share, methods = covered(40, 30, 4, rho=rho, cluster=cluster, draws=120)
+    share, methods = covered(40, 30, 4, rho=rho, cluster=cluster, draws=60)
     assert 91.0 < share < 98.5
     assert methods == {"between"}
 

@@ -1,7 +1,6 @@
 """Loads add up: the sum acts on the shaft as its parts do together, in any order."""
 
 import functools
-import itertools
 import math
 import operator
 import pickle
@@ -217,10 +216,11 @@ def refused(call, *words):
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
-@pytest.mark.parametrize(("name", "value"), [
-    pair for pair in itertools.product(MAKERS, BAD) if pair != ("Pendulum(inertia)", None)], ids=str)
-def test_what_is_no_finite_number_is_refused(name, value):
-    refused(lambda: MAKERS[name](value), name, "finite number")
+@pytest.mark.parametrize("name", MAKERS)
+def test_what_is_no_finite_number_is_refused(name):
+    for value in BAD:
+        if (name, value) != ("Pendulum(inertia)", None):  # then it is that of a point mass
+            refused(lambda value=value: MAKERS[name](value), name, "finite number")
 
 
 @pytest.mark.parametrize("name", MAKERS)

@@ -54,13 +54,14 @@ def fine(plant, torque, drive, q, w, end):
     return q, w
 
 
-@pytest.mark.parametrize(("zones", "torque", "drive"), list(product(DEAD_ZONES, LOADS, (-1.0, 0.0, 1.0))))
-@pytest.mark.parametrize("w", [0.0, 4.0, -9.0])
-def test_legs_against_a_fine_solution(zones, torque, drive, w):
+@pytest.mark.parametrize("zones", DEAD_ZONES)
+@pytest.mark.parametrize("torque", LOADS)
+def test_legs_against_a_fine_solution(zones, torque):
     plant = Plant(**PLANT | {"D_drive": zones[0], "D_off": zones[1]})
-    q, speed, done = legs.slide(legs.shaft_of(plant, torque), drive, 0.3, w, 0.06)
-    assert done == 1.0
-    assert (q, speed) == pytest.approx(fine(plant, torque, drive, 0.3, w, 0.06), abs=2e-8)
+    for drive, w in product((-1.0, 0.0, 1.0), (0.0, 4.0, -9.0)):
+        q, speed, done = legs.slide(legs.shaft_of(plant, torque), drive, 0.3, w, 0.06)
+        assert done == 1.0
+        assert (q, speed) == pytest.approx(fine(plant, torque, drive, 0.3, w, 0.06), abs=2e-8), (drive, w)
 
 
 @pytest.mark.parametrize("time", [1e-12, 1e-6, 1e-3, 1.0, 100.0])

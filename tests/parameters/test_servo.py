@@ -49,7 +49,7 @@ def test_names_follow_the_order_of_the_groups(servo):
 def test_replace_changes_what_it_names_and_nothing_else(servo):
     other = servo.replace({NAME: 3.1, "gear.gear_reduction": 200})
     assert (other.get(NAME), other.gear.gear_reduction) == (3.1, 200.0)
-    assert (other.source(NAME).origin, other.source(NAME).source) == ("assumed", "replaced")
+    assert (other.source(NAME).origin, other.source(NAME).source) == ("assumed", "set by the user")
     assert other.source("motor.torque_constant") == servo.source("motor.torque_constant")
     assert (other.name, other.title) == (servo.name, servo.title)
     assert servo.get(NAME) == 3.0

@@ -13,8 +13,12 @@ from servotwin.physics import forward_efficiency
 from servotwin.physics.sheet import (
     load_share,
     motor_from_sheet,
+    no_load_current_of,
     sheet_efficiency,
     sheet_growth,
+    sheet_resistance,
+    sheet_stall_torque,
+    sheet_torque_constant,
     stall_current_for,
 )
 
@@ -170,6 +174,23 @@ def test_the_stall_current_for_an_efficiency_is_that_of_the_motor(sheet):
                               sheet["no_load_current"], sheet["gear_efficiency"], sheet["drop_voltage"])
     assert found == pytest.approx(motor.stall_current, rel=1e-6)
     assert found > sheet["no_load_current"]
+
+
+@given(sheets, st.floats(0.0, 1.0))
+def test_a_motor_has_the_speed_and_the_torque_of_its_sheet_whatever_is_viscous(sheet, share):
+    V, V_d, I_0, eta, T_s, w_0 = (sheet[name] for name in (
+        "supply_voltage", "drop_voltage", "no_load_current", "gear_efficiency", "stall_torque", "no_load_speed"))
+    I_s = stall_current_for(V, T_s, w_0, I_0, eta, V_d, share)
+    R = sheet_resistance(V, I_s, V_d)
+    K = sheet_torque_constant(V, w_0, I_0, R, V_d)
+    assert I_s > I_0
+    if I_0 < 0.99 * I_s:  # else speed and torque are differences of nearly equal numbers
+        friction = K * I_0 * (1.0 - load_share(eta))
+        assert sheet_stall_torque(K, I_s, I_0, eta, share) == pytest.approx(T_s, rel=1e-6)
+        again = no_load_current_of(V, R, K, (1.0 - share) * friction, share * friction / w_0, 1.0 - load_share(eta),
+                                   V_d)
+        assert again == pytest.approx(I_0, rel=1e-6)
+        assert (V - V_d - R * again) / K == pytest.approx(w_0, rel=1e-5)
 
 
 @given(st.floats(0.05, 1.0))

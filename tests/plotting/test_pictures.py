@@ -127,3 +127,12 @@ def test_formula():
     assert made.width > 0.0
     with pytest.raises(ValueError, match="Expected"):
         plotting.formula_svg(r"$\dfrac{k_a$")
+
+
+def test_points_that_come_later_lie_in_front():
+    """The measured points of the paper's figures 25 to 27 were hidden by the simulated ones."""
+    drawn = [plotting.Curve(label, [0.0, 1.0], [0.0, 1.0], points=True, style=style)
+             for label, style in (("simulated", 3), ("measured", 0))]
+    figure = plotting.curves(drawn, x_label="x", y_label="y")
+    heights = [container.lines[0].get_zorder() for container in figure.axes[0].containers]
+    assert heights[0] < heights[1]

@@ -68,3 +68,22 @@ def test_every_metric_has_words_and_a_unit_that_fits(metric):
 ])
 def test_values_are_readable(value, dimension, text):
     assert plotting.readable(value, dimension) == text
+
+
+@pytest.mark.parametrize("metric", ["rise_time", "overshoot"])
+def test_labels_stand_apart(metric):
+    """From a study of 12 parameters whose overshoot only rises: labels of bars lay on the names of the parameters."""
+    names = ("electronics.voltage_to_pulse_gain", "motor.rotor_inertia", "friction.load_friction_external_stribeck",
+             "supply.open_circuit_voltage", "electronics.off_state")
+    ends = ((0.0, 0.0), (0.0, 0.038), (0.017, 0.0), (0.0, 0.0019), (0.0, 0.0))
+    if metric == "rise_time":
+        ends = ((0.184, 0.185), (0.2, 0.17), (0.1, 0.185), (0.185, 0.186), (0.1849, 0.1851))
+    values = [(1.2345e-3, 2.3456e-3)] * 4 + [("brake", "coast")]
+    bars = tuple(Bar(name, *value, *end, 0.1, 0.2) for name, value, end in zip(names, values, ends, strict=True))
+    figure = plotting.tornado(Tornado(metric, 0.0 if metric == "overshoot" else 0.185, bars))
+    figure.canvas.draw()
+    ax = figure.axes[0]
+    boxes = [text.get_window_extent() for text in (*ax.texts, *ax.get_yticklabels())]
+    for k, one in enumerate(boxes):
+        assert not any(one.overlaps(other) for other in boxes[k + 1:])
+    assert all(0.0 <= box.x0 and box.x1 <= figure.bbox.x1 for box in boxes)

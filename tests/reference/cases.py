@@ -26,7 +26,7 @@ from .plant import Load, Plant, Signal, no_torque
 Groups = dict[str, dict[str, float]]
 Spec = dict[str, Any]
 
-DURATION = 1.5
+DURATION = 1.0
 GRAVITY = 9.80665
 LOADS = ("free", "inertia", "viscous", "constant", "coulomb", "pendulum", "spring", "recorded", "mixture")
 COMMANDS = ("step", "ramp", "sine", "chirp", "prbs", "samples")

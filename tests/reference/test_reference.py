@@ -193,7 +193,7 @@ def test_mean_voltage_servo_of_the_specification() -> None:
 
 def test_power_balance_of_the_bounded_servo() -> None:
     """Kinetic energy gained = work of motor, drag, friction and load, by quadrature from event to event."""
-    for seed in range(6):
+    for seed in range(4):
         c = random_case(np.random.default_rng(seed), stops=False)
         P = c.plant
         cuts = {t for t, _ in solve_bounded(P, c.v_c, DURATION, [], breaks=c.breaks).events}
@@ -227,7 +227,7 @@ def test_power_balance_of_the_averaged_servo() -> None:
 
 def test_bounded_servo_does_not_depend_on_step_and_tolerance() -> None:
     times = np.linspace(0.0, DURATION, 51)
-    for seed in range(100, 112):
+    for seed in range(100, 106):
         c = random_case(np.random.default_rng(seed))
         a = solve_bounded(c.plant, c.v_c, DURATION, times, breaks=c.breaks)
         b = solve_bounded(c.plant, c.v_c, DURATION, times, breaks=c.breaks, rtol=1e-11, max_step=7e-4)
@@ -239,7 +239,7 @@ def test_bounded_servo_does_not_depend_on_step_and_tolerance() -> None:
 @pytest.mark.parametrize("solver", [solve_averaged, solve_averaged_inductive])
 def test_averaged_servos_do_not_depend_on_tolerance(solver) -> None:
     times = np.linspace(0.0, DURATION, 51)
-    for seed in range(200, 208):
+    for seed in range(200, 204):
         c = random_case(np.random.default_rng(seed))
         a = solver(c.plant, c.v_c, DURATION, times, breaks=c.breaks)
         b = solver(c.plant, c.v_c, DURATION, times, breaks=c.breaks, tol=1e-10)
@@ -295,9 +295,9 @@ def test_averaged_servo_against_thirty_digits() -> None:
             fric = m(N) * m(P.F1) * mpmath.tanh(m(P.k) * N * w)
             return [w, (N * m(P.k_a) * i_a - N**2 * m(P.B_m) * w - fric) / (N**2 * m(P.J_m))]
 
-        exact = mpmath.odefun(f, 0, [m(1), m(0)])(m(0.03125))
+        exact = mpmath.odefun(f, 0, [m(1), m(0)])(m(0.015625))
         exact = [float(x) for x in exact]
-    got = solve_averaged(P, lambda t: 1.25 + 0.125 * math.sin(20 * t), 0.03125, np.array([0.03125]), (1.0, 0.0))
+    got = solve_averaged(P, lambda t: 1.25 + 0.125 * math.sin(20 * t), 0.015625, np.array([0.015625]), (1.0, 0.0))
     assert abs(got.q[0] - exact[0]) < 1e-14
     assert abs(got.w[0] - exact[1]) < 1e-12
 

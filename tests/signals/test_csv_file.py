@@ -48,6 +48,8 @@ def refused(path, *words, **options):
     "time_ms,pulse_width_ms\n0,1.5\n500,1.6\n",
     "time,pulse_width\n0,0.0015\n0.5,1.6e-3\n",
     "time,pulse_width_s\n+0,.0015\n5e-1,16.0E-4\n",
+    "time_s;pulse_width_us\n0,0;1500\n0,5;1600\n", "# a bench\ntime_s\tpulse_width_us\n0\t1500\n0.5\t1600\n",
+    "time_s pulse_width_us\n0 1500\n0.5 1600\n",
 ])
 def test_one_command_in_many_hands(file, content):
     signal = signals.from_csv(file(content))
@@ -108,11 +110,11 @@ def test_what_python_writes_is_read_back_exactly(file, gaps, data):
     ("time_s\n0\n", ("one of pulse_width_us",)),
     ("time_s,output_angle_deg\n0,1\n", ("command columns", "output_angle_deg", "one of pulse_width_us")),
     ("Time_s,pulse_width_us\n0,1500\n", ("a time column", "Time_s")),
-    ("time_s;pulse_width_us\n0;1500\n", ("a time column", "time_s;pulse_width_us")),
+    ("time_s;pulse_width_us\n0,5;1500\n1.0;1600\n", ("line 3, time_s", "'1.0'", "decimal comma")),
     ("time_s,time_s,pulse_width_us\n0,1,1500\n", ("time_s 2 times", "once")),
     ("time_s,pulse_width_us,pulse_width_us\n0,1500,1600\n", ("pulse_width_us 2 times", "once")),
     ("time_s,pulse_width_us\n0,abc\n", ("line 2, pulse_width_us", "'abc'", "a number")),
-    ("time_s,pulse_width_us\n\n\n0,1500\n1,\n", ("line 5, pulse_width_us", "''")),
+    ("time_s,pulse_width_us\n\n\n0,1500\n1,\n", ("line 5, pulse_width_us", "nothing")),
     ("time_s,pulse_width_us\n0,1500\n1\n", ("line 3, pulse_width_us", "nothing")),
     ("time_s,pulse_width_us\n0,1500 us\n", ("line 2", "'1500 us'")),
     ("time_s,pulse_width_us\nnull,1500\n", ("line 2, time_s", "'null'")),
@@ -124,14 +126,13 @@ def test_what_python_writes_is_read_back_exactly(file, gaps, data):
     ("time_s,pulse_width_us\n-inf,1500\n", ("time of sample 0",)),
     ("time_s,pulse_width_us\n0,0\n", ("pulse width", "positive")),
     ("time_s,pulse_width_us\n0,-1500\n", ("pulse width", "positive")),
-    (b"time_s,pulse_width_us\n0,1500\0\n", ("line 2", "1500")),
-    (b"\0\0\0", ("header without rows",)),
-    (b"\0\n\0\n", ("a time column",)),
-    (b"\xff\xfet\0i\0m\0e\0", ("not readable as CSV", "utf-8")),  # UTF-16
-    (b"time_s,pulse_width_\xb5s\n0,1500\n", ("not readable as CSV",)),  # Latin-1
-    (b"PK\x03\x04\x14\0\x06\0\xd0\x9f\xe2", ("not readable as CSV",)),  # a spreadsheet
+    (b"time_s,pulse_width_us\n0,1500\0\n", ("line 2", "a NUL")),
+    (b"\0\0\0", ("binary data",)), (b"\0\n\0\n", ("empty file",)),
+    (b"\xff\xfet\0i\0m\0e\0", ("header without rows",)),  # UTF-16
+    (b"time_s,pulse_width_\xb5s\n0,1500\n", ("pulse_width_µs", "one of pulse_width_us")),  # Latin-1
+    (b"PK\x03\x04\x14\0\x06\0\xd0\x9f\xe2", ("a zip archive or an Excel workbook",)),
     ('time_s,pulse_width_us\n0,"1500\n1,1600\n', ("line",)),  # a quote that never ends
-    (b"time_s,pulse_width_us\n0," + b"9" * 200_000 + b"\n", ("not readable as CSV", "field limit")),
+    (b'time_s,pulse_width_us\n0,"' + b"9" * 200_000 + b'"\n', ("not readable as CSV", "field limit")),
     ("\x1b[2Jtime_s,x\n0,1\n", ("a time column",)),
 ])
 def test_what_is_wrong_is_said_in_one_line(file, content, words):
@@ -154,7 +155,7 @@ def test_places_that_are_no_files(tmp_path, file):
     refused(tmp_path, "cannot be read", "directory")
     refused(path / "below.csv", "cannot be read")
     refused(tmp_path / ("n" * 300), "cannot be read")
-    refused(f"{path}\0", "not readable")
+    refused(f"{path}\0", "cannot be read")
 
 
 def read_or_refuse(path):

@@ -12,11 +12,12 @@ import pytest
 import servotwin as st
 from absent_values import ABSENT, HEAT, TABLES
 from servotwin import loads, signals
-from servotwin.simulation import many
+from servotwin.simulation import files, many
 from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.lane_loads import LOAD_NAMES, with_numbers
 from servotwin.simulation.lanes import run_lanes
 from servotwin.simulation.packing import Commands
+from servotwin.simulation.sweep import read_columns
 
 SERVO = st.load_servo("hitec-hs-755hb")
 MODELS = (st.BoundedServo, st.PulseServo)
@@ -278,6 +279,39 @@ def test_xarray(batch):
     assert data["load.inertia"].values.tolist() == [0.0, 1e-3, 2e-3]
     assert data["status"].dims == ("lane",)
     assert data.sizes == {"lane": 3, "time": 7}
+
+
+def test_pandas(batch):
+    pytest.importorskip("pandas")
+    frame = batch.to_dataframe()
+    assert frame.index.names == ["lane", "time"]
+    assert list(frame.columns) == ["output_angle", "drive"]
+    assert np.array_equal(frame.loc[2, "output_angle"], batch["output_angle"][2])
+    assert frame.attrs["units"] == batch.units
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_files_have_a_row_for_each_lane_and_time(batch, tmp_path, monkeypatch, ending):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow")
+    monkeypatch.setattr(files, "_ROWS", 10)  # one lane at a time
+    batch.save(tmp_path / f"a.{ending}")
+    found = read_columns(tmp_path / f"a.{ending}")
+    assert list(found) == ["lane", "load.inertia", "time_s", "output_angle_deg", "drive"]
+    assert found["lane"].tolist() == [lane for lane in range(3) for _ in range(7)]
+    assert found["load.inertia"].tolist() == [x for x in (0.0, 1e-3, 2e-3) for _ in range(7)]
+    assert found["time_s"] == pytest.approx(np.tile(batch.time, 3))
+    assert found["output_angle_deg"] == pytest.approx(np.degrees(batch["output_angle"]).ravel(), rel=1e-14)
+
+
+def test_files_are_kept_unless_asked(batch, tmp_path):
+    (tmp_path / "a.csv").write_text("mine")
+    for name, said in (("a.csv", "exists already"), ("a.txt", r"ends in \.csv or \.parquet"), ("none/a.csv", "none")):
+        with pytest.raises(st.errors.OutputError if name != "a.csv" else st.errors.OutputExistsError, match=said):
+            batch.save(tmp_path / name)
+    assert (tmp_path / "a.csv").read_text() == "mine"
+    batch.save(tmp_path / "a.csv", overwrite=True)
+    assert (tmp_path / "a.csv").read_text().startswith("lane,")
 
 
 def test_progress(capsys):

@@ -40,7 +40,7 @@ def test_every_combination_of_features(servo, stretcher):
     batch = st.simulate_many(model, COMMAND, duration=0.2, load=LOAD, parameters=parameters, output_times=TIMES,
                              seeds=7, outputs=("output_angle", "drive"))
     assert batch.ok
-    every = 1 if stretcher == "linear" else 3
+    every = 5 if stretcher == "linear" else 15  # any three features meet in all eight ways
     for lane in range(0, len(batch), every):
         own = {name: values[lane].item() for name, values in parameters.items()}
         plain = st.simulate(st.PulseServo(model.servo.replace(own)), COMMAND, duration=0.2, load=LOAD,

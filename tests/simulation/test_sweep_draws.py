@@ -159,7 +159,7 @@ def test_nothing_is_left_of_what_is_outside(model):
 def test_the_spread_of_the_file(model):
     found = d.stated(model)
     assert found["electronics.stretcher_gain"] == d.Uniform(60.0, 200.0)
-    assert found["potentiometer.feedback_gain"] == d.Normal(0.41966, 0.00225858)
+    assert found["electronics.one_shot_slope"] == d.Normal(0.00135937, 9.71642e-6)
     assert found["electronics.deadband"] == d.Uniform(8e-6, 16e-6)
     assert "motor.armature_inductance" not in found  # it is not read
     assert "supply.open_circuit_voltage" not in found  # it has none

@@ -118,14 +118,19 @@ def test_a_folder_that_is_there_is_refused_without_resume(model, folder):
         st.sweep(model, STEP, directory=folder, **OPTIONS)
 
 
+def test_all_that_differs_is_named(model, folder):
+    with pytest.raises(OutputError, match=r"seed is 4 and was 3; .*truncate is true and was false; repeat"):
+        st.sweep(model, STEP, directory=folder, resume=True, **{**OPTIONS, "seed": 4, "truncate": True})
+
+
 @pytest.mark.parametrize(("change", "said"), [
-    ({"seed": 4}, "seed: got 4, allowed: 3, as there"),
-    ({"lanes": 50}, "lanes: got 50, allowed: 40"),
-    ({"duration": 0.6}, "duration: got 0.6"),
-    ({"vary": {"load.inertia": "uniform:0..3e-3"}}, "vary.load.inertia: got 'uniform:0..3e-3'"),
+    ({"seed": 4}, "seed is 4 and was 3"),
+    ({"lanes": 50}, "lanes is 50 and was 40"),
+    ({"duration": 0.6}, "duration is 0.6 and was"),
+    ({"vary": {"load.inertia": "uniform:0..3e-3"}}, 'vary.load.inertia is "uniform:0..3e-3" and was'),
     ({"metrics": ["overshoot"]}, "metrics"),
     ({"load": st.loads.Constant(0.1)}, "load.torque"),
-    ({"chunk": 20}, "chunk: got 20"),
+    ({"chunk": 20}, "chunk is 20 and was"),
     ({"truncate": True}, "truncate"),
 ])
 def test_another_study_is_not_gone_on_with(model, folder, change, said):

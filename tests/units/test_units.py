@@ -19,6 +19,7 @@ TURN = 2.0 * math.pi
 KNOWN = [
     (50.0, "%", "number", 0.5), (1500.0, "us", "time", 0.0015), (20.0, "ms", "time", 0.02), (2.0, "min", "time", 120.0),
     (180.0, "deg", "angle", math.pi), (360.0, "deg/s", "speed", TURN), (60.0, "rpm", "speed", TURN),
+    (360.0, "deg/s", "output speed", TURN), (0.1, "deg/us", "angle per pulse", TURN / 3600.0 * 1e6),
     (1.0, "s/deg", "inverse speed", 180.0 / math.pi), (250.0, "mV", "voltage", 0.25), (285.0, "mA", "current", 0.285),
     (80.0, "mohm", "resistance", 0.08), (0.5, "mH", "inductance", 5e-4), (120.0, "uH", "inductance", 1.2e-4),
     (1.0, "mN m", "torque", 1e-3), (100.0, "kgf cm", "torque", GRAVITY), (13.2, "kgf cm", "torque", 1.2944778),
@@ -31,7 +32,8 @@ KNOWN = [
     (7.324, "mV/deg", "voltage per angle", 7.324e-3 * 180.0 / math.pi),
     (1.0, "V/deg", "voltage per angle", 180.0 / math.pi),
     (2.44, "mV", "voltage per count", 2.44e-3), (55.0, "g", "mass", 0.055), (12.0, "cm", "length", 0.12),
-    (3.0, "mm", "length", 0.003), (-0.15, "%/K", "inverse temperature", -1.5e-3),
+    (3.0, "mm", "length", 0.003), (10.0, "in", "length", 10 * INCH), (10.0, "lb", "mass", 10 * POUND),
+    (160.0, "oz", "mass", 10 * POUND), (-0.15, "%/K", "inverse temperature", -1.5e-3),
 ]
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import servotwin as st
 from reference import reference
-from reference.cases import DURATION, random_case
+from reference.cases import COMMANDS, DURATION, LOADS, random_case
 from validation.cases_in_words import command_of, load_of, servo_of
 
 TIMES = np.linspace(0.0, DURATION, 151)
@@ -21,9 +21,28 @@ def run(model_class, case):
                        output_times=TIMES).raise_if_failed()
 
 
+# Every load with two commands, so that each command is there three times; the servos are random
+PAIRS = [(load, COMMANDS[(k + turn) % len(COMMANDS)]) for turn in (0, 3) for k, load in enumerate(LOADS)]
+FIRST = PAIRS[:len(LOADS)]  # every load once, every command at least once
+
+
+def of(load, command, seed):
+    return random_case(np.random.default_rng([seed, LOADS.index(load), COMMANDS.index(command)]), load=load,
+                       command=command)
+
+
+@pytest.mark.parametrize(("load", "command"), PAIRS)
+def test_bounded_servo(load, command):
+    bounded_agrees(of(load, command, 0))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(80))
-def test_bounded_servo(seed):
-    case = random_case(np.random.default_rng(seed))
+def test_more_bounded_servos(seed):
+    bounded_agrees(random_case(np.random.default_rng(seed)))
+
+
+def bounded_agrees(case):
     exact = reference.solve_bounded(case.plant, case.v_c, DURATION, TIMES, breaks=case.breaks)
     result = run(st.BoundedServo, case)
     tolerance = 1e-12 if result.stats.method == "closed form" else 1e-9
@@ -31,17 +50,17 @@ def test_bounded_servo(seed):
     np.testing.assert_allclose(result["output_speed"], exact.w, rtol=0.0, atol=100 * tolerance)
 
 
-@pytest.mark.parametrize("seed", range(20))
-def test_averaged_servo(seed):
-    case = random_case(np.random.default_rng(1000 + seed))
+@pytest.mark.parametrize(("load", "command"), FIRST)
+def test_averaged_servo(load, command):
+    case = of(load, command, 1000)
     exact = reference.solve_averaged(case.plant, case.v_c, DURATION, TIMES, breaks=case.breaks)
     result = run(st.AveragedServo, case)
     np.testing.assert_allclose(result["output_angle"], exact.q, rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_averaged_servo_with_inductance(seed):
-    case = random_case(np.random.default_rng(2000 + seed))
+@pytest.mark.parametrize(("load", "command"), FIRST)
+def test_averaged_servo_with_inductance(load, command):
+    case = of(load, command, 2000)
     exact = reference.solve_averaged_inductive(case.plant, case.v_c, DURATION, TIMES, breaks=case.breaks)
     result = run(st.AveragedServoInductive, case)
     np.testing.assert_allclose(result["output_angle"], exact.q, rtol=0.0, atol=1e-9)

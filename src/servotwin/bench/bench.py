@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from servotwin.simulation import Result, State
 
 _LOOK = 0.25  # s between two looks whether the shaft stands
+_GENERATOR = "the generator of the bench"
 _LOOP, _STRETCH = "electronics.bridge_gain", "electronics.stretcher_gain"
 
 
@@ -299,8 +300,8 @@ def bench_servo(servo: Servo, generator: PulseGenerator | None = None) -> Servo:
     gain, period = servo.get(_LOOP), servo.get("electronics.frame_period")
     after = (generator or PulseGenerator()).frame_period
     if gain is None and servo.get(_STRETCH) is not None:
-        return servo.replace({"electronics.frame_period": after})
+        return servo.replace({"electronics.frame_period": after}, source=_GENERATOR)
     if not isinstance(gain, int | float):
         raise MissingParameterError("Bench", servo.name, [_LOOP])
     before = float(period) if isinstance(period, int | float) else 0.02
-    return servo.replace({"electronics.frame_period": after, _LOOP: gain * before / after})
+    return servo.replace({"electronics.frame_period": after, _LOOP: gain * before / after}, source=_GENERATOR)

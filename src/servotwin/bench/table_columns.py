@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from servotwin.errors import CommandError, InputError
-from servotwin.signals.csv_file import _numbers, _read
+from servotwin.errors import InputError
+from servotwin.tables import read_table
 
 
 class _Quantity(NamedTuple):
@@ -192,24 +192,22 @@ def _given(table: Mapping[str, ArrayLike]) -> dict[str, NDArray[np.float64] | In
 
 
 def _of_file(path: Path) -> dict[str, NDArray[np.float64] | InputError]:
-    try:
-        header, rows = _read(path)
-    except CommandError as error:
-        raise InputError(error.what, got=error.got, allowed=error.allowed) from None
-    twice = [name for name in header if name and header.count(name) > 1]
+    table = read_table(path, lambda name: _NUMBER.sub("", name) in _NAMES)
+    table.check_lengths(shorter=True)
+    twice = [name for name in table.header if name and table.header.count(name) > 1]
     if twice:
-        raise InputError(f"{path}: column", got=f"{twice[0]} {header.count(twice[0])} times",
+        raise InputError(f"{path}: column", got=f"{twice[0]} {table.header.count(twice[0])} times",
                          allowed=f"once; another instrument is {twice[0]}_2, its number in front of the unit")
     found: dict[str, NDArray[np.float64] | InputError] = {}
-    for name in filter(None, header):
+    for name in filter(None, table.header):
         try:
-            values = np.array(_numbers(path, header, rows, name))
-        except CommandError as error:
-            found[name] = InputError(error.what, got=error.got, allowed=error.allowed)
+            values = table.numbers(name)
+        except InputError as error:
+            found[name] = error
             continue
-        bad = [line for line, value in zip(rows, values, strict=True) if not math.isfinite(value)]
-        found[name] = values if not bad else InputError(
-            f"{path}: line {bad[0]}, {name}", got=float(values[list(rows).index(bad[0])]), allowed="a finite number")
+        bad = np.flatnonzero(~np.isfinite(values))
+        found[name] = values if not bad.size else InputError(
+            f"{path}: line {table.rows[bad[0]].line}, {name}", got=float(values[bad[0]]), allowed="a finite number")
     return found
 
 

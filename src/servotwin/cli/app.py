@@ -8,6 +8,7 @@ import typer
 
 from servotwin import __version__
 from servotwin.cli.catalog import catalog
+from servotwin.cli.curves import curves
 from servotwin.cli.fit import fit
 from servotwin.cli.paper_command import paper
 from servotwin.cli.simulate import simulate
@@ -44,6 +45,9 @@ app.command("paper", help="Reproduce the paper's figures and tables in a report.
 app.command("simulate", help="Simulate one servo under one command and one load.",
             epilog="Example: servotwin simulate hitec-hs-755hb --step 0:180 --plot run.png\n\n"
                    "Example: servotwin simulate my-servo.toml --sine 1500:200:2 --unit us --out run.csv")(simulate)
+app.command("curves", help="Compute the sheets of servos: torque, speed and current, holding, lifting, warming.",
+            epilog="Example: servotwin curves towerpro-mg996r --voltage 4.8,6 --out mg996r.html\n\n"
+                   "Example: servotwin curves towerpro-mg996r hitec-hs-422 --voltage 5 --lift 0.5kg --arm 10cm")(curves)
 app.command("sweep", help="Draw the parameters of a servo, simulate all, and say which of them matter.",
             epilog="Example: servotwin sweep hitec-hs-755hb --step 0:60 --vary motor.torque_constant=normal:10% "
                    "--vary electronics.deadband=uniform:4us..8us --lanes 10000 --out study --plot")(sweep)

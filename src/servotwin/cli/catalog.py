@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli.catalog_which import which
 from servotwin.cli.from_sheet import from_sheet
-from servotwin.cli.terminal import emit_help, emit_json, pairs, show, table
+from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
@@ -37,14 +38,16 @@ def list_servos(as_json: _Json = False) -> None:
     from servotwin.cli.servo_facts import headline
     from servotwin.parameters import catalog_names, load_servo
 
-    found = [headline(load_servo(name)) for name in catalog_names()]
+    with patience("reading the catalog"):
+        found = [headline(load_servo(name)) for name in catalog_names()]
     if as_json:
         emit_json(found)
         return
     rows = [(servo["id"], servo["title"], _number(servo["supply_voltage"], "{:.3g} V"),
-             _number(servo["stall_torque"], "{:.3g} N m"), _number(servo["speed"], "{:.0f} deg/s"),
+             _number(servo["stall_torque"], "{:.3g} N m"),
+             _number(servo["twin_stall_torque"], "{:.3g} N m"), _number(servo["speed"], "{:.0f} deg/s"),
              _brief(servo["flags"])) for servo in found]
-    show(table(("id", "title", "at", "torque", "speed", "flags"), rows, wraps="flags"))
+    show(table(("id", "title", "at", "torque", "of twin", "speed", "flags"), rows, wraps="flags"))
 
 
 @catalog.command("show", help="Show every parameter of a servo and its source.",
@@ -55,15 +58,15 @@ def show_servo(
 ) -> None:
     """Show every parameter of a servo."""
     from servotwin.cli.servo_facts import headline, parameters
-    from servotwin.cli.servo_page import heading, parameter_table
+    from servotwin.cli.servo_page import figures, heading, parameter_table
     from servotwin.parameters import load_servo
 
     loaded = load_servo(servo)
-    found = parameters(loaded)
+    facts, found = headline(loaded), parameters(loaded)
     if as_json:
-        emit_json({**headline(loaded), "notes": loaded.notes.strip(), "parameters": found})
+        emit_json({**facts, "notes": loaded.notes.strip(), "parameters": found})
         return
-    show(*heading(loaded), "", *parameter_table(found))
+    show(*heading(loaded), *figures(facts), "", *parameter_table(found))
 
 
 @catalog.command("check", help="Check a servo file, and which models it can run.",
@@ -127,3 +130,5 @@ catalog.command("from-sheet", help="Make a servo file out of what a maker prints
     'Example: servotwin catalog from-sheet --name my-servo --torque "13.2 kgf.cm" --speed "0.23 s/60deg" '
     '--running-current "285 mA" --at 6V --deadband "8 us" --out my-servo.toml\n\n'
     "Example: servotwin catalog from-sheet --csv sheets.csv --out my-catalog"))(from_sheet)
+catalog.command("which", help="List the servos that lift a mass on an arm, lightest first.", epilog=(
+    "Example: servotwin catalog which --lift 0.5kg --arm 10cm --voltage 5 --time 0.3"))(which)

@@ -6,8 +6,10 @@ import contextlib
 import os
 import sys
 import warnings
-from typing import TYPE_CHECKING
 
+from servotwin.cli import interrupts
+
+TYPE_CHECKING = False  # as in interrupts: Ctrl-C is watched as soon as can be
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from typing import TextIO
@@ -21,7 +23,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        Words after `servotwin`; those of the process unless given.
+        Words after `servotwin`. Without them those of the process are run, and the process ends here: after the last
+        line, or by Ctrl-C at any time before.
 
     Returns
     -------
@@ -35,7 +38,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     servotwin 0.1.0
     0
     """
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments is not None:
+        return _ran(list(arguments))
+    words = sys.argv[1:]
+    interrupts.watch(words)
+    interrupts.leave(_ran(words))
+
+
+def _ran(words: Sequence[str]) -> int:
     try:
         for stream in (sys.stdout, sys.stderr):
             if hasattr(stream, "reconfigure"):
@@ -44,7 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             code = _run(words)
         if sys.stdout is not None:
             sys.stdout.flush()
-        return code
+        return interrupts.CODE if interrupts.noted() else code
     except KeyboardInterrupt as error:
         return _failed(error, words)
     except SystemExit:  # how rich, which draws the help, reacts to a broken pipe
@@ -79,7 +89,8 @@ def _failed(error: BaseException, words: Sequence[str]) -> int:
         _discard_stdout()
     elif "--json" in words:
         _try_write(sys.stdout, failure.to_json())
-    _try_write(sys.stderr, f"servotwin: error: {failure.message}")
+    kind = "" if failure.code == interrupts.CODE else "error: "
+    _try_write(sys.stderr, f"servotwin: {kind}{failure.message}")
     return failure.code
 
 

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+from servotwin.cli.interrupts import CODE
 from servotwin.errors import ServotwinError
 
 _LONGEST = 600  # characters; what is longer is cut in its middle
@@ -57,7 +58,7 @@ def describe(error: BaseException) -> Failure:
     """
     kind = type(error).__name__
     if isinstance(error, KeyboardInterrupt) or kind == "Abort":
-        return Failure(message="interrupted", code=130, kind="KeyboardInterrupt")
+        return Failure(message="interrupted", code=CODE, kind="KeyboardInterrupt")
     if isinstance(error, ServotwinError):
         return Failure(message=one_line(str(error)), code=2, kind=kind, data=_data(error))
     if hasattr(error, "format_message"):  # of the command line's parser, whichever version of it

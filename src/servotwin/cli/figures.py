@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 
 from servotwin.errors import InputError
+from servotwin.units import DIMENSIONS
 
 _DEG = math.pi / 180.0
 _G = 9.80665
@@ -17,13 +18,15 @@ VOLTAGE = {"v": 1.0, "mv": 1e-3}
 CURRENT = {"a": 1.0, "ma": 1e-3}
 TIME = {"us": 1e-6, "usec": 1e-6, "ms": 1e-3, "s": 1.0}
 ANGLE = {"deg": _DEG, "degree": _DEG, "degrees": _DEG, "rad": 1.0}
-MASS = {"g": 1e-3, "kg": 1.0, "oz": 0.028349523}
+MASS, LENGTH = DIMENSIONS["mass"], DIMENSIONS["length"]
+SECONDS = {"s": 1.0, "ms": 1e-3}
 SPEED = {"deg/s": _DEG, "rad/s": 1.0, "rpm": math.pi / 30.0}
 _SHOWN = {"nm": "N m", "mnm": "mN m", "ncm": "N cm", "kgfcm": "kgf.cm", "ozfin": "oz.in", "v": "V", "mv": "mV",
           "a": "A", "ma": "mA"}
 _HIDDEN = ("kgcm", "ozin", "gfcm", "usec", "degree", "degrees")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_SPELLINGS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u00b0": "deg", "\u00b7": ".", "\u22c5": "."})
+_SPELLINGS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u00b0": "deg", "\u00b7": ".", "\u22c5": ".",
+                            "\u00b2": "2"})
 
 
 def figure(option: str, text: str, known: Mapping[str, float]) -> float:
@@ -54,6 +57,33 @@ def figure(option: str, text: str, known: Mapping[str, float]) -> float:
     if unit not in known:
         raise InputError(option, got=text, allowed=f"a number with one of the units {_allowed(known)}")
     return value * known[unit]
+
+
+def with_usual_unit(option: str, text: str, known: Mapping[str, float], usual: str) -> float:
+    """Return a figure in SI; a bare number has the usual unit.
+
+    Raises
+    ------
+    InputError
+        As `figure`.
+
+    Examples
+    --------
+    >>> with_usual_unit("--voltage", "6", VOLTAGE, "V"), with_usual_unit("--time", "300 ms", SECONDS, "s")
+    (6.0, 0.3)
+    """
+    return figure(option, text if re.search(r"[A-Za-z]", text.replace("e", "")) else f"{text} {usual}", known)
+
+
+def spelled(dimension: str) -> dict[str, float]:
+    """Return the units of a dimension as `figure` spells them, with their factors to SI.
+
+    Examples
+    --------
+    >>> spelled("inertia")
+    {'kgm2': 1.0, 'gcm2': 1e-07, 'kgcm2': 0.0001}
+    """
+    return {_plain(unit): factor for unit, factor in DIMENSIONS[dimension].items()}
 
 
 def speed(option: str, text: str) -> float:
@@ -174,7 +204,12 @@ def _split(option: str, text: str, allowed: str) -> tuple[float, str]:
     value = float(found[1])
     if not (math.isfinite(value) and value > 0.0):
         raise InputError(option, got=text, allowed=f"a positive number with a unit ({allowed})")
-    return value, re.sub(r"[\s.\-*]", "", (found[2] or "")).lower()
+    return value, _plain(found[2] or "")
+
+
+def _plain(unit: str) -> str:
+    """Return a unit without blanks, dots and dashes, in small letters."""
+    return re.sub(r"[\s.\-*]", "", unit).lower()
 
 
 def _allowed(known: Mapping[str, float]) -> str:

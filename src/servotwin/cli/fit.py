@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli import log_reading
 from servotwin.cli.terminal import emit_json, patience, show
 
 if TYPE_CHECKING:
@@ -16,21 +19,21 @@ if TYPE_CHECKING:
     from servotwin.identification import Advice, Fit, Ladder, Log
     from servotwin.models import Model
 
-_LOGS, _SEARCH, _OUTPUT = "Logs and servo", "What is searched, and how", "Output"
-_INTERRUPTED = 130  # exit code
+_LOGS, _SEARCH, _OUTPUT = log_reading.PANEL, "What is searched, and how", "Output"
 
 
 def fit(
     logs: Annotated[list[Path] | None, typer.Argument(
-        metavar="LOGS", help="Files or folders of logs: CSV with or without a sidecar, JSON of BAM or Miuzei.")] = None,
+        metavar="LOGS", help=log_reading.HELP)] = None,
     servo: Annotated[str | None, typer.Option(
         metavar="SERVO", help="Where the search begins, and what is not searched: id in the catalog, or path of a "
         "servo file (.toml).", rich_help_panel=_LOGS)] = None,
-    file_format: Annotated[str, typer.Option(
-        "--format", metavar="FORMAT", help="Of the logs: auto, csv, bam or miuzei.", rich_help_panel=_LOGS)] = "auto",
+    file_format: log_reading.FormatOption = "auto",
+    columns: log_reading.ColumnsOption = None,
+    joint: log_reading.JointOption = None,
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable, SI.",
-        rich_help_panel=_LOGS)] = None,
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
+        "in SI.", rich_help_panel=_LOGS)] = None,
     holdout: Annotated[str | None, typer.Option(
         metavar="SHARE|NAMES", help="Logs that are predicted and not fitted: a share of each kind of motion such as "
         "0.25, or names with commas; 0 for none (default: a fourth of each kind with four logs or more).",
@@ -101,13 +104,17 @@ def fit(
     _check_ladder(search.model, ladder=ladder)
     options = {"holdout": holdout, "nuisance": nuisance, "sensors": sensors, "starts": starts, "loss": loss,
                "level": level, "intervals": intervals, "seed": seed, "compare": compare}
-    found = _run(search, _read(logs, file_format, leave_out or []), _options(options), ladder=ladder)
+    chosen = _options(options)
+    given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json)
+    found = _run(search, given, chosen, ladder=ladder)
     files = _write(found.fit, targets, force=force)
     if advise and not found.fit.interrupted and found.fit.doubt is not None:
         found = _Found(found.fit, found.ladder, _advice(found.fit))
     _report(found, files, as_json=as_json)
     if found.fit.interrupted:
-        raise typer.Exit(_INTERRUPTED)
+        from servotwin.cli.interrupts import CODE
+
+        raise typer.Exit(CODE)
 
 
 @dataclass(frozen=True)
@@ -177,14 +184,6 @@ def _search(servo: str, model: str | None, change: list[str], free: list[str] | 
                    fit_words.priors_of(prior, names, nominal, of_servo=priors))
 
 
-def _read(paths: list[Path], file_format: str, leave_out: list[str]) -> list[Log]:
-    from servotwin.cli import fit_words
-
-    windows = fit_words.left_out(leave_out)
-    with patience("reading"):
-        return fit_words.without(fit_words.read_all(paths, file_format), windows)
-
-
 def _options(given: dict[str, Any]) -> dict[str, Any]:
     """Return the options of `identify` that words say."""
     from servotwin.cli import fit_words
@@ -202,17 +201,39 @@ def _run(search: _Search, logs: list[Log], options: dict[str, Any], *, ladder: b
     from servotwin.identification import friction_ladder, identify
 
     servo, kind = search.model.servo, type(search.model)
-    progress = sys.stderr is not None and sys.stderr.isatty()
-    if ladder:
-        climbed = friction_ladder(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
-                                  progress=progress, **options)
-        found = _Found(climbed.fit, climbed)
-    else:
-        found = _Found(identify(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
-                                progress=progress, **options))
+    with _progress() as progress:
+        if ladder:
+            climbed = friction_ladder(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
+                                      progress=progress, **options)
+            found = _Found(climbed.fit, climbed)
+        else:
+            found = _Found(identify(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
+                                    progress=progress, **options))
     if found.fit.interrupted and found.fit.cost == float("inf"):
         raise KeyboardInterrupt  # before the first step: there is nothing to keep
     return found
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[float, str], None]]:
+    """Give what shows the progress on a terminal, and ends the search after an interrupt, with the best so far.
+
+    Before the first step there is no best, and an interrupt ends the process.
+    """
+    from servotwin.cli.interrupts import finishing
+    from servotwin.identification.fitting.checks import shown
+
+    with shown(sys.stderr is not None and sys.stderr.isatty()) as show, contextlib.ExitStack() as stack:
+        checks: list[Callable[[], None]] = []
+
+        def tell(share: float, text: str) -> None:
+            show(share, text)
+            if share > 0.0 and not checks:
+                checks.append(stack.enter_context(finishing()))
+            for check in checks:
+                check()
+
+        yield tell
 
 
 def _first_advice(search: _Search) -> Advice:
@@ -261,7 +282,7 @@ def _report(found: _Found, files: list[str], *, as_json: bool) -> None:
     from servotwin.cli import fit_show
 
     if as_json:
-        more: dict[str, Any] = {}
+        more: dict[str, Any] = {"reading": log_reading.facts([trace.log for trace in found.fit.traces])}
         if found.ladder is not None:
             more["ladder"] = fit_show.ladder_facts(found.ladder)
         if found.advice is not None:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from servotwin.cli.summary import names as dotted
+from servotwin.cli.summary import was_set
 from servotwin.cli.terminal import pairs, table
 from servotwin.identification.report.shown import (
     MODELS,
@@ -42,14 +44,19 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
     parts.append(errors(tables_of(fit), fit.traces, "motion"))
     if fit.warnings:
         parts += ["", *[f"! {text}" for text in fit.warnings]]
-    if files:
-        parts += ["", written(files)]
+    given = was_set(fit.model)
+    if given or files:
+        parts += ["", pairs([*([("set", dotted(given))] if given else []), *_written(files)])]
     return parts
 
 
 def written(files: Sequence[str]) -> RenderableType:
     """Return the names of files that were written."""
-    return pairs([("written", name) for name in files])
+    return pairs(_written(files))
+
+
+def _written(files: Sequence[str]) -> list[tuple[str, str]]:
+    return [("written", name) for name in files]
 
 
 def _estimates(fit: Fit) -> RenderableType:
@@ -101,7 +108,7 @@ def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
         "noise": {name: float(value) for name, value in fit.noise.items()}, "warnings": list(fit.warnings),
         "starts": [{"cost": float(start.cost), "converged": bool(start.converged)} for start in fit.starts],
         "data": fit.servo.fit.get("data"), "seconds": fit.seconds, "interrupted": fit.interrupted,
-        "files": list(files),
+        "set": was_set(fit.model), "files": list(files),
     }
 
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from servotwin import units
+from servotwin.cli.numbers import quantity
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.report.shown import dimension_of_free
-from servotwin.simulation.sweep.distributions import Distribution, Normal, Offset, Relative, Uniform
+from servotwin.simulation.sweep.kinds import Distribution, Normal, Offset, Relative, Uniform
 from servotwin.simulation.sweep.words import distribution_of
 
 if TYPE_CHECKING:
@@ -22,7 +20,6 @@ if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
 MODEL_NAMES = ("pulse", "pulse-inductive", "bounded")
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
 def names(words: Sequence[str] | None) -> tuple[str, ...] | None:
@@ -246,38 +243,6 @@ def without(logs: Sequence[Log], windows: Sequence[tuple[str | None, float, floa
             for log in logs]
 
 
-def quantity(option: str, text: str, dimension: str, *, bare: str | None = None) -> float:
-    """Return a number with its unit, in SI.
-
-    Parameters
-    ----------
-    option, text : str
-    dimension : str
-        Of `servotwin.units`.
-    bare : str, optional
-        Unit of a number without one; else a unit is required.
-
-    Raises
-    ------
-    InputError
-        If it is no number, or its unit does not fit.
-
-    Examples
-    --------
-    >>> quantity("--max-error", "180 deg", "angle"), quantity("--leave-out", "3", "time", bare="s")
-    (3.141592653589793, 3.0)
-    """
-    match = _NUMBER.fullmatch(text)
-    unit = (match[2] or bare) if match else None
-    if match is None or unit is None:
-        raise InputError(option, got=text, allowed="a number with a unit: " + ", ".join(units.DIMENSIONS[dimension]))
-    try:
-        return units.to_si(float(match[1]), unit, dimension)
-    except ServotwinError:
-        raise InputError(option, got=text, allowed="a number with a unit: "
-                         + ", ".join(units.DIMENSIONS[dimension])) from None
-
-
 def limits_of(words: Sequence[str], angle: bool) -> Mapping[str | None, float]:
     """Return the largest error that is allowed (SI), by kind of motion; None stands for every kind.
 
@@ -294,18 +259,3 @@ def limits_of(words: Sequence[str], angle: bool) -> Mapping[str | None, float]:
             raise InputError("--max-error", got=word, allowed="a positive number with a unit, such as 3deg")
         found[name.strip() or None] = value
     return found
-
-
-def read_all(paths: Sequence[Path], file_format: str) -> list[Log]:
-    """Return the logs of several files and folders.
-
-    Raises
-    ------
-    InputError
-        If one cannot be read.
-    """
-    from servotwin.identification import read_logs
-
-    return [log for path in paths for log in read_logs(path, file_format)]
-
-

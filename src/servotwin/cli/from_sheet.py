@@ -205,6 +205,7 @@ def _motor(found: dict[str, Any]) -> list[RenderableType]:
 
 
 def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as_json: bool) -> None:
+    from servotwin.cli.interrupts import held
     from servotwin.errors import OutputExistsError
     from servotwin.identification import read_sheets, servo_from_sheet, sheet_contradictions, write_servo_text
 
@@ -218,8 +219,9 @@ def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as
             raise OutputExistsError(file)
     if out is not None:
         _folder(out)
-        for servo, file in zip(servos, files, strict=True):
-            write_servo_text(servo, file, overwrite=force)
+        with held():
+            for servo, file in zip(servos, files, strict=True):
+                write_servo_text(servo, file, overwrite=force)
     rows = [_found(sheet, servo) for sheet, servo in zip(kept, servos, strict=True)]
     left = [*found.left_out, *(f"{sheet.title}: {sheet_contradictions(sheet)[0].text}" for sheet in refused)]
     if as_json:

@@ -8,31 +8,37 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from servotwin import loads
+from servotwin.cli import figures
 from servotwin.cli.numbers import numbers, read_columns
 from servotwin.errors import InputError, LoadError, UnknownNameError
 from servotwin.loads import Load, Part
+from servotwin.models import Model, mid_travel
 
 FORMS = {
-    "inertia": "KG_M2", "viscous": "NM_S_PER_RAD", "torque": "NM", "coulomb": "NM",
+    "inertia": "KG_M2", "viscous": "NM_S_PER_RAD", "torque": "NM", "coulomb": "NM", "arm": "MASS:LENGTH",
     "pendulum": "KG:M[:HANGING_DEG]", "spring": "NM_PER_RAD[:REST_DEG]", "recorded": "FILE.csv",
 }
+_UNITS = {"inertia": figures.spelled("inertia"), "viscous": figures.spelled("torque per speed"),
+          "torque": figures.TORQUE, "coulomb": figures.TORQUE}
 _NEXT = re.compile(r",(?=\s*[A-Za-z_]+\s*=)")  # a comma that begins another part
 _TIMES = {"time_s": 1.0, "time_ms": 1e-3, "time": 1.0}
 _TORQUES = {"torque_Nm": 1.0, "torque_mNm": 1e-3, "torque": 1.0}
 
 
-def load_from(words: Sequence[str]) -> Load:
+def load_from(words: Sequence[str], model: Model | None = None) -> Load:
     """Return the load that `--load` options describe; a free shaft without any.
 
     Parameters
     ----------
     words : sequence of str
-        Such as ``"inertia=1e-3,viscous=1e-4"``; numbers in SI, angles in degrees.
+        Such as ``"inertia=1e-3,torque=0.5kgf.cm"``; numbers without unit in SI, angles in degrees.
+    model : Model, optional
+        What carries it: where the arm of ``"arm=0.5kg:10cm"`` is horizontal is the middle of its travel.
 
     Raises
     ------
     LoadError
-        If a part is malformed or out of range.
+        If a part is malformed or out of range, or an arm has no servo that it hangs on.
     UnknownNameError
         If there is no such part.
 
@@ -43,9 +49,9 @@ def load_from(words: Sequence[str]) -> Load:
     (0.001, 0.1, 0.12)
     """
     total = Load()
-    for name, value in _parts(words):
+    for name, value in parts_of(words):
         try:
-            total = total + _MAKERS[name](value)
+            total = total + (_arm(value, model) if name == "arm" else _MAKERS[name](value))
         except InputError as error:
             what = error.what if error.what == f"--load {name}" else f"--load {name}: {error.what}"
             raise LoadError(what, got=error.got, allowed=error.allowed) from None
@@ -60,7 +66,7 @@ def recorded_files(words: Sequence[str]) -> list[Path]:
     >>> [path.name for path in recorded_files(["inertia=1,recorded=torque.csv"])]
     ['torque.csv']
     """
-    return [Path(value) for name, value in _parts(words) if name == "recorded"]
+    return [Path(value) for name, value in parts_of(words) if name == "recorded"]
 
 
 def described(words: Sequence[str]) -> str:
@@ -71,10 +77,22 @@ def described(words: Sequence[str]) -> str:
     >>> described([])
     'none (free shaft)'
     """
-    return ", ".join(f"{name} {value}" for name, value in _parts(words)) or "none (free shaft)"
+    return ", ".join(f"{name} {value}" for name, value in parts_of(words)) or "none (free shaft)"
 
 
-def _parts(words: Sequence[str]) -> list[tuple[str, str]]:
+def parts_of(words: Sequence[str]) -> list[tuple[str, str]]:
+    """Return name and value of each part.
+
+    Raises
+    ------
+    LoadError, UnknownNameError
+        If there is no value, or no such part.
+
+    Examples
+    --------
+    >>> parts_of(["inertia=1e-3,arm=0.5kg:10cm"])
+    [('inertia', '1e-3'), ('arm', '0.5kg:10cm')]
+    """
     parts = []
     for text in (piece for word in words for piece in _NEXT.split(word)):
         name, equals, value = (text.partition("=")[k].strip() for k in range(3))
@@ -86,8 +104,48 @@ def _parts(words: Sequence[str]) -> list[tuple[str, str]]:
     return parts
 
 
+def mass_on_arm(text: str) -> tuple[float, float]:
+    """Return mass [kg] and length [m] of an arm.
+
+    Examples
+    --------
+    >>> mass_on_arm("0.5kg:10cm")
+    (0.5, 0.1)
+    """
+    mass, colon, length = text.partition(":")
+    if not colon:
+        raise LoadError("--load arm", got=text, allowed="MASS:LENGTH, such as 0.5kg:10cm")
+    return figures.figure("--load arm", mass, figures.MASS), figures.figure("--load arm", length, figures.LENGTH)
+
+
+def torque_of(text: str) -> float:
+    """Return a torque [N m], bare or with a unit; the sign counts.
+
+    Examples
+    --------
+    >>> torque_of("-0.1"), round(torque_of("1 kgf.cm"), 4)
+    (-0.1, 0.0981)
+    """
+    return _with_unit("torque", text)
+
+
+def _with_unit(name: str, text: str) -> float:
+    """Return a number in SI, or one with a unit; the sign counts."""
+    if not re.search(r"\d\s*[^\W\d_]", re.sub(r"[eE][-+]?\d+\s*$", "", text)):
+        return numbers(f"--load {name}", text, (FORMS[name],))[0]
+    sign = -1.0 if text.lstrip().startswith("-") else 1.0
+    return sign * figures.figure(f"--load {name}", text.lstrip().lstrip("+-"), _UNITS[name])
+
+
 def _single(make: Callable[[float], Part], name: str) -> Callable[[str], Part]:
-    return lambda text: make(numbers(f"--load {name}", text, (FORMS[name],))[0])
+    return lambda text: make(_with_unit(name, text))
+
+
+def _arm(text: str, model: Model | None) -> Part:
+    mass, length = mass_on_arm(text)
+    if model is None:
+        raise LoadError("--load arm", got=text, allowed="only where a servo carries it")
+    return loads.Pendulum(mass=mass, length=length, hanging_angle=mid_travel(model) - 0.5 * math.pi)
 
 
 def _pendulum(text: str) -> Part:

@@ -81,4 +81,4 @@ def servo_of(servo: str, change: Sequence[str]) -> Servo:
     from servotwin.parameters import load_servo
 
     loaded = load_servo(servo)
-    return loaded.replace(settings(change)) if change else loaded
+    return loaded.replace(settings(change), source="set by --set") if change else loaded

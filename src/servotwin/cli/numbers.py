@@ -2,11 +2,47 @@
 
 from __future__ import annotations
 
-import csv
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from servotwin.errors import InputError
+from servotwin import units
+from servotwin.errors import InputError, UnitError
+from servotwin.tables import read_table
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+
+
+def quantity(option: str, text: str, dimension: str, *, bare: str | None = None) -> float:
+    """Return a number with its unit, in SI.
+
+    Parameters
+    ----------
+    option, text : str
+    dimension : str
+        Of `servotwin.units`.
+    bare : str, optional
+        Unit of a number without one; else a unit is required.
+
+    Raises
+    ------
+    InputError
+        If it is no number, or its unit does not fit.
+
+    Examples
+    --------
+    >>> quantity("--max-error", "180 deg", "angle"), quantity("--leave-out", "3", "time", bare="s")
+    (3.141592653589793, 3.0)
+    """
+    match = _NUMBER.fullmatch(text)
+    unit = (match[2] or bare) if match else None
+    try:
+        if match is not None and unit is not None:
+            return units.to_si(float(match[1]), unit, dimension)
+    except UnitError:
+        pass
+    raise InputError(option, got=text, allowed=("a number in SI, or " if bare else "") + "a number with a unit: "
+                     + ", ".join(units.DIMENSIONS[dimension]))
 
 
 def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | None = None) -> list[float]:
@@ -67,39 +103,13 @@ def read_columns(path: Path, *wanted: Mapping[str, float]) -> list[list[float]]:
     >>> read_columns(file, {"time_s": 1.0}, {"torque_Nm": 1.0, "torque_mNm": 1e-3})
     [[0.0, 1.0], [0.0, 0.2]]
     """
-    header, rows = _table(path)
+    known = {name for names in wanted for name in names}
+    table = read_table(path, lambda name: name in known)
+    table.check_lengths(shorter=True)
     columns = []
     for names in wanted:
-        name = next((name for name in names if name in header), None)
+        name = next((name for name in names if name in table.header), None)
         if name is None:
-            raise InputError(f"{path}: columns", got=", ".join(header), allowed="one of " + ", ".join(names))
-        k = header.index(name)
-        columns.append([names[name] * _number(path, row, k, line, name) for line, row in rows])
+            raise InputError(f"{path}: columns", got=", ".join(table.header), allowed="one of " + ", ".join(names))
+        columns.append([names[name] * value for value in table.numbers(name).tolist()])
     return columns
-
-
-def _number(path: Path, row: list[str], k: int, line: int, name: str) -> float:
-    try:
-        return float(row[k])
-    except (IndexError, ValueError):
-        got = row[k] if k < len(row) else "nothing"
-        raise InputError(f"{path}: line {line}, {name}", got=got, allowed="a number") from None
-
-
-def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not readable as CSV (not a UTF-8 text)") from None
-    except OSError as error:
-        raise InputError(f"{path}: not readable as CSV ({error.strerror})") from None
-    except (csv.Error, ValueError) as error:
-        raise InputError(f"{path}: not readable as CSV ({error})") from None
-    if len(rows) < 2:
-        raise InputError(str(path), got="a header without rows" if rows else "an empty file",
-                         allowed="a header and at least one row")
-    return [cell.strip() for cell in rows[0][1]], rows[1:]

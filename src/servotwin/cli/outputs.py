@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from servotwin.cli.interrupts import held
 from servotwin.errors import OutputError, OutputExistsError
+from servotwin.parameters.output_file import undone
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +86,7 @@ def staged(targets: Sequence[Target], *, force: bool) -> Iterator[list[Path]]:
 
     Examples
     --------
+    >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())
     >>> target = Target(option="--out", path=folder / "a.csv", endings=(".csv",))
     >>> with staged([target], force=False) as paths:
@@ -94,10 +98,11 @@ def staged(targets: Sequence[Target], *, force: bool) -> Iterator[list[Path]]:
         places = [target.place for target in targets]
         drafts = []
         for target, place in zip(targets, places, strict=True):
+            folder = place.parent / f".servotwin-{secrets.token_hex(8)}"
+            stack.enter_context(undone(partial(shutil.rmtree, folder, ignore_errors=True)))
             with _naming(target):
-                folder = tempfile.mkdtemp(dir=place.parent, prefix=".servotwin-")
-            stack.callback(shutil.rmtree, folder, ignore_errors=True)
-            drafts.append(Path(folder) / place.name)
+                folder.mkdir(0o700)
+            drafts.append(folder / place.name)
         try:
             yield drafts
         except OutputError as error:
@@ -108,9 +113,10 @@ def staged(targets: Sequence[Target], *, force: bool) -> Iterator[list[Path]]:
         for target, place in zip(targets, places, strict=True):
             if place.exists() and not force:  # it came into being meanwhile
                 raise OutputExistsError(target.path)
-        for target, draft, place in zip(targets, drafts, places, strict=True):
-            with _naming(target):
-                draft.replace(place)
+        with held():
+            for target, draft, place in zip(targets, drafts, places, strict=True):
+                with _naming(target):
+                    draft.replace(place)
 
 
 def _check_place(target: Target, *, force: bool) -> None:
@@ -127,9 +133,9 @@ def _check_place(target: Target, *, force: bool) -> None:
         if not place.parent.is_dir():
             raise OutputError(f"{target.option} {target.path}: {target.path.parent} is no folder")
         # Permissions do not tell (root, read-only file systems): try.
-        handle, probe = tempfile.mkstemp(dir=place.parent, prefix=f".{place.name}.", suffix=".partial")
-        os.close(handle)
-        Path(probe).unlink()
+        probe = place.with_name(f".servotwin-{secrets.token_hex(8)}.partial")
+        with undone(lambda: probe.unlink(missing_ok=True)):
+            probe.touch(0o600, exist_ok=False)
 
 
 @contextlib.contextmanager

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import MissingParameterError, ServotwinError
-from servotwin.models import MODELS
+from servotwin.loads import as_load
+from servotwin.models import MODELS, default_model
+from servotwin.parameters import printed_flags, printed_points
+from servotwin.physics import stall_torque
 
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
@@ -20,14 +24,37 @@ def headline(servo: Servo) -> dict[str, Any]:
     >>> headline(load_servo("hitec-hs-755hb"))["title"]
     'Hitec HS-755HB'
     """
-    seconds = _fact(servo, "speed_per_60deg", "time")
+    printed = printed_points(servo)[0]
     return {
         "id": servo.name, "title": servo.title, "kind": servo.kind,
-        "supply_voltage": _fact(servo, "supply_voltage", "voltage"),
-        "stall_torque": _fact(servo, "stall_torque", "torque"),
-        "speed": 60.0 / seconds if seconds else None,
-        "flags": list(servo.flags),
+        "supply_voltage": printed.supply_voltage,
+        "stall_torque": printed.stall_torque,
+        "twin_stall_torque": twin_torque(servo),
+        "speed": 60.0 / printed.time_60 if printed.time_60 else None,
+        "flags": list(printed_flags(servo)),
     }
+
+
+def twin_torque(servo: Servo) -> float | None:
+    """Return the stall torque [N m] of the twin at the voltage of the sheet; None where the file has no motor.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> round(twin_torque(load_servo("hitec-hs-755hb")), 2)
+    1.65
+    """
+    voltage = printed_points(servo)[0].supply_voltage
+    at = servo if voltage is None else servo.replace({"supply.open_circuit_voltage": voltage})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            plant = default_model(at).pack(as_load(None))
+        except ServotwinError:
+            return None
+    driving = plant.V - plant.D_drive if plant.V > 0.0 else plant.V_max
+    current = min(max(driving, 0.0) / plant.R_drive, plant.I_max)
+    return float(stall_torque(current, plant.K, plant.F_forward, plant.K_m, plant.K_e))
 
 
 def parameters(servo: Servo) -> list[dict[str, Any]]:
@@ -70,8 +97,3 @@ def readiness(servo: Servo) -> dict[str, dict[str, Any]]:
             problem = str(error)
         found[name] = {"runs": not lacks and problem is None, "lacks": lacks, "problem": problem, "ignored": ignored}
     return found
-
-
-def _fact(servo: Servo, name: str, dimension: str) -> float | None:
-    entry = servo.sheet.get(name)
-    return servo.sheet_values(name, dimension)[0] if isinstance(entry, dict) else None

@@ -14,9 +14,19 @@ if TYPE_CHECKING:
 
 def heading(servo: Servo) -> list[RenderableType]:
     """Return title, kind, notes and flags of a servo."""
-    said = servo.flags
+    from servotwin.parameters import printed_flags
+
+    said = printed_flags(servo)
     return [f"{servo.title} ({servo.name}), {servo.kind}", " ".join(servo.notes.split()),
             *([f"flags: {'; '.join(said)}"] if said else [])]
+
+
+def figures(facts: dict[str, Any]) -> list[RenderableType]:
+    """Return the stall torque of the sheet and that of the twin, as `servo_facts.headline` tells them."""
+    said = [f"{facts[key]:.3g} N m {words}" for key, words in (
+        ("stall_torque", "by the sheet"), ("twin_stall_torque", "by these parameters")) if facts[key] is not None]
+    at = f" at {facts['supply_voltage']:.3g} V" if facts["supply_voltage"] is not None else ""
+    return [f"stall torque{at}: {', '.join(said)}"] if said else []
 
 
 def parameter_table(rows: list[dict[str, Any]]) -> list[RenderableType]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -43,12 +44,13 @@ def simulate(
         "dc-motor (default: pulse; bounded where the servo's file has no chip).",
         rich_help_panel=shared.PLANT)] = None,
     load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help="What hangs on the shaft, repeatable or with commas, SI: inertia=, viscous=, "
-        "torque=, coulomb=, pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
+        metavar="PART=VALUE", help="What hangs on the shaft, repeatable or with commas, SI or with a unit: inertia=, "
+        "viscous=, torque=0.5kgf.cm, coulomb=; arm=0.5kg:10cm, horizontal in the middle of the travel; SI alone: "
+        "pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
         "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, or give one that the servo lacks, such as "
-        "supply.current_limit=1; repeatable, SI.",
+        "supply.current_limit=1A; repeatable; with a unit, or in SI.",
         rich_help_panel=shared.PLANT)] = None,
     seed: Annotated[int, typer.Option(
         metavar="NUMBER", help="Seed of a pulse servo's noise.", rich_help_panel=shared.PLANT)] = 0,
@@ -109,8 +111,8 @@ def _run(model: Model, words: CommandWords, load: list[str], duration: float, ou
     if chip is not None and signal.edges is None and duration > _MOST_FRAMES * chip.frame_period:
         raise InputError("--duration", got=duration,
                          allowed=f"at most {_MOST_FRAMES:g} frames of {1e3 * chip.frame_period:g} ms")
-    with patience("simulating"):
-        result = run(model, signal, duration=duration, load=load_from(load), output_step=output_step, seed=seed)
+    result = run(model, signal, duration=duration, load=load_from(load, model), output_step=output_step, seed=seed,
+                 progress=sys.stderr is not None and sys.stderr.isatty())
     return result.raise_if_failed()
 
 

@@ -14,6 +14,7 @@ from servotwin.simulation.remarks import Remark
 
 if TYPE_CHECKING:
     from servotwin.models import Model
+    from servotwin.parameters.quantity import Quantity
     from servotwin.simulation import Result
 
 _ENERGY = ("winding", "bridge", "brush", "conversion", "friction", "stops", "load", "stored")
@@ -45,10 +46,14 @@ def facts(result: Result) -> dict[str, Any]:
         "angle": angle,
         "final_angle": float(result.at(angle, [result.time[-1]])[0]),
         "step_metrics": None if metrics is None else dataclasses.asdict(metrics),
+        "time_to_target": math.nan if metrics is None else metrics.arrival_time,
+        "holding_error": result.holding_error,
+        "mean_current": result.mean_current,
         "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
         "energy": dataclasses.asdict(result.energy),
         "remarks": [remark._asdict() for remark in result.remarks],
         "solution": dataclasses.asdict(result.stats),
+        "set": was_set(result.model),
         "assumed": assumed(result.model),
         "ignored": list(result.model.ignored),
     }
@@ -60,10 +65,26 @@ def model_name(model: Model) -> str:
 
 
 def assumed(model: Model) -> list[str]:
-    """Return the dotted names that a model reads and nobody measured."""
+    """Return the dotted names that a model reads and nobody measured or set."""
+    return [name for name, known in _read(model).items() if known.origin == "assumed" and not known.was_set]
+
+
+def was_set(model: Model) -> list[str]:
+    """Return the dotted names that a model reads and the user set.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> was_set(st.PulseServo(st.load_servo("hitec-hs-755hb").replace({"supply.open_circuit_voltage": 5.0})))
+    ['supply.open_circuit_voltage']
+    """
+    return [name for name, known in _read(model).items() if known.was_set]
+
+
+def _read(model: Model) -> dict[str, Quantity]:
     servo = model.servo
     read = dict.fromkeys((*model.requires, *model.optional))
-    return [name for name in read if servo.get(name) is not None and servo.source(name).origin == "assumed"]
+    return {name: servo.source(name) for name in read if servo.get(name) is not None}
 
 
 def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -72,13 +93,14 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     Examples
     --------
     >>> energy = {"supply": 2.0, "winding": 1.5, "friction": 0.5}
-    >>> lines({"final_angle": 3.14159265, "peak_current": 1.8, "energy": energy})[:2]
-    [('final angle', '180.00 deg'), ('peak current', '1.800 A')]
+    >>> lines({"final_angle": 3.14159265, "mean_current": 0.2, "peak_current": 1.8, "energy": energy})[:2]
+    [('final angle', '180.00 deg'), ('current', '0.200 A in the mean, 1.800 A at most')]
     """
     rows = [(label, found[key]) for key, label in (("command", "command"), ("load", "load")) if key in found]
     rows.append((_angle_label(found), f"{_deg(found['final_angle']):z.2f} deg"))
+    rows += _arrival_rows(found)
     rows += _step_rows(found.get("step_metrics"))
-    rows.append(("peak current", f"{found['peak_current']:z.3f} A"))
+    rows.append(("current", f"{found['mean_current']:z.3f} A in the mean, {found['peak_current']:z.3f} A at most"))
     energy = found["energy"]
     parts = [f"{name} {energy[name]:.4g} J" for name in _ENERGY if abs(energy.get(name, 0.0)) > 1e-9]
     rows.append(("energy", f"{energy['supply']:z.4g} J supplied: {', '.join(parts) or 'nothing moved'}"))
@@ -92,6 +114,7 @@ def origin_lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("status", f"{found['status'].lower()}, {found['duration']:g} s simulated"),
         *(("remark", Remark(**remark).words) for remark in found["remarks"]),
         ("solved", f"{solution['method']}, {solution['motions']} motions, {solution['events']} events"),
+        *([("set", names(found["set"]))] if found["set"] else []),
         ("assumed", names(found["assumed"])),
         ("ignored", names(found["ignored"])),
     ]
@@ -117,12 +140,21 @@ def _angle_label(found: Mapping[str, Any]) -> str:
     return "final motor angle" if found.get("angle") == "motor_angle" else "final angle"
 
 
+def _arrival_rows(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return when a servo gets to where a step sends it, and how far off it stands in the end."""
+    metrics, rows = found.get("step_metrics"), []
+    if metrics is not None and not math.isnan(metrics["target"]):
+        arrived = found["time_to_target"]
+        rows.append(("time to get there", f"{1e3 * arrived:.1f} ms (within 1 deg)" if not math.isnan(arrived) else
+                     "does not get within 1 deg"))
+    error = found.get("holding_error", math.nan)
+    return rows if math.isnan(error) else [*rows, ("holding error", f"{round(_deg(error), 2) + 0.0:.2f} deg")]
+
+
 def _step_rows(metrics: Mapping[str, float] | None) -> list[tuple[str, str]]:
     if metrics is None:
         return []
     rows = []
-    if not math.isnan(metrics["target"]):
-        rows.append(("steady error", f"{_deg(metrics['steady_error']):z.2f} deg"))
     if not math.isnan(metrics["rise_time"]):
         rows.append(("rise time", f"{1e3 * metrics['rise_time']:z.1f} ms (10 to 90 %)"))
     if not math.isnan(metrics["settling_time"]):

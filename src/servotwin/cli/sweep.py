@@ -45,14 +45,15 @@ def sweep(
         rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE",
-        help="Change a nominal parameter, or give one that the servo lacks; repeatable, SI.",
+        help="Change a nominal parameter, or give one that the servo lacks; repeatable; with a unit, or in SI.",
         rich_help_panel=shared.PLANT)] = None,
     vary: Annotated[list[str] | None, typer.Option(
         metavar="NAME=DISTRIBUTION", help="Draw a parameter of servo or load, repeatable: normal:10%, uniform:10%, "
         "uniform:4us..8us, normal:3ohm±0.3ohm, lognormal:10%, triangular:4us..6us..8us, choice:brake,coast. A single "
         "number is a spread about the nominal value.", rich_help_panel=_VARIED)] = None,
     from_file: Annotated[bool, typer.Option(
-        "--from-file", help="Draw every parameter whose spread the servo file states.",
+        "--from-file", help="Draw what the servo file states a spread of. What is fixed together is drawn together: "
+        "of a servo made of a sheet the figures of the sheet.",
         rich_help_panel=_VARIED)] = False,
     draws: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Take draws from a table: .csv or .parquet, a column for each dotted name, SI.",
@@ -97,7 +98,7 @@ def sweep(
         "duration": duration, "vary": _varied(nominal, vary or [], from_file=from_file), "draws": _draws(draws),
         "lanes": lanes, "seed": seed, "sampling": sampling, "truncate": truncate, "output_step": output_step,
         "directory": out, "resume": resume, "file_format": file_format}, scheduler)
-    _report(study, metric or [], out, plot=plot, as_json=as_json)
+    _report(study, nominal, metric or [], out, plot=plot, as_json=as_json)
 
 
 def _check_options(out: Path | None, *, resume: bool, plot: bool, varies: bool) -> None:
@@ -122,7 +123,11 @@ def _varied(model: Model, words: list[str], *, from_file: bool) -> dict[str, Any
         if name in given:
             raise InputError(f"--vary {name}", got=f"{given[name]} and {text}", allowed="one distribution")
         given[name] = text
-    return {**(stated(model) if from_file else {}), **given}
+    spreads = stated(model) if from_file else {}
+    if from_file and not spreads:
+        raise InputError("--from-file", got=f"servo {model.servo.name!r}, whose file states no spread",
+                         allowed="std, or lower and upper, of at least one value")
+    return {**spreads, **given}
 
 
 def _draws(path: Path | None) -> dict[str, Any] | None:
@@ -133,6 +138,7 @@ def _draws(path: Path | None) -> dict[str, Any] | None:
 
 def _run(model: Model, words: Any, load: list[str], metric: list[str], options: dict[str, Any],
          scheduler: str | None) -> Study:
+    from servotwin.cli.interrupts import last_words
     from servotwin.cli.load_words import load_from
     from servotwin.cli.scheduler import executor_at
     from servotwin.errors import InputError
@@ -145,28 +151,31 @@ def _run(model: Model, words: Any, load: list[str], metric: list[str], options: 
         raise InputError("--duration", got=duration, allowed="a positive number of seconds")
     signal = words.signal(duration)
     metrics = tuple(dict.fromkeys([*metric, *checked_metrics(None, model, signal, duration)]))
-    with executor_at(scheduler) as executor:
-        try:
-            return run(model, signal, load=load_from(load), metrics=metrics, executor=executor,
-                       progress=sys.stderr is not None and sys.stderr.isatty(), **options)
-        except KeyboardInterrupt:
-            if options["directory"] is not None and sys.stderr is not None:
-                sys.stderr.write(f"servotwin: what is finished is in {options['directory']}; the same command with "
-                                 "--resume goes on\n")
-            raise
+    with executor_at(scheduler) as executor, last_words(lambda: _how_to_go_on(options["directory"])):
+        return run(model, signal, load=load_from(load, model), metrics=metrics, executor=executor,
+                   progress=sys.stderr is not None and sys.stderr.isatty(), **options)
 
 
-def _report(study: Study, metric: list[str], out: Path | None, *, plot: bool, as_json: bool) -> None:
+def _how_to_go_on(folder: Path | None) -> str | None:
+    from servotwin.simulation.sweep.folder import STUDY
+
+    if folder is None or not (folder / STUDY).exists():
+        return None
+    return f"what is finished is in {folder}; the same command with --resume goes on"
+
+
+def _report(study: Study, nominal: Model, metric: list[str], out: Path | None, *, plot: bool, as_json: bool) -> None:
+    from servotwin.cli.summary import was_set
     from servotwin.cli.sweep_words import sections
 
     chosen = metric[0] if metric else study.metrics[0]
     files = [] if out is None else [str(out)]
-    if plot and out is not None:
+    if plot and out is not None and study.tornado(chosen).bars:
         from servotwin import plotting
 
         with patience("drawing"):
             plotting.save(plotting.tornado(study.tornado(chosen)), out / "tornado.png", overwrite=True)
     if as_json:
-        emit_json({"definition": dict(study.definition), **study.summary(), "files": files})
+        emit_json({"definition": dict(study.definition), "set": was_set(nominal), **study.summary(), "files": files})
         return
-    show(*sections(study, chosen, files))
+    show(*sections(study, chosen, files, was_set(nominal)))

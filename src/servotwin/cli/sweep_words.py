@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from servotwin import plotting, units
+from servotwin.cli.summary import names
 from servotwin.cli.terminal import pairs, table
 from servotwin.simulation.remarks import words
 from servotwin.simulation.sweep import dimension_of
@@ -21,14 +22,15 @@ _MOST_FAILURES = 3
 _MOST_LANES = 5  # of a kind of remark
 
 
-def sections(study: Study, metric: str, files: Sequence[str]) -> list[RenderableType]:
-    """Return what is printed of a study; `metric` is that of the tornado."""
+def sections(study: Study, metric: str, files: Sequence[str], given: Sequence[str] = ()) -> list[RenderableType]:
+    """Return what is printed of a study; `metric` is that of the tornado, and `given` what the user set."""
     definition = study.definition
     head = f"{definition['servo']}, {definition['model']}, {len(study)} lanes, {definition['duration']:g} s"
-    rows = [("varied", ", ".join(study.parameters)), ("failed", _failed(study)), *_remarks(study),
-            *(("written", name) for name in files)]
+    follow = [("follow", ", ".join(study.followed))] if study.followed else []
+    rows = [("varied", ", ".join(study.parameters)), *follow, ("failed", _failed(study)), *_remarks(study),
+            *([("set", names(given))] if given else []), *(("written", name) for name in files)]
     return [head, pairs(rows), "", _quantiles(study), "", f"what moves {plotting.metric_shown(metric).words}, one at a "
-            "time, and its share of the variance", _tornado(study, metric)]
+            "time, and its share of the variance", *_tornado(study, metric)]
 
 
 def _failed(study: Study) -> str:
@@ -57,15 +59,19 @@ def _quantiles(study: Study) -> RenderableType:
     return table(header, rows)
 
 
-def _tornado(study: Study, metric: str) -> RenderableType:
+def _tornado(study: Study, metric: str) -> list[RenderableType]:
     shown = plotting.metric_shown(metric)
     unit = f" ({shown.label})" if shown.label else ""
-    rows = []
-    for bar in study.tornado(metric).bars[:_MOST_BARS]:
+    rows, found = [], study.tornado(metric)
+    for bar in found.bars[:_MOST_BARS]:
         low, high = (plotting.readable(value, dimension_of(bar.name)) for value in (bar.low, bar.high))
         share = "" if math.isnan(bar.share) else f"{100.0 * bar.share:.1f} %"
         rows.append([bar.name, low, high, _text(bar.at_low, metric), _text(bar.at_high, metric), share])
-    return table(["parameter", "from (5 %)", "to (95 %)", f"gives{unit}", "and", "share"], rows)
+    left = [f"{len(names)} {words}" for words, names in (
+        ("more move it less", found.bars[_MOST_BARS:]), ("others that vary do not move it", found.still)) if names]
+    if not rows:
+        return ["nothing that varies moves it, so there is no tornado"]
+    return [table(["parameter", "from (5 %)", "to (95 %)", f"gives{unit}", "and", "share"], rows), *left]
 
 
 def _text(value: float, metric: str) -> str:

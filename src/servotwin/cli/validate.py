@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli import log_reading
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, patience, show, table
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from servotwin.cli.outputs import Target
+    from servotwin.identification import Log
     from servotwin.identification.fitting.validate import Validation
 
 _EXCEEDED = 1  # exit code
@@ -26,14 +28,16 @@ _MOST_LOGS = 30
 def validate(
     servo: shared.ServoArgument,
     logs: Annotated[list[Path], typer.Argument(
-        metavar="LOGS", help="Files or folders of logs: CSV with or without a sidecar, JSON of BAM or Miuzei.")],
+        metavar="LOGS", help=log_reading.HELP)],
     model: Annotated[str | None, typer.Option(
         metavar="MODEL", help="pulse, pulse-inductive or bounded (default: that of the servo file's fit, else pulse).")]
     = None,
-    file_format: Annotated[str, typer.Option(
-        "--format", metavar="FORMAT", help="Of the logs: auto, csv, bam or miuzei.")] = "auto",
+    file_format: log_reading.FormatOption = "auto",
+    columns: log_reading.ColumnsOption = None,
+    joint: log_reading.JointOption = None,
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable, SI.")] = None,
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
+        "in SI.")] = None,
     nuisance: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="What belongs to the rig and is fitted to these logs: delay, log_delay, angle_offset, "
         "angle_sag, initial_state; repeatable or with commas (default: none; the others are as the servo file's fit "
@@ -53,7 +57,8 @@ def validate(
 ) -> None:
     """Run a servo against logs, and say how far it is off."""
     targets = _targets(report, [Path(servo), *logs], force=force)
-    found = _run(servo, model, change or [], logs, file_format, leave_out or [], nuisance, sensors)
+    found = _run(servo, model, change or [], nuisance, sensors, lambda: log_reading.read(
+        logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json))
     limits = _limits(found, max_error or [])
     files = _write(found, targets, force=force)
     above = exceeded(found, limits)
@@ -70,8 +75,8 @@ def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Ta
     return targets
 
 
-def _run(servo: str, model: str | None, change: list[str], logs: list[Path], file_format: str, leave_out: list[str],
-         nuisance: list[str] | None, sensors: list[str] | None) -> Validation:
+def _run(servo: str, model: str | None, change: list[str], nuisance: list[str] | None, sensors: list[str] | None,
+         read: Callable[[], list[Log]]) -> Validation:
     from servotwin.cli import fit_words
     from servotwin.cli.model_words import class_of, servo_of
     from servotwin.identification.fitting.validate import validate as run
@@ -79,10 +84,7 @@ def _run(servo: str, model: str | None, change: list[str], logs: list[Path], fil
     kind = None if model is None else class_of(model, fit_words.MODEL_NAMES)
     changed = servo_of(servo, change)
     fitted = fit_words.some_or_none("--nuisance", nuisance, ())
-    windows = fit_words.left_out(leave_out)
-    with patience("reading"):
-        given = fit_words.without(fit_words.read_all(logs, file_format), windows)
-    return run(given, changed, kind, nuisance=fitted, sensors=fit_words.names(sensors),
+    return run(read(), changed, kind, nuisance=fitted, sensors=fit_words.names(sensors),
                progress=sys.stderr is not None and sys.stderr.isatty())
 
 
@@ -128,6 +130,7 @@ def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str |
     if as_json:
         emit_json({
             "servo": found.servo.name, "model": type(found.model).__name__, "logs": len(found.traces),
+            "reading": log_reading.facts([trace.log for trace in found.traces]),
             "nuisance": dict(found.nuisance), "fitted": list(found.fitted),
             "errors": fit_show.error_facts(found.errors), "noise": dict(found.noise),
             "max_error": {motion or "all": limit for motion, limit in limits.items()}, "above": dict(above),

@@ -15,9 +15,12 @@ from servotwin.identification.logs.bam_convention import BamConvention
 from servotwin.identification.logs.bam_logs import read_bam_log, write_bam_log
 from servotwin.identification.logs.bam_parameters import read_bam_parameters, write_bam_parameters
 from servotwin.identification.logs.csv_logs import read_csv_log, write_log
+from servotwin.identification.logs.keep import keep_columns
+from servotwin.identification.logs.lerobot import read_lerobot_logs
 from servotwin.identification.logs.log import Log
 from servotwin.identification.logs.miuzei import read_miuzei_logs
 from servotwin.identification.logs.readers import read_logs
+from servotwin.identification.logs.reading import ReadColumn, Reading
 from servotwin.identification.sheets.contradictions import Contradiction, sheet_contradictions, sheet_flags
 from servotwin.identification.sheets.csv_sheets import SheetList, read_sheets
 from servotwin.identification.sheets.motor_range import MotorRange, Range, motor_range
@@ -44,6 +47,8 @@ __all__ = [
     "MotorRange",
     "Point",
     "Range",
+    "ReadColumn",
+    "Reading",
     "Rung",
     "Sheet",
     "SheetList",
@@ -57,10 +62,12 @@ __all__ = [
     "advise",
     "friction_ladder",
     "identify",
+    "keep_columns",
     "motor_range",
     "read_bam_log",
     "read_bam_parameters",
     "read_csv_log",
+    "read_lerobot_logs",
     "read_logs",
     "read_miuzei_logs",
     "read_sheets",

@@ -6,6 +6,7 @@ from servotwin.models.bounded import BoundedServo
 from servotwin.models.default import default_class, default_model
 from servotwin.models.motors import DCMotor, GearedMotor
 from servotwin.models.pulse import PulseServo, PulseServoInductive
+from servotwin.models.travel import mid_travel
 
 MODELS: dict[str, type[Model]] = {
     "dc-motor": DCMotor,
@@ -18,4 +19,4 @@ MODELS: dict[str, type[Model]] = {
 }
 
 __all__ = ["MODELS", "AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "Model",
-           "PulseServo", "PulseServoInductive", "default_class", "default_model"]
+           "PulseServo", "PulseServoInductive", "default_class", "default_model", "mid_travel"]

@@ -15,7 +15,8 @@ from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
 from servotwin.models.pulse_plant import gear_numbers, sensor_numbers, source_numbers, thermal_numbers
-from servotwin.physics import electronics, potentiometer
+from servotwin.physics import bridge, electronics, potentiometer
+from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -143,6 +144,54 @@ class _Pulsed(Model):
             V_br=self.value_or("motor.brush_drop_voltage", 0.0), V_oc=self.value("supply.open_circuit_voltage"),
             coast=self._coasts(), step=self.value_or("potentiometer.quantisation", 0.0))
 
+    def check_mean(self, what: str, more: tuple[str, ...] = ()) -> None:
+        """Say in one line where pulses have no mean that grows with the error; `what` is it that would need one.
+
+        Raises
+        ------
+        InputError
+            If the bridge coasts between drives: it then has no mean voltage that follows the error.
+
+        Warns
+        -----
+        UserWarning
+            If a minimum drive time, an RC stretcher, a back-EMF injection, or one of `more`, makes the mean another.
+        """
+        if self.servo.get("electronics.off_state") == "coast":
+            raise InputError(f"{what} of {self.servo.name}", got="a bridge that coasts",
+                             allowed="one that brakes: without current the mean voltage is the motor's own")
+        left_out = [name for name in ("electronics.minimum_drive_time", "electronics.stretcher_time_constant",
+                                      "electronics.back_emf_injection", *more) if self.value_or(name, 0.0) != 0.0]
+        if left_out:
+            warnings.warn(f"{self.servo.name}: {what} leaves out {', '.join(left_out)}: the gain that its pulses have "
+                          "in the mean does not hold with it", stacklevel=3)
+
+    def mean_gain(self, frame_period: float | None = None) -> float:
+        """Return A k_s [V/V]: the mean voltage behind R_a, at standstill, per volt of error beyond the deadband.
+
+        It is `physics.averaged_bridge_gain` of R_a times the current that a drive sends through the resting motor,
+        so that the drops and resistances of supply, bridge and brushes count while the bridge drives.
+
+        Parameters
+        ----------
+        frame_period : float, optional
+            T_f [s]; the servo's own unless given.
+
+        Raises
+        ------
+        InputError
+            If the frame period is not a positive number.
+        """
+        T_f = self.frame_period if frame_period is None else frame_period
+        if not (is_finite(T_f) and T_f > 0.0):
+            raise InputError("frame_period", got=T_f, allowed="a positive number [s]")
+        source = source_numbers(self, self._coasts())
+        stalled = bridge.bridge_current(source["V"], 0.0, source["D_drive"], source["R_drive"])
+        gain = electronics.averaged_bridge_gain(
+            self.value("motor.armature_resistance") * min(float(stalled), source["I_max"]), 0.0,
+            self.value("electronics.stretcher_gain"), T_f, self.value("electronics.one_shot_slope"))
+        return float(gain)
+
     def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Return angles [rad] and errors [V] of the potentiometer's linearity table; empty without one."""
         angles, errors = (self.servo.get(f"potentiometer.linearity_{name}") for name in ("angle", "error"))
@@ -256,13 +305,7 @@ class PulseServo(_Pulsed):
         >>> round(model.value("electronics.bridge_gain"), 2)
         45.67
         """
-        if self.servo.get("electronics.off_state") == "coast":
-            raise InputError("averaged()", got="a bridge that coasts",
-                             allowed="one that brakes: without current the mean voltage is the motor's own")
-        left_out = [name for name in ("electronics.minimum_drive_time", "electronics.stretcher_time_constant",
-                                      "electronics.back_emf_injection") if self.value_or(name, 0.0) != 0.0]
-        if left_out:
-            warnings.warn(f"{self.servo.name}: the averaged servo leaves out {', '.join(left_out)}", stacklevel=2)
+        self.check_mean("the averaged servo")
         T_f = self.frame_period if frame_period is None else frame_period
         slope = self.value("electronics.one_shot_slope")
         s_r, T_0 = 1.0 / slope, self.value_or("electronics.one_shot_offset", 0.0)
@@ -273,7 +316,8 @@ class PulseServo(_Pulsed):
         return BoundedServo(self.servo.replace({
             "electronics.bridge_gain": float(gain), "electronics.comparator_gain": 1.0,
             "electronics.pulse_to_voltage_gain": s_r, "electronics.command_offset": s_r * (t_0 - T_0),
-            "electronics.voltage_deadband": s_r * self.value_or("electronics.deadband", 0.0)}))
+            "electronics.voltage_deadband": s_r * self.value_or("electronics.deadband", 0.0)},
+            source="the mean of the pulses"))
 
 
 @final

@@ -15,11 +15,13 @@ from servotwin.parameters.groups import (
     Thermal,
 )
 from servotwin.parameters.output_file import write_file
+from servotwin.parameters.printed import PrintedPoint, printed_fact, printed_flags, printed_points
 from servotwin.parameters.quantity import ORIGINS, Quantity
-from servotwin.parameters.servo import KINDS, Servo, servo_from_values, unit_of
+from servotwin.parameters.servo import KINDS, Servo, dimension_of, servo_from_values, unit_of
 
 __all__ = [
     "GROUPS", "KINDS", "ORIGINS", "Dataset", "Electronics", "Friction", "Gear", "Group", "Motor", "Potentiometer",
-    "Quantity", "Servo", "Stops", "Supply", "Thermal", "catalog_names", "dataset_names", "load_dataset", "load_servo",
+    "PrintedPoint", "Quantity", "Servo", "Stops", "Supply", "Thermal", "catalog_names", "dataset_names",
+    "dimension_of", "load_dataset", "load_servo", "printed_fact", "printed_flags", "printed_points",
     "servo_from_values", "unit_of", "write_file",
 ]

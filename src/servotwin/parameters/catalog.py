@@ -38,7 +38,7 @@ def load_servo(name: str | Path) -> Servo:
     Raises
     ------
     UnknownNameError
-        If it is no id of the catalog; the nearest one is suggested.
+        If it is no id of the catalog; the nearest five are suggested.
     ServoFileError
         If the file cannot be read or holds something wrong.
 
@@ -53,5 +53,6 @@ def load_servo(name: str | Path) -> Servo:
     if text not in catalog_names():
         if os.path.isfile(text):
             return read_servo_file(Path(text))
-        raise UnknownNameError("servo", text, catalog_names())
+        raise UnknownNameError("servo", text, catalog_names(),
+                               allowed="an id that `servotwin catalog list` shows, or a servo file")
     return read_servo_file(_folder() / f"{text}.toml", name=f"catalog/{text}.toml")

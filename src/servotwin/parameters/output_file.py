@@ -2,12 +2,41 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-import tempfile
-from collections.abc import Callable
+import secrets
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from servotwin.errors import OutputError, OutputExistsError
+
+_undoing: list[Callable[[], object]] = []  # of what is half written
+
+
+@contextlib.contextmanager
+def undone(undo: Callable[[], object]) -> Iterator[None]:
+    """Run `undo` at the end of the block, however it ends, or by `undo_all` where the process ends within it.
+
+    Examples
+    --------
+    >>> with undone(lambda: print("removed")):
+    ...     2 + 2
+    4
+    removed
+    """
+    _undoing.append(undo)
+    try:
+        yield
+    finally:
+        undo()
+        _undoing.remove(undo)
+
+
+def undo_all() -> None:
+    """Undo what is half written: the process ends here."""
+    for undo in reversed(_undoing):
+        with contextlib.suppress(Exception):
+            undo()
 
 
 def write_file(path: str | Path, write: Callable[[Path], object], *, overwrite: bool = False) -> None:
@@ -22,6 +51,7 @@ def write_file(path: str | Path, write: Callable[[Path], object], *, overwrite: 
 
     Examples
     --------
+    >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())
     >>> write_file(folder / "a.txt", lambda path: path.write_text("text"))
     >>> (folder / "a.txt").read_text()
@@ -37,19 +67,14 @@ def write_file(path: str | Path, write: Callable[[Path], object], *, overwrite: 
             raise OutputError(f"{target} is a folder")
         if target.exists() and not target.is_file():
             raise OutputError(f"{target} is no regular file")  # a device must not be replaced by a file
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=".partial-", suffix=target.suffix)
+        partial = target.with_name(f".partial-{secrets.token_hex(8)}{target.suffix}")
+        with undone(lambda: partial.unlink(missing_ok=True)):
+            partial.touch(0o600, exist_ok=False)
+            write(partial)
+            partial.chmod(0o666 & ~_umask())
+            os.replace(partial, target)
     except OSError as error:
         raise OutputError(f"{target} cannot be written ({error.strerror})") from None
-    partial = Path(name)
-    try:
-        os.close(handle)
-        write(partial)
-        partial.chmod(0o666 & ~_umask())
-        os.replace(partial, target)
-    except OSError as error:
-        raise OutputError(f"{target} cannot be written ({error.strerror})") from None
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _umask() -> int:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from servotwin.errors import ParameterError
 
+SET_BY_USER = "set by the user"
+_SET = "set by "
 ORIGINS = ("measured", "identified", "datasheet", "literature", "assumed")
 
 
@@ -65,6 +67,11 @@ class Quantity:
                 raise ParameterError("lower", got=self.lower, allowed=f"at most the value {self.value!r}")
             if self.upper is not None and self.upper < self.value - slack:
                 raise ParameterError("upper", got=self.upper, allowed=f"at least the value {self.value!r}")
+
+    @property
+    def was_set(self) -> bool:
+        """Whether a person set it, by `Servo.replace` or `--set`, rather than a file assumed it."""
+        return self.origin == "assumed" and self.source is not None and self.source.startswith(_SET)
 
     @property
     def spread(self) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from servotwin.errors import ParameterError, ServotwinError, UnknownNameError
+from servotwin.errors import ParameterError, UnknownNameError
 from servotwin.parameters.groups import (
     GROUPS,
     Electronics,
@@ -21,11 +21,18 @@ from servotwin.parameters.groups import (
     Supply,
     Thermal,
 )
-from servotwin.parameters.quantity import Quantity
-from servotwin.units import is_finite, si_unit, to_si
+from servotwin.parameters.quantity import SET_BY_USER, Quantity
+from servotwin.units import si_unit
 
 Value = float | tuple[float, ...] | str
 KINDS = ("analog", "digital", "bus")
+_USUAL = {  # what people call it -> its name
+    "voltage": "supply.open_circuit_voltage", "supply_voltage": "supply.open_circuit_voltage",
+    "resistance": "motor.armature_resistance", "inductance": "motor.armature_inductance",
+    "inertia": "motor.rotor_inertia", "viscous_friction": "motor.motor_viscous_friction",
+    "ratio": "gear.gear_reduction", "gear_ratio": "gear.gear_reduction", "reduction": "gear.gear_reduction",
+    "play": "gear.backlash", "coulomb_torque": "friction.coulomb_torque_forward",
+    "dead_band": "electronics.deadband", "frame": "electronics.frame_period", "gain": "electronics.stretcher_gain"}
 _PLACES = {f"{group}.{f.name}": (group, f.name) for group, kind in GROUPS.items() for f in fields(kind)}
 
 
@@ -134,35 +141,15 @@ class Servo:
             raise ParameterError(f"{name} is not given by servo {self.name!r}")
         return self.quantities[name]
 
-    @property
-    def flags(self) -> tuple[str, ...]:
-        """What the file's [sheet] says of itself: what it lacks, and where it contradicts itself.
+    def replace(self, values: Mapping[str, Value | None], *, source: str = SET_BY_USER) -> Servo:
+        """Return a servo with some values replaced; their origin becomes assumed.
 
-        Examples
-        --------
-        >>> servo_from_values("mine", {}).flags
-        ()
-        """
-        found = self.sheet.get("flags")
-        return tuple(flag for flag in found if isinstance(flag, str)) if isinstance(found, list) else ()
-
-    def sheet_values(self, name: str, dimension: str) -> tuple[float, ...]:
-        """Return the values (SI) that the sheet has for a fact: the main one first, then those of other voltages.
-
-        Examples
-        --------
-        >>> from servotwin.parameters import load_servo
-        >>> load_servo("hitec-hs-755hb").sheet_values("supply_voltage", "voltage")
-        (6.0, 4.8)
-        """
-        tables = [self.sheet, *also] if isinstance(also := self.sheet.get("also_at"), list) else [self.sheet]
-        found = [_si(table.get(name), dimension) for table in tables if isinstance(table, Mapping)]
-        return tuple(value for value in found if value is not None)
-
-    def replace(self, values: Mapping[str, Value | None]) -> Servo:
-        """Return a servo with some values replaced (dotted name to SI number); their origin becomes assumed.
-
-        None takes a value away.
+        Parameters
+        ----------
+        values : mapping
+            Dotted name to SI number; None takes a value away.
+        source : str
+            Who says so; what begins with "set by" is listed under `set` in summaries.
 
         Raises
         ------
@@ -179,7 +166,7 @@ class Servo:
             group, key = check_name(name)
             value = getattr(groups[group], key)
             if value is not None:
-                quantities[name] = _replaced(name, value)
+                quantities[name] = _replaced(name, value, source)
         return replace(self, quantities=quantities, **groups)
 
     def with_checked(self, values: Mapping[str, Value | None]) -> Servo:
@@ -194,7 +181,7 @@ class Servo:
                 made.__dict__[group] = object.__new__(GROUPS[group])
                 made.__dict__[group].__dict__.update(self.__dict__[group].__dict__)
             made.__dict__[group].__dict__[key] = value
-        changed = {name: _replaced(name, value) for name, value in values.items() if value is not None}
+        changed = {name: _replaced(name, value, SET_BY_USER) for name, value in values.items() if value is not None}
         made.__dict__["quantities"] = MappingProxyType({**self.quantities, **changed})
         return made
 
@@ -261,10 +248,26 @@ def check_name(name: str) -> tuple[str, str]:
     """
     place = _PLACES.get(name)
     if place is None:
-        group = name.partition(".")[0]
-        near = [n for n in _PLACES if n.startswith(f"{group}.")] or list(_PLACES)
-        raise UnknownNameError("parameter", name, near)
+        group, _, key = str(name).partition(".")
+        meant = _USUAL.get(key or group)
+        if group in GROUPS:
+            near = [n for n in _PLACES if n.startswith(f"{group}.")]
+            raise UnknownNameError("parameter", name, near, meant=meant if meant in near else None)
+        raise UnknownNameError("parameter", name, _PLACES, meant=meant,
+                               allowed=f"GROUP.NAME, with a group of {', '.join(GROUPS)}")
     return place
+
+
+def dimension_of(name: str) -> str:
+    """Return what a parameter measures, in the words of `servotwin.units`; "word" for words.
+
+    Examples
+    --------
+    >>> dimension_of("motor.rotor_inertia")
+    'inertia'
+    """
+    group, key = check_name(name)
+    return str(GROUPS[group].__dataclass_fields__[key].metadata["dimension"])
 
 
 def unit_of(name: str) -> str:
@@ -275,24 +278,12 @@ def unit_of(name: str) -> str:
     >>> unit_of("motor.rotor_inertia")
     'kg m2'
     """
-    group, key = check_name(name)
-    dimension = GROUPS[group].__dataclass_fields__[key].metadata["dimension"]
+    dimension = dimension_of(name)
     return "" if dimension == "word" else si_unit(dimension)
 
 
-def _replaced(name: str, value: Value) -> Quantity:
-    return Quantity(value=value, unit=unit_of(name), origin="assumed", source="replaced")
-
-
-def _si(entry: Any, dimension: str) -> float | None:
-    """Return an entry of a sheet in SI; None where it is none: a person's own [sheet] may hold anything."""
-    if not isinstance(entry, Mapping) or not is_finite(entry.get("value")):
-        return None
-    try:
-        value = to_si(entry["value"], str(entry.get("unit")), dimension)
-    except ServotwinError:
-        return None
-    return value if is_finite(value) else None
+def _replaced(name: str, value: Value, source: str) -> Quantity:
+    return Quantity(value=value, unit=unit_of(name), origin="assumed", source=source)
 
 
 def _rebuild(state: dict[str, Any]) -> Servo:

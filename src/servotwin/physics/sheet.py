@@ -12,6 +12,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
 
 from servotwin.errors import ParameterError
 from servotwin.physics._typing import Real
@@ -96,16 +99,17 @@ def motor_from_sheet(*, supply_voltage: float, stall_torque: float, no_load_spee
     if not 0.0 <= drop_voltage < supply_voltage:
         raise ParameterError("sheet drop_voltage", got=drop_voltage, allowed="from 0 to below the supply voltage")
     U = supply_voltage - drop_voltage
+    R: Any
     if stall_current is not None:
         if stall_current <= no_load_current:
             raise ParameterError("sheet stall_current", got=stall_current,
                                  allowed=f"more than the no-load current {no_load_current:g} A")
-        R, eta = U / stall_current, math.nan
+        R, eta = sheet_resistance(supply_voltage, stall_current, drop_voltage), math.nan
     else:
         gap = 0.5 * stall_torque * no_load_speed / (gear_efficiency * no_load_current)
         x = U * U / (U + gap + math.sqrt(gap) * math.sqrt(gap + 2.0 * U))  # one over the larger root, times U²
         R, eta = x / no_load_current, gear_efficiency
-    K_out = (U - R * no_load_current) / no_load_speed
+    K_out: Any = sheet_torque_constant(supply_voltage, no_load_speed, no_load_current, R, drop_voltage)
     if stall_current is not None:
         eta = stall_torque / (K_out * (stall_current - no_load_current))
     mu_m = load_share(min(eta, 1.0))
@@ -113,17 +117,143 @@ def motor_from_sheet(*, supply_voltage: float, stall_torque: float, no_load_spee
                       coulomb_torque=K_out * no_load_current * (1.0 - mu_m))
 
 
-def load_share(gear_efficiency: float) -> float:
-    """Return the friction per torque through the gear that makes an efficiency, equal for motor and load.
+def sheet_resistance(supply_voltage: Real, stall_current: Real, drop_voltage: Real = 0.0) -> Real:
+    """Return the resistance of the motor's circuit that a stall current says.
 
     Parameters
     ----------
-    gear_efficiency : float
+    supply_voltage : float or array
+        V [V].
+    stall_current : float or array
+        I_s [A].
+    drop_voltage : float or array
+        V_d [V].
+
+    Returns
+    -------
+    float or array
+        R = (V − V_d)/I_s [ohm].
+
+    Examples
+    --------
+    >>> round(sheet_resistance(6.0, 1.8415, 0.4), 3)
+    3.041
+    """
+    return (supply_voltage - drop_voltage) / stall_current
+
+
+def sheet_torque_constant(supply_voltage: Real, no_load_speed: Real, no_load_current: Real, resistance: Real,
+                          drop_voltage: Real = 0.0) -> Real:
+    """Return the torque per current at the output that a speed without load says.
+
+    Parameters
+    ----------
+    supply_voltage : float or array
+        V [V].
+    no_load_speed : float or array
+        ω_0 [rad/s].
+    no_load_current : float or array
+        I_0 [A].
+    resistance : float or array
+        R [ohm].
+    drop_voltage : float or array
+        V_d [V].
+
+    Returns
+    -------
+    float or array
+        K_out = (V − V_d − R I_0)/ω_0 [N m/A].
+
+    Examples
+    --------
+    >>> round(sheet_torque_constant(6.0, math.pi / 3 / 0.23, 0.285, 3.041, 0.4), 3)
+    1.04
+    """
+    return (supply_voltage - drop_voltage - resistance * no_load_current) / no_load_speed
+
+
+def sheet_stall_torque(output_torque_constant: Real, stall_current: Real, no_load_current: Real,
+                       gear_efficiency: Real, viscous_share: Real = 0.0) -> Real:
+    """Return the torque that a servo just cannot turn against.
+
+    Parameters
+    ----------
+    output_torque_constant : float or array
+        K_out [N m/A].
+    stall_current : float or array
+        I_s [A].
+    no_load_current : float or array
+        I_0 [A].
+    gear_efficiency : float or array
+        η_g [1].
+    viscous_share : float or array
+        s, what of the friction at the no-load speed grows with the speed, and is not there at stall [1].
+
+    Returns
+    -------
+    float or array
+        T_s = η_g K_out (I_s − (1 − s) I_0) [N m].
+
+    Examples
+    --------
+    >>> round(sheet_stall_torque(1.0396, 1.8415, 0.285, 0.8), 4)
+    1.2945
+    """
+    return gear_efficiency * output_torque_constant * (stall_current - (1.0 - viscous_share) * no_load_current)
+
+
+def no_load_current_of(supply_voltage: Real, resistance: Real, output_torque_constant: Real, coulomb_torque: Real,
+                       viscous_friction: Real = 0.0, motor_share: Real = 1.0, drop_voltage: Real = 0.0) -> Real:
+    """Return the current of a servo that turns without load, from its parameters.
+
+    Parameters
+    ----------
+    supply_voltage : float or array
+        V [V].
+    resistance : float or array
+        R [ohm].
+    output_torque_constant : float or array
+        K_out [N m/A].
+    coulomb_torque : float or array
+        τ_c at the output [N m].
+    viscous_friction : float or array
+        b = N² B_m at the output [N m s/rad].
+    motor_share : float or array
+        1 − μ_m, what the gear leaves of the motor's torque [1].
+    drop_voltage : float or array
+        V_d [V].
+
+    Returns
+    -------
+    float or array
+        I_0 of K_out I_0 (1 − μ_m) = τ_c + b ω_0 and ω_0 = (V − V_d − R I_0)/K_out [A].
+
+    Examples
+    --------
+    >>> round(no_load_current_of(6.0, 3.041, 1.0396, 0.26336, 0.0, 8.0 / 9.0, 0.4), 3)
+    0.285
+    """
+    R, K, b, U = resistance, output_torque_constant, viscous_friction, supply_voltage - drop_voltage
+    return (coulomb_torque + b * U / K) / (motor_share * K + b * R / K)
+
+
+@overload
+def load_share(gear_efficiency: float) -> float: ...
+@overload
+def load_share(gear_efficiency: Real) -> Real: ...
+def load_share(gear_efficiency: Real) -> Real:
+    """Return the friction per torque through the gear that makes an efficiency, equal for motor and load.
+
+    It is its own inverse: of a share it returns the efficiency.
+
+    Parameters
+    ----------
+    gear_efficiency : float or array
         η_g, above 0 and at most 1 [1].
 
     Returns
     -------
-    float
+    float or array
         μ_m = μ_e = (1 − η_g)/(1 + η_g), which gives η_g = (1 − μ_m)/(1 + μ_e) [1].
 
     Examples
@@ -132,6 +262,44 @@ def load_share(gear_efficiency: float) -> float:
     0.1111
     """
     return (1.0 - gear_efficiency) / (1.0 + gear_efficiency)
+
+
+def stall_torque(stall_current: Real, output_torque_constant: Real, coulomb_torque: Real,
+                 load_friction_motor: Real = 0.0, load_friction_external: Real = 0.0) -> Real:
+    """Return the torque against which a motor with a gear just still turns.
+
+    Parameters
+    ----------
+    stall_current : float or array
+        I_s = (V − V_d)/R, or what the source gives at most [A].
+    output_torque_constant : float or array
+        K_out = N k_a [N m/A].
+    coulomb_torque : float or array
+        τ_c = N F_c of a sliding gear, at the output [N m].
+    load_friction_motor, load_friction_external : float or array
+        K_m and K_e, both K_l for one share [1].
+
+    Returns
+    -------
+    float or array
+        T_s = ((1 − K_m) K_out I_s − τ_c)/(1 + K_e), the balance of motor, load and gear friction (M3, M5); 0 where
+        friction holds the motor [N m].
+
+    Notes
+    -----
+    With K_m = K_e = μ and τ_c = K_out I_0 (1 − μ) it is η_g K_out (I_s − I_0), as of `motor_from_sheet`.
+
+    Examples
+    --------
+    >>> motor = motor_from_sheet(supply_voltage=6.0, stall_torque=1.2945, no_load_speed=math.pi / 3 / 0.23,
+    ...                          no_load_current=0.285)
+    >>> mu = load_share(motor.gear_efficiency)
+    >>> round(float(stall_torque(motor.stall_current, motor.output_torque_constant, motor.coulomb_torque, mu, mu)), 4)
+    1.2945
+    """
+    K_m, K_e = load_friction_motor, load_friction_external
+    T_s: Real = np.maximum(((1.0 - K_m) * output_torque_constant * stall_current - coulomb_torque) / (1.0 + K_e), 0.0)
+    return T_s
 
 
 def sheet_efficiency(supply_voltage: Real, stall_torque: Real, no_load_speed: Real, no_load_current: Real,
@@ -174,7 +342,7 @@ def sheet_efficiency(supply_voltage: Real, stall_torque: Real, no_load_speed: Re
 
 
 def stall_current_for(supply_voltage: Real, stall_torque: Real, no_load_speed: Real, no_load_current: Real,
-                      gear_efficiency: Real = 1.0, drop_voltage: Real = 0.0) -> Real:
+                      gear_efficiency: Real = 1.0, drop_voltage: Real = 0.0, viscous_share: Real = 0.0) -> Real:
     """Return the stall current with which torque and speed have a given efficiency of the gear.
 
     Parameters
@@ -191,11 +359,13 @@ def stall_current_for(supply_voltage: Real, stall_torque: Real, no_load_speed: R
         η_g; with 1 and no drop the result is the least current that can make the torque [1].
     drop_voltage : float or array
         V_d [V].
+    viscous_share : float or array
+        s, what of the friction at the no-load speed grows with the speed [1].
 
     Returns
     -------
     float or array
-        I_s, the root above I_0 of η_g (V − V_d)(I_s − I_0)² = T_s ω_0 I_s [A].
+        I_s, the root above I_0 of η_g (V − V_d)(I_s − I_0)(I_s − (1 − s) I_0) = T_s ω_0 I_s [A].
 
     Examples
     --------
@@ -203,8 +373,10 @@ def stall_current_for(supply_voltage: Real, stall_torque: Real, no_load_speed: R
     0.8
     """
     half = 0.5 * stall_torque * no_load_speed / (gear_efficiency * (supply_voltage - drop_voltage))
-    I_0 = no_load_current
-    return I_0 + half + (half * (half + 2.0 * I_0)) ** 0.5
+    I_0, s = no_load_current, viscous_share
+    # with the middle m = half + (1 - s/2) I_0 of both roots, m² - (1 - s) I_0² without a difference of large numbers
+    middle = half + (1.0 - 0.5 * s) * I_0
+    return middle + (half * (half + (2.0 - s) * I_0) + (0.5 * s * I_0) ** 2) ** 0.5
 
 
 def sheet_growth(lower_voltage: Real, upper_voltage: Real, drop_voltage: Real = 0.0,

@@ -5,6 +5,13 @@ asked for. Angles are in degrees and pulses in microseconds.
 """
 
 from servotwin.plotting.block_diagrams import PAPER_DIAGRAMS, block_diagram
+from servotwin.plotting.characteristics import (
+    bandwidth_curves,
+    compared_curves,
+    holding_curves,
+    lift_curve,
+    speed_curves,
+)
 from servotwin.plotting.diagram import Diagram
 from servotwin.plotting.files import save
 from servotwin.plotting.formula import Formula, formula_svg
@@ -24,15 +31,20 @@ __all__ = [
     "Limit",
     "Shown",
     "axes_grid",
+    "bandwidth_curves",
     "block_diagram",
+    "compared_curves",
     "curves",
     "finished",
     "formula_svg",
+    "holding_curves",
+    "lift_curve",
     "metric_shown",
     "pulses",
     "readable",
     "save",
     "shown",
+    "speed_curves",
     "time_response",
     "to_bytes",
     "tornado",

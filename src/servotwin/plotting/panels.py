@@ -57,7 +57,7 @@ def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequen
     Parameters
     ----------
     drawn : sequence of Curve
-        At least one, at most five of each kind.
+        At least one, at most five of each kind; points that come later lie in front.
     x_label, y_label : str
         With the unit in brackets.
     limits : sequence of Limit
@@ -100,20 +100,20 @@ def curves(drawn: Sequence[Curve], *, x_label: str, y_label: str, limits: Sequen
 
 def _panel(ax: Axes, drawn: Sequence[Curve], label: str) -> None:
     for place, curve in enumerate(drawn):
-        _draw(ax, curve, place if curve.style is None else curve.style)
+        _draw(ax, curve, place if curve.style is None else curve.style, place)
     ax.margins(y=0.09)
     ax.set_ylabel(label)
 
 
-def _draw(ax: Axes, curve: Curve, style: int) -> None:
+def _draw(ax: Axes, curve: Curve, style: int, place: int) -> None:
     colour, dash = LINES[style % len(LINES)]
     if not curve.points:
         ax.plot(np.asarray(curve.x), np.asarray(curve.y), color=colour, linestyle=dash, label=curve.label)
         return
     marker = _MARKERS[style % len(_MARKERS)]
     ax.errorbar(np.asarray(curve.x), np.asarray(curve.y), yerr=curve.error, color=colour, linestyle="none",
-                marker=marker, markersize=5.5, markerfacecolor="white" if style else colour, capsize=3.0,
-                elinewidth=1.0, label=curve.label, zorder=3 + style)
+                marker=marker, markersize=6.5 if style else 4.5, markerfacecolor="white" if style else colour,
+                capsize=3.0, elinewidth=1.0, label=curve.label, zorder=3 + place)  # the last one in front
 
 
 def pulses(edges: Sequence[float], widths: Sequence[float], *, frame_period: float) -> Figure:

@@ -12,6 +12,8 @@ from servotwin.plotting.responses import SHOWN, Shown
 from servotwin.units.look import COLOURS, axes_grid, context, finished, readable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -28,6 +30,7 @@ _METRICS = {
     "peak_error": Shown("peak error", "", "°", "deg", "angle"),
 }
 _WIDTH, _ROW = 6.6, 0.42  # inch
+_LETTER, _GAP, _ROOM, _ROUNDS = 4.3, 6.0, 240.0, 30  # pt: of a label; of the axis, beside names and shares
 _SIDES = (("low end (5 %)", COLOURS["blue"], ""), ("high end (95 %)", COLOURS["orange"], "////"))
 
 
@@ -77,13 +80,14 @@ def tornado(found: Tornado, *, most: int = 12) -> Figure:
     shown = metric_shown(found.metric)
     figure, (ax,) = axes_grid(1, width=_WIDTH, height=1.15 + _ROW * len(bars))
     with context():
+        leftward = any(at < found.nominal for bar in bars for at in (bar.at_low, bar.at_high))
         for row, bar in enumerate(bars):
-            _draw(ax, row, bar, found.nominal, shown)
+            _draw(ax, row, bar, found.nominal, shown, leftward=leftward)
         if math.isfinite(found.nominal):
             ax.axvline(_in(shown, found.nominal), color=COLOURS["black"], linewidth=1.0)
         ax.set_yticks(range(len(bars)), [bar.name for bar in bars])
         ax.set_ylim(len(bars) - 0.45, -0.55)
-        ax.margins(x=0.2)
+        ax.set_xlim(*_limits(bars, found.nominal, shown, leftward=leftward))
         ax.grid(visible=False, axis="y")
         ax.set_xlabel(f"{shown.words} ({shown.label})" if shown.label else shown.words)
         for label, colour, hatch in _SIDES:
@@ -95,7 +99,30 @@ def tornado(found: Tornado, *, most: int = 12) -> Figure:
     return finished(figure)
 
 
-def _draw(ax: Axes, row: int, bar: Bar, nominal: float, shown: Shown) -> None:
+def _goes_right(at: float, nominal: float, side: int, *, leftward: bool) -> bool:
+    """Tell on which side of its bar a label stands; where no bar goes left, names stand there and no label."""
+    return at > nominal or (at == nominal and (side > 0 or not leftward))
+
+
+def _limits(bars: Sequence[Bar], nominal: float, shown: Shown, *, leftward: bool) -> tuple[float, float]:
+    """Return an axis on which every label has room beside its bar."""
+    from servotwin.simulation.sweep import dimension_of
+
+    labels = [(_in(shown, at), _goes_right(at, nominal, side, leftward=leftward),
+               (_GAP + _LETTER * len(readable(value, dimension_of(bar.name)))) / _ROOM) for bar in bars
+              for side, value, at in ((-1, bar.low, bar.at_low), (1, bar.high, bar.at_high)) if math.isfinite(at)]
+    ends = [x for x, _, _ in labels] + ([_in(shown, nominal)] if math.isfinite(nominal) else [])
+    low, high = min(ends, default=0.0), max(ends, default=1.0)
+    if high - low < 1e-9 * max(abs(low), abs(high), 1e-300):
+        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(low) or 1.0)
+    for _ in range(_ROUNDS):  # a wider axis makes every label wider on it
+        width = high - low
+        low = min([low, *(x - share * width for x, right, share in labels if not right)])
+        high = max([high, *(x + share * width for x, right, share in labels if right)])
+    return low, high
+
+
+def _draw(ax: Axes, row: int, bar: Bar, nominal: float, shown: Shown, *, leftward: bool) -> None:
     from servotwin.simulation.sweep import dimension_of
 
     for side, value, at, (_, colour, hatch) in ((-1, bar.low, bar.at_low, _SIDES[0]),
@@ -104,11 +131,12 @@ def _draw(ax: Axes, row: int, bar: Bar, nominal: float, shown: Shown) -> None:
         words = readable(value, dimension_of(bar.name))
         if not (math.isfinite(at) and math.isfinite(nominal)):
             ax.annotate(f"{words}: no value", xy=(0.5, y), xycoords=("axes fraction", "data"), fontsize=7.0,
-                        ha="center", va="center", color=COLOURS["grey"])
+                        ha="center", va="center", color=COLOURS["grey"], zorder=3.0,
+                        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8})
             continue
         left, right = _in(shown, nominal), _in(shown, at)
         ax.barh(y, right - left, height=0.36, left=left, color=colour, hatch=hatch, edgecolor="white", linewidth=0.0)
-        ends_right = right >= left if right != left else side > 0
+        ends_right = _goes_right(at, nominal, side, leftward=leftward)
         ax.annotate(words, xy=(right, y), xytext=(3.0 if ends_right else -3.0, 0.0), textcoords="offset points",
                     ha="left" if ends_right else "right", va="center", fontsize=7.0)
     if math.isfinite(bar.share):

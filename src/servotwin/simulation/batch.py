@@ -11,11 +11,15 @@ import numpy as np
 
 from servotwin.errors import MissingExtraError, SimulationError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
+from servotwin.simulation import files
 from servotwin.simulation.remarks import LaneRemark
 from servotwin.simulation.simulator import Simulator, simulated
 from servotwin.simulation.status import Status
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
     import xarray as xr
     from numpy.typing import NDArray
 
@@ -137,6 +141,50 @@ class Batch:
             others = f" (and {more} more of {len(self)} lanes)" if more else ""
             raise SimulationError(Status.of_code(int(self.status[lane])).name, time, f"lane {lane}: {cause}{others}")
         return self
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return all signals (SI) as a pandas DataFrame, a row for each lane and time.
+
+        What differs between lanes is not in it; `to_xarray` has it as coordinates, and a file of `save` as columns.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> model = st.BoundedServo(st.load_servo("hitec-hs-755hb"))
+        >>> batch = st.simulate_many(model, st.signals.step(0.0, 60.0, unit="deg"), duration=1.0,
+        ...                          parameters={"load.inertia": [0.0, 1e-3]}, output_step=0.5)
+        >>> batch.to_dataframe().index.names, batch.to_dataframe().loc[1].shape
+        (FrozenList(['lane', 'time']), (3, 1))
+        """
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingExtraError("pandas", "data") from None
+        frame = pd.DataFrame({name: values.ravel() for name, values in self.signals.items()},
+                             index=pd.MultiIndex.from_product([range(len(self)), self.time], names=["lane", "time"]))
+        frame.attrs["units"] = dict(self.units)
+        return frame
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write all signals to a CSV or Parquet file, a row for each lane and time.
+
+        Columns are `lane`, what differs between lanes by its dotted name (SI), `time_s`, and the signals, the unit of
+        each in its name. What a failed lane has not reached is nan.
+
+        Parameters
+        ----------
+        path : str or Path
+            Ends in .csv or .parquet; the latter needs pyarrow.
+        overwrite : bool
+            Whether a file that is there may be replaced.
+
+        Raises
+        ------
+        OutputExistsError, OutputError
+            If the file exists and `overwrite` is false, or it cannot be written.
+        """
+        files.save_lanes(path, self.time, self.signals, self.units, {**self.lanes.numbers, **self.lanes.words},
+                         overwrite=overwrite)
 
     def to_xarray(self) -> xr.Dataset:
         """Return all signals (SI) as an xarray Dataset over `lane` and `time`, with what differs between lanes."""

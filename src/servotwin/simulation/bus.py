@@ -217,7 +217,8 @@ def _on_supply(model: Model, supply: Supply) -> Model:
     """Return the model with this supply instead of its own."""
     return type(model)(model.servo.replace({
         f"supply.{name}": getattr(supply, name)
-        for name in ("open_circuit_voltage", "internal_resistance", "current_limit")}))
+        for name in ("open_circuit_voltage", "internal_resistance", "current_limit")},
+        source="the supply that all share"))
 
 
 def _source(supply: Supply) -> Source:

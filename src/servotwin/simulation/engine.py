@@ -5,6 +5,7 @@ It drives the kernels and keeps what they leave behind: states to go on from, se
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -140,10 +141,11 @@ class Segment:
 
 @dataclass
 class Record:
-    """What a run leaves behind: segments in order, and events."""
+    """What a run leaves behind: segments in order, and events; who is told how far it is [s]."""
 
     segments: list[Segment]
     events: list[Event]
+    tell: Callable[[float], object] | None = None
 
 
 def run(plan: Plan, state: State, until: float, record: Record | None = None) -> State:
@@ -192,6 +194,8 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
             if point.time > before or not record.segments:
                 record.segments.append(Segment(before, point.time, motion, chip_frame.error, wiper,
                                                chip_frame.drive))
+            if record.tell is not None:
+                record.tell(point.time)
             if kind >= 0:
                 record.events.append(Event(point.time, event_name(kind, point.mode), point.y[0]))
         if kind >= 0:

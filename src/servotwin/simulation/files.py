@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin import units
+from servotwin.errors import OutputError
 from servotwin.parameters import write_file
 
 # SI unit -> (suffix of the column, unit in the file, dimension)
@@ -17,6 +19,7 @@ _COLUMNS = {
     "rad": ("deg", "deg", "angle"), "rad/s": ("deg_per_s", "deg/s", "speed"), "N m": ("Nm", "N m", "torque"),
     "K": ("K", "K", "temperature"), "1": ("", "1", "number"),
 }
+_ROWS = 200_000  # that are held as text at once
 _OWN = dict.fromkeys(("pulse_width", "error_time"), ("us", "us", "time"))
 
 
@@ -31,11 +34,75 @@ def save_csv(path: str | Path, signals: Mapping[str, NDArray[np.float64]], si_un
     OutputError
         If it cannot be written.
     """
-    names, columns = [], []
+    shown = shown_columns(signals, si_units)
+    table = np.column_stack(list(shown.values()))
+    write_file(path, lambda file: np.savetxt(file, table, fmt="%.12g", delimiter=",", header=",".join(shown),
+                                             comments="", encoding="utf-8"), overwrite=overwrite)
+
+
+def shown_columns(signals: Mapping[str, NDArray[Any]], si_units: Mapping[str, str]) -> dict[str, NDArray[Any]]:
+    """Return signals as columns of a file: in the units of people, which the names say.
+
+    Examples
+    --------
+    >>> shown_columns({"output_angle": np.array([np.pi])}, {"output_angle": "rad"})
+    {'output_angle_deg': array([180.])}
+    """
+    found = {}
     for name, values in signals.items():
         suffix, unit, dimension = _OWN.get(name) or _COLUMNS[si_units[name]]
-        names.append(f"{name}_{suffix}" if suffix else name)
-        columns.append(np.asarray(units.from_si(values, unit, dimension)))
-    table = np.column_stack(columns) + 0.0  # -0 becomes 0
-    write_file(path, lambda file: np.savetxt(file, table, fmt="%.12g", delimiter=",", header=",".join(names),
-                                             comments="", encoding="utf-8"), overwrite=overwrite)
+        signless = np.asarray(units.from_si(values, unit, dimension)) + 0.0  # -0 becomes 0
+        found[f"{name}_{suffix}" if suffix else name] = signless
+    return found
+
+
+def save_lanes(path: str | Path, time: NDArray[np.float64], signals: Mapping[str, NDArray[Any]],
+               si_units: Mapping[str, str], varied: Mapping[str, NDArray[Any]], *, overwrite: bool = False) -> None:
+    """Write signals of many lanes, one row for each lane and time, as CSV or Parquet.
+
+    Parameters
+    ----------
+    path : str or Path
+        Ends in .csv or .parquet.
+    time : ndarray, shape (T,)
+    signals : mapping of str to ndarray, shape (B, T)
+    si_units : mapping
+        Of `time` and the signals.
+    varied : mapping of str to ndarray, shape (B,)
+        What differs from lane to lane.
+    overwrite : bool
+
+    Raises
+    ------
+    OutputExistsError
+        If the file exists and `overwrite` is false.
+    OutputError
+        If it cannot be written, or its name ends otherwise.
+    MissingExtraError
+        If Parquet is asked for and pyarrow is not installed.
+    """
+    from servotwin.simulation.sweep.tables import FORMATS, check_format, encoded
+
+    ending = Path(path).suffix.lower().removeprefix(".")
+    if ending not in FORMATS:
+        raise OutputError("file of a batch", got=str(path), allowed="a name that ends in .csv or .parquet")
+    check_format(ending)
+    lanes, times = next(iter(signals.values())).shape
+
+    def rows(first: int, last: int) -> dict[str, NDArray[Any]]:
+        of_lanes = {"lane": np.arange(first, last), **{name: column[first:last] for name, column in varied.items()}}
+        flat = {"time": np.tile(time, last - first), **{name: x[first:last].ravel() for name, x in signals.items()}}
+        return {**{name: np.repeat(column, times) for name, column in of_lanes.items()},
+                **shown_columns(flat, si_units)}
+
+    def write(file: Path) -> None:
+        if ending == "parquet":
+            file.write_bytes(encoded(rows(0, lanes), ending))
+            return
+        step = max(1, _ROWS // times)
+        with file.open("wb") as stream:
+            for first in range(0, lanes, step):
+                text = encoded(rows(first, min(first + step, lanes)), ending)
+                stream.write(text if first == 0 else text[text.index(b"\n") + 1:])
+
+    write_file(path, write, overwrite=overwrite)

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from servotwin.simulation.result import Result
     from servotwin.simulation.trajectory import Trajectory
 
+_NEAR = math.radians(1.0)
+_LOOK = 0.1  # s, five usual frames
+
 
 @dataclass(frozen=True)
 class StepMetrics:
@@ -39,6 +42,8 @@ class StepMetrics:
         Highest speed [rad/s].
     peak_current : float
         Highest magnitude of the armature current [A].
+    arrival_time : float
+        Until the angle stays within 1° of the target; nan where it does not by the end [s].
     """
 
     initial: float
@@ -50,6 +55,7 @@ class StepMetrics:
     steady_error: float
     slew_rate: float
     peak_current: float
+    arrival_time: float = math.nan
 
 
 def step_metrics(result: Result) -> StepMetrics:
@@ -83,7 +89,39 @@ def step_metrics(result: Result) -> StepMetrics:
     return StepMetrics(
         initial=q0, final=q1, target=target, rise_time=rise, settling_time=settling, overshoot=overshoot,
         steady_error=target - q1, slew_rate=result.peak(result.model.layout[1]),
-        peak_current=result.peak("armature_current"))
+        peak_current=result.peak("armature_current"), arrival_time=_arrival(result, target, q1, start))
+
+
+def _arrival(result: Result, target: float, final: float, start: float) -> float:
+    """Return the time [s] from the step on until the angle stays near the target; nan where it ends elsewhere."""
+    if not abs(final - target) <= _NEAR:
+        return math.nan
+    return _last_outside(result.trajectory, lambda samples: 1.0 + np.asarray(samples.angle - target), start,
+                         _NEAR) - start
+
+
+def holding_error(result: Result) -> float:
+    """Return the mean of command less angle while the command stands still at the end [rad].
+
+    The mean is that of the last tenth of a second, or of as much as there is since the command stands still; nan where
+    it never does, or the model knows no angle of its command.
+    """
+    last = result.command.pieces.table[-1]
+    start = max(result.ended - _LOOK, last.start, 0.0)
+    if "command_angle" not in result.model.available or last.slope or last.amplitude or not start < result.ended:
+        return math.nan
+    asked = float(result.at("command_angle", [result.ended])[0])
+    return asked - result.mean(result.model.layout[0], start)
+
+
+def mean_current(result: Result) -> float:
+    """Return the mean current of the supply [A]; of a model without one, that of the motor regardless of its sign."""
+    name = "supply_current" if "supply_current" in result.model.available else "armature_current"
+    if name == "supply_current":
+        return result.mean(name)
+    whole = result.trajectory.integral(
+        lambda samples: np.abs(result.model.output(name, samples, result.drive, result.load))[None, :])
+    return float(whole[0]) / result.ended
 
 
 def peak(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]]) -> float:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from servotwin.parameters import printed_flags, printed_points
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
@@ -37,12 +39,13 @@ def warn_of(servo: Servo, commands: Sequence[Signal], duration: float, *, voltag
 
 
 def _of_servo(servo: Servo, voltages: ArrayLike | None) -> Iterator[str]:
-    reason = next((flag for flag in servo.flags if flag.startswith("impossible")), None)
+    reason = next((flag for flag in printed_flags(servo) if flag.startswith("impossible")), None)
     if reason is not None:
         yield (f"{servo.name}: its data sheet contradicts itself ({reason}); no servo has all that it says, nor does "
                "this one")
     given = servo.supply.open_circuit_voltage if voltages is None else float(np.max(voltages))
-    rated = max(servo.sheet_values("supply_voltage", "voltage"), default=None)
+    printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage is not None]
+    rated = max(printed, default=None)
     if given is not None and rated is not None and given > _TOO_MUCH * rated:
         yield f"{servo.name}: a supply of {given:g} V is more than twice the {rated:g} V of its data sheet"
 

@@ -15,7 +15,7 @@ from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
 from servotwin.simulation import files
 from servotwin.simulation.energy import Energy, energy_of
-from servotwin.simulation.metrics import StepMetrics, peak, step_metrics
+from servotwin.simulation.metrics import StepMetrics, holding_error, mean_current, peak, step_metrics
 from servotwin.simulation.remarks import Remark, remarks_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.trajectory import Trajectory
@@ -144,8 +144,24 @@ class Result:
         """Return the largest magnitude of a signal (SI) over the whole continuous solution."""
         return peak(self.trajectory, lambda samples: self.model.output(name, samples, self.drive, self.load))
 
+    def mean(self, name: str, since: float = 0.0) -> float:
+        """Return the mean over time of a signal (SI), from `since` [s] to the end of the continuous solution."""
+        part = self.trajectory.since(since)
+        whole = part.integral(lambda samples: self.model.output(name, samples, self.drive, self.load)[None, :])
+        return float(whole[0]) / (self.ended - since)
+
+    @property
+    def mean_current(self) -> float:
+        """Mean current of the supply [A]; of a model without one, that of the motor regardless of its sign."""
+        return mean_current(self)
+
+    @property
+    def holding_error(self) -> float:
+        """Command less angle in the mean of the last tenth of a second; nan where the command moves there [rad]."""
+        return holding_error(self)
+
     def step_metrics(self) -> StepMetrics:
-        """Return rise time, settling time, overshoot, steady error, slew rate and peak current of a step.
+        """Return rise, settling and arrival time, overshoot, steady error, slew rate and peak current of a step.
 
         Raises
         ------

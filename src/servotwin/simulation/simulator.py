@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from servotwin.signals import Signal
 from servotwin.simulation import engine
 from servotwin.simulation.engine import Plan, Record, State
 from servotwin.simulation.oddities import warn_of
+from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.result import Result
 from servotwin.simulation.start import check_start, start_vector
 from servotwin.simulation.status import Status
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from servotwin.loads import Load, Part
 
 _MOST_SAMPLES = 20_000_000
+_THOUSAND = 1000  # parts of a run, of which progress tells
 
 
 class Simulator:
@@ -149,7 +151,7 @@ class Simulator:
 
 def simulate(model: Model, command: Signal, *, duration: float, load: Load | Part | None = None,
              output_step: float | None = None, output_times: ArrayLike | None = None,
-             initial: Mapping[str, float] | None = None, seed: int = 0) -> Result:
+             initial: Mapping[str, float] | None = None, seed: int = 0, progress: Progress = False) -> Result:
     """Simulate from t = 0 to `duration` and return the result.
 
     Parameters
@@ -169,6 +171,8 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
         Initial values by state name (SI), see `Simulator.initial`.
     seed : int
         Seed of all noise.
+    progress : bool or callable
+        True shows a bar for what lasts over a second; a callable is called with the thousandths that are done and 1000.
 
     Raises
     ------
@@ -195,21 +199,35 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
     simulator = Simulator(model, load, seed)
     simulator.drive(command)  # raises if the model cannot follow it
     warn_of(model.servo, [command], duration)
-    return simulated(simulator, command, duration, times, initial)
+    return simulated(simulator, command, duration, times, initial, progress)
 
 
 def simulated(simulator: Simulator, command: Signal, duration: float, times: NDArray[np.float64],
-              initial: Mapping[str, float] | None) -> Result:
+              initial: Mapping[str, float] | None, progress: Progress = False) -> Result:
     """Return what `simulate` does, of arguments that it has looked at."""
-    record = Record([], [])
     status, ended, cause = Status.COMPLETED, duration, Status.COMPLETED.message
-    try:
-        simulator._run(simulator.initial(command, initial), duration, command, 0.0, record)
-    except SimulationError as error:
-        status, ended, cause = Status[error.status], error.time, error.cause
+    with shown(progress, _THOUSAND, "simulating") as show:
+        record = Record([], [], _thousandths(duration, show) if progress else None)
+        try:
+            simulator._run(simulator.initial(command, initial), duration, command, 0.0, record)
+        except SimulationError as error:
+            status, ended, cause = Status[error.status], error.time, error.cause
     return Result(model=simulator.model, command=command, load=simulator.load, drive=simulator.drive(command),
                   time=times, trajectory=Trajectory(tuple(record.segments)), events=tuple(record.events),
                   status=status, ended=ended, cause=cause)
+
+
+def _thousandths(duration: float, show: Callable[[int], None]) -> Callable[[float], None]:
+    """Return what shows the thousandths of the duration, each once."""
+    last = 0
+
+    def tell(time: float) -> None:
+        nonlocal last
+        done = int(_THOUSAND * time / duration)
+        if done > last:
+            last = done
+            show(done)
+    return tell
 
 
 def _model(model: Model) -> Model:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +40,11 @@ class Trajectory:
             return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((4, t.size)), *np.zeros((2, t.size)))
         index = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
         return self._states(t, index)
+
+    def since(self, start: float) -> Trajectory:
+        """Return what is left of it from a time [s] on."""
+        return replace(self, segments=tuple(replace(segment, start=max(segment.start, start))
+                                            for segment in self.segments if segment.end > start))
 
     def inside(self, index: int, time: Array) -> Samples:
         """Return the state at `time` [s] by the motion of one segment, its end included."""

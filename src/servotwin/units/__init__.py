@@ -19,6 +19,7 @@ _DEG = math.pi / 180.0
 _SPELLINGS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u2126": "ohm", "\u03a9": "ohm", "\u00b7": " ",
                             "\u22c5": " ", "\u00b0": "deg", "\u00b2": "2"})
 _GRAVITY = 9.80665  # standard gravity, m/s^2 (CGPM 1901), for kgf
+_POUND, _INCH = 0.45359237, 0.0254  # kg, m: the international pound and inch of 1959
 
 # dimension -> {unit: factor to SI}; the first unit of each is the SI one.
 DIMENSIONS: dict[str, dict[str, float]] = {
@@ -26,12 +27,14 @@ DIMENSIONS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
     "angle": {"rad": 1.0, "deg": _DEG},
     "speed": {"rad/s": 1.0, "deg/s": _DEG, "rpm": math.pi / 30.0},
+    "output speed": {"rad/s": 1.0, "deg/s": _DEG},
+    "angle per pulse": {"rad/s": 1.0, "deg/us": _DEG * 1e6},
     "inverse speed": {"s/rad": 1.0, "s/deg": 1.0 / _DEG},
     "voltage": {"V": 1.0, "mV": 1e-3},
     "current": {"A": 1.0, "mA": 1e-3},
     "resistance": {"ohm": 1.0, "mohm": 1e-3},
     "inductance": {"H": 1.0, "mH": 1e-3, "uH": 1e-6},
-    "torque": {"N m": 1.0, "mN m": 1e-3, "kgf cm": _GRAVITY * 1e-2, "ozf in": 0.45359237 / 16 * _GRAVITY * 0.0254},
+    "torque": {"N m": 1.0, "mN m": 1e-3, "kgf cm": _GRAVITY * 1e-2, "ozf in": _POUND / 16 * _GRAVITY * _INCH},
     "torque per current": {"N m/A": 1.0, "mN m/A": 1e-3},
     "voltage per speed": {"V s/rad": 1.0, "mV s/rad": 1e-3, "V/krpm": 0.03 / math.pi},
     "inertia": {"kg m2": 1.0, "g cm2": 1e-7, "kg cm2": 1e-4},
@@ -43,8 +46,8 @@ DIMENSIONS: dict[str, dict[str, float]] = {
     "voltage per time": {"V/s": 1.0, "V/ms": 1e3, "mV/us": 1e3},
     "voltage per angle": {"V/rad": 1.0, "mV/deg": 1e-3 / _DEG, "V/deg": 1.0 / _DEG},
     "voltage per count": {"V": 1.0, "mV": 1e-3},
-    "mass": {"kg": 1.0, "g": 1e-3},
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    "mass": {"kg": 1.0, "g": 1e-3, "oz": _POUND / 16, "lb": _POUND},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": _INCH},
     "acceleration": {"m/s2": 1.0},
     "heat capacity": {"J/K": 1.0},
     "thermal resistance": {"K/W": 1.0},

@@ -6,14 +6,16 @@ import csv
 import io
 import math
 import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from servotwin.cli.interrupts import held
 from servotwin.cli.paper.study import Study, headline_numbers, run_study
 from servotwin.errors import OutputError, OutputExistsError
+from servotwin.parameters.output_file import undone
 
 _PAGE = "report.html"
 _TABLES = ("table-2.csv", "fits.csv", "parameters.csv")
@@ -66,20 +68,18 @@ def write_paper_report(out: Path, *, force: bool,
     """
     tell = progress or _silent
     out = Path(out)
-    made = _check(out, force)
-    try:
-        partial = Path(tempfile.mkdtemp(dir=out, prefix=".partial-"))
-    except OSError as error:
-        _remove_empty(made)
-        raise OutputError(f"{out} cannot be written ({error.strerror})") from None
-    try:
-        numbers = _write_all(partial, tell)
-        names = _move(partial, out)
-    except OSError as error:
-        raise OutputError(f"{out} cannot be written ({error.strerror})") from None
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
-        _remove_empty(made)
+    _check_free(out, force)
+    made = [path for path in (out, *out.parents) if not path.exists()]
+    partial = out / f".partial-{secrets.token_hex(8)}"
+    with undone(lambda: _remove_empty(made)), undone(lambda: shutil.rmtree(partial, ignore_errors=True)):
+        _make(out)
+        try:
+            partial.mkdir(0o700)
+            numbers = _write_all(partial, tell)
+            with held():
+                names = _move(partial, out)
+        except OSError as error:
+            raise OutputError(f"{out} cannot be written ({error.strerror})") from None
     tell("done", 1.0)
     return PaperReport(
         folder=out, page=out / _PAGE, numbers=numbers,
@@ -91,22 +91,23 @@ def _silent(words: str, fraction: float) -> None:
     """Tell nobody."""
 
 
-def _check(out: Path, force: bool) -> list[Path]:
-    """Make the folder and return what was made; raise if it is there with a report, or cannot be made."""
+def _check_free(out: Path, force: bool) -> None:
+    """Raise if there is a report already."""
     if not force:
         there = [out / _PAGE, *(out / "data" / name for name in _TABLES)]
         there += [*out.glob("figures/figure-*"), *out.glob("data/figure-*")] if out.is_dir() else []
         for path in there:
             if path.exists():
                 raise OutputExistsError(path)
-    missing = [path for path in (out, *out.parents) if not path.exists()]
+
+
+def _make(out: Path) -> None:
+    """Make the folder."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        _remove_empty(missing)
         reason = "a file is in its place" if isinstance(error, FileExistsError) else error.strerror
         raise OutputError(f"{out} cannot be made as a folder ({reason})") from None
-    return missing
 
 
 def _remove_empty(folders: Sequence[Path]) -> None:

@@ -73,7 +73,8 @@ def run_vibration(servo: Servo, rows: Sequence[TableRow]) -> VibrationStudy:
 
 def _stand(servo: Servo, rows: Sequence[TableRow], k: int, control: ControlSupply, resistance: float) -> Stand:
     """Return the step to a row from the first one, to the first from the second."""
-    apparatus = bench.Bench(PulseServo(servo.replace({"supply.internal_resistance": resistance})))
+    apparatus = bench.Bench(PulseServo(servo.replace({"supply.internal_resistance": resistance},
+                                                   source="no source: a soft and a stiff supply")))
     before, after = (rows[j].reading.command_voltage for j in (0 if k else 1, k))
     command = signals.step(before, after, at=STEP_AT, unit="V")
     run = bench.run_on_one_supply(apparatus, command, DURATION, control)

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.free import LUMPED, N, Space
+from servotwin.identification.fitting.free import LUMPED, Space
 from servotwin.identification.logs.log import Log
 from servotwin.models import BoundedServo, Model
+from servotwin.parameters.output_side import N
 
 if TYPE_CHECKING:
     from servotwin.signals import Signal

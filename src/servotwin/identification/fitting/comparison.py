@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,7 +40,7 @@ class Tables:
 
 
 def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo: Servo,
-            beside: tuple[str, ...]) -> Tables:
+            beside: tuple[str, ...], tell: Callable[[], object] = lambda: None) -> Tables:
     """Return the errors of the fitted servo, log by log, and of the models beside it.
 
     Parameters
@@ -55,6 +55,8 @@ def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo:
         The fitted one, where the simpler models begin.
     beside : tuple of str
         Of `BESIDE`.
+    tell : callable, optional
+        Called after each step of theirs.
     """
     model, fitted = task.forecast.model, task.fitted
     own = type(model).__name__
@@ -64,7 +66,7 @@ def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo:
         if slew:
             errors[SLEW] = slew
     if "M1" in beside:
-        simple = _of_m1(task, traces, type(model)(servo))
+        simple = _of_m1(task, traces, type(model)(servo), tell)
         if simple:
             errors[M1] = simple
     models = tuple(errors)
@@ -90,7 +92,7 @@ def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace]
     return found
 
 
-def _of_m1(whole: Task, traces: Sequence[Trace], model: Model) -> dict[int, LogError]:
+def _of_m1(whole: Task, traces: Sequence[Trace], model: Model, tell: Callable[[], object]) -> dict[int, LogError]:
     """Return the errors of the servo with Coulomb and viscous friction; none where it is that already."""
     space, logs = whole.forecast.space, [trace.log for trace in traces]
     beyond = [f"friction.{name}" for name in _BEYOND_M1]
@@ -108,7 +110,7 @@ def _of_m1(whole: Task, traces: Sequence[Trace], model: Model) -> dict[int, LogE
     simple = Space(plain, [*free, *more], bounds=own_bounds, priors=beliefs or None, load=load)
     forecast = Forecast(logs, plain, simple, whole.forecast.nuisance, whole.forecast.sensors)
     task = Task(forecast, whole.loss, whole.fitted, whole.seed, 1, whole.noise)
-    found, _ = task.search(lambda share, text: None)
+    found, _ = task.search(lambda share, text: (tell(), None)[1])
     errors = {}
     for k, part in enumerate(forecast.at(found.point, derivatives=False)):
         residual = by_sensor(forecast, k, part)[traces[k].signal]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, ParameterError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters import GROUPS, Servo
+from servotwin.parameters.output_side import OUTPUT_SIDE, N, motor_side, output_value
 from servotwin.parameters.servo import check_name, unit_of
 from servotwin.simulation.lane_loads import LOAD_NAMES
 from servotwin.units import is_finite, si_unit
@@ -21,11 +22,9 @@ Array = NDArray[np.float64]
 Bounds = Mapping[str, tuple[float, float]]
 Priors = Mapping[str, tuple[float, float]]
 
-N = "gear.gear_reduction"
 LUMPED: dict[str, tuple[tuple[str, ...], int, str]] = {  # name -> members, power of N that leads to the motor, unit
-    "output_torque_constant": (("motor.torque_constant", "motor.back_emf_constant"), 1, "N m/A"),
-    "output_inertia": (("motor.rotor_inertia",), 2, "kg m2"),
-    "output_coulomb_torque": (("friction.coulomb_torque_forward", "friction.coulomb_torque_backward"), 1, "N m"),
+    name: (OUTPUT_SIDE[name].members, OUTPUT_SIDE[name].power, si_unit(OUTPUT_SIDE[name].dimension))
+    for name in ("output_torque_constant", "output_inertia", "output_coulomb_torque")
 }
 """Parameters at the output shaft, which are what motion alone can tell (physics of a geared motor, no N)."""
 
@@ -172,15 +171,12 @@ class Space:
         own = {name: values[:, k] for k, name in enumerate(self.names)}
         reduction: Any = own.get(N, self.servo.get(N))
         columns = {name: column for name, column in own.items() if name not in LUMPED}
-        for name, (members, power, _) in LUMPED.items():
-            if name in own:
-                columns |= {member: own[name] / reduction**power for member in members}
-        return columns
+        return columns | motor_side({name: own[name] for name in LUMPED if name in own}, reduction)
 
     def servo_at(self, x: Array) -> Servo:
         """Return the servo with the values of a point; numbers of the load apart."""
         return self.servo.replace({name: float(column[0]) for name, column in self.columns(x[None, :]).items()
-                                   if name not in LOAD_NAMES})
+                                   if name not in LOAD_NAMES}, source="where a search of a fit stands")
 
     def random(self, rng: np.random.Generator) -> Array:
         """Return a random start: anywhere between bounds that were given, else about the nominal values."""
@@ -254,12 +250,7 @@ def nominal(servo: Servo, name: str) -> float | None:
     if name not in LUMPED:
         value = servo.get(name)
         return float(value) if isinstance(value, int | float) else None
-    members, power, _ = LUMPED[name]
-    found = [servo.get(member) for member in members]
-    reduction = servo.get(N)
-    if any(not isinstance(value, int | float) for value in (*found, reduction)):
-        return None
-    return float(np.mean(np.array(found, dtype=np.float64))) * float(reduction) ** power  # type: ignore[arg-type]
+    return output_value(servo, name)
 
 
 def _parameter(servo: Servo, name: str, limits: tuple[float, float] | None, belief: tuple[float, float] | None,

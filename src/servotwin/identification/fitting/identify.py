@@ -21,7 +21,7 @@ from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.holdout import split
 from servotwin.identification.fitting.intervals import Ends, ends
 from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, Point
-from servotwin.identification.fitting.record import identified_servo, with_record
+from servotwin.identification.fitting.record import identified_servo, with_record, with_what_logs_say
 from servotwin.identification.fitting.remedies import with_remedies
 from servotwin.identification.fitting.task import HUBER, Task, by_sensor
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
@@ -94,7 +94,7 @@ def identify(
     Returns
     -------
     Fit
-        After an interrupt (Ctrl-C) the best so far, without intervals.
+        After an interrupt (Ctrl-C, or a KeyboardInterrupt out of `progress`) the best so far, without intervals.
 
     Raises
     ------
@@ -152,9 +152,11 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
         interrupted = True
     traces = _traces(forecast, found.point, held_out)
     final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubt, reaching, level)
+    final = with_what_logs_say(final, [forecast.cases[k].log for k in task.fitted], forecast.space.names)
     try:
         show(0.95, "errors")
-        tables = compare(task, held_out, traces, final, () if interrupted else beside)
+        tables = compare(task, held_out, traces, final, () if interrupted else beside,
+                         lambda: show(0.95, "errors of simpler models"))
     except KeyboardInterrupt:
         interrupted, tables = True, compare(task, held_out, traces, final, ())
     fit = _fit(task, found, doubt, reaching, vague, task.at_bound(found), final, traces, tables, ended)

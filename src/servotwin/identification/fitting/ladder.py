@@ -186,7 +186,7 @@ def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
                if term in own and not base.get(term) and not values.get(term)}
     if base.get("friction.breakaway_ratio") == 1.0 and "friction.breakaway_ratio" in RUNGS[name]:
         values["friction.breakaway_ratio"] = own["friction.breakaway_ratio"]
-    return base.replace(values)
+    return base.replace(values, source="where a rung of the friction ladder begins")
 
 
 def _rung(name: str, fit: Fit) -> Rung:

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.free import LUMPED, N, Space
+from servotwin.identification.fitting.free import LUMPED, Space
 from servotwin.identification.logs.log import Log
 from servotwin.parameters import Servo
+from servotwin.parameters.output_side import N
 from servotwin.parameters.quantity import Quantity
 from servotwin.simulation.lane_loads import LOAD_NAMES
 
@@ -52,6 +53,30 @@ def identified_servo(servo: Servo, space: Space, shared: Array, doubt: Uncertain
             quantities[member] = Quantity(value=value, unit=found.quantities[member].unit,  # type: ignore[arg-type]
                                           origin="identified", source=f"fit to logs, see [fit]; {said}", **given)
     return replace(found, quantities=quantities)
+
+
+def with_what_logs_say(servo: Servo, logs: Sequence[Log], searched: Sequence[str]) -> Servo:
+    """Return a servo with the parameters that all logs give alike, such as their supply voltage.
+
+    Parameters
+    ----------
+    servo : Servo
+    logs : sequence of Log
+        Those that were fitted.
+    searched : sequence of str
+        What the fit found, which stays.
+    """
+    first, *others = logs
+    stays = {member for name in searched for member in (LUMPED[name][0] if name in LUMPED else (name,))}
+    alike = {name: value for name, value in first.parameters.items() if name not in stays
+             and value != servo.get(name) and all(log.parameters.get(name) == value for log in others)}
+    if not alike:
+        return servo
+    said = servo.replace(alike)
+    quantities = {name: Quantity(value=float(value), unit=said.quantities[name].unit, origin="measured",
+                                 source="said of all logs that were fitted, in their sidecars")
+                  for name, value in alike.items()}
+    return replace(said, quantities={**said.quantities, **quantities})
 
 
 def data_hash(logs: Sequence[Log]) -> str:

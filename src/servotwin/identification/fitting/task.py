@@ -30,6 +30,10 @@ _NEAR = 0.3  # rad, an offset that the search finds by itself
 _LOOKS = 25  # of each log, for a first offset
 _MOST_SAG = 3.0  # rad/V
 _DELAY = 0.02  # s, where the search for it begins
+_STARTS = 0.6  # of the way: rough searches from several starts
+_MOST = {"rough": 12, "all": 25}  # steps
+
+Told = Callable[[float, str], None]
 
 
 @dataclass
@@ -53,7 +57,8 @@ class Task:
         beliefs = [p.scaled_prior for p in space.parameters] + [None] * len(extra)
         self.prior = Prior(np.array([b[0] if b else 0.0 for b in beliefs]),
                            np.array([1.0 / b[1] if b else 0.0 for b in beliefs]))
-        self._best: Outcome | None = None
+        self._best: Outcome | None = None  # of the search that goes on
+        self._ended: list[Outcome] = []  # where rough searches ended, each in its own noise
 
     def nominal(self) -> Point:
         """Return where the servo's values stand."""
@@ -88,56 +93,74 @@ class Task:
             warnings.simplefilter("ignore")
             return type(model)(model.servo.replace(own))
 
-    def search(self, tell: Callable[[float, str], None]) -> tuple[Outcome, list[Outcome]]:
-        """Return the best point, and where the search from each start ended."""
+    def search(self, tell: Told) -> tuple[Outcome, list[Outcome]]:
+        """Return the best point, and where the search from each start ended; the way is told after each step."""
         nominal = self.nominal()
         self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
         self.forecast.strict = False  # from here on, what no servo is counts as failed
-        few = self._few()
         ended: list[Outcome] = []
+        began = _STARTS if self.starts > 1 else 0.0
         if self.starts > 1:
-            for k, start in enumerate(self._candidates(nominal, few)):
-                tell(0.6 * k / self.starts, f"start {k + 1} of {self.starts}")
-                self._set_noise(self.forecast.at(start, derivatives=False, cases=few), few, rough=True)
-                search = self._search(few)
-                first = search.costs([start])[0]
-                ended.append(search.run(start, most=12, tell=self._keep, least_gain=_ROUGH * first))
-            ended = self._on_one_scale(ended, few)
+            ended = self._rough(nominal, tell)
             nominal = ended[0].point
-        tell(0.6, "all logs")
+        tell(began, "all logs")
         if len(self.forecast.sensors) > 1 and self.noise is None:
             self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted, rough=True)
-            nominal = self._search(self.fitted).run(nominal, most=25, tell=self._keep).point
+            nominal = self._search(self.fitted).run(
+                nominal, most=_MOST["all"], tell=self._kept(tell, began, began, "all", "all logs")).point
             self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
-        best = self._refined(nominal, self.fitted, rounds=6, most=25, tell=tell)
+        best = self._refined(nominal, self.fitted, rounds=6, tell=tell, began=began)
         return best, ended or [best]
+
+    def _rough(self, nominal: Point, tell: Told) -> list[Outcome]:
+        """Search from several starts on some logs; return where that ended, the best first."""
+        few = self._few()
+        for k, start in enumerate(self._candidates(nominal, few)):
+            text, share = f"start {k + 1} of {self.starts}", _STARTS / self.starts
+            tell(k * share, text)
+            self._set_noise(self.forecast.at(start, derivatives=False, cases=few), few, rough=True)
+            search = self._search(few)
+            first = search.costs([start])[0]
+            self._ended.append(search.run(start, most=_MOST["rough"], least_gain=_ROUGH * first,
+                                          tell=self._kept(tell, k * share, (k + 1) * share, "rough", text)))
+            self._best = None
+        ended, self._ended = self._on_one_scale(self._ended, few), []
+        self._best = ended[0]
+        return ended
 
     def _search(self, cases: Sequence[int]) -> Search:
         return Search(self.forecast, self.loss, self.prior, self.lower, self.upper, cases)
 
-    def _refined(self, start: Point, cases: Sequence[int], *, rounds: int, most: int,
-                 tell: Callable[[float, str], None] | None = None) -> Outcome:
+    def _refined(self, start: Point, cases: Sequence[int], *, rounds: int, tell: Told, began: float) -> Outcome:
         """Search, estimate the noise anew, and search on until it stays."""
         best = Outcome(start, math.inf, False, 0)
+        share = (1.0 - began) / rounds
         for k in range(rounds):
             search = self._search(cases)
-            best = search.run(best.point, most=most, tell=self._keep)
+            best = search.run(best.point, most=_MOST["all"], tell=self._kept(
+                tell, began + k * share, began + (k + 1) * share, "all", "all logs"))
             if not math.isfinite(best.cost):
                 return best
-            if tell is not None:
-                tell(0.6 + 0.4 * (k + 1) / rounds, "all logs")
+            tell(began + (k + 1) * share, "all logs")
             change = self._set_noise(self.forecast.at(best.point, derivatives=False, cases=cases), cases)
             if change < 0.02 and best.converged:
                 break
         search = self._search(cases)
         return replace(best, cost=search.costs([best.point])[0])
 
-    def _keep(self, step: int, outcome: Outcome) -> None:
-        self._best = outcome
+    def _kept(self, tell: Told, begin: float, end: float, stage: str, text: str) -> Callable[[int, Outcome], None]:
+        """Return what keeps the best so far after each step, and tells how far the search is."""
+        def keep(step: int, outcome: Outcome) -> None:
+            self._best = outcome
+            tell(begin + (end - begin) * step / _MOST[stage], text)
+        return keep
 
     def best_so_far(self) -> Outcome:
-        """Return where an interrupted search stood."""
-        return self._best or Outcome(self.nominal(), math.inf, False, 0)
+        """Return where an interrupted search stood, or where an earlier start ended, if that is better."""
+        known = [*self._ended, *([self._best] if self._best is not None else [])]
+        if any(math.isfinite(outcome.cost) for outcome in known[1:]):
+            return self._on_one_scale(known, self._few())[0]
+        return known[0] if known else Outcome(self.nominal(), math.inf, False, 0)
 
     def _few(self) -> list[int]:
         """Return some logs of every kind of motion, for the rough searches."""

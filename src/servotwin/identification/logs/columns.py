@@ -11,10 +11,12 @@ import numpy as np
 
 from servotwin import units
 from servotwin.errors import InputError, UnitError
+from servotwin.identification.logs.stamps import CLOCKS
 from servotwin.models.outputs import SIGNALS
+from servotwin.units.words import unit_word
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Container, Sequence
 
     from numpy.typing import NDArray
 
@@ -43,7 +45,7 @@ class Column:
     column : str
         As the header says it.
     unit : str
-        Of the number after `scale` and `offset`.
+        Of the number after `scale` and `offset`; "iso" and "clock" for times that are dates and times of day.
     scale, offset : float
         Of raw numbers, such as counts.
     from_first : bool
@@ -91,18 +93,31 @@ def check_unit(what: str, unit: object, name: str) -> str:
     """
     if unit == "ns" and dimension_of(name) == "time":
         return "ns"
+    if isinstance(unit, str) and unit in CLOCKS and name == TIME:
+        return unit
     if not isinstance(unit, str):
         raise UnitError(what, got=unit, allowed="a text, such as " + si_unit_of(name))
     try:
         units.factor(unit, dimension_of(name))
     except UnitError as error:
-        more = ", ns" if dimension_of(name) == "time" else ""
+        more = (", ns" if dimension_of(name) == "time" else "") + (", iso, clock" if name == TIME else "")
         raise UnitError(what, got=error.got, allowed=f"{error.allowed}{more}") from None
     return unit
 
 
-def columns_of(header: list[str], where: object) -> dict[str, Column]:
+def columns_of(header: Sequence[str], where: object, *, taken: Container[str] = (),
+               says_more: Callable[[str], object] = lambda column: None) -> dict[str, Column]:
     """Return which columns of a header hold which signal, by their names; others are passed over.
+
+    Parameters
+    ----------
+    header : sequence of str
+    where : object
+        What errors name.
+    taken : container of str
+        Signals that are known already.
+    says_more : callable
+        Whether a name that is nearly one of these says something else.
 
     Raises
     ------
@@ -116,36 +131,44 @@ def columns_of(header: list[str], where: object) -> dict[str, Column]:
     """
     found: dict[str, Column] = {}
     for column in header:
-        name = _name_of(column, where)
-        if name is None:
+        name = _name_of(column, where, says_more)
+        if name is None or name in taken:
             continue
         if name in found:
             raise InputError(f"{where}: {name}", got=f"columns {found[name].column} and {column}",
                              allowed="one of them")
-        suffix = column[len(name) + 1:]
-        unit = _SUFFIXES[dimension_of(name)][suffix] if suffix else si_unit_of(name)
-        found[name] = Column(column, unit)
+        found[name] = Column(column, _unit_behind(column, name) or si_unit_of(name))
     return found
 
 
-def _name_of(column: str, where: object) -> str | None:
+def _unit_behind(column: str, name: str) -> str | None:
+    """Return the unit behind a name, None where it is none of the signal's."""
+    suffix = column[len(name) + 1:]
+    known = _SUFFIXES[dimension_of(name)]
+    if suffix in known:
+        return known[suffix]
+    unit, dimension = unit_word(suffix) or ("", "")
+    return unit if suffix and dimension == dimension_of(name) else None
+
+
+def _name_of(column: str, where: object, says_more: Callable[[str], object]) -> str | None:
     """Return the signal that a column's name says, None where it says none."""
     if column in NAMES:
         return column
     name = max((name for name in NAMES if column.startswith(f"{name}_")), key=len, default="")
     if name:
-        known = _SUFFIXES[dimension_of(name)]
-        if column[len(name) + 1:] in known:
+        if _unit_behind(column, name) is not None:
             return name
         if name in (TIME, SWITCH, "drive"):  # "time_of_day", "drive_mode": another thing
             return None
         raise UnitError(f"{where}: unit of column {column}", got=column[len(name) + 1:],
-                        allowed=f"{', '.join(known) or 'none'}; without one it is in {si_unit_of(name)}")
-    stem = _stem(column)
-    near = get_close_matches(stem, NAMES, n=1, cutoff=0.85)
-    if near:
+                        allowed=f"{', '.join(_SUFFIXES[dimension_of(name)]) or 'none'}; without one it is in "
+                        f"{si_unit_of(name)}")
+    near = get_close_matches(_stem(column), NAMES, n=1, cutoff=0.85)
+    if near and not says_more(column):
         raise InputError(f"{where}: column", got=column,
-                         allowed=f'{near[0]}, if that is meant; "columns" of a sidecar says which column is what')
+                         allowed=f'{near[0]}, if that is meant; --columns or "columns" of a sidecar says which column '
+                         "is what")
     return None
 
 
@@ -153,18 +176,6 @@ def _stem(column: str) -> str:
     """Return a column's name without a unit behind it."""
     suffixes = sorted({s for known in _SUFFIXES.values() for s in known}, key=len, reverse=True)
     return next((column[:-len(s) - 1] for s in suffixes if column.endswith(f"_{s}")), column)
-
-
-def lacking(where: object, what: str, header: Iterable[str], names: Iterable[str]) -> InputError:
-    """Return the error of a file that has none of some columns."""
-    allowed = ", ".join(f"{name}{_example(name)}" for name in names)
-    return InputError(f"{where}: no {what} among the columns", got=", ".join(header), allowed=f"one of {allowed}")
-
-
-def _example(name: str) -> str:
-    known = _SUFFIXES[dimension_of(name)]
-    first = {"time": "s", "pulse_width": "us", "angle": "deg"}
-    return "_" + (first.get(name) or first.get(dimension_of(name)) or next(iter(known)))
 
 
 def switch_value(text: str) -> float:

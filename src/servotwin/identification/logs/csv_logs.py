@@ -5,69 +5,50 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, OutputError, OutputExistsError, UnknownNameError
-from servotwin.identification.logs.columns import (
-    COMMANDS,
-    SWITCH,
-    TIME,
-    Column,
-    columns_of,
-    lacking,
-    switch_value,
-)
+from servotwin.identification.logs.column_words import wanted_columns
+from servotwin.identification.logs.columns import COMMANDS, SWITCH, TIME, Column, switch_value
 from servotwin.identification.logs.json_file import write_json
-from servotwin.identification.logs.log import ANGLES, Log
+from servotwin.identification.logs.layout import is_known_name, layout_of
+from servotwin.identification.logs.log import Log
+from servotwin.identification.logs.reading import Reading
 from servotwin.identification.logs.sidecar import FOLDER_FILE, Sidecar, sidecar_of, sidecar_path, sidecar_words
+from servotwin.identification.logs.stamps import CLOCKS, stamps_of
 from servotwin.parameters import write_file
-from servotwin.signals.csv_file import _read
+from servotwin.tables import TextTable, read_table
 
 
-class _Table(NamedTuple):
-    """A CSV file: its header, and its rows with their line numbers."""
-
-    path: Path
-    header: list[str]
-    lines: list[int]
-    rows: list[list[str]]
-
-    def cells(self, column: str) -> list[str]:
-        """Return the cells of a column; a row that is too short has an empty one."""
-        k = self.header.index(column)
-        return [row[k].strip() if k < len(row) else "" for row in self.rows]
-
-    def without(self, drop: NDArray[np.bool_]) -> _Table:
-        """Return the table without some rows."""
-        keep = np.flatnonzero(~drop).tolist()
-        return self._replace(lines=[self.lines[k] for k in keep], rows=[self.rows[k] for k in keep])
-
-
-def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None) -> Log:
+def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
+                 columns: str | Mapping[str, str] | None = None) -> Log:
     r"""Return the log in a CSV file.
 
     Columns are named after their signal, with the unit behind it (`time_s`, `pulse_width_us`, `output_angle_deg`) or
     in SI without one; the sidecar `<name>.json` beside the file, or `logs.json` in its folder, says the rest. A file
-    that `Result.save` has written is a log too.
+    that `Result.save` has written is a log too. Tables of other loggers are read where names, units and values tell
+    what their columns are: `Log.reading` shows it.
 
     Parameters
     ----------
     path : str or Path
     sidecar : str or Path, optional
         A file in place of the folder's `logs.json`.
+    columns : str or mapping, optional
+        Which column is which signal in which unit, such as ``"time=t:ms angle=pos:deg-90"`` or
+        ``{"angle": "pos:deg-90"}``; counts before the sidecar.
 
     Raises
     ------
     InputError
-        If file or sidecar cannot be read, lacks a column, has a value that is no number or in a unit that cannot be, or
-        time stands still or runs backwards: names file, line and column.
+        If file or sidecar cannot be read, time, command or angle cannot be told from its columns, a value is no number
+        or in a unit that cannot be, or time stands still or runs backwards: names file, line and column.
 
     Examples
     --------
@@ -79,22 +60,26 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None) -> Log:
     ('run', [True, False, True])
     """
     path = Path(path)
-    table = _table(path)
+    wanted = wanted_columns(columns)
+    asked = {one.column for one in wanted.values()}
+    table = read_table(path, lambda name: name in asked or is_known_name(name), unended=False)
     said = sidecar_of(path, None if sidecar is None else Path(sidecar))
-    columns = dict(said.columns) if said.columns is not None else columns_of(table.header, path)
-    _check_columns(table, columns)
-    command = _command_of(table, columns, said)
-    time, table = _times(table, columns[TIME], said.drop_repeated)
-    measured = {name: column.to_si(_numbers(table, column, empty=math.nan), name) for name, column in columns.items()
-                if name not in (TIME, SWITCH, *COMMANDS)}
-    if not any(name in measured for name in ANGLES):
-        raise lacking(path, "measured angle", table.header, ANGLES)
-    values = columns[command].to_si(_numbers(table, columns[command]), command)
-    switch = _switch(table, columns[SWITCH]) if SWITCH in columns else None
+    table.check_lengths()
+    layout = layout_of(table, said.columns, wanted)
+    of = layout.columns
+    command = _command_of(table, of, said)
+    time, table = _times(table, of[TIME], said.drop_repeated)
+    measured = {name: column.to_si(table.numbers(column.column, missing=math.nan), name)
+                for name, column in of.items() if name not in (TIME, SWITCH, *COMMANDS)}
+    values = of[command].to_si(table.numbers(of[command].column), command)
+    switch = _switch(table, of[SWITCH]) if SWITCH in of else None
+    used = {column.column for column in layout.shown}
+    reading = Reading(file=str(path), columns=layout.shown, remarks=table.remarks,
+                      layout=of, unread=tuple(name for name in table.header if name and name not in used))
     given = {"name": path.stem, "source": str(path), **said.log}
     with in_file(path, str(given["name"])):
         return Log(time=time, command=values, command_kind=COMMANDS[command], measured=measured, torque_on=switch,
-                   **given)
+                   reading=reading, **given)
 
 
 @contextmanager
@@ -154,39 +139,17 @@ def _cell(value: float) -> str:
     return "" if math.isnan(value) else repr(value)
 
 
-def _table(path: Path) -> _Table:
-    try:
-        header, rows = _read(path)
-    except InputError as error:
-        raise InputError(error.what, got=error.got, allowed=error.allowed) from None
-    return _Table(path, header, list(rows), list(rows.values()))
-
-
-def _check_columns(table: _Table, columns: dict[str, Column]) -> None:
-    for name, column in columns.items():
-        count = table.header.count(column.column)
-        if count == 0:
-            raise InputError(f"{table.path}: column of {name}", got=column.column, allowed=", ".join(table.header))
-        if count > 1:
-            raise InputError(f"{table.path}: column", got=f"{column.column} {count} times", allowed="once")
-    if TIME not in columns:
-        raise lacking(table.path, "time", table.header, (TIME,))
-
-
-def _command_of(table: _Table, columns: dict[str, Column], said: Sidecar) -> str:
+def _command_of(table: TextTable, columns: Mapping[str, Column], said: Sidecar) -> str:
     """Return which column is the command: the one that the sidecar says, else the first of `COMMANDS`."""
     found = [name for name in COMMANDS if name in columns]
     if said.command is not None and said.command not in found:
         raise InputError(f"{table.path}: command", got=said.command, allowed=", ".join(found) or "a column of the file")
-    if not found:
-        raise lacking(table.path, "command", table.header, COMMANDS)
     return said.command or found[0]
 
 
-def _times(table: _Table, column: Column, drop_repeated: bool) -> tuple[NDArray[np.float64], _Table]:
+def _times(table: TextTable, column: Column, drop_repeated: bool) -> tuple[NDArray[np.float64], TextTable]:
     """Return the times, and the table without the rows that are passed over."""
-    raw = _since_first(table, column) if column.from_first else _numbers(table, column)
-    time = column.to_si(raw, TIME)
+    time = _seconds(table, column)
     same = np.append(False, np.diff(time) == 0.0)
     if drop_repeated and same.any():
         table, time = table.without(same), time[~same]
@@ -195,41 +158,42 @@ def _times(table: _Table, column: Column, drop_repeated: bool) -> tuple[NDArray[
         k = int(bad[0]) + 1
         stands = "stands still" if time[k] == time[k - 1] else "runs backwards"
         help_ = ' ("drop_repeated" of a sidecar passes such rows over)' if time[k] == time[k - 1] else ""
-        raise InputError(f"{table.path}: line {table.lines[k]}, {column.column}: time {stands}",
-                         got=f"{time[k]:.9g} s after {time[k - 1]:.9g} s in line {table.lines[k - 1]}",
+        raise InputError(f"{table.path}: line {table.rows[k].line}, {column.column}: time {stands}",
+                         got=f"{time[k]:.9g} s after {time[k - 1]:.9g} s in line {table.rows[k - 1].line}",
                          allowed=f"increasing times{help_}")
     return time, table
 
 
-def _since_first(table: _Table, column: Column) -> NDArray[np.float64]:
+def _seconds(table: TextTable, column: Column) -> NDArray[np.float64]:
+    """Return the times of all rows as the file has them [s]."""
+    if column.unit in CLOCKS:
+        stamps = stamps_of(table, column.column)
+        if stamps is None or stamps.unit != column.unit:
+            raise InputError(f"{table.path}: line {table.rows[0].line}, {column.column}",
+                             got=table.cells(column.column)[0] or "nothing", allowed=CLOCKS[column.unit])
+        return stamps.time
+    raw = _since_first(table, column) if column.from_first else table.numbers(column.column)
+    return column.to_si(raw, TIME)
+
+
+def _since_first(table: TextTable, column: Column) -> NDArray[np.float64]:
     """Return stamps less the first one, subtracted before they are rounded: nanoseconds since 1970 have 19 digits."""
+    cells = table.cells(column.column)
     try:
-        stamps = [Decimal(cell) for cell in table.cells(column.column)]
+        stamps = [Decimal(cell.replace(",", ".", 1) if table.decimal == "," else cell) for cell in cells]
         return np.array([float(stamp - stamps[0]) for stamp in stamps])
     except (InvalidOperation, OverflowError):
         # not all are plain numbers: the ordinary way names the line
-        values = _numbers(table, column)
+        values = table.numbers(column.column)
         with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused with its line
             return np.asarray(values - values[0])
 
 
-def _numbers(table: _Table, column: Column, *, empty: float | None = None) -> NDArray[np.float64]:
-    """Return the numbers of a column as they stand there; `empty` is what an empty cell counts as."""
+def _switch(table: TextTable, column: Column) -> NDArray[np.bool_]:
     values = []
-    for line, cell in zip(table.lines, table.cells(column.column), strict=True):
-        try:
-            values.append(float(cell) if cell or empty is None else empty)
-        except ValueError:
-            raise InputError(f"{table.path}: line {line}, {column.column}", got=cell or "nothing",
-                             allowed="a number") from None
-    return np.array(values, dtype=np.float64)
-
-
-def _switch(table: _Table, column: Column) -> NDArray[np.bool_]:
-    values = []
-    for line, cell in zip(table.lines, table.cells(column.column), strict=True):
+    for row, cell in zip(table.rows, table.cells(column.column), strict=True):
         values.append(switch_value(cell))
         if math.isnan(values[-1]):
-            raise InputError(f"{table.path}: line {line}, {column.column}", got=cell or "nothing",
+            raise InputError(f"{table.path}: line {row.line}, {column.column}", got=cell or "nothing",
                              allowed="1 or 0, true or false")
     return np.asarray(np.array(values) == 1.0)

@@ -16,6 +16,7 @@ from servotwin.loads import Load, Recorded, as_load
 from servotwin.signals.shapes import sampled
 
 if TYPE_CHECKING:
+    from servotwin.identification.logs.reading import Reading
     from servotwin.signals import Signal
 
 ANGLES = ("output_angle", "feedback_voltage")  # of the signals that tell where the shaft is, the better one first
@@ -54,6 +55,8 @@ class Log:
         Windows start ≤ time < stop that say nothing about the servo [s].
     source : str
         Where it was read.
+    reading : Reading, optional
+        How: which column of a file was taken as what.
 
     Raises
     ------
@@ -84,6 +87,7 @@ class Log:
     conditions: Mapping[str, float | str] = field(default_factory=dict)
     left_out: tuple[tuple[float, float], ...] = ()
     source: str = ""
+    reading: Reading | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         where = check.texts(self.name, self.motion, self.source)

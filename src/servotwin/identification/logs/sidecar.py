@@ -185,6 +185,29 @@ def _column(what: str, name: str, entry: object) -> Column:
     return Column(column, unit, float(entry.get("scale", 1.0)), float(entry.get("offset", 0.0)), from_first)
 
 
+def column_entries(columns: Mapping[str, Column]) -> dict[str, dict[str, Any]]:
+    """Return what a sidecar says of columns under `columns`; what is as usual is left out.
+
+    Examples
+    --------
+    >>> column_entries({"output_angle": Column("pos", "deg", offset=-90.0)})
+    {'output_angle': {'column': 'pos', 'unit': 'deg', 'offset': -90.0}}
+    """
+    made: dict[str, dict[str, Any]] = {}
+    for name, column in columns.items():
+        entry: dict[str, Any] = {"column": column.column}
+        if name != SWITCH:
+            entry["unit"] = column.unit
+        if column.scale != 1.0:
+            entry["scale"] = column.scale
+        if column.offset != 0.0:
+            entry["offset"] = column.offset
+        if column.from_first:
+            entry["from_first"] = True
+        made[name] = entry
+    return made
+
+
 def sidecar_words(log: Log) -> dict[str, Any]:
     """Return the content of the sidecar of a log; what is empty is left out."""
     content: dict[str, Any] = {

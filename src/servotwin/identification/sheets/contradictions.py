@@ -13,6 +13,7 @@ from servotwin.identification.sheets.motor_range import (
     FINE_DROPS,
     completed,
     motor_range,
+    no_load_current_is_known,
     stall_current_is_known,
 )
 from servotwin.identification.sheets.sheet import Sheet, SheetPoint
@@ -58,7 +59,9 @@ def sheet_contradictions(sheet: Sheet) -> tuple[Contradiction, ...]:
     """
     found = [*_growth(sheet), *(one for point in sheet.main for one in _efficiency(sheet, point))]
     if not found and not motor_range(sheet).possible:
-        voltages = " and ".join(f"{point.supply_voltage:g} V" for point in sheet.main)
+        used = sorted(point.supply_voltage for point in sheet.own
+                      if point.complete or (point.stall_current, point.no_load_current) != (None, None))
+        voltages = " and ".join(f"{voltage:g} V" for voltage in used)
         found.append(Contradiction(flag="impossible: the voltages do not fit together", text=(
             f"torque, speed and currents at {voltages} are each possible, but not of one and the same motor and gear: "
             "one of these voltages, or a figure beside it, is wrong.")))
@@ -183,7 +186,7 @@ def _down(x: float) -> str:
 
 
 def _currents(sheet: Sheet) -> Iterator[str]:
-    stall, running = stall_current_is_known(sheet), any(p.no_load_current is not None for p in sheet.main)
+    stall, running = stall_current_is_known(sheet), no_load_current_is_known(sheet)
     if not stall and not running:
         yield "no current given"
     elif not stall:

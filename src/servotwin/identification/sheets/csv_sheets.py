@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Mapping
@@ -12,6 +11,7 @@ from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.identification.sheets.sheet import Sheet, SheetPoint
+from servotwin.tables import read_table
 
 _DEG = math.pi / 180.0
 _POINT = {"V": ("supply_voltage", 1.0), "stall_torque_Nm": ("stall_torque", 1.0),
@@ -151,28 +151,21 @@ def _pulse(where: str, text: str, k: int) -> float:
 
 
 def _rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            table = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not a UTF-8 text" if isinstance(
-            error, OSError | UnicodeDecodeError) else str(error)
-        raise InputError(f"{path}: not readable as CSV ({reason})") from None
-    if len(table) < 2:
-        raise InputError(str(path), got="a header without rows" if table else "an empty file",
-                         allowed="a header and at least one row")
-    header = table[0][1]
+    table = read_table(path, lambda name: name in COLUMNS)
+    header = table.header
     for column in header:
         if column not in COLUMNS and column not in _UNUSED:
             raise InputError(f"{path}: {UnknownNameError('column', column, COLUMNS)}")
     for needed in ("model", "V", "stall_torque_Nm", "speed_s_per_60deg"):
         if needed not in header:
             raise InputError(f"{path}: columns", got=", ".join(header), allowed=f"also {needed}")
-    for line, row in table[1:]:
-        if len(row) > len(header):
-            raise InputError(f"{path}: line {line}", got=f"{len(row)} cells",
-                             allowed=f"{len(header)}, as in the header")
-    return [(line, dict(zip(header, row + [""] * (len(header) - len(row)), strict=True))) for line, row in table[1:]]
+    table.check_lengths(shorter=True)
+    n = len(header)
+    return [(line, {name: _plain(cell) if table.decimal == "," else cell
+                    for name, cell in zip(header, [*cells, *[""] * (n - len(cells))][:n], strict=True)})
+            for line, cells in table.rows]
+
+
+def _plain(cell: str) -> str:
+    """Return a number with a decimal point; texts stay as they are."""
+    return cell.replace(",", ".") if re.fullmatch(r"[+-]?\d*,\d+", cell) else cell

@@ -130,7 +130,7 @@ def motor_range(sheet: Sheet) -> MotorRange:
         no_load_current=among(lambda m: _no_load_torque(m) / m.output_torque_constant),
         coulomb_torque=among(lambda m: m.coulomb_torque), drop_voltage=best.drop,
         efficiency_from_sheet=stall_current_is_known(sheet),
-        current_from_sheet=any(point.no_load_current is not None for point in sheet.main), possible=bool(possible))
+        current_from_sheet=no_load_current_is_known(sheet), possible=bool(possible))
 
 
 def _no_load_torque(motor: SheetMotor) -> float:
@@ -138,7 +138,7 @@ def _no_load_torque(motor: SheetMotor) -> float:
 
 
 def stall_current_is_known(sheet: Sheet) -> bool:
-    """Return whether the main source prints a stall current at any voltage.
+    """Return whether the main source prints a stall current at any voltage, be it one without torque and speed.
 
     Examples
     --------
@@ -146,7 +146,12 @@ def stall_current_is_known(sheet: Sheet) -> bool:
     >>> stall_current_is_known(Sheet(name="a", points=(point,)))
     False
     """
-    return any(point.stall_current is not None for point in sheet.main)
+    return any(point.stall_current is not None for point in sheet.own)
+
+
+def no_load_current_is_known(sheet: Sheet) -> bool:
+    """Return whether the main source prints a running current at any voltage."""
+    return any(point.no_load_current is not None for point in sheet.own)
 
 
 def completed(sheet: Sheet, drop: float, points: Sequence[SheetPoint]) -> tuple[SheetPoint, ...]:
@@ -163,8 +168,8 @@ def completed(sheet: Sheet, drop: float, points: Sequence[SheetPoint]) -> tuple[
     """
     filled = []
     for point in points:
-        I_0 = _nearest(sheet.main, point, "no_load_current")
-        I_s = _nearest(sheet.main, point, "stall_current")
+        I_0 = _nearest(sheet.own, point, "no_load_current")
+        I_s = _nearest(sheet.own, point, "stall_current")
         new = point
         if point.stall_current is None and I_s is not None and I_s.stall_current is not None:
             new = replace(new, stall_current=I_s.stall_current * (point.supply_voltage - drop)
@@ -184,8 +189,7 @@ def _assumptions(sheet: Sheet) -> Iterator[_Assumed]:
     """Yield the combinations of what the sheet leaves open, the likelier ones first."""
     fine = stall_current_is_known(sheet)
     efficiencies = (None,) if fine else EFFICIENCIES
-    given = any(point.no_load_current is not None for point in sheet.main)
-    ratios = (None,) if given else FINE_CURRENT_RATIOS if fine else CURRENT_RATIOS
+    ratios = (None,) if no_load_current_is_known(sheet) else FINE_CURRENT_RATIOS if fine else CURRENT_RATIOS
     # A lower drop is the smaller step away from what is likely: it goes before another current
     for ratio, efficiency, drop in itertools.product(ratios, efficiencies, FINE_DROPS if fine else DROPS):
         yield _Assumed(drop=drop, efficiency=efficiency, ratio=ratio)
@@ -223,8 +227,9 @@ def _together(points: Sequence[SheetPoint], alone: Sequence[SheetMotor], sheet: 
     V, T_s, w_0 = (np.array([getattr(point, name) for point in points]) for name in (
         "supply_voltage", "stall_torque", "no_load_speed"))
     U, U_n = V - assumed.drop, sheet.nominal.supply_voltage - assumed.drop
-    known = np.array([point.stall_current is not None for point in sheet.main])
-    I_s = np.array([point.stall_current or 1.0 for point in sheet.main])
+    stalled = [(point.supply_voltage - assumed.drop, point.stall_current) for point in sheet.own
+               if point.stall_current is not None]
+    U_s, I_s = np.array(stalled).reshape(-1, 2).T
     given = [point.no_load_current for point in points]
 
     def facts(x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -233,7 +238,7 @@ def _together(points: Sequence[SheetPoint], alone: Sequence[SheetMotor], sheet: 
         I_0 = np.array([assumed.ratio * U_n / R if assumed.ratio is not None else i for i in given], dtype=np.float64)
         left = np.maximum(U - R * I_0, 1e-6 * U)  # a trial step may be too far
         return np.concatenate([np.log(left / (K * w_0)), np.log(eta * K * left / (R * T_s)),
-                               np.log(U / (R * I_s))[known]])
+                               np.log(U_s / (R * I_s))])
 
     names = ("resistance", "output_torque_constant", "gear_efficiency")[:3 if assumed.efficiency is None else 2]
     x = np.mean([[math.log(getattr(motor, name)) for name in names] for motor in alone], axis=0)

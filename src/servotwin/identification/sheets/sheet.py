@@ -168,7 +168,7 @@ class Sheet:
         self._check_points()
 
     def _check_points(self) -> None:
-        if any(point.complete and point.source == self.points[0].source for point in self.points):
+        if self.main:
             return
         has = {name for point in self.points for name in ("stall_torque", "no_load_speed")
                if getattr(point, name) is not None}
@@ -181,10 +181,14 @@ class Sheet:
                          allowed="stall torque and speed at one and the same supply voltage")
 
     @property
+    def own(self) -> tuple[SheetPoint, ...]:
+        """All points of the first source, those without torque or speed too: their currents count."""
+        return tuple(point for point in self.points if point.source == self.points[0].source)
+
+    @property
     def main(self) -> tuple[SheetPoint, ...]:
         """The complete points of the first source, by rising voltage: they make the servo."""
-        own = (point for point in self.points if point.complete and point.source == self.points[0].source)
-        return tuple(sorted(own, key=lambda point: point.supply_voltage))
+        return tuple(sorted((point for point in self.own if point.complete), key=lambda point: point.supply_voltage))
 
     @property
     def others(self) -> tuple[SheetPoint, ...]:

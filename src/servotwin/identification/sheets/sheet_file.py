@@ -3,26 +3,17 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from servotwin import units
-from servotwin.errors import InputError, ServotwinError
+from servotwin.errors import InputError
 from servotwin.identification.sheets.sheet import Sheet, SheetPoint
-from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, unit_of, write_file
+from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, dimension_of, unit_of, write_file
+from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE, figure, printed
 
-_FLAGS, _NOTE, _ELSE = "flags", "note", "also_at"
-# key of the file -> field, dimension, unit; a speed is printed as the time for 60 degrees
-_POINT = {"supply_voltage": ("supply_voltage", "voltage", "V"), "stall_torque": ("stall_torque", "torque", "N m"),
-          "speed_per_60deg": ("no_load_speed", "time", "s"), "no_load_current": ("no_load_current", "current", "A"),
-          "stall_current": ("stall_current", "current", "A"), "idle_current": ("idle_current", "current", "A")}
-_WHOLE = {"deadband": ("deadband", "time", "us"), "pulse_min": ("pulse_min", "time", "us"),
-          "pulse_max": ("pulse_max", "time", "us"), "neutral_pulse": ("neutral_pulse", "time", "us"),
-          "travel": ("travel", "angle", "deg"), "travel_per_400us": ("angle_per_pulse", "angle", "deg"),
-          "stop_travel": ("stop_travel", "angle", "deg"), "backlash": ("backlash", "angle", "deg"),
-          "gear_reduction": ("gear_reduction", "number", "1"), "mass": ("mass", "mass", "g")}
+_FLAGS, _NOTE = "flags", "note"
 _WORDS = ("motor_type", "modulation")
 # parameters whose SI unit makes awkward numbers
 _UNITS = {"motor.armature_inductance": "mH", "motor.torque_constant": "mN m/A", "motor.back_emf_constant": "mV s/rad",
@@ -49,11 +40,11 @@ def sheet_table(sheet: Sheet, flags: Iterable[str] = ()) -> dict[str, Any]:
         found[_NOTE] = sheet.note
     found |= {name: getattr(sheet, name) for name in _WORDS if getattr(sheet, name)}
     nominal = sheet.nominal
-    found |= _entries(nominal, _POINT, {}, sheet.source_at(nominal))
-    found |= _entries(sheet, _WHOLE, sheet.sources, sheet.source or "data sheet")
+    found |= _entries(nominal, POINT, {}, sheet.source_at(nominal))
+    found |= _entries(sheet, WHOLE, sheet.sources, sheet.source or "data sheet")
     rest = [point for point in sheet.points if point is not nominal]
     if rest:
-        found[_ELSE] = [_entries(point, _POINT, {}, sheet.source_at(point)) for point in rest]
+        found[ELSE] = [_entries(point, POINT, {}, sheet.source_at(point)) for point in rest]
     return found
 
 
@@ -74,14 +65,14 @@ def sheet_of(servo: Servo) -> Sheet:
     table = servo.sheet
     if not table:
         raise InputError(f"servo {servo.name!r} has no table [sheet]")
-    known = (*_POINT, *_WHOLE, *_WORDS, _FLAGS, _NOTE, _ELSE)
+    known = (*POINT, *WHOLE, *_WORDS, _FLAGS, _NOTE, ELSE)
     for key in table:
         if key not in known:
             raise InputError(f"[sheet] of {servo.name!r}", got=key, allowed=", ".join(known))
-    values, sources = _read(servo, table, _WHOLE)
-    rows = table.get(_ELSE, [])
+    values, sources = _read(servo, table, WHOLE)
+    rows = table.get(ELSE, [])
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
-        raise InputError(f"[sheet] {_ELSE} of {servo.name!r}", got=rows, allowed=f"tables [[sheet.{_ELSE}]]")
+        raise InputError(f"[sheet] {ELSE} of {servo.name!r}", got=rows, allowed=f"tables [[sheet.{ELSE}]]")
     points = [_read_point(servo, row) for row in (table, *rows)]
     source = points[0].source
     values |= {name: str(table.get(name, "")) for name in _WORDS}
@@ -97,18 +88,13 @@ def _entries(given: Sheet | SheetPoint, keys: Mapping[str, tuple[str, str, str]]
     for key, (name, dimension, unit) in keys.items():
         value = getattr(given, name)
         if value is not None:
-            found[key] = {"value": float(f"{units.from_si(_printed(key, value), unit, dimension):.10g}"), "unit": unit,
+            found[key] = {"value": float(f"{units.from_si(printed(key, value), unit, dimension):.10g}"), "unit": unit,
                           "source": sources.get(name) or source}
     return found
 
 
-def _printed(key: str, value: float) -> float:
-    """Return a value as sheets print it; it is its own inverse, or nearly."""
-    return math.pi / 3.0 / value if key == "speed_per_60deg" else value * 400e-6 if key == "travel_per_400us" else value
-
-
 def _read_point(servo: Servo, row: Mapping[str, Any]) -> SheetPoint:
-    values, sources = _read(servo, row, _POINT)
+    values, sources = _read(servo, row, POINT)
     if "supply_voltage" not in values:
         raise InputError(f"[sheet] of {servo.name!r}", got="figures without supply_voltage", allowed="both")
     return SheetPoint(**values, source=sources.get("stall_torque") or next(iter(sources.values())))
@@ -117,21 +103,10 @@ def _read_point(servo: Servo, row: Mapping[str, Any]) -> SheetPoint:
 def _read(servo: Servo, row: Mapping[str, Any], keys: Mapping[str, tuple[str, str, str]]
           ) -> tuple[dict[str, Any], dict[str, str]]:
     values, sources = {}, {}
-    for key, (name, dimension, unit) in keys.items():
-        if key not in row:
-            continue
-        entry = row[key]
-        if isinstance(entry, Mapping) and str(entry.get("source", "")).startswith("assumed"):
-            continue  # written by hand to make up for what is not printed
-        try:
-            value = units.to_si(float(entry["value"]), str(entry["unit"]), dimension)
-        except (KeyError, TypeError, ValueError, ServotwinError):
-            raise InputError(f"[sheet] {key} of {servo.name!r}", got=entry,
-                             allowed=f'{{ value = ..., unit = "{unit}", source = "..." }}') from None
-        if value > 0.0:
-            value = math.pi / 3.0 / value if key == "speed_per_60deg" else value
-        values[name] = value / 400e-6 if key == "travel_per_400us" else value
-        sources[name] = str(entry.get("source", ""))
+    for key, (name, _, _) in keys.items():
+        found = figure(servo.name, key, row[key]) if key in row else None
+        if found is not None:
+            values[name], sources[name] = found.value, found.source
     return values, sources
 
 
@@ -179,10 +154,10 @@ def write_servo_text(servo: Servo, path: str | Path, *, overwrite: bool = False)
 def _sheet_lines(table: Mapping[str, Any]) -> list[str]:
     lines = ["[sheet]  # facts as printed"]
     for key, entry in table.items():
-        if key != _ELSE:
+        if key != ELSE:
             lines.append(f"{key} = {_toml(entry)}")
-    for row in table.get(_ELSE, []):
-        lines += ["", f"[[sheet.{_ELSE}]]", *(f"{key} = {_toml(entry)}" for key, entry in row.items())]
+    for row in table.get(ELSE, []):
+        lines += ["", f"[[sheet.{ELSE}]]", *(f"{key} = {_toml(entry)}" for key, entry in row.items())]
     return lines
 
 
@@ -199,7 +174,7 @@ def _text(text: str) -> str:
 
 
 def _line(name: str, quantity: Quantity) -> str:
-    dimension = GROUPS[name.partition(".")[0]].__dataclass_fields__[name.partition(".")[2]].metadata["dimension"]
+    dimension = dimension_of(name)
     unit = _UNITS.get(name, unit_of(name))
 
     def number(x: Any) -> Any:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from servotwin.errors import InputError
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.progress import Progress, shown
-from servotwin.simulation.sweep.distributions import Distribution
 from servotwin.simulation.sweep.folder import Folder
 from servotwin.simulation.sweep.jobs import run_chunk
+from servotwin.simulation.sweep.kinds import Distribution
 from servotwin.simulation.sweep.plan import planned
 from servotwin.simulation.sweep.running import run_plan
 from servotwin.simulation.sweep.study import Study
@@ -40,7 +40,8 @@ def sweep(
         Positive [s].
     vary : mapping of str to Distribution or str, optional
         Distribution by dotted name of servo or load: one of `distributions`, or words such as ``"normal:10%"`` and
-        ``"uniform:4us..8us"``. They are independent of each other.
+        ``"uniform:4us..8us"``. They are independent of each other. A number that several parameters follow from,
+        such as ``"sheet.no_load_speed"`` or ``"output_torque_constant"``, is one of the names that `stated` gives.
     draws : mapping of str to array, shape (n,), optional
         Values (SI) that were drawn elsewhere, by dotted name; lane k takes the k-th of each.
     lanes : int, optional

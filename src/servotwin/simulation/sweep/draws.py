@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ParameterError
-from servotwin.simulation.sweep.distributions import Distribution, Truncated
+from servotwin.simulation.sweep.kinds import Distribution, Truncated
 from servotwin.simulation.sweep.names import Parameter, parameter
 from servotwin.simulation.sweep.words import distribution_of
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import platform
@@ -16,11 +17,14 @@ from numpy.typing import NDArray
 from servotwin import __version__
 from servotwin.errors import InputError, OutputError
 from servotwin.parameters import write_file
+from servotwin.parameters.output_file import undone
 from servotwin.simulation.sweep.tables import check_format, encoded, read_columns
 
 Column = NDArray[Any]
 
 STUDY, SUMMARY = "study.json", "summary.json"
+_FOLLOWING = ("parameters_sha256", "chunk")  # from all the others
+_MOST_NAMED = 6  # of what differs
 _LIBRARIES = ("numpy", "scipy", "numba")
 
 
@@ -48,14 +52,20 @@ class Folder:
         check_format(file_format)
         self.path, self._format = Path(path), file_format
         own = {**definition, "servotwin": __version__, "format": file_format}
-        self._make()
-        if not self._empty():
-            if not resume:
-                raise OutputError(f"{self.path} is not empty; resume=True (--resume) goes on with the study there")
-            self._check_same(own)
-            return
-        versions = {"python": platform.python_version(), **{name: metadata.version(name) for name in _LIBRARIES}}
-        self._write(STUDY, _json({"sha256": _fingerprint(own), "definition": own, "versions": versions}))
+        new = not self.path.exists()
+        with undone(self._remove_empty if new else lambda: None):
+            self._make()
+            if not self._empty():
+                if not resume:
+                    raise OutputError(f"{self.path} is not empty; resume=True (--resume) goes on with the study there")
+                self._check_same(own)
+                return
+            versions = {"python": platform.python_version(), **{name: metadata.version(name) for name in _LIBRARIES}}
+            self._write(STUDY, _json({"sha256": _fingerprint(own), "definition": own, "versions": versions}))
+
+    def _remove_empty(self) -> None:
+        with contextlib.suppress(OSError, ValueError):  # it has the study, or never was
+            self.path.rmdir()
 
     def _make(self) -> None:
         if "\0" in str(self.path):
@@ -82,10 +92,13 @@ class Folder:
             raise OutputError(f"{self.path} holds no study that could be gone on with ({STUDY} is missing or broken); "
                               "name another folder") from None
         ours = _flat(json.loads(json.dumps(own)))
-        for name in (*ours, *theirs):
-            if theirs.get(name) != ours.get(name):
-                raise OutputError(f"{file} is of another study: {name}", got=ours.get(name, "nothing"),
-                                  allowed=f"{theirs.get(name, 'nothing')!r}, as there")
+        differ = [name for name in dict.fromkeys((*ours, *theirs)) if theirs.get(name) != ours.get(name)]
+        if differ:
+            said = [name for name in differ if name not in _FOLLOWING] or differ
+            more = f"; {len(said) - _MOST_NAMED} more" if len(said) > _MOST_NAMED else ""
+            raise OutputError(f"{file} is of another study: " + "; ".join(
+                f"{name} is {_short(ours, name)} and was {_short(theirs, name)}" for name in said[:_MOST_NAMED]) + more
+                + "; repeat it as it was, or name another folder")
 
     def _write(self, name: str, content: bytes) -> None:
         try:
@@ -135,6 +148,12 @@ def _json(content: Mapping[str, Any]) -> bytes:
 
 def _fingerprint(definition: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(definition, sort_keys=True).encode()).hexdigest()
+
+
+def _short(content: Mapping[str, Any], name: str) -> str:
+    """Return a value as a line has room for it."""
+    text = json.dumps(content[name]) if name in content else "not given"
+    return text if len(text) <= 60 else f"{text[:40]} ..."
 
 
 def _flat(content: Mapping[str, Any], above: str = "") -> dict[str, Any]:

@@ -5,22 +5,22 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-
-from servotwin.errors import ParameterError
-from servotwin.parameters import GROUPS
+from servotwin import parameters
+from servotwin.errors import ParameterError, UnknownNameError
 from servotwin.parameters.groups import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
 from servotwin.simulation.lane_inputs import _check_name
 from servotwin.simulation.lane_loads import _PARTS, LOAD_NAMES
+from servotwin.simulation.sweep.joint import DIMENSIONS, TINY
+from servotwin.simulation.sweep.stated import Together
 from servotwin.units import si_unit
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
     from servotwin.models import Model
 
-_TINY = float(np.nextafter(0.0, 1.0))
-_RANGES = {POSITIVE: (_TINY, math.inf), NOT_NEGATIVE: (0.0, math.inf), AT_LEAST_ONE: (1.0, math.inf),
+_RANGES = {POSITIVE: (TINY, math.inf), NOT_NEGATIVE: (0.0, math.inf), AT_LEAST_ONE: (1.0, math.inf),
            FRACTION: (0.0, 1.0)}
+_PLACES_OF_JOINTS = ("sheet.", "calibration.", "output_")
 _OF_LOAD = {
     "load.inertia": "inertia", "load.viscous_friction": "torque per speed", "load.torque": "torque",
     "load.coulomb_torque": "torque", "load.pendulum.mass": "mass", "load.pendulum.length": "length",
@@ -62,26 +62,34 @@ def dimension_of(name: str) -> str:
     --------
     >>> dimension_of("motor.armature_resistance"), dimension_of("load.pendulum.mass")
     ('resistance', 'mass')
+    >>> dimension_of("sheet.stall_torque")
+    'torque'
     """
+    if name in DIMENSIONS:
+        return DIMENSIONS[name]
     if name in _OF_LOAD:
         return _OF_LOAD[name]
-    group, _, key = name.partition(".")
-    return str(GROUPS[group].__dataclass_fields__[key].metadata["dimension"])
+    return parameters.dimension_of(name)
 
 
 def parameter(name: str, model: Model, load: Load) -> Parameter:
-    """Return what is known of a dotted name.
+    """Return what is known of a dotted name, or of a number that others follow from.
 
     Raises
     ------
     UnknownNameError, ParameterError, LoadError
         If there is no such number, the model does not read it, or it is a table.
     """
-    _check_name(model, name)
     if name in LOAD_NAMES:
         return _of_load(name, load)
+    if name not in (*model.requires, *model.optional):
+        together = Together(model)
+        if name.startswith(_PLACES_OF_JOINTS):
+            return _of_joint(name, together, model)
+        if name not in together.unread:
+            _check_name(model, name)
     group, _, key = name.partition(".")
-    metadata = GROUPS[group].__dataclass_fields__[key].metadata
+    metadata = parameters.GROUPS[group].__dataclass_fields__[key].metadata
     rule, dimension, nominal = metadata["rule"], dimension_of(name), model.servo.get(name)
     if rule == "table" or isinstance(nominal, tuple):
         raise ParameterError(f"vary {name}", got="a table", allowed="a number or a word")
@@ -89,6 +97,18 @@ def parameter(name: str, model: Model, load: Load) -> Parameter:
         return Parameter(name, dimension, -math.inf, math.inf, " or ".join(rule), nominal)
     lower, upper = _RANGES.get(rule, (-math.inf, math.inf))
     return Parameter(name, dimension, lower, upper, f"{rule} [{si_unit(dimension)}]", nominal)
+
+
+def _of_joint(name: str, together: Together, model: Model) -> Parameter:
+    if name not in DIMENSIONS:
+        raise UnknownNameError("number to draw", name, DIMENSIONS)
+    if name not in together.coordinates:
+        raise ParameterError(f"vary {name}", got=f"a number from which nothing of {model.servo.name!r} follows",
+                             allowed=", ".join(together.coordinates) or "parameters of servo and load")
+    one = together.coordinates[name]
+    rule = POSITIVE if one.lower > 0.0 else NOT_NEGATIVE
+    allowed = f"{rule}{'' if math.isinf(one.upper) else f', at most {one.upper:g}'} [{si_unit(one.dimension)}]"
+    return Parameter(name, one.dimension, one.lower, one.upper, allowed, one.nominal)
 
 
 def _of_load(name: str, load: Load) -> Parameter:

@@ -17,7 +17,6 @@ from servotwin.loads import Load, as_load
 from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.many import _memory
 from servotwin.simulation.packing import Chunk, Commands, groups
-from servotwin.simulation.sweep.distributions import ENDS, Distribution
 from servotwin.simulation.sweep.draws import (
     SAMPLINGS,
     check_ranges,
@@ -27,8 +26,10 @@ from servotwin.simulation.sweep.draws import (
     noise_seeds,
 )
 from servotwin.simulation.sweep.jobs import Job
+from servotwin.simulation.sweep.kinds import ENDS, Distribution
 from servotwin.simulation.sweep.metrics import checked_metrics, decision_times, output_times, step_time
 from servotwin.simulation.sweep.names import parameter
+from servotwin.simulation.sweep.stated import Together
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -54,7 +55,11 @@ class Plan:
     job : Job
         What all chunks share.
     columns : mapping of str to ndarray, shape (lanes,)
-        The parameters of all lanes, by dotted name (SI).
+        What is drawn, of all lanes, by dotted name (SI).
+    followed : mapping of str to ndarray, shape (lanes,)
+        Parameters that follow from it, by dotted name (SI).
+    together : Together
+        How they follow.
     seeds : ndarray of int64, shape (lanes,)
         Of each lane's noise.
     ends : mapping of str to tuple
@@ -69,6 +74,8 @@ class Plan:
 
     job: Job
     columns: Mapping[str, Column]
+    followed: Mapping[str, Column]
+    together: Together
     seeds: NDArray[np.int64]
     ends: Mapping[str, tuple[Any, ...]]
     nominal: Mapping[str, Any]
@@ -88,14 +95,16 @@ class Plan:
     def part(self, k: int) -> tuple[dict[str, Column], NDArray[np.int64]]:
         """Return parameters and seeds of a chunk."""
         which = slice(k * self.chunk, (k + 1) * self.chunk)
-        return {name: column[which] for name, column in self.columns.items()}, self.seeds[which]
+        columns = {**self.together.read(self.columns), **self.followed}
+        return {name: column[which] for name, column in columns.items()}, self.seeds[which]
 
     def one_at_a_time(self) -> tuple[dict[str, Column], NDArray[np.int64]]:
         """Return the lanes of the tornado: the nominal one, then each end of each parameter in turn."""
         moved: list[tuple[str, Any]] = [(name, end) for name, ends in self.ends.items() for end in ends]
         columns = {name: np.array([self.nominal[name], *(
             end if which == name else self.nominal[name] for which, end in moved)]) for name in self.columns}
-        return columns, np.repeat(self.seeds[:1], len(moved) + 1)
+        parameters = {**self.together.read(columns), **self.together.follow(columns)}
+        return parameters, np.repeat(self.seeds[:1], len(moved) + 1)
 
 
 def planned(model: Model, command: Signal, *, duration: float, vary: Mapping[str, Distribution | str] | None,
@@ -113,7 +122,7 @@ def planned(model: Model, command: Signal, *, duration: float, vary: Mapping[str
         raise InputError("vary", got=type(vary).__name__, allowed="a mapping of dotted names to distributions")
     lanes_of(model, command, load, None, None, None)
     job = _job(model, command, as_load(load), duration, metrics, output_step)
-    drawing = vary or {}
+    drawing, advice = vary or {}, "" if truncate else _ADVICE
     table = checked_table(draws or {}, model, job.load)
     count = _count(lanes, drawing, table)
     _check_memory(count, len(drawing) + len(table) + len(job.metrics) + 3)
@@ -121,14 +130,18 @@ def planned(model: Model, command: Signal, *, duration: float, vary: Mapping[str
     columns = dict(sorted({**drawn(distributions, count, seed, sampling),
                            **{name: column[:count] for name, column in table.items()}}.items()))
     size = chunk or _chunk_size(count, len(job.times))
+    check_ranges(columns, model, job.load, advice=advice)
+    together = Together(model)
+    followed = together.follow(columns)
     plan = Plan(
-        job=job, columns=columns, seeds=noise_seeds(count, seed), chunk=size, ends=_ends(columns, distributions),
+        job=job, columns=columns, followed=followed, together=together, seeds=noise_seeds(count, seed), chunk=size,
+        ends=_ends(columns, distributions),
         nominal=_nominal(columns, model, job.load), definition={
             **_of_job(job), "output_step": float(output_step), "lanes": count, "seed": int(seed),
             "sampling": sampling, "truncate": bool(truncate), "chunk": size,
             "vary": {name: _described(drawing[name]) for name in sorted(drawing)}, "draws": sorted(table),
-            "parameters_sha256": _digest(columns)})
-    _check_lanes(job, plan.columns, plan.seeds, advice="" if truncate else _ADVICE)
+            "follow": list(followed), "parameters_sha256": _digest({**columns, **followed})})
+    _check_lanes(job, {**together.read(columns), **followed}, plan.seeds, advice=advice)
     try:
         _check_lanes(job, *plan.one_at_a_time(), advice="")
     except InputError as error:

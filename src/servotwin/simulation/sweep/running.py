@@ -29,7 +29,7 @@ _NAMES = np.array([status.name for status in Status])
 
 def table_names(plan: Plan) -> tuple[str, ...]:
     """Return the names of the columns of the table."""
-    return ("lane", *plan.columns, *plan.job.metrics, "status", "ended", *COLUMNS.values())
+    return ("lane", *plan.columns, *plan.followed, *plan.job.metrics, "status", "ended", *COLUMNS.values())
 
 
 def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[int], object]) -> Columns:
@@ -44,7 +44,7 @@ def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[i
     show : callable
         Is told how many lanes are done.
     """
-    table: Columns = {"lane": np.arange(plan.lanes), **plan.columns}
+    table: Columns = {"lane": np.arange(plan.lanes), **plan.columns, **plan.followed}
     table |= {name: np.empty(plan.lanes) for name in plan.job.metrics}
     table |= {"status": np.full(plan.lanes, Status.COMPLETED.name, _NAMES.dtype), "ended": np.empty(plan.lanes),
               **{name: np.empty(plan.lanes) for name in COLUMNS.values()}}

@@ -16,7 +16,7 @@ from servotwin.errors import InputError, MissingExtraError, UnknownNameError
 from servotwin.simulation.remarks import KINDS, LaneRemark, of_columns
 from servotwin.simulation.status import Status
 from servotwin.simulation.sweep.folder import Folder
-from servotwin.simulation.sweep.tornado import Tornado, bar_of, sorted_bars, variance_share
+from servotwin.simulation.sweep.tornado import Tornado, bar_of, tornado_of, variance_share
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -45,9 +45,9 @@ class Study:
     plan : Plan
         What was run.
     table : mapping of str to ndarray, shape (lanes,)
-        "lane", every parameter by its dotted name (SI), every metric (SI; nan where a lane has none), "status" (name
-        of a `Status`), "ended" [s], and for each kind of remark its time [s], nan in lanes of which it is not said:
-        "pulses_refused", "ended_on_a_stop", "cannot_hold".
+        "lane", all that is drawn and every parameter that follows from it by dotted name (SI), every metric (SI; nan
+        where a lane has none), "status" (name of a `Status`), "ended" [s], and for each kind of remark its time [s],
+        nan in lanes of which it is not said: "pulses_refused", "ended_on_a_stop", "cannot_hold".
     moved : mapping of str to ndarray
         Each metric in the lanes of the tornado: the nominal lane, then each end of each parameter.
     """
@@ -66,8 +66,13 @@ class Study:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Dotted names of what differs from lane to lane."""
+        """Dotted names of what is drawn."""
         return tuple(self.plan.columns)
+
+    @property
+    def followed(self) -> tuple[str, ...]:
+        """Dotted names of parameters that follow from what is drawn, and so differ from lane to lane too."""
+        return tuple(self.plan.followed)
 
     @property
     def metrics(self) -> tuple[str, ...]:
@@ -135,7 +140,8 @@ class Study:
             own = np.array(rest[first:first + len(values)])
             first += len(values)
             bars.append(bar_of(name, values, own, nominal, variance_share(self.table[name], self.table[metric])))
-        return Tornado(metric, nominal, sorted_bars(bars))
+        lanes = int(np.isfinite(self.table[metric]).sum())
+        return tornado_of(metric, nominal, bars, lanes)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the table as a pandas DataFrame, a row for each lane."""
@@ -159,7 +165,8 @@ class Study:
             found["metrics"][name] = {
                 "lanes": int(np.isfinite(self.table[name]).sum()), "nominal": _plain(tornado.nominal),
                 "quantiles": {f"{p:g}": _plain(value) for p, value in quantiles[name].items()},
-                "tornado": [{key: _plain(value) for key, value in bar._asdict().items()} for bar in tornado.bars]}
+                "tornado": [{key: _plain(value) for key, value in bar._asdict().items()} for bar in tornado.bars],
+                "without_effect": list(tornado.still)}
         return found
 
     def save(self, directory: str | Path, *, file_format: str = "csv") -> None:

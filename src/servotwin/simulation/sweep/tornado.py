@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 
 _MOST_CLASSES = 32
+_LEAST_LANES = 8  # fewer have no share
+_LEAST_REACH = 0.01  # of the farthest bar
 
 
 class Bar(NamedTuple):
@@ -44,7 +46,7 @@ class Bar(NamedTuple):
 
 @dataclass(frozen=True)
 class Tornado:
-    """The parameters of a study, those that move a metric farthest first.
+    """The parameters of a study that move a metric, those that move it farthest first.
 
     Parameters
     ----------
@@ -52,11 +54,15 @@ class Tornado:
     nominal : float
         The metric while all parameters are nominal (SI).
     bars : tuple of Bar
+    still : tuple of str
+        Names of what is drawn and does not move it: alone less than a hundredth of what the first bar does, and its
+        share of the variance no more than chance makes.
     """
 
     metric: str
     nominal: float
     bars: tuple[Bar, ...]
+    still: tuple[str, ...] = ()
 
 
 def bar_of(name: str, values: tuple[Any, ...], metric: NDArray[np.float64], nominal: float, share: float) -> Bar:
@@ -73,6 +79,45 @@ def bar_of(name: str, values: tuple[Any, ...], metric: NDArray[np.float64], nomi
     low, high = ends
     reach = float(np.ptp([metric[low], metric[high], nominal]))
     return Bar(name, values[low], values[high], float(metric[low]), float(metric[high]), reach, share)
+
+
+def tornado_of(metric: str, nominal: float, bars: list[Bar], lanes: int) -> Tornado:
+    """Return the tornado of a metric that so many lanes have; what does not move it is only named.
+
+    A bar without a value at one of its ends moves the metric, out of existence.
+
+    Examples
+    --------
+    >>> found = [Bar("load.inertia", 0.0, 1.0, 0.2, 0.3, 0.1, 0.9), Bar("load.torque", 0.0, 0.5, 0.2, 0.2, 0.0, 0.0)]
+    >>> tornado_of("rise_time", 0.2, found, 100).still
+    ('load.torque',)
+    """
+    known = [bar.reach for bar in bars if not math.isnan(bar.reach)]
+    least, chance = _LEAST_REACH * max(known, default=0.0), chance_share(lanes)
+    moving = [bar for bar in bars if math.isnan(bar.reach) or bar.reach > least or bar.share > chance]
+    return Tornado(metric, nominal, sorted_bars(moving), tuple(sorted(
+        bar.name for bar in bars if bar not in moving)))
+
+
+def chance_share(lanes: int) -> float:
+    """Return what the share of a parameter without effect exceeds by chance in about one of a thousand.
+
+    Three standard deviations: sorted into c classes, the part between them of n independent values is, as a share of
+    the whole, that of a beta distribution with c − 1 and n − c degrees of freedom.
+
+    Examples
+    --------
+    >>> round(chance_share(2000), 3)
+    0.012
+    """
+    if lanes < _LEAST_LANES:
+        return math.inf
+    classes = _classes(lanes)
+    return 3.0 * math.sqrt(2.0 * (classes - 1.0) / (lanes - classes)) / math.sqrt(lanes - 1.0)
+
+
+def _classes(lanes: int) -> int:
+    return min(int(math.sqrt(lanes)), _MOST_CLASSES)
 
 
 def sorted_bars(bars: list[Bar]) -> tuple[Bar, ...]:
@@ -113,9 +158,9 @@ def variance_share(values: NDArray[Any], metric: NDArray[np.float64]) -> float:
         raise InputError("metric", got=metric.shape, allowed=f"one number for each of {values.shape[0]} values")
     good = np.isfinite(metric)
     x, y = values[good], metric[good]
-    if len(y) < 8 or not np.ptp(y) > 1e-12 * np.max(np.abs(y)):
+    if len(y) < _LEAST_LANES or not np.ptp(y) > 1e-12 * np.max(np.abs(y)):
         return math.nan
-    count = min(int(math.sqrt(len(y))), _MOST_CLASSES)
+    count = _classes(len(y))
     options, of = np.unique(x, return_inverse=True)
     if len(options) > count:
         place = np.empty(len(x), dtype=np.int64)

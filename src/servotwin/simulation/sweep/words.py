@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from servotwin import units
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.simulation.sweep.distributions import (
+from servotwin.simulation.sweep.kinds import (
     Choice,
     Distribution,
     LogNormal,

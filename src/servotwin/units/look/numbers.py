@@ -6,9 +6,11 @@ import math
 
 from servotwin import units
 
-_FOREIGN = ("kgf cm", "ozf in", "V/krpm", "min", "%", "%/K", "s/deg", "N m/deg", "V/deg", "rpm", "deg/s")
+_FOREIGN = ("kgf cm", "ozf in", "V/krpm", "min", "%", "%/K", "s/deg", "N m/deg", "V/deg", "rpm", "deg/s",
+            "oz", "lb", "in")
 _PRINTED = {"ohm": "Ω", "mohm": "mΩ", "us": "µs", "uH": "µH", "us/V": "µs/V", "deg": "°", "1": "",
-            "mV/us": "mV/µs"}
+            "mV/us": "mV/µs", "deg/us": "°/µs",
+            "deg/s": "°/s"}
 
 
 def readable(value: float | str, dimension: str) -> str:
@@ -37,8 +39,11 @@ def unit_for(value: float, dimension: str) -> str:
     ('mN m/A', 'deg')
     """
     known = [unit for unit in units.DIMENSIONS[dimension] if unit not in _FOREIGN]
-    if "deg" in known:
-        return "deg"
+    for usual in ("deg", "deg/us"):
+        if usual in known:
+            return usual
+    if dimension == "output speed":  # of a shaft that turns by degrees; motors are read in rad/s
+        return "deg/s"
     if not value or not math.isfinite(value):
         return known[0]
     numbers = {unit: abs(units.from_si(value, unit, dimension)) for unit in known}

@@ -1,0 +1,165 @@
+"""`servotwin curves`: the sheets of servos as they should have been."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from servotwin.cli import shared_options as shared
+from servotwin.cli.terminal import emit_json, pairs, patience, show, table
+
+if TYPE_CHECKING:
+    from servotwin.cli.outputs import Target
+    from servotwin.datasheet import DataSheet
+
+_MODELS = ("pulse", "pulse-inductive", "bounded")
+_PICTURES = (".png", ".svg", ".pdf")
+_ZERO_CELSIUS = 273.15
+_ASKED = "What is asked"
+
+
+def curves(
+    servos: Annotated[list[str], typer.Argument(
+        metavar="ID...", help="Ids in the catalog, or paths of servo files (.toml).")],
+    voltage: Annotated[list[str] | None, typer.Option(
+        metavar="VOLTS", help="Supply voltages, such as 4.8,6 (default: the servo's own).",
+        rich_help_panel=_ASKED)] = None,
+    lift: Annotated[str | None, typer.Option(
+        metavar="MASS", help="A mass to lift, such as 0.5kg, 120g, 4oz or 1lb; with --arm.",
+        rich_help_panel=_ASKED)] = None,
+    arm: Annotated[str | None, typer.Option(
+        metavar="LENGTH", help="The length of its arm, such as 10cm, 80mm or 4in.", rich_help_panel=_ASKED)] = None,
+    load: Annotated[list[str] | None, typer.Option(
+        metavar="PART=VALUE", help="torque=0.3 shows the point of the curves against 0.3 N m; arm=0.5kg:10cm is "
+        "--lift 0.5kg --arm 10cm.", rich_help_panel=_ASKED)] = None,
+    hot: Annotated[float, typer.Option(
+        metavar="CELSIUS", help="Temperature of the winding in the hot curves.", rich_help_panel=_ASKED)] = 100.0,
+    quick: Annotated[bool, typer.Option(
+        "--quick", help="Leave out the bandwidth, whose sines take longer than all else.",
+        rich_help_panel=_ASKED)] = False,
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: by the kind of the servo).",
+        rich_help_panel=shared.PLANT)] = None,
+    change: Annotated[list[str] | None, typer.Option(
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable.",
+        rich_help_panel=shared.PLANT)] = None,
+    out: Annotated[Path | None, typer.Option(
+        metavar="FILE.html", help="Write a page with tables and pictures.", rich_help_panel=shared.OUTPUT)] = None,
+    plot: Annotated[Path | None, typer.Option(
+        metavar="FILE", help="Draw the curves: .png, .svg or .pdf; of several servos torque and current beside each "
+        "other.", rich_help_panel=shared.OUTPUT)] = None,
+    csv: Annotated[Path | None, typer.Option(
+        "--csv", metavar="FILE.csv", help="Write the curves, a row a point.", rich_help_panel=shared.OUTPUT)] = None,
+    force: Annotated[bool, typer.Option(
+        "--force", help="Replace files that exist.", rich_help_panel=shared.OUTPUT)] = False,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """Compute the sheets of servos from their parameters, beside what their makers print."""
+    from servotwin.cli.curves_words import facts
+    from servotwin.cli.lift_words import loads_of
+
+    asked = loads_of(lift, arm, load or [])
+    targets = _targets(out, plot, csv, servos, force=force)
+    sheets = _computed(servos, model, change or [], {
+        "voltage": _voltages(voltage), "lift": asked.lift, "hot": hot + _ZERO_CELSIUS, "bandwidth": not quick})
+    _write(sheets, targets, asked.torque, force=force)
+    files = [str(target.path) for target in targets]
+    if as_json:
+        emit_json({"servos": [facts(sheet, asked.torque) for sheet in sheets], "files": files})
+        return
+    for sheet in sheets:
+        _show(sheet, asked.torque)
+    if files:
+        show(pairs([("written", name) for name in files]))
+
+
+def _targets(out: Path | None, plot: Path | None, csv: Path | None, servos: list[str], *,
+             force: bool) -> list[Target]:
+    from servotwin.cli.outputs import Target, check_targets
+    from servotwin.errors import InputError
+
+    repeated = next((name for name in servos if servos.count(name) > 1), None)
+    if repeated is not None:
+        raise InputError("servos", got=f"{repeated!r} twice", allowed="each once")
+    targets = [Target(option=option, path=path, endings=endings) for option, path, endings in (
+        ("--out", out, (".html", ".htm")), ("--plot", plot, _PICTURES), ("--csv", csv, (".csv",))) if path is not None]
+    check_targets(targets, force=force, inputs=[Path(servo) for servo in servos])
+    return targets
+
+
+def _voltages(words: list[str] | None) -> list[float] | None:
+    from servotwin.cli.figures import VOLTAGE, with_usual_unit
+
+    if words is None:
+        return None
+    return [with_usual_unit("--voltage", part, VOLTAGE, "V") for word in words for part in word.split(",")]
+
+
+def _computed(servos: list[str], model: str | None, change: list[str], options: dict[str, Any]) -> list[DataSheet]:
+    from servotwin.cli.model_words import model_of
+    from servotwin.datasheet import curves as compute
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # which model stands for which kind is said in the notes
+        models = [model_of(servo, model, change, _MODELS) for servo in servos]
+    found = []
+    for each in models:
+        with patience(f"computing {each.servo.name}"):
+            found.append(compute(each, **options))
+    return found
+
+
+def _write(sheets: list[DataSheet], targets: list[Target], torque: float | None, *, force: bool) -> None:
+    from servotwin.cli.outputs import staged
+
+    with patience("drawing"), staged(targets, force=force) as drafts:
+        for target, draft in zip(targets, drafts, strict=True):
+            if target.option == "--out":
+                from servotwin.cli.curves_page import page
+
+                draft.write_text(page(sheets, torque), encoding="utf-8", newline="\n")
+            elif target.option == "--plot":
+                from servotwin import plotting
+
+                drawn = plotting.speed_curves(sheets[0]) if len(sheets) == 1 else plotting.compared_curves(sheets)
+                plotting.save(drawn, draft)
+            else:
+                _write_points(sheets, draft)
+
+
+def _write_points(sheets: list[DataSheet], path: Path) -> None:
+    import csv
+
+    from servotwin.units import from_si
+
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(("servo", "supply_voltage_V", "winding_temperature_K", "output_speed_deg_per_s",
+                         "load_torque_Nm", "supply_current_A", "load_power_W", "efficiency"))
+        for sheet in sheets:
+            for part in sheet.voltages:
+                for curve in (part.cold, part.hot):
+                    speeds = [from_si(speed, "deg/s", "speed") for speed in curve.speed.tolist()]
+                    for point in zip(speeds, curve.torque, curve.current, curve.power, curve.efficiency, strict=True):
+                        writer.writerow((sheet.servo.name, f"{part.voltage:.12g}",
+                                         f"{curve.temperatures.winding:.12g}", *(f"{x:.12g}" for x in point)))
+
+
+def _show(sheet: DataSheet, torque: float | None) -> None:
+    from servotwin.cli.curves_words import hot_words, lift_pairs, notes, rows
+    from servotwin.cli.summary import model_name
+    from servotwin.parameters import printed_points
+
+    servo, points = sheet.servo, printed_points(sheet.servo)
+    parts: list[Any] = [f"{servo.title or servo.name} ({servo.name}), model {model_name(sheet.model)}"]
+    parts += [f"  note: {note}" for note in notes(sheet)]
+    for part in sheet.voltages:
+        head = (f"at {part.voltage:g} V", "cold", "hot", "sheet", "off")
+        parts += ["", table(head, rows(part, points, torque))]
+        if part.lift is not None:
+            parts += ["", pairs(lift_pairs(part.lift))]
+    parts += [f"cold: 25 deg C; hot: {hot_words(sheet.voltages[0])}", ""]
+    show(*parts)

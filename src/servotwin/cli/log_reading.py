@@ -1,0 +1,112 @@
+"""Logs read for a command: how their columns were taken is shown, and what the user said of them is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from servotwin.cli.terminal import patience, show, table
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from servotwin.identification import Log
+
+_MOST_REMARKS = 5
+_QUIET = ("named", "sidecar")  # someone said so before
+
+PANEL = "Logs and servo"
+HELP = "Files or folders of logs: tables (CSV) with or without a sidecar, JSON of BAM or Miuzei, LeRobot datasets."
+FormatOption = Annotated[str, typer.Option(
+    "--format", metavar="FORMAT", help="Of the logs: auto, csv, bam, miuzei or lerobot.", rich_help_panel=PANEL)]
+ColumnsOption = Annotated[list[str] | None, typer.Option(
+    metavar="SIGNAL=COLUMN:UNIT", help='Which column of a table is what: "time=t:ms angle=pos:deg-90"; kept in the '
+    "sidecar. What is not said is known by its name or guessed, and shown.", rich_help_panel=PANEL)]
+JointOption = Annotated[list[str] | None, typer.Option(
+    metavar="NAME[:UNIT]", help="Which joints of a LeRobot dataset, and their unit; repeatable or with commas, *:deg "
+    "for all.", rich_help_panel=PANEL)]
+
+
+def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None, joints: Sequence[str] | None,
+         leave_out: Sequence[str], *, force: bool = False, quiet: bool = False) -> list[Log]:
+    """Return the logs of files and folders.
+
+    What was guessed or said of columns is shown, unless `quiet`, and what was said is written into sidecars.
+
+    Raises
+    ------
+    InputError
+        If one cannot be read, a window is none, or a sidecar says otherwise and `force` is false.
+    """
+    from servotwin.cli import fit_words
+    from servotwin.errors import OutputError, OutputExistsError
+    from servotwin.identification import keep_columns, read_logs
+
+    windows = fit_words.left_out(leave_out)
+    said = None if not columns else " ".join(columns)
+    chosen = None if not joints else ",".join(joints)
+    written: list[str] = []
+    with patience("reading"):
+        given = [(path, read_logs(path, file_format, columns=said, joints=chosen)) for path in paths]
+        logs = fit_words.without([log for _, some in given for log in some], windows)
+        for path, some in given if said else ():
+            try:
+                written += [f"written  {file}, which keeps --columns" for file in keep_columns(
+                    some, path if path.is_dir() else None, overwrite=force)]
+            except OutputExistsError:
+                raise
+            except OutputError as error:  # such as logs on a medium that cannot be written to
+                written.append(f"--columns is not kept: {error}")
+    parts = _parts(logs)
+    if (parts or written) and not quiet:
+        show(*parts, *written, "")
+    for line in written if quiet else ():
+        typer.echo(line, err=True)
+    return logs
+
+
+def facts(logs: Sequence[Log]) -> list[dict[str, Any]]:
+    """Return how logs were read, as plain data for JSON: one entry for each way."""
+    return [{"logs": [log.name for log in some],
+             "columns": [{"column": one.column, "signal": one.signal, "unit": one.unit, "known": one.known}
+                         for one in some[0].reading.columns if some[0].reading is not None],
+             "remarks": [remark for log in some if log.reading is not None for remark in log.reading.remarks]}
+            for some in _alike(logs) if some[0].reading is not None]
+
+
+def _alike(logs: Sequence[Log]) -> list[list[Log]]:
+    """Return logs in groups whose columns were read in the same way."""
+    groups: dict[Any, list[Log]] = {}
+    for log in logs:
+        if log.reading is not None:
+            groups.setdefault(log.reading.columns, []).append(log)
+    return list(groups.values())
+
+
+def _parts(logs: Sequence[Log]) -> list[RenderableType]:
+    """Return a table of the columns that were guessed or said just now, and what was passed over."""
+    groups = _alike(logs)
+    shown = [some for some in groups if some[0].reading is not None
+             and any(one.known not in _QUIET for one in some[0].reading.columns)]
+    rows = [(_file(some), one.column, one.signal, one.unit, one.known) for some in shown if some[0].reading is not None
+            for one in some[0].reading.columns]
+    parts: list[RenderableType] = []
+    if rows:
+        many = len(groups) > 1
+        names = ("file", "column", "signal", "unit", "known")
+        parts.append(table(names if many else names[1:], [row if many else row[1:] for row in rows]))
+    unread = dict.fromkeys(name for some in shown if some[0].reading is not None for name in some[0].reading.unread)
+    if unread:
+        parts.append(f"not read: {', '.join(unread)}")
+    remarks = list(dict.fromkeys(f"{log.reading.file}: {remark}" for log in logs if log.reading is not None
+                                 for remark in log.reading.remarks))
+    more = [f"... and {len(remarks) - _MOST_REMARKS} more"] if len(remarks) > _MOST_REMARKS else []
+    return [*parts, *remarks[:_MOST_REMARKS], *more]
+
+
+def _file(some: Sequence[Log]) -> str:
+    name = some[0].name
+    return name if len(some) == 1 else f"{name} and {len(some) - 1} more"

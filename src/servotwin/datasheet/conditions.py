@@ -1,0 +1,112 @@
+"""The same servo at another supply voltage, or warm."""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from servotwin.errors import InputError
+from servotwin.parameters import printed_points
+from servotwin.physics.thermal import Temperatures, magnet_factor, winding_resistance
+from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from servotwin.models import Model
+    from servotwin.parameters import Servo
+
+_Model = TypeVar("_Model", bound="Model")
+_MOST = 2.0  # times the highest voltage that the sheet prints
+_THERMAL = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient", "ambient",
+            "magnet_coefficient")
+
+
+def highest_voltage(servo: Servo) -> float:
+    """Return the highest supply voltage that the sheet prints; that of the servo without one [V].
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> highest_voltage(load_servo("gobilda-2000-135"))
+    7.4
+    """
+    printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage]
+    own = servo.supply.open_circuit_voltage
+    return max([*printed, *([own] if own and not printed else [])], default=0.0)
+
+
+def check_voltage(servo: Servo, voltage: float) -> float:
+    """Return a supply voltage [V] that may be asked for.
+
+    Raises
+    ------
+    InputError
+        If it is not positive, or more than twice what the sheet knows.
+    """
+    most = _MOST * highest_voltage(servo)
+    allowed = "a positive number [V]" + (f" up to {most:g}, twice the highest of the sheet" if most else "")
+    if not (is_finite(voltage) and voltage > 0.0 and (not most or voltage <= most)):
+        raise InputError(f"supply voltage of {servo.name}", got=voltage, allowed=allowed)
+    return float(voltage)
+
+
+def at_voltage(model: _Model, voltage: float) -> _Model:
+    """Return the model at another supply voltage [V]; the gain of a mean bridge goes with the supply that it switches.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> at_voltage(st.PulseServo(st.load_servo("hitec-hs-755hb")), 4.8).servo.supply.open_circuit_voltage
+    4.8
+    """
+    servo = model.servo
+    check_voltage(servo, voltage)
+    drop = model.value_or("supply.bridge_drop_voltage", 0.0)
+    if voltage <= drop + model.value_or("motor.brush_drop_voltage", 0.0):
+        raise InputError(f"{servo.name} does not turn at {voltage:g} V",
+                         allowed="a supply that overcomes bridge, brushes and friction")
+    values: dict[str, Any] = {"supply.open_circuit_voltage": voltage}
+    gain, own = servo.electronics.bridge_gain, servo.supply.open_circuit_voltage
+    if gain is not None and own is not None and own > drop:
+        values["electronics.bridge_gain"] = gain * (voltage - drop) / (own - drop)
+    return changed(model, values)
+
+
+def at_temperatures(model: _Model, now: Temperatures, magnet_coefficient: float) -> _Model:
+    """Return the model with a winding and a housing that keep these temperatures [K].
+
+    Parameters
+    ----------
+    model : Model
+    now : Temperatures
+        Copper follows the winding, magnets the housing.
+    magnet_coefficient : float
+        [1/K].
+    """
+    servo = model.servo
+    field = float(magnet_factor(now.housing, magnet_coefficient))
+    values: dict[str, Any] = {f"thermal.{name}": None for name in _THERMAL if getattr(servo.thermal, name) is not None}
+    values["motor.armature_resistance"] = float(winding_resistance(
+        now.winding, model.value("motor.armature_resistance")))
+    for name in ("motor.torque_constant", "motor.back_emf_constant"):
+        values[name] = model.value(name) * field
+    return changed(model, values)
+
+
+def changed(model: _Model, values: dict[str, Any]) -> _Model:
+    """Return the model with some parameters replaced; what it warns of it has said before."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return type(model)(model.servo.replace(values))
+
+
+@contextlib.contextmanager
+def warned_once() -> Iterator[None]:
+    """Let each warning through once, however many runs give it."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for message, category in dict.fromkeys((str(each.message), each.category) for each in caught):
+        warnings.warn(message, category, stacklevel=4)

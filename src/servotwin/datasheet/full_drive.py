@@ -1,0 +1,208 @@
+"""A servo at full drive: what it turns, draws and lifts while its bridge does not pause.
+
+Far from its goal a servo drives without a pause, so speed over torque needs no chip: it is the steady motion of the
+model's own motor, bridge, source and gear friction. All is for motion towards +q.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from servotwin.errors import InputError
+from servotwin.loads import Load, as_load
+from servotwin.models.kernels import armature, contact, walk
+from servotwin.models.kernels.plant import FORWARD, FREE, REFERENCE_TEMPERATURE, RIGID, Mode, Plant, Vector
+from servotwin.physics.pieces import constant_pieces
+from servotwin.simulation.engine import Plan, Record, State, run
+from servotwin.simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from servotwin.loads import Part
+    from servotwin.models import Model
+    from servotwin.models.samples import Samples
+
+_LONGEST_SWING = 30.0  # s; what takes longer creeps
+
+
+class Swing(NamedTuple):
+    """A turn at full drive, from rest.
+
+    Parameters
+    ----------
+    time : float
+        Until the shaft has turned so far; nan where it does not [s].
+    mean_current : float
+        Of the supply, over that time [A].
+    """
+
+    time: float
+    mean_current: float
+
+
+@dataclass(frozen=True)
+class FullDrive:
+    """The steady motion of a servo whose bridge drives without a pause.
+
+    Parameters
+    ----------
+    model : Model
+        With a supply: `PulseServo`, `PulseServoInductive` or `BoundedServo`.
+
+    Raises
+    ------
+    InputError
+        If the model has no supply, or its supply cannot turn the shaft.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> drive = FullDrive(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+    >>> round(drive.no_load_speed, 3), round(drive.stall_torque, 3)
+    (4.646, 1.651)
+    """
+
+    model: Model
+
+    def __post_init__(self) -> None:
+        name = self.model.servo.name
+        plant = self._plant
+        if not (plant.V > 0.0 or math.isfinite(plant.V_max)):
+            raise InputError(f"full drive of {type(self.model).__name__}",
+                             allowed="a model with a supply: PulseServo, PulseServoInductive or BoundedServo")
+        voltage = self.model.value("supply.open_circuit_voltage")
+        if not self.acceleration(0.0, 0.0) > 0.0:
+            raise InputError(f"{name} does not turn at {voltage:g} V",
+                             allowed="a supply that overcomes bridge, brushes and friction")
+
+    @cached_property
+    def _plant(self) -> Plant:
+        return self.loaded(None)
+
+    def loaded(self, load: Load | Part | None) -> Plant:
+        """Return the numbers of servo and load, without what an endless steady motion does not meet."""
+        return self.model.pack(as_load(load))._replace(
+            L=0.0, lower=-math.inf, upper=math.inf, half_play=0.0, half_slack=0.0, C_w=0.0, p=0.0, b_o=0.0,
+            half_deadband=0.0)
+
+    @cached_property
+    def voltage(self) -> float:
+        """What the plant follows at full drive: the supply behind its bridge, or an error that saturates it [V]."""
+        plant = self._plant
+        return plant.V if plant.V > 0.0 else 2.0 * plant.V_max / plant.gain
+
+    def current(self, speed: float) -> float:
+        """Return the current of the supply and the motor [A] at a speed [rad/s]."""
+        zone = armature.zone_of(self._plant, self.voltage, 0.0, 0.0, speed, 0.0)
+        return armature.current(self._plant, zone, self.voltage, 0.0, speed)
+
+    def bus_voltage(self, speed: float) -> float:
+        """Return what is left of the source's voltage [V] at a speed [rad/s]."""
+        plant = self._plant
+        if plant.V == 0.0:
+            return self.model.value("supply.open_circuit_voltage")
+        zone = armature.zone_of(plant, self.voltage, 0.0, 0.0, speed, 0.0)
+        return armature.bus_voltage(plant, zone, self.voltage, speed, self.current(speed), False)
+
+    def acceleration(self, speed: float, torque: float) -> float:
+        """Return the acceleration [rad/s²] at a speed [rad/s] that is not negative, against a torque [N m]."""
+        plant, y = self._plant, _state(0.0, speed)
+        zone = armature.zone_of(plant, self.voltage, 0.0, 0.0, speed, 0.0)
+        sliding = FORWARD if contact.has_friction(plant) else FREE
+        return contact.acceleration(plant, Mode(zone, sliding, RIGID, FREE), self.voltage, torque, y)
+
+    def torque(self, speed: float) -> float:
+        """Return the torque [N m] against which the shaft turns steadily at a speed [rad/s]; 0 beyond no load."""
+        most = self._plant.K * self.current(speed)
+        if not self.acceleration(speed, 0.0) > 0.0:
+            return 0.0
+        return _root(lambda tau: self.acceleration(speed, tau), 0.0, most)
+
+    @cached_property
+    def no_load_speed(self) -> float:
+        """Steady speed of the free shaft [rad/s]."""
+        plant = self._plant
+        limit = (plant.V if plant.V > 0.0 else plant.V_max) / plant.K_b
+        return _root(lambda w: self.acceleration(w, 0.0), 0.0, limit)
+
+    @cached_property
+    def slowest(self) -> float:
+        """Speed of the most torque [rad/s]: 0, unless static friction fades with speed."""
+        if self._plant.w_s == 0.0:
+            return 0.0
+        from scipy.optimize import minimize_scalar
+
+        speeds = np.linspace(0.0, self.no_load_speed, 101)
+        at = int(np.argmax([self.torque(w) for w in speeds.tolist()]))
+        if at == 0:
+            return 0.0
+        found = minimize_scalar(lambda w: -self.torque(w), bounds=(speeds[at - 1], speeds[at + 1]), method="bounded",
+                                options={"xatol": 1e-9 * self.no_load_speed})
+        return float(found.x)
+
+    @cached_property
+    def stall_torque(self) -> float:
+        """The most torque against which the shaft still turns [N m]: what brings it to a stand."""
+        return self.torque(self.slowest)
+
+    @cached_property
+    def stall_current(self) -> float:
+        """Current of the standing servo at full drive [A]."""
+        return self.current(0.0)
+
+    @cached_property
+    def starting_torque(self) -> float:
+        """The most torque against which the shaft starts from rest [N m]: static friction counts in full."""
+        tau_m = self._plant.K * self.stall_current
+
+        def beyond(tau: float) -> float:
+            return tau_m - tau - contact.holding_bounds(self._plant, tau_m, -tau)[1]
+
+        return _root(beyond, 0.0, tau_m) if beyond(0.0) > 0.0 else 0.0
+
+    def speed(self, torque: float) -> float:
+        """Return the steady speed [rad/s] against a torque [N m]; 0 from the stall torque on."""
+        if not math.isfinite(torque):
+            raise InputError("torque", got=torque, allowed="a finite number [N m]")
+        if torque >= self.stall_torque:
+            return 0.0
+        high = self.no_load_speed if torque >= 0.0 else 10.0 * self.no_load_speed
+        return _root(lambda w: self.acceleration(w, torque), self.slowest, high)
+
+    def swing(self, load: Load | Part | None, start: float, end: float) -> Swing:
+        """Return how the shaft turns from rest at one angle to a larger one [rad]; `load` acts all the way."""
+        hung = as_load(load)
+        plant = self.loaded(hung)._replace(upper=end, restitution=0.0)
+        record = Record([], [])
+        state = State(time=0.0, places=self.model.states, point=walk.started(_state(start, 0.0), RIGID))
+        run(Plan(plant, constant_pieces(self.voltage), hung.torque_pieces), state, _LONGEST_SWING, record)
+        time = next((event.time for event in record.events if event.kind == "upper stop"), math.nan)
+        if math.isnan(time):
+            return Swing(math.nan, math.nan)
+        moving = Trajectory(tuple(segment for segment in record.segments if segment.start < time))
+        return Swing(time, float(moving.integral(self._currents)[0]) / time)
+
+    def _currents(self, samples: Samples) -> NDArray[np.float64]:
+        return np.array([[self.current(w) for w in samples.speed.tolist()]])
+
+
+def _state(angle: float, speed: float) -> Vector:
+    cool = REFERENCE_TEMPERATURE
+    return angle, speed, 0.0, cool, cool, angle, speed
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a function that falls through 0 between two numbers does so."""
+    if function(high) >= 0.0:
+        return high
+    from scipy.optimize import brentq
+
+    return float(brentq(function, low, high, xtol=1e-15, rtol=8.9e-16, maxiter=200))

@@ -1,0 +1,114 @@
+"""A servo that stands: how far a load pulls it off, what it draws, and the smallest command that moves it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from servotwin import loads, signals
+from servotwin.datasheet.conditions import changed
+from servotwin.models import mid_travel
+from servotwin.models.outputs import warm_plant
+from servotwin.simulation.simulator import simulate
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from servotwin.models import Model
+    from servotwin.models.samples import Samples
+    from servotwin.simulation import Result
+
+SETTLE, LOOK = 1.5, 0.5  # s: what is told of standing holds for the mean of the last half second of two
+_STANDS = math.radians(2.0)  # rad/s: what goes faster at the end does not stand
+_FURTHEST_STEP = math.radians(20.0)
+_WAIT = 0.2  # s, in which a command either moves the shaft or does not
+_MOVED = 1e-9  # rad
+_HALVINGS = 18
+
+
+class Held(NamedTuple):
+    """A servo under a constant torque, 1.5 to 2 s after that was put on.
+
+    Parameters
+    ----------
+    torque : float
+        Towards −q [N m].
+    error : float
+        Commanded less mean angle; nan where the shaft does not stand [rad].
+    current : float
+        Mean of the supply [A].
+    heat : float
+        Mean of i² R in the winding [W].
+    """
+
+    torque: float
+    error: float
+    current: float
+    heat: float
+
+    @property
+    def stands(self) -> bool:
+        """Whether the shaft stands at the end, or all but stands."""
+        return not math.isnan(self.error)
+
+
+def hold(model: Model, torque: float, *, inertia: float = 0.0) -> Held:
+    """Return how a servo holds a constant torque [N m] in mid-travel; `inertia` is the load's [kg m²]."""
+    end, asked = SETTLE + LOOK, mid_travel(model)
+    result = simulate(_without_stops(model), signals.constant(asked, unit="rad"), duration=end,
+                      load=loads.Constant(torque) + loads.Inertia(inertia), output_times=[SETTLE, end])
+    before, after = result["output_angle"].tolist()
+    if not (result.status.ok and abs(after - before) <= _STANDS * LOOK):
+        return Held(torque, math.nan, math.nan, math.nan)
+    angle, current, heat = _means(result, SETTLE)
+    return Held(torque, asked - angle, current, heat)
+
+
+def holding_errors(model: Model, stall_torque: float, shares: tuple[float, ...] = (0.1, 0.25, 0.5, 0.75, 0.9)
+                   ) -> tuple[Held, ...]:
+    """Return how a servo holds shares of its stall torque [N m]."""
+    return tuple(hold(model, share * stall_torque) for share in shares)
+
+
+def smallest_move(model: Model) -> float:
+    """Return the smallest step of the command that moves the shaft, from where there is no error [rad].
+
+    The potentiometer's noise is left out: with it every command moves a little now and then.
+    """
+    free, start = _without_stops(model), mid_travel(model)
+    low, high = 0.0, _FURTHEST_STEP
+    if not _moves(free, start, high):
+        return math.nan
+    for _ in range(_HALVINGS):
+        half = 0.5 * (low + high)
+        low, high = (low, half) if _moves(free, start, half) else (half, high)
+    return high
+
+
+def _moves(model: Model, start: float, step: float) -> bool:
+    result = simulate(model, signals.step(start, start + step, at=0.0, unit="rad"), duration=_WAIT,
+                      output_times=[0.0, _WAIT])
+    before, after = result["output_angle"].tolist()
+    return bool(abs(after - before) > _MOVED)
+
+
+def _without_stops(model: Model) -> Model:
+    """Return the model without stops, which would hold what the servo does not, and without noise."""
+    gone = ("stops.lower_angle", "stops.upper_angle", "potentiometer.noise")
+    return changed(model, {name: None for name in gone if model.servo.get(name) is not None})
+
+
+def _means(result: Result, start: float) -> tuple[float, float, float]:
+    """Return the means of angle [rad], supply current [A] and heat of the winding [W] from `start` [s] on."""
+    model, drive, load = result.model, result.drive, result.load
+    drawn = "supply_current" if "supply_current" in model.available else "armature_current"
+
+    def looked_at(samples: Samples) -> NDArray[np.float64]:
+        i = model.output("armature_current", samples, drive, load)
+        return np.array([samples.angle, model.output(drawn, samples, drive, load),
+                         warm_plant(model, samples, load).R * i * i])
+
+    angle, current, heat = (result.trajectory.since(start).integral(looked_at) / (result.ended - start)).tolist()
+    return angle, current, heat

@@ -1,0 +1,92 @@
+"""What a maker prints of a servo: the [sheet] of its file as numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from servotwin import units
+from servotwin.errors import ServotwinError
+
+if TYPE_CHECKING:
+    from servotwin.parameters.servo import Servo
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrintedPoint:
+    """What is printed for one supply voltage; None is not printed.
+
+    Parameters
+    ----------
+    supply_voltage : float, optional
+        [V].
+    stall_torque : float, optional
+        [N m].
+    time_60 : float, optional
+        Time for 60 degrees without load [s].
+    no_load_current, stall_current : float, optional
+        [A].
+    """
+
+    supply_voltage: float | None
+    stall_torque: float | None
+    time_60: float | None
+    no_load_current: float | None
+    stall_current: float | None
+
+
+def printed_fact(table: Mapping[str, Any], name: str, dimension: str) -> float | None:
+    """Return a figure of a table of a sheet (SI); None where it is not there, or no figure of this dimension.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> printed_fact(load_servo("towerpro-mg996r").sheet, "mass", "mass")
+    0.055
+    """
+    entry = table.get(name)
+    if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
+        return None
+    try:
+        value = units.to_si(entry["value"], str(entry.get("unit")), dimension)
+    except ServotwinError:
+        return None  # a person's own [sheet] may hold anything
+    return value if math.isfinite(value) else None
+
+
+def printed_points(servo: Servo) -> tuple[PrintedPoint, ...]:
+    """Return what is printed at each voltage, the sheet's main one first; a voltage may come from several sources.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import load_servo
+    >>> [point.stall_torque for point in printed_points(load_servo("emax-es08a"))]
+    [0.177, 0.147]
+    """
+    others = servo.sheet.get("also_at")
+    tables = [servo.sheet, *(others if isinstance(others, list) else [])]
+    return tuple(_point(table) for table in tables if isinstance(table, Mapping))
+
+
+def printed_flags(servo: Servo) -> tuple[str, ...]:
+    """Return what the [sheet] says of itself: what it lacks, and where it contradicts itself.
+
+    Examples
+    --------
+    >>> from servotwin.parameters import servo_from_values
+    >>> printed_flags(servo_from_values("mine", {}))
+    ()
+    """
+    found = servo.sheet.get("flags")
+    return tuple(flag for flag in found if isinstance(flag, str)) if isinstance(found, list) else ()
+
+
+def _point(table: Mapping[str, Any]) -> PrintedPoint:
+    return PrintedPoint(
+        supply_voltage=printed_fact(table, "supply_voltage", "voltage"),
+        stall_torque=printed_fact(table, "stall_torque", "torque"),
+        time_60=printed_fact(table, "speed_per_60deg", "time"),
+        no_load_current=printed_fact(table, "no_load_current", "current"),
+        stall_current=printed_fact(table, "stall_current", "current"))

@@ -1,0 +1,344 @@
+"""Kinds of distributions to draw from: each one is its quantile function, so that a draw needs one number."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.units import is_finite
+
+Array = NDArray[np.float64]
+
+ENDS = (0.05, 0.95)  # of a bar of the tornado
+
+
+class Distribution(ABC):
+    """Something to draw from: probabilities between 0 and 1 become values, in SI."""
+
+    @abstractmethod
+    def quantile(self, p: Array) -> NDArray[Any]:
+        """Return the values below which a draw falls with probability `p`, same shape."""
+
+    @abstractmethod
+    def cdf(self, x: float) -> float:
+        """Return the probability of a draw of at most `x`."""
+
+    @property
+    def ends(self) -> tuple[Any, ...]:
+        """The 5 % and the 95 % value; of a choice, all its options."""
+        low, high = self.quantile(np.array(ENDS)).tolist()
+        return low, high
+
+    def about(self, nominal: float) -> Distribution:
+        """Return the distribution for a parameter that is nominally `nominal`; the same where that does not matter."""
+        return self
+
+    @property
+    def needs_nominal(self) -> bool:
+        """Whether it is a spread about the nominal value."""
+        return False
+
+    def described(self) -> dict[str, Any]:
+        """Return kind and numbers, ready for JSON; what is infinite is None."""
+        found: dict[str, Any] = {"kind": type(self).__name__}
+        for f in fields(self):  # type: ignore[arg-type]  # all that are final are dataclasses
+            found[f.name] = _plain(getattr(self, f.name))
+        return found
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Distribution):
+        return value.described()
+    if isinstance(value, tuple):
+        return list(value)
+    return None if isinstance(value, float) and math.isinf(value) else value
+
+
+def _checked(kind: Distribution, **rules: str) -> None:
+    """Raise unless all fields are finite and those named in `rules` hold: "positive"."""
+    for f in fields(kind):  # type: ignore[arg-type]
+        value = getattr(kind, f.name)
+        positive = rules.get(f.name) == "positive"
+        if not is_finite(value) or (positive and not value > 0.0):
+            raise InputError(f"{type(kind).__name__}({f.name})", got=value,
+                             allowed="a positive number" if positive else "a finite number")
+        object.__setattr__(kind, f.name, float(value))
+
+
+@dataclass(frozen=True)
+class Uniform(Distribution):
+    """All values from `lower` to `upper` alike.
+
+    Examples
+    --------
+    >>> Uniform(4e-6, 8e-6).quantile(np.array([0.5])).tolist()
+    [6e-06]
+    """
+
+    lower: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        _checked(self)
+        if not self.lower < self.upper:
+            raise InputError("Uniform(lower, upper)", got=(self.lower, self.upper), allowed="lower less than upper")
+
+    def quantile(self, p: Array) -> Array:
+        """Return the values at probabilities `p`."""
+        return np.asarray(self.lower + (self.upper - self.lower) * p)
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of a draw of at most `x`."""
+        return min(max((x - self.lower) / (self.upper - self.lower), 0.0), 1.0)
+
+
+@dataclass(frozen=True)
+class Normal(Distribution):
+    """The bell curve with mean and standard deviation `std`.
+
+    Examples
+    --------
+    >>> Normal(3.0, 0.3).quantile(np.array([0.5])).tolist()
+    [3.0]
+    """
+
+    mean: float
+    std: float
+
+    def __post_init__(self) -> None:
+        _checked(self, std="positive")
+
+    def quantile(self, p: Array) -> Array:
+        """Return the values at probabilities `p`."""
+        from scipy.special import ndtri
+
+        return np.asarray(self.mean + self.std * ndtri(p))
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of a draw of at most `x`."""
+        from scipy.special import ndtr
+
+        return float(ndtr((x - self.mean) / self.std))
+
+
+@dataclass(frozen=True)
+class LogNormal(Distribution):
+    """Positive values whose natural logarithm is normal: `median` times e to a normal draw of deviation `sigma`.
+
+    Examples
+    --------
+    >>> LogNormal(3.0, 0.1).quantile(np.array([0.5])).tolist()
+    [3.0]
+    """
+
+    median: float
+    sigma: float
+
+    def __post_init__(self) -> None:
+        _checked(self, median="positive", sigma="positive")
+
+    def quantile(self, p: Array) -> Array:
+        """Return the values at probabilities `p`."""
+        from scipy.special import ndtri
+
+        return np.asarray(self.median * np.exp(self.sigma * ndtri(p)))
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of a draw of at most `x`."""
+        from scipy.special import ndtr
+
+        return float(ndtr(math.log(x / self.median) / self.sigma)) if x > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Triangular(Distribution):
+    """Likeliest at `mode`, impossible outside `lower` and `upper`.
+
+    Examples
+    --------
+    >>> Triangular(0.0, 1.0, 2.0).quantile(np.array([0.125, 0.5])).tolist()
+    [0.5, 1.0]
+    """
+
+    lower: float
+    mode: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        _checked(self)
+        if not (self.lower <= self.mode <= self.upper and self.lower < self.upper):
+            raise InputError("Triangular(lower, mode, upper)", got=(self.lower, self.mode, self.upper),
+                             allowed="numbers that increase")
+
+    def quantile(self, p: Array) -> Array:
+        """Return the values at probabilities `p`."""
+        a, m, b = self.lower, self.mode, self.upper
+        rising = a + np.sqrt(p * (b - a) * (m - a))
+        falling = b - np.sqrt((1.0 - p) * (b - a) * (b - m))
+        return np.where(p * (b - a) < m - a, rising, falling)
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of a draw of at most `x`."""
+        a, m, b = self.lower, self.mode, self.upper
+        if x <= m:
+            return 0.0 if x <= a else (x - a)**2 / ((b - a) * (m - a))
+        return 1.0 if x >= b else 1.0 - (b - x)**2 / ((b - a) * (b - m))
+
+
+@dataclass(frozen=True)
+class Choice(Distribution):
+    """One of a few numbers or words, each as likely; one that is listed twice is twice as likely.
+
+    Examples
+    --------
+    >>> Choice(("brake", "coast")).quantile(np.array([0.2, 0.7])).tolist()
+    ['brake', 'coast']
+    """
+
+    options: tuple[float, ...] | tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        given: Any = self.options
+        options = tuple(given) if isinstance(given, list | tuple | np.ndarray) else ()
+        words = all(isinstance(x, str) for x in options)
+        if not options or not (words or all(map(is_finite, options))):
+            raise InputError("Choice(options)", got=given, allowed="a list of finite numbers, or of words")
+        object.__setattr__(self, "options", options if words else tuple(map(float, options)))
+
+    def quantile(self, p: Array) -> NDArray[Any]:
+        """Return the options at probabilities `p`, in the order of the list."""
+        index = np.minimum((p * len(self.options)).astype(np.int64), len(self.options) - 1)
+        return np.array(self.options)[index]
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of a draw of at most `x`."""
+        return sum(not isinstance(option, str) and option <= x for option in self.options) / len(self.options)
+
+    @property
+    def ends(self) -> tuple[Any, ...]:
+        """All options."""
+        return tuple(dict.fromkeys(self.options))
+
+
+@dataclass(frozen=True)
+class Relative(Distribution):
+    """A factor on the nominal value.
+
+    Examples
+    --------
+    >>> Relative(Uniform(0.9, 1.1)).about(3.0).ends
+    (2.73, 3.27)
+    """
+
+    factor: Distribution
+
+    @property
+    def needs_nominal(self) -> bool:
+        """Whether it is a spread about the nominal value."""
+        return True
+
+    def about(self, nominal: float) -> Distribution:
+        """Return the distribution for a parameter that is nominally `nominal`, which is not 0."""
+        if nominal == 0.0:
+            raise InputError("a relative spread", got="a nominal value of 0", allowed="an absolute spread")
+        return Affine(self.factor, offset=0.0, scale=nominal)
+
+    def quantile(self, p: Array) -> NDArray[Any]:
+        """Return the factors at probabilities `p`."""
+        return self.factor.quantile(p)
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of a factor of at most `x`."""
+        return self.factor.cdf(x)
+
+
+@dataclass(frozen=True)
+class Offset(Distribution):
+    """Something added to the nominal value.
+
+    Examples
+    --------
+    >>> Offset(Uniform(-1.0, 1.0)).about(3.0).ends
+    (2.1, 3.9)
+    """
+
+    added: Distribution
+
+    @property
+    def needs_nominal(self) -> bool:
+        """Whether it is a spread about the nominal value."""
+        return True
+
+    def about(self, nominal: float) -> Distribution:
+        """Return the distribution for a parameter that is nominally `nominal`."""
+        return Affine(self.added, offset=nominal, scale=1.0)
+
+    def quantile(self, p: Array) -> NDArray[Any]:
+        """Return what is added, at probabilities `p`."""
+        return self.added.quantile(p)
+
+    def cdf(self, x: float) -> float:
+        """Return the probability that at most `x` is added."""
+        return self.added.cdf(x)
+
+
+@dataclass(frozen=True)
+class Affine(Distribution):
+    """`offset` + `scale` times a draw of another distribution.
+
+    Examples
+    --------
+    >>> Affine(Uniform(0.0, 1.0), offset=1.0, scale=-2.0).quantile(np.array([0.0, 1.0])).tolist()
+    [-1.0, 1.0]
+    """
+
+    distribution: Distribution
+    offset: float
+    scale: float
+
+    def quantile(self, p: Array) -> Array:
+        """Return the values at probabilities `p`."""
+        drawn: Array = self.distribution.quantile(p if self.scale > 0.0 else 1.0 - p)
+        return self.offset + self.scale * drawn
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of a draw of at most `x`."""
+        below = self.distribution.cdf((x - self.offset) / self.scale)
+        return below if self.scale > 0.0 else 1.0 - below
+
+
+@dataclass(frozen=True)
+class Truncated(Distribution):
+    """Another distribution between two bounds, which are possible themselves.
+
+    Examples
+    --------
+    >>> Truncated(Uniform(-1.0, 1.0), 0.0, math.inf).quantile(np.array([0.5])).tolist()
+    [0.5]
+    """
+
+    distribution: Distribution
+    lower: float
+    upper: float
+
+    def __post_init__(self) -> None:
+        if not self.distribution.cdf(self.lower) < self.distribution.cdf(self.upper):
+            raise InputError("a truncated distribution", got=f"nothing from {self.lower:g} to {self.upper:g}",
+                             allowed="one that reaches into these bounds")
+
+    def quantile(self, p: Array) -> Array:
+        """Return the values at probabilities `p`."""
+        below, upto = self.distribution.cdf(self.lower), self.distribution.cdf(self.upper)
+        drawn: Array = self.distribution.quantile(below + p * (upto - below))
+        return np.clip(drawn, self.lower, self.upper)
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of a draw of at most `x`."""
+        below, upto = self.distribution.cdf(self.lower), self.distribution.cdf(self.upper)
+        return min(max((self.distribution.cdf(x) - below) / (upto - below), 0.0), 1.0)

@@ -1,0 +1,112 @@
+"""The rows of what is printed: each number stands at its label, in its unit."""
+
+import math
+
+import pytest
+
+import servotwin as st
+from servotwin.cli.summary import lines
+
+SERVO = "hitec-hs-755hb"
+
+
+def rows(text):
+    """Return label and value of each line of pairs."""
+    found = {}
+    for line in text.splitlines():
+        label, _, value = line.strip().partition("  ")
+        found.setdefault(label, value.strip())
+    return found
+
+
+def number(text):
+    return float(text.split()[0])
+
+
+def test_every_row_of_a_step_is_its_metric(simulate):
+    printed = rows(simulate("--step", "0:90", "--at", "0.2", "--model", "bounded", "--load", "inertia=3e-2").out)
+    run = st.simulate(st.BoundedServo(st.load_servo(SERVO)), st.signals.step(0.0, 90.0, at=0.2, unit="deg"),
+                      duration=1.5, load=st.loads.Inertia(3e-2))
+    metrics = run.step_metrics()
+    expected = {"final angle": (math.degrees(metrics.final), "deg", 0.006),
+                "steady error": (math.degrees(metrics.steady_error), "deg", 0.006),
+                "rise time": (1e3 * metrics.rise_time, "ms (10 to 90 %)", 0.06),
+                "settling time": (1e3 * metrics.settling_time, "ms (2 %)", 0.06),
+                "overshoot": (100.0 * metrics.overshoot, "%", 0.006),
+                "peak speed": (math.degrees(metrics.slew_rate), "deg/s", 0.06),
+                "peak current": (metrics.peak_current, "A", 0.0006)}
+    for label, (value, unit, rounding) in expected.items():
+        assert number(printed[label]) == pytest.approx(value, abs=rounding), label
+        assert printed[label].partition(" ")[2] == unit
+    assert metrics.settling_time > metrics.rise_time > 0.0
+    assert metrics.overshoot > 0.01
+    assert number(printed["energy"]) == pytest.approx(run.energy.supply, rel=1e-3)
+
+
+def test_what_a_run_does_not_have_has_no_row():
+    """A motor has no target, a shaft that stays has no times."""
+    facts = {"final_angle": 1.0, "peak_current": 0.5, "energy": {"supply": 1.0}, "step_metrics": {
+        "target": math.nan, "steady_error": math.nan, "rise_time": math.nan, "settling_time": 0.25,
+        "overshoot": math.nan, "slew_rate": math.pi}}
+    assert dict(lines(facts)) == {"final angle": "57.30 deg", "settling time": "250.0 ms (2 %)",
+                                  "peak speed": "180.0 deg/s", "peak current": "0.500 A",
+                                  "energy": "1 J supplied: nothing moved"}
+    facts["step_metrics"] |= {"target": 1.1, "steady_error": math.radians(-2.0), "rise_time": 0.1,
+                              "settling_time": math.nan, "overshoot": 0.125}
+    found = dict(lines(facts))
+    assert (found["steady error"], found["rise time"], found["overshoot"]) == (
+        "-2.00 deg", "100.0 ms (10 to 90 %)", "12.50 %")
+    assert "settling time" not in found
+
+
+def draws(stiff, lanes=8):
+    return "load.spring.stiffness\n" + "".join(f"{1e27 if k in stiff else 0.1}\n" for k in range(lanes))
+
+
+@pytest.mark.parametrize(("failed", "named", "more"), [
+    ((1,), [1], ""), ((0, 4, 6), [0, 4, 6], ""), ((1, 2, 5, 7), [1, 2, 5], "; and 1 more"),
+    (range(1, 8), [1, 2, 3], "; and 4 more")])
+def test_three_failures_are_named_and_the_others_counted(cli, tmp_path, failed, named, more):
+    (tmp_path / "draws.csv").write_text(draws(failed))
+    ended = cli("sweep", SERVO, "--step", "0:60", "--duration", "0.2", "--draws", "draws.csv", "--load", "spring=0.1",
+                "--model", "pulse")
+    assert ended.code == 0, ended.err
+    text = " ".join(ended.out.split())
+    start = text.index(f"failed {len(failed)}: ")
+    said = text[start:text.index(" metric ", start)]
+    assert [int(part.split()[0]) for part in said.split("lane ")[1:]] == named
+    assert said.count(" more") == bool(more)
+    assert said.endswith(more)
+
+
+def test_a_sweep_without_failures_says_none(cli, tmp_path):
+    (tmp_path / "draws.csv").write_text(draws(()))
+    ended = cli("sweep", SERVO, "--step", "0:60", "--duration", "0.2", "--draws", "draws.csv", "--load", "spring=0.1",
+                "--metric", "rise_time", "--metric", "peak_current")
+    assert rows(ended.out)["failed"] == "none"
+    assert rows(ended.out)["varied"] == "load.spring.stiffness"
+
+
+def test_the_tables_of_a_sweep_are_its_numbers(cli):
+    words = ["sweep", SERVO, "--step", "0:60", "--duration", "0.6", "--lanes", "40", "--vary",
+             "motor.torque_constant=uniform:10%", "--vary", "load.inertia=uniform:0..2e-3", "--metric", "settling_time",
+             "--metric", "peak_current"]
+    text = cli(*words).out.splitlines()
+    study = st.sweep(st.PulseServo(st.load_servo(SERVO)), st.signals.step(0.0, 60.0, at=0.1, unit="deg"), duration=0.6,
+                     lanes=40, metrics=["settling_time", "peak_current"], vary={
+                         "motor.torque_constant": "uniform:10%", "load.inertia": "uniform:0..2e-3"})
+    for label, unit, name, factor in (("settling time", "ms", "settling_time", 1e3),
+                                      ("peak current", "A", "peak_current", 1.0)):
+        line = next(line for line in text if line.startswith(label))
+        cells = line.removeprefix(label).split()
+        tornado, quantiles = study.tornado(name), study.quantiles()[name]
+        assert cells[0] == unit
+        assert [float(cell) for cell in cells[1:]] == pytest.approx(
+            [factor * x for x in (tornado.nominal, *quantiles.values())], rel=1e-3)
+    bars = study.tornado("settling_time").bars
+    shown = [line.split() for line in text if line.startswith(("motor.torque_constant ", "load.inertia "))]
+    assert [cells[0] for cells in shown] == [bar.name for bar in bars]
+    for cells, bar in zip(shown, bars, strict=True):
+        assert [float(cell) for cell in cells[-4:-2]] == pytest.approx([1e3 * bar.at_low, 1e3 * bar.at_high], rel=1e-3)
+        assert float(cells[-2]) == pytest.approx(100.0 * bar.share, abs=0.06)
+        assert cells[-1] == "%"

@@ -1,0 +1,38 @@
+"""Each compiled form on its own: who takes it, and that it moves a servo as `simulate` does.
+
+Compiling is most of what the tests cost on a machine that has not done it yet. With the mark `compiles` these go first,
+and two processes that share the tests begin with different ones (tests/conftest.py).
+"""
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from servotwin.simulation import lane_runs
+
+STEP = st.signals.step(10.0, 50.0, at=0.02, unit="deg")
+# Each compiled form, what leads to it and how far it may be off; the order halves the work between two processes
+FORMS = {
+    "pendulum_walks": ({}, st.loads.Pendulum(mass=0.1, length=0.1), "float64", 1e-9),
+    "walks": ({"supply.current_limit": 1.0}, None, "float64", 1e-9),
+    "blocks_float64": ({}, st.loads.Inertia(1e-3), "float64", 1e-9),
+    "blocks_float32": ({}, st.loads.Inertia(1e-3), "float32", 1e-4),
+    "plain_walks": ({}, st.loads.Recorded([0.0, 1.0], [0.0, 0.05]), "float64", 1e-9),
+}
+
+
+@pytest.mark.compiles
+@pytest.mark.parametrize("name", FORMS)
+def test_each_compiled_form_moves_a_servo_as_it_should(servo, monkeypatch, name):
+    changes, load, dtype, tolerance = FORMS[name]
+    used, kernels = [], lane_runs.kernels
+    monkeypatch.setattr(lane_runs, "kernels", lambda recipe: (used.append(recipe.name), kernels(recipe))[1])
+    model = st.PulseServo(servo.replace(changes))
+    column = {"motor.armature_resistance": [2.8, 3.2, 3.6]}
+    batch = st.simulate_many(model, STEP, duration=0.15, load=load, parameters=column, output_step=0.01, dtype=dtype)
+    assert set(used) == {name}
+    for lane, R in enumerate(column["motor.armature_resistance"]):
+        alone = st.simulate(st.PulseServo(model.servo.replace({"motor.armature_resistance": R})), STEP, duration=0.15,
+                            load=load, output_step=0.01)
+        np.testing.assert_allclose(batch["output_angle"][lane], alone["output_angle"], rtol=0.0, atol=tolerance)
+        assert np.ptp(alone["output_angle"]) > 0.2
