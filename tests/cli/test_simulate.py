@@ -199,3 +199,37 @@ def test_noise_follows_the_seed(simulate):
     noisy = ("--model", "pulse", "--step", "0:20", "--duration", "0.5", "--json", "--set", "potentiometer.noise=0.02")
     first, again, other = (simulate(*noisy, "--seed", seed).out for seed in ("1", "1", "2"))
     assert first == again != other
+
+
+@pytest.mark.parametrize(("words", "said", "remarks"), [
+    (("--load", "torque=3"), ["ended on a stop that it was not sent to at 1.5 s", "cannot hold its load at 1.5 s"],
+     [{"kind": "ended on a stop", "time": 1.5}, {"kind": "cannot hold", "time": 1.5}]),
+    (("--set", "electronics.pulse_width_max=1.2e-3"), ["all pulses refused from 0.1 s on"],
+     [{"kind": "pulses refused", "time": 0.1}]),
+    ((), [], []),
+])
+def test_remarks_are_shown(simulate, words, said, remarks):
+    run = ("--step", "0:60", "--model", "pulse", *words)
+    printed = simulate(*run).out
+    assert [line.strip().removeprefix("remark").strip() for line in printed.splitlines() if "remark " in line] == said
+    found = simulate(*run, "--json").data
+    assert found["status"] == "COMPLETED"
+    assert found["remarks"] == [{"kind": one["kind"], "time": pytest.approx(one["time"])} for one in remarks]
+
+
+def test_warnings_are_one_line_each(cli):
+    ended = cli("simulate", "feetech-ft-7235", "--step", "0:30", "--at", "2", "--set", "supply.open_circuit_voltage=17",
+                "--model", "bounded")
+    assert ended.code == 0
+    warned = ended.err.splitlines()
+    assert [line.partition("warning: ")[2].split(": ")[0].split(" comes")[0] for line in warned] == [
+        "feetech-ft-7235", "feetech-ft-7235", "the first change of the command"]
+
+
+def test_nothing_is_minus_zero(simulate, tmp_path):
+    words = ("--constant", "0", "--out", "run.csv", "--force")
+    ended = simulate(*words)
+    assert "-0 " not in ended.out.replace("deg", " ")
+    assert "-0.0" not in ended.out
+    assert "-0.0" not in simulate(*words, "--json").out
+    assert not any(cell == "-0" for line in (tmp_path / "run.csv").read_text().splitlines() for cell in line.split(","))

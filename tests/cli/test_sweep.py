@@ -179,3 +179,12 @@ def test_an_interrupt_says_how_to_go_on(child_environment, tmp_path):
                                 "servotwin: interrupted"]
     found = np.genfromtxt(tmp_path / "study" / "lanes-00000.csv", delimiter=",", skip_header=1, usecols=(0, 1, 2))
     assert np.isfinite(found).all()
+
+
+def test_remarks_are_counted_with_their_first_lanes(sweep):
+    words = ("--step", "0:60", "--duration", "0.8", "--lanes", "16", "--vary", "load.torque=uniform:2..4")
+    shown = " ".join(sweep(*words).out.split())
+    assert "cannot hold its load: 16 of 16 (lanes 0, 1, 2, 3, 4 ...)" in shown
+    found = sweep(*words, "--json").data["remarks"]
+    assert found["cannot hold"] == {"lanes": 16, "first": list(range(16))}
+    assert "pulses refused" not in found

@@ -23,39 +23,44 @@ def number(text):
     return float(text.split()[0])
 
 
-def test_every_row_of_a_step_is_its_metric(simulate):
-    printed = rows(simulate("--step", "0:90", "--at", "0.2", "--model", "bounded", "--load", "inertia=3e-2").out)
+@pytest.mark.parametrize(("inertia", "arrives"), [("1e-2", True), ("3e-2", False)])
+def test_every_row_of_a_step_is_its_metric(simulate, inertia, arrives):
+    printed = rows(simulate("--step", "0:90", "--at", "0.2", "--model", "bounded", "--load", f"inertia={inertia}").out)
     run = st.simulate(st.BoundedServo(st.load_servo(SERVO)), st.signals.step(0.0, 90.0, at=0.2, unit="deg"),
-                      duration=1.5, load=st.loads.Inertia(3e-2))
+                      duration=1.5, load=st.loads.Inertia(float(inertia)))
     metrics = run.step_metrics()
     expected = {"final angle": (math.degrees(metrics.final), "deg", 0.006),
-                "steady error": (math.degrees(metrics.steady_error), "deg", 0.006),
+                "holding error": (math.degrees(metrics.steady_error), "deg", 0.006),
                 "rise time": (1e3 * metrics.rise_time, "ms (10 to 90 %)", 0.06),
                 "settling time": (1e3 * metrics.settling_time, "ms (2 %)", 0.06),
                 "overshoot": (100.0 * metrics.overshoot, "%", 0.006),
-                "peak speed": (math.degrees(metrics.slew_rate), "deg/s", 0.06),
-                "peak current": (metrics.peak_current, "A", 0.0006)}
+                "peak speed": (math.degrees(metrics.slew_rate), "deg/s", 0.06)}
+    if arrives:
+        expected["time to get there"] = (1e3 * metrics.arrival_time, "ms (within 1 deg)", 0.06)
+    else:
+        assert printed["time to get there"] == "does not get within 1 deg"
+        assert metrics.overshoot > 0.01
     for label, (value, unit, rounding) in expected.items():
         assert number(printed[label]) == pytest.approx(value, abs=rounding), label
         assert printed[label].partition(" ")[2] == unit
     assert metrics.settling_time > metrics.rise_time > 0.0
-    assert metrics.overshoot > 0.01
+    mean, peak = (number(part) for part in printed["current"].split(", "))
+    assert (mean, peak) == pytest.approx((run.mean_current, metrics.peak_current), abs=6e-4)
     assert number(printed["energy"]) == pytest.approx(run.energy.supply, rel=1e-3)
 
 
 def test_what_a_run_does_not_have_has_no_row():
     """A motor has no target, a shaft that stays has no times."""
-    facts = {"final_angle": 1.0, "peak_current": 0.5, "energy": {"supply": 1.0}, "step_metrics": {
-        "target": math.nan, "steady_error": math.nan, "rise_time": math.nan, "settling_time": 0.25,
-        "overshoot": math.nan, "slew_rate": math.pi}}
+    facts = {"final_angle": 1.0, "mean_current": 0.25, "peak_current": 0.5, "energy": {"supply": 1.0}, "step_metrics": {
+        "target": math.nan, "rise_time": math.nan, "settling_time": 0.25, "overshoot": math.nan, "slew_rate": math.pi}}
     assert dict(lines(facts)) == {"final angle": "57.30 deg", "settling time": "250.0 ms (2 %)",
-                                  "peak speed": "180.0 deg/s", "peak current": "0.500 A",
+                                  "peak speed": "180.0 deg/s", "current": "0.250 A in the mean, 0.500 A at most",
                                   "energy": "1 J supplied: nothing moved"}
-    facts["step_metrics"] |= {"target": 1.1, "steady_error": math.radians(-2.0), "rise_time": 0.1,
-                              "settling_time": math.nan, "overshoot": 0.125}
+    facts["step_metrics"] |= {"target": 1.1, "rise_time": 0.1, "settling_time": math.nan, "overshoot": 0.125}
+    facts |= {"time_to_target": 0.2, "holding_error": math.radians(-2.0)}
     found = dict(lines(facts))
-    assert (found["steady error"], found["rise time"], found["overshoot"]) == (
-        "-2.00 deg", "100.0 ms (10 to 90 %)", "12.50 %")
+    assert (found["holding error"], found["rise time"], found["overshoot"], found["time to get there"]) == (
+        "-2.00 deg", "100.0 ms (10 to 90 %)", "12.50 %", "200.0 ms (within 1 deg)")
     assert "settling time" not in found
 
 

@@ -109,7 +109,7 @@ def test_the_bus_gives_no_more_than_all_take_and_nothing_at_rest(servo):
 
 
 def test_a_regulator_takes_nothing_back_in_the_middle_of_a_drive(servo):
-    """One motor returns what another takes; where that is more, a regulator keeps its voltage, and nothing is lost."""
+    """Where one motor returns more than another takes, a regulator keeps its voltage, and no energy is lost."""
     turning = st.PulseServo(servo.replace({"electronics.off_state": "coast"}))
     quiet = st.signals.pulse_train([1.0], [1500.0])
     fleet = st.simulate_bus(

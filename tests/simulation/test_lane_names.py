@@ -41,9 +41,13 @@ def test_the_first_lane_that_is_wrong_is_named(options, error, words):
 def test_failures_keep_their_lanes_and_times_in_every_chunk():
     resistance = np.full(9, SERVO.motor.armature_resistance)
     resistance[[3, 7]] = 1e-300
-    runs = [st.simulate_many(st.BoundedServo(SERVO), STEP, duration=0.2, output_step=0.02, chunk=chunk,
+    steps = [signals.step(10.0, 50.0, at=0.05 + 0.01 * lane, unit="deg") for lane in range(9)]
+    runs = [st.simulate_many(st.BoundedServo(SERVO), steps, duration=0.2, output_step=0.02, chunk=chunk,
                              parameters={"motor.armature_resistance": resistance}) for chunk in (2, 4, 9)]
     for batch in runs:
+        for lane, time, _ in batch.failures:  # some time after its own step, and nothing is known from then on
+            assert 0.05 + 0.01 * lane < time < 0.05 + 0.01 * lane + 0.1
+            np.testing.assert_array_equal(np.isnan(batch["output_angle"][lane]), batch.time > time)
         assert [failure.lane for failure in batch.failures] == [3, 7]
         assert np.flatnonzero(batch.status).tolist() == [3, 7]
         assert np.flatnonzero(np.isnan(batch["output_angle"][:, -1])).tolist() == [3, 7]
@@ -65,3 +69,13 @@ def test_a_lane_alone_is_that_lane():
         run = result.at("output_angle", result.time)  # simulated again, alone
         np.testing.assert_allclose(run, batch["output_angle"][lane], rtol=0.0, atol=1e-9)
     assert len({float(x) for x in batch["error_time"][:, -1]}) == 4
+
+
+def test_pendulums_with_and_without_an_inertia_of_their_own_stand_side_by_side():
+    """A point mass has the inertia m l²; beside one that says its own, each keeps what it has."""
+    hung = [loads.Pendulum(mass=0.1, length=0.1), loads.Pendulum(mass=0.1, length=0.1, inertia=2e-2),
+            loads.Pendulum(mass=0.1, length=0.1, inertia=5e-3), loads.Pendulum(mass=0.2, length=0.1)]
+    batch = st.simulate_many(st.PulseServo(SERVO), STEP, load=hung, duration=0.2, output_step=0.02)
+    for lane, load in enumerate(hung):
+        alone = st.simulate(st.PulseServo(SERVO), STEP, load=load, duration=0.2, output_step=0.02)
+        np.testing.assert_allclose(batch["output_angle"][lane], alone["output_angle"], rtol=0.0, atol=1e-9)

@@ -1,13 +1,16 @@
 """Numbers of a study in closed form: metrics on unequal steps, the middle of the draws, and lanes across chunks."""
 
+import json
 import math
 
 import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.errors import InputError
+from servotwin.errors import InputError, OutputError
+from servotwin.simulation.sweep import variance_share
 from servotwin.simulation.sweep.metrics import lane_metrics, output_times, step_time
+from servotwin.simulation.sweep.tornado import bar_of
 
 STEP = st.signals.step(0.0, 60.0, at=0.1, unit="deg")
 
@@ -97,6 +100,28 @@ def test_quantiles_are_the_smallest_values_that_enough_lanes_reach(model):
     assert list(found.values()) == [ordered[0], ordered[0], ordered[4], ordered[5], ordered[9]]
 
 
+def test_shares_of_few_lanes_by_hand():
+    """Classes of means 2.5 and 4.5: 8 of a sum of squares of 18, corrected to 1 − (10/18) (7/6)."""
+    values = np.array([0.0] * 4 + [1.0] * 4)
+    metric = np.array([1.0, 2.0, 3.0, 4.0, 3.0, 4.0, 5.0, 6.0])
+    assert variance_share(values, metric) == pytest.approx(1.0 - 10.0 / 18.0 * 7.0 / 6.0, rel=1e-12)
+    assert variance_share(np.where(values > 0.0, "coast", "brake"), metric) == pytest.approx(0.3518518, abs=1e-6)
+
+
+def test_what_does_nothing_has_hardly_a_share_of_few_lanes():
+    rng = np.random.default_rng(5)
+    shares = [variance_share(rng.normal(size=30), rng.normal(size=30)) for _ in range(300)]
+    assert np.mean(shares) < 0.08  # of five classes; without the correction it is 4/29
+
+
+@pytest.mark.parametrize(("metric", "low", "high", "reach"), [
+    ([0.1, 0.5, 0.2], "a", "b", 0.4), ([0.3, 0.2, 0.7], "b", "c", 0.5), ([0.1, math.nan, 0.2], "a", "c", 0.15)])
+def test_a_bar_of_three_options_lies_between_the_two_that_reach_farthest(metric, low, high, reach):
+    bar = bar_of("electronics.off_state", ("a", "b", "c"), np.array(metric), 0.25, 0.5)
+    assert (bar.low, bar.high) == (low, high)
+    assert bar.reach == pytest.approx(reach)
+
+
 @pytest.fixture
 def folder(model, tmp_path):
     st.sweep(model, STEP, duration=0.2, draws={"load.inertia": np.linspace(0.0, 3e-3, 10)}, chunk=4,
@@ -112,6 +137,17 @@ def test_a_chunk_with_rows_missing_or_too_many_is_not_gone_on_with(model, folder
     lines = (folder / file).read_text().splitlines()
     (folder / file).write_text("\n".join(change(lines)) + "\n")
     with pytest.raises(InputError, match=file.replace(".", r"\.")):
+        st.sweep(model, STEP, duration=0.2, draws={"load.inertia": np.linspace(0.0, 3e-3, 10)}, chunk=4,
+                 metrics=["end_output_angle"], directory=folder, resume=True)
+
+
+def test_a_study_that_says_more_is_another_one(model, folder):
+    """Such as one of a servo that had a number which this one lacks."""
+    file = folder / "study.json"
+    content = json.loads(file.read_text())
+    content["definition"]["parameters"]["gear.backlash"] = 0.01
+    file.write_text(json.dumps(content))
+    with pytest.raises(OutputError, match=r"another study: parameters\.gear\.backlash: got 'nothing'"):
         st.sweep(model, STEP, duration=0.2, draws={"load.inertia": np.linspace(0.0, 3e-3, 10)}, chunk=4,
                  metrics=["end_output_angle"], directory=folder, resume=True)
 
@@ -137,3 +173,12 @@ def test_lanes_of_one_chunk_have_seeds_of_their_own(servo):
     errors = runs[0].table["end_error_time"]
     assert len(set(errors.tolist())) == 6
     np.testing.assert_array_equal(errors, runs[1].table["end_error_time"])
+
+
+def test_the_noise_of_the_tornado_is_the_same_in_all_its_lanes(servo):
+    """So that what does not matter moves nothing, and what matters is not mistaken for luck."""
+    noisy = st.PulseServo(servo.replace({"potentiometer.noise": 2e-3}))
+    study = st.sweep(noisy, STEP, duration=0.3, lanes=8, metrics=["end_error_time"], seed=1, vary={
+        "stops.upper_angle": "uniform:3rad..4rad", "stops.lower_angle": "uniform:-2rad..-1rad"})
+    assert np.ptp(study.table["end_error_time"]) > 1e-7
+    assert np.ptp(study.moved["end_error_time"]) == 0.0

@@ -98,7 +98,7 @@ class CommandWords:
         """Return the command in words; `duration` [s] is that of the run."""
         unit = self.unit or _DEFAULT_UNIT
         at = _DEFAULT_AT if self.at is None else self.at
-        values = [f"{x:g}" for x in self._values()]
+        values = [f"{x:zg}" for x in self._values()]
         match self.shape:
             case "step":
                 return f"step {values[0]} to {values[1]} {unit} at {at:g} s"

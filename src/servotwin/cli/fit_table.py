@@ -110,4 +110,4 @@ def _parameters(found: TableCalibration) -> list[Any]:
 
 
 def _values(one: Quantity) -> tuple[str, str]:
-    return f"{one.value:.6g}", "" if one.std is None else f"{one.std:.2g}"
+    return f"{one.value:z.6g}", "" if one.std is None else f"{one.std:.2g}"

@@ -194,8 +194,8 @@ def _motor(found: dict[str, Any]) -> list[RenderableType]:
              "output_torque_constant": ("torque per current, at the output", "N m/A"),
              "gear_efficiency": ("efficiency of the gear", "1"), "no_load_current": ("running current", "A"),
              "coulomb_torque": ("Coulomb friction, at the output", "N m")}
-    rows = [(words, f"{found['motor'][name]['value']:.4g}", unit,
-             f"{found['motor'][name]['lower']:.4g} to {found['motor'][name]['upper']:.4g}")
+    rows = [(words, f"{found['motor'][name]['value']:z.4g}", unit,
+             f"{found['motor'][name]['lower']:z.4g} to {found['motor'][name]['upper']:z.4g}")
             for name, (words, unit) in names.items()]
     volts = ", ".join(f"{v:g} V" for v in found["voltages"])
     return [pairs([("voltages", volts), ("possible", "yes" if found["possible"] else "NO"),
@@ -244,4 +244,4 @@ def _folder(out: Path) -> None:
 
 
 def _ranged(found: dict[str, float]) -> str:
-    return f"{found['value']:.3g} ({found['lower']:.3g} to {found['upper']:.3g})"
+    return f"{found['value']:z.3g} ({found['lower']:z.3g} to {found['upper']:z.3g})"

@@ -46,5 +46,5 @@ def parameter_table(rows: list[dict[str, Any]]) -> list[RenderableType]:
 
 
 def _value(value: Any) -> str:
-    return ", ".join(f"{x:.5g}" for x in value) if isinstance(value, list) else (
-        value if isinstance(value, str) else f"{value:.5g}")
+    return ", ".join(f"{x:z.5g}" for x in value) if isinstance(value, list) else (
+        value if isinstance(value, str) else f"{value:z.5g}")

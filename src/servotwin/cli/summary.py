@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin import units
 from servotwin.errors import InputError
 from servotwin.models import MODELS
+from servotwin.simulation.remarks import Remark
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -50,6 +51,7 @@ def facts(result: Result) -> dict[str, Any]:
         "mean_current": result.mean_current,
         "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
         "energy": dataclasses.asdict(result.energy),
+        "remarks": [remark._asdict() for remark in result.remarks],
         "solution": dataclasses.asdict(result.stats),
         "set": was_set(result.model),
         "assumed": assumed(result.model),
@@ -95,13 +97,13 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     [('final angle', '180.00 deg'), ('current', '0.200 A in the mean, 1.800 A at most')]
     """
     rows = [(label, found[key]) for key, label in (("command", "command"), ("load", "load")) if key in found]
-    rows.append((_angle_label(found), f"{_deg(found['final_angle']):.2f} deg"))
+    rows.append((_angle_label(found), f"{_deg(found['final_angle']):z.2f} deg"))
     rows += _arrival_rows(found)
     rows += _step_rows(found.get("step_metrics"))
-    rows.append(("current", f"{found['mean_current']:.3f} A in the mean, {found['peak_current']:.3f} A at most"))
+    rows.append(("current", f"{found['mean_current']:z.3f} A in the mean, {found['peak_current']:z.3f} A at most"))
     energy = found["energy"]
     parts = [f"{name} {energy[name]:.4g} J" for name in _ENERGY if abs(energy.get(name, 0.0)) > 1e-9]
-    rows.append(("energy", f"{energy['supply']:.4g} J supplied: {', '.join(parts) or 'nothing moved'}"))
+    rows.append(("energy", f"{energy['supply']:z.4g} J supplied: {', '.join(parts) or 'nothing moved'}"))
     return rows
 
 
@@ -110,6 +112,7 @@ def origin_lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     solution = found["solution"]
     return [
         ("status", f"{found['status'].lower()}, {found['duration']:g} s simulated"),
+        *(("remark", Remark(**remark).words) for remark in found["remarks"]),
         ("solved", f"{solution['method']}, {solution['motions']} motions, {solution['events']} events"),
         *([("set", names(found["set"]))] if found["set"] else []),
         ("assumed", names(found["assumed"])),
@@ -153,13 +156,13 @@ def _step_rows(metrics: Mapping[str, float] | None) -> list[tuple[str, str]]:
         return []
     rows = []
     if not math.isnan(metrics["rise_time"]):
-        rows.append(("rise time", f"{1e3 * metrics['rise_time']:.1f} ms (10 to 90 %)"))
+        rows.append(("rise time", f"{1e3 * metrics['rise_time']:z.1f} ms (10 to 90 %)"))
     if not math.isnan(metrics["settling_time"]):
-        rows.append(("settling time", f"{1e3 * metrics['settling_time']:.1f} ms (2 %)"))
+        rows.append(("settling time", f"{1e3 * metrics['settling_time']:z.1f} ms (2 %)"))
     if not math.isnan(metrics["overshoot"]):
-        rows.append(("overshoot", f"{100 * metrics['overshoot']:.2f} %"))
+        rows.append(("overshoot", f"{100 * metrics['overshoot']:z.2f} %"))
     speed = units.from_si(metrics["slew_rate"], "deg/s", "speed")
-    return [*rows, ("peak speed", f"{speed:.1f} deg/s")]
+    return [*rows, ("peak speed", f"{speed:z.1f} deg/s")]
 
 
 def _deg(angle: float) -> float:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from servotwin import plotting, units
 from servotwin.cli.summary import names
 from servotwin.cli.terminal import pairs, table
+from servotwin.simulation.remarks import words
 from servotwin.simulation.sweep import dimension_of
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 _MOST_BARS = 12
 _MOST_FAILURES = 3
+_MOST_LANES = 5  # of a kind of remark
 
 
 def sections(study: Study, metric: str, files: Sequence[str], given: Sequence[str] = ()) -> list[RenderableType]:
@@ -25,7 +27,7 @@ def sections(study: Study, metric: str, files: Sequence[str], given: Sequence[st
     definition = study.definition
     head = f"{definition['servo']}, {definition['model']}, {len(study)} lanes, {definition['duration']:g} s"
     follow = [("follow", ", ".join(study.followed))] if study.followed else []
-    rows = [("varied", ", ".join(study.parameters)), *follow, ("failed", _failed(study)),
+    rows = [("varied", ", ".join(study.parameters)), *follow, ("failed", _failed(study)), *_remarks(study),
             *([("set", names(given))] if given else []), *(("written", name) for name in files)]
     return [head, pairs(rows), "", _quantiles(study), "", f"what moves {plotting.metric_shown(metric).words}, one at a "
             "time, and its share of the variance", *_tornado(study, metric)]
@@ -36,6 +38,14 @@ def _failed(study: Study) -> str:
     named = "; ".join(f"lane {f.lane} at {f.time:g} s: {f.cause}" for f in failures[:_MOST_FAILURES])
     more = f"; and {len(failures) - _MOST_FAILURES} more" if len(failures) > _MOST_FAILURES else ""
     return f"{len(failures)}: {named}{more}" if failures else "none"
+
+
+def _remarks(study: Study) -> list[tuple[str, str]]:
+    found = []
+    for kind, lanes in study.remarked().items():
+        first = ", ".join(map(str, lanes[:_MOST_LANES])) + (" ..." if len(lanes) > _MOST_LANES else "")
+        found.append(("remark", f"{words(kind)}: {len(lanes)} of {len(study)} (lane{'s'[:len(lanes) > 1]} {first})"))
+    return found
 
 
 def _quantiles(study: Study) -> RenderableType:
@@ -66,4 +76,4 @@ def _tornado(study: Study, metric: str) -> list[RenderableType]:
 
 def _text(value: float, metric: str) -> str:
     shown = plotting.metric_shown(metric)
-    return "" if math.isnan(value) else f"{units.from_si(value, shown.unit, shown.dimension):.4g}"
+    return "" if math.isnan(value) else f"{units.from_si(value, shown.unit, shown.dimension):z.4g}"

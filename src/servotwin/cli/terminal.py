@@ -49,13 +49,14 @@ def emit_help(context: typer.Context) -> None:
 
 
 def emit_json(data: Any) -> None:
-    """Write one JSON document; a number that is not finite becomes null.
+    """Write one JSON document; a number that is not finite becomes null, and -0 becomes 0.
 
     Examples
     --------
-    >>> emit_json({"a": float("nan")})
+    >>> emit_json({"a": float("nan"), "b": -0.0})
     {
-      "a": null
+      "a": null,
+      "b": 0.0
     }
     """
     emit(json.dumps(_finite(data), indent=2, allow_nan=False))
@@ -121,8 +122,8 @@ def _finite(data: Any) -> Any:
         return {str(key): _finite(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
         return [_finite(value) for value in data]
-    if isinstance(data, float) and not math.isfinite(data):
-        return None
+    if isinstance(data, float):
+        return data + 0.0 if math.isfinite(data) else None
     return data
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from servotwin.models.base import Model, check_travel
+from servotwin.models.base import Model, check_accepted, check_travel
 from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
 from servotwin.physics import electronics, potentiometer
@@ -34,8 +34,8 @@ _SIGNALS = (
 class _Averaged(Model):
     """What the two averaged servos share: (38) with offsets, (41), and the command chain."""
 
-    optional = ("electronics.command_offset", "electronics.command_pulse_offset", "potentiometer.feedback_offset",
-                "gear.output_inertia")
+    optional = ("electronics.command_offset", "electronics.command_pulse_offset", "electronics.pulse_width_min",
+                "electronics.pulse_width_max", "potentiometer.feedback_offset", "gear.output_inertia")
     signals = _SIGNALS
 
     def _plant(self, load: Load, inductance: float) -> Plant:
@@ -53,11 +53,18 @@ class _Averaged(Model):
                 self.value_or("electronics.command_pulse_offset", 0.0))
 
     def command(self, signal: Signal) -> Pieces:
-        """Return v_c [V]: k_p v_i + b_i of a voltage, k_p2 (t_a − t_0) + b_i of a pulse, p q* + b_o of an angle."""
+        """Return v_c [V]: k_p v_i + b_i of a voltage, k_p2 (t_a − t_0) + b_i of a pulse, p q* + b_o of an angle.
+
+        Raises
+        ------
+        CommandError
+            If a pulse is one that the chip refuses, or an angle is outside the travel.
+        """
         k_p1, k_p2, b_i, t_0 = self._gains()
         if signal.kind == "voltage":
             return signal.pieces.scaled(k_p1 * k_p2, b_i)
         if signal.kind == "pulse_width":
+            check_accepted(signal, self)
             return signal.pieces.scaled(k_p2, b_i - k_p2 * t_0)
         check_travel(signal, self.servo)
         return signal.pieces.scaled(self.value("potentiometer.feedback_gain"),

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from servotwin.signals import Signal
 
 
+PULSE_RANGE = (3e-4, 2.7e-3)  # s, of what chips accept where the servo does not say; no source
+
+
 class Place(NamedTuple):
     """A state: its signal name, its place among the numbers of the engine, and the factor from there to the signal."""
 
@@ -235,6 +238,26 @@ def check_widths(signal: Signal | LaneSignal, widths: Pieces | LanePieces, perio
             allowed="more than 0 us" + (f" and less than a frame of {1e6 * frame:.6g} us" if frame < math.inf else ""))
 
 
+def check_accepted(signal: Signal | LaneSignal, model: Model) -> None:
+    """Raise CommandError if a command of pulses, for a model of their mean, has one that the chip refuses.
+
+    Bounds are `electronics.pulse_width_min` and `electronics.pulse_width_max`, or `PULSE_RANGE`.
+    """
+    shortest, longest = (model.value_or(f"electronics.pulse_width_{end}", usual)
+                         for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
+    lowest, highest = signal.pieces.extremes
+    bad = _First((lowest < shortest) | (highest > longest))
+    if not bad:
+        return
+    short = bad.of(lowest) < bad.of(shortest)
+    k, start = bad.piece(signal, short)
+    raise CommandError(
+        f"pulse width{bad.lane(signal)}, piece {k} of the command (from {start:g} s on)",
+        got=f"{1e6 * bad.of(lowest if short else highest):.6g} us",
+        allowed=f"{1e6 * bad.of(shortest):.6g} to {1e6 * bad.of(longest):.6g} us, the pulses that {model.servo.name} "
+        "accepts")
+
+
 class _First:
     """The first lane for which something is so; without lanes, whether it is."""
 
@@ -248,6 +271,11 @@ class _First:
     def of(self, value: Any) -> float:
         """Return that lane's of a column, or the number."""
         return float(np.ravel(value)[self._lane if np.size(value) > 1 else 0])
+
+    def piece(self, signal: Signal | LaneSignal, lowest: bool) -> tuple[int, float]:
+        """Return number and start [s] of the piece that has that lane's lowest, or highest, value."""
+        pieces = signal.pieces.of(self._lane) if isinstance(signal.pieces, LanePieces) else signal.pieces
+        return pieces.extreme(lowest)
 
     def lane(self, signal: Signal | LaneSignal) -> str:
         """Return how an error names the lane."""

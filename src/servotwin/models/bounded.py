@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from servotwin.errors import MissingParameterError
-from servotwin.models.base import Model, check_travel, clipped
+from servotwin.models.base import Model, check_accepted, check_travel, clipped
 from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
 from servotwin.physics import potentiometer
@@ -54,6 +54,7 @@ class BoundedServo(Model):
         "stops.lower_angle", "stops.upper_angle", "stops.restitution",
         "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset", "electronics.command_offset",
         "electronics.pulse_to_voltage_gain", "electronics.one_shot_slope", "electronics.one_shot_offset",
+        "electronics.pulse_width_min", "electronics.pulse_width_max",
     )
     layout = ("output_angle", "output_speed")
     signals = (
@@ -115,10 +116,17 @@ class BoundedServo(Model):
             restitution=self.value_or("stops.restitution", 0.0))
 
     def command(self, signal: Signal) -> Pieces:
-        """Return v_c [V]: k_p v_i + b_i of a voltage, (t_a − T_0)/one_shot_slope of a pulse, p q* + b_o of an angle."""
+        """Return v_c [V]: k_p v_i + b_i of a voltage, (t_a − T_0)/one_shot_slope of a pulse, p q* + b_o of an angle.
+
+        Raises
+        ------
+        CommandError
+            If a pulse is one that the chip refuses, or an angle is outside the travel.
+        """
         if signal.kind == "voltage":
             return signal.pieces.scaled(self.value("electronics.voltage_to_pulse_gain") * self._k_p2, self._b_i)
         if signal.kind == "pulse_width":
+            check_accepted(signal, self)
             return signal.pieces.scaled(1.0 / self._slope, -self._T_0 / self._slope)
         check_travel(signal, self.servo)
         return signal.pieces.scaled(self.value("potentiometer.feedback_gain"),

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from servotwin.physics.pieces import Piece, Pieces
+
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
@@ -86,6 +88,13 @@ class LanePieces:
     def scaled(self, gain: float | Array, offset: float | Array) -> LanePieces:
         """Return gain · y + offset."""
         return replace(self, gain=gain * self.gain, offset=gain * self.offset + offset)
+
+    def of(self, lane: int) -> Pieces:
+        """Return the function of one lane, by its place."""
+        one = slice(lane, lane + 1)
+        gain, offset = (x[one] if isinstance(x, np.ndarray) else x for x in (self.gain, self.offset))
+        _, _, rows = LanePieces(self.rows, self.first[one], self.count[one], gain, offset).tables()
+        return Pieces(tuple(Piece(*row) for row in rows.tolist()))
 
     @property
     def initial(self) -> Array:

@@ -79,7 +79,7 @@ class Quantity:
         if self.std is not None:
             return f"± {self.std:.4g}"
         if self.lower is not None and self.upper is not None:
-            return f"{self.lower:.4g} to {self.upper:.4g}"
+            return f"{self.lower:z.4g} to {self.upper:z.4g}"
         if self.lower is not None or self.upper is not None:
-            return f"from {self.lower:.4g}" if self.lower is not None else f"up to {self.upper:.4g}"
+            return f"from {self.lower:z.4g}" if self.lower is not None else f"up to {self.upper:z.4g}"
         return ""

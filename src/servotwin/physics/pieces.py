@@ -107,6 +107,19 @@ class Pieces:
         """Lowest and highest value until the last piece starts (a sinusoid counts with its whole amplitude)."""
         return self.bounds(self.table[-1].start)
 
+    def extreme(self, lowest: bool) -> tuple[int, float]:
+        """Return number and start [s] of the piece with the lowest, or highest, of the `extremes`.
+
+        Examples
+        --------
+        >>> Pieces((Piece(value=1.0), Piece(start=2.0, value=3.0))).extreme(False)
+        (1, 2.0)
+        """
+        ends = (*self._starts[1:], self._starts[-1])
+        ranges = [piece_range(piece, end)[not lowest] for piece, end in zip(self.table, ends, strict=True)]
+        k = ranges.index(min(ranges) if lowest else max(ranges))
+        return k, self._starts[k]
+
     def __getstate__(self) -> dict[str, object]:
         """Leave caches out, so that equal tables pickle to equal bytes."""
         return {"table": self.table}

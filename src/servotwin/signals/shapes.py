@@ -11,6 +11,7 @@ from servotwin import units
 from servotwin.errors import CommandError
 from servotwin.physics.pieces import Piece, Pieces, constant_pieces
 from servotwin.signals.signal import KINDS, Signal, in_si, kind_of
+from servotwin.signals.time_base import warn_of_time_base
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -156,12 +157,24 @@ def samples(time: ArrayLike, value: ArrayLike, *, unit: str, hold: str = "previo
     CommandError
         If the arrays are empty, of unequal length, unsorted or not finite, or a linear slope is beyond all numbers.
 
+    Warns
+    -----
+    UserWarning
+        If the times look as if they were a thousand times too long or too short.
+
     Examples
     --------
     >>> float(samples([0.0, 1.0], [0.0, 1.0], unit="rad", hold="linear")(0.25))
     0.25
     """
     t, y = _arrays(time, value, unit, "samples")
+    warn_of_time_base(t, y, kind_of(unit), "the command")
+    return sampled(t, y, unit=unit, hold=hold, frame_period=frame_period)
+
+
+def sampled(t: NDArray[np.float64], y: NDArray[np.float64], *, unit: str, hold: str,
+            frame_period: float | None = None) -> Signal:
+    """Return what `samples` does of arrays in SI that were checked before; `unit` is what the caller gave."""
     if hold == "previous":
         return _held(t, y, unit, frame_period)
     if hold != "linear":
@@ -189,6 +202,7 @@ def pulse_train(edges: ArrayLike, widths: ArrayLike, *, unit: str = "us") -> Sig
     if kind_of(unit) != "pulse_width":
         raise CommandError("unit of a pulse width", got=unit, allowed="us, ms, s")
     t, y = _arrays(edges, widths, unit, "pulse_train")
+    warn_of_time_base(t, y, "pulse_width", "the pulses")
     late = np.flatnonzero(y[:-1] >= np.diff(t))
     if late.size:
         raise CommandError(f"pulse {late[0]}", got=f"width {y[late[0]]:g} s",

@@ -12,7 +12,8 @@ import numpy as np
 from servotwin.errors import MissingExtraError, SimulationError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
 from servotwin.simulation import files
-from servotwin.simulation.simulator import simulate
+from servotwin.simulation.remarks import LaneRemark
+from servotwin.simulation.simulator import Simulator, simulated
 from servotwin.simulation.status import Status
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ class Batch:
         How each lane ended: the code of a `Status`, 0 where it reached the end.
     failures : tuple of Failure
         (lane, time [s], cause) of those that did not; their signals are nan from there on.
+    remarks : tuple of LaneRemark
+        (lane, kind, time [s]) of what is to be said of those that did, as `Result.remarks`.
     duration : float
         [s]
 
@@ -64,13 +67,14 @@ class Batch:
     time: NDArray[np.float64]
     status: NDArray[np.int8]
     failures: tuple[Failure, ...]
+    remarks: tuple[LaneRemark, ...]
     duration: float
     signals: Mapping[str, NDArray[np.floating]]
     lanes: Lanes
 
     def __repr__(self) -> str:
         return (f"Batch({self.lanes.model!r}, lanes={len(self)}, times={len(self.time)}, "
-                f"signals={tuple(self.signals)}, failures={len(self.failures)})")
+                f"signals={tuple(self.signals)}, failures={len(self.failures)}, remarks={len(self.remarks)})")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -120,9 +124,9 @@ class Batch:
 
     def _lane(self, lane: int) -> Result:
         lanes = self.lanes
-        result = simulate(
-            lanes.lane_model(lane), lanes.commands[lanes.command_of[lane]], duration=self.duration,
-            load=lanes.load(lane), output_times=self.time, initial=lanes.initial_of(lane), seed=int(lanes.seeds[lane]))
+        simulator = Simulator(lanes.lane_model(lane), lanes.load(lane), int(lanes.seeds[lane]))
+        result = simulated(simulator, lanes.commands[lanes.command_of[lane]], self.duration, self.time,
+                           lanes.initial_of(lane))
         for name, values in self.signals.items():
             own = values[lane].astype(np.float64)
             own.setflags(write=False)

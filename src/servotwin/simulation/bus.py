@@ -24,6 +24,8 @@ from servotwin.simulation.bus_engine import Bus, Unit
 from servotwin.simulation.bus_group import Group
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
+from servotwin.simulation.oddities import warn_of
+from servotwin.simulation.remarks import ServoRemark
 from servotwin.simulation.result import Result
 from servotwin.simulation.simulator import Simulator, _times
 from servotwin.simulation.status import Status
@@ -95,6 +97,11 @@ class Fleet(Mapping[str, Result]):
         return np.asarray(sum(result["supply_current"] for result in self.results.values()))
 
     @cached_property
+    def remarks(self) -> tuple[ServoRemark, ...]:
+        """What is to be said of each servo, (servo, kind, time [s]), as `Result.remarks`."""
+        return tuple(ServoRemark(name, *remark) for name, result in self.results.items() for remark in result.remarks)
+
+    @cached_property
     def energy(self) -> Energy:
         """Energy balance of all servos together [J]; its `supply` is what the bus has delivered."""
         parts = [result.energy for result in self.results.values()]
@@ -140,6 +147,11 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     ------
     InputError
         On bad input; names the servo.
+
+    Warns
+    -----
+    UserWarning
+        As `simulate` does.
     """
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
@@ -155,6 +167,8 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
             raise InputError(f"model of {name}", got=model, allowed="a pulse servo")
         sims[name] = sim
         units.append(Unit(plan, plan.chip, state.point))
+    for name, (_, command, _) in given.items():
+        warn_of(sims[name].model.servo, [command], duration)
     source = _source(supply)
     status, ended, cause = Status.COMPLETED, duration, Status.COMPLETED.message
     try:

@@ -51,7 +51,8 @@ def shown_columns(signals: Mapping[str, NDArray[Any]], si_units: Mapping[str, st
     found = {}
     for name, values in signals.items():
         suffix, unit, dimension = _OWN.get(name) or _COLUMNS[si_units[name]]
-        found[f"{name}_{suffix}" if suffix else name] = np.asarray(units.from_si(values, unit, dimension))
+        signless = np.asarray(units.from_si(values, unit, dimension)) + 0.0  # -0 becomes 0
+        found[f"{name}_{suffix}" if suffix else name] = signless
     return found
 
 

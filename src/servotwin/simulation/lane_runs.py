@@ -28,6 +28,7 @@ _PLAIN_WALKS = Recipe(
 _SWINGING = Recipe(
     "pendulum_walks", _ENTRY, absent=(*((name, x) for name, x in _RARE.items() if name != "gravity"), ("sweep", 0.0)),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
+_ENDING = Recipe("ending", ("servotwin.models.kernels.ending:look_at_lanes",))
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a walk leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
@@ -51,6 +52,11 @@ def run(work: Work) -> Raw:
         rest = np.flatnonzero(some & (given_up != 0))
         if len(rest):
             run_walks(work, lanes, rest, times, raw, recipe)
+    kernels(_ENDING).look_at_lanes(
+        work.law == "pulse", lanes, _rows(work.torque.rows), _indices(work.torque.first), _indices(work.torque.count),
+        float(work.duration), raw.final, raw.refused, raw.marks)
+    failed = raw.status != 0
+    raw.refused[failed], raw.marks[failed] = np.nan, 0
     return raw
 
 
@@ -65,13 +71,14 @@ def _run_some(work: Work, lanes: Lanes, braked: bool, which: NDArray[np.int64], 
               given_up: NDArray[np.int8]) -> None:
     """Run only some lanes side by side."""
     part = Raw({name: np.zeros((len(which), len(times)), values.dtype) for name, values in raw.fields.items()},
-               raw.status, raw.ended)
+               raw.status, raw.ended, np.zeros((len(which), raw.final.shape[1])), raw.refused, raw.marks)
     marks = np.zeros(len(which), np.int8)
     columns: Any = (x if name in _SHARED else np.ascontiguousarray(x[..., which])
                     for name, x in zip(Lanes._fields, lanes, strict=True))
     _run_blocks(work, Lanes(*columns), braked, times, outputs_of(work, part, marks))
     for name, values in part.fields.items():
         raw.fields[name][which] = values
+    raw.final[which, :2] = part.final[:, :2]
     given_up[which] = marks
 
 
@@ -83,11 +90,12 @@ def run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats,
         part = which[start:start + at_once]
         room = np.zeros((len(part), len(_ALL), len(times)))
         status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
+        final = np.zeros((len(part), raw.final.shape[1]))
         kernels(recipe).walk_lanes(
             work.law == "pulse", lanes, np.array(work.curve, np.float64), _rows(work.torque.rows),
             _indices(work.torque.first), _indices(work.torque.count), part, float(work.duration), times, room,
-            status, ended)
-        raw.status[part], raw.ended[part] = status, ended
+            final, status, ended)
+        raw.status[part], raw.ended[part], raw.final[part] = status, ended, final
         failed = (status != 0)[:, None] & (times >= ended[:, None])
         for k, name in enumerate(_ALL):
             if name in raw.fields:
@@ -160,4 +168,4 @@ def outputs_of(work: Work, raw: Raw, given_up: NDArray[np.int8]) -> Outputs:
     """Return the arrays into which the kernels write."""
     none = {name: np.zeros((0, 0), np.int8 if name in SMALL_FIELDS else work.dtype) for name in FIELDS}
     angle, speed, contact, drive, error = ({**none, **raw.fields}[name] for name in FIELDS)
-    return Outputs(angle, speed, contact, drive, error, given_up)
+    return Outputs(angle, speed, contact, drive, error, given_up, raw.final)

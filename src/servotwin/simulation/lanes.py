@@ -152,11 +152,20 @@ class Raw:
         Codes of `Status`.
     ended : ndarray of float64, shape (B,)
         The time of the failure, or the duration [s].
+    final : ndarray of float64, shape (B, 4)
+        Last angle [rad] and speed [rad/s], and temperatures of winding and housing [K].
+    refused : ndarray of float64, shape (B,)
+        From when on all pulses are refused [s]; nan where the last one is not.
+    marks : ndarray of int8, shape (B,)
+        Sums of `kernels.ending.ON_STOP` and `CANNOT_HOLD`.
     """
 
     fields: dict[str, NDArray[np.generic]]
     status: NDArray[np.int8]
     ended: Floats
+    final: Floats
+    refused: Floats
+    marks: NDArray[np.int8]
 
 
 def empty_raw(work: Work) -> Raw:
@@ -164,7 +173,8 @@ def empty_raw(work: Work) -> Raw:
     shape = (work.lanes, len(work.times))
     kinds = {name: np.dtype(np.int8) if name in SMALL_FIELDS else np.dtype(work.dtype) for name in work.fields}
     return Raw({name: np.zeros(shape, kind) for name, kind in kinds.items()}, np.zeros(work.lanes, np.int8),
-               np.full(work.lanes, work.duration))
+               np.full(work.lanes, work.duration), np.ascontiguousarray(work.start[[0, 1, 3, 4]].T),
+               np.full(work.lanes, np.nan), np.zeros(work.lanes, np.int8))
 
 
 def run_lanes(work: Work) -> Raw:

@@ -19,8 +19,10 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.simulation.batch import Batch, Failure
 from servotwin.simulation.lane_inputs import Lanes, lanes_of
 from servotwin.simulation.lanes import Raw, Work, run_lanes
+from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.packing import Asked, Chunk, Commands, groups
 from servotwin.simulation.progress import Progress, shown
+from servotwin.simulation.remarks import lane_remarks
 from servotwin.simulation.simulator import _times
 from servotwin.simulation.status import Status
 from servotwin.units import is_finite
@@ -96,6 +98,11 @@ def simulate_many(
         On bad input, before anything runs; names lane and parameter. A lane that ends early says so in
         `Batch.status`, is nan from there on, and harms no other.
 
+    Warns
+    -----
+    UserWarning
+        As `simulate` does, once for all lanes.
+
     Examples
     --------
     >>> import servotwin as st
@@ -105,13 +112,26 @@ def simulate_many(
     >>> batch["output_angle"].shape
     (4, 1)
     """
+    lanes = lanes_of(model, command, load, parameters, initial, seeds)
+    if is_finite(duration) and duration > 0.0:
+        warn_of(lanes.model.servo, lanes.commands, duration,
+                voltages=lanes.numbers.get("supply.open_circuit_voltage"))
+    return simulate_lanes(lanes, duration=duration, output_step=output_step, output_times=output_times,
+                          outputs=outputs, dtype=dtype, executor=executor, chunk=chunk, progress=progress)
+
+
+def simulate_lanes(
+    lanes: Lanes, *, duration: float, output_step: float | None = None, output_times: ArrayLike | None = None,
+    outputs: Sequence[str] = ("output_angle",), dtype: DTypeLike = "float64", executor: Any = None,
+    chunk: int | None = None, progress: Progress = False,
+) -> Batch:
+    """Return what `simulate_many` does of lanes that were zipped before, without warnings."""
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
     if executor is not None and (isinstance(executor, type) or not callable(getattr(executor, "submit", None))):
         raise InputError("executor", got=executor, allowed="one with a submit method, as in concurrent.futures")
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
-    lanes = lanes_of(model, command, load, parameters, initial, seeds)
     times = np.array(_times(duration, output_step, output_times))  # a copy: it becomes read-only
     asked = Asked(float(duration), times, _outputs(lanes.model, outputs), _dtype(dtype))
     commands = Commands(lanes)
@@ -119,6 +139,7 @@ def simulate_many(
     signals = _space(lanes, asked)
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
+    refused, marks = np.empty(lanes.count), np.empty(lanes.count, dtype=np.int8)
     own = _threads(os.getpid()) if executor is None else executor
     with shown(progress, lanes.count, "simulate_many") as show, closing(_run(packs, asked, own)) as running:
         for which, raw, values in running:
@@ -129,6 +150,7 @@ def simulate_many(
                 for name, column in values.items():
                     signals[name][place] = column
             status[place], ended[place] = raw.status, raw.ended
+            refused[place], marks[place] = raw.refused, raw.marks
             done += len(which)
             show(done)
     arrays: list[NDArray[Any]] = [times, status, *signals.values()]
@@ -136,8 +158,8 @@ def simulate_many(
         array.setflags(write=False)
     failures = tuple(Failure(int(lane), float(ended[lane]), Status.of_code(int(status[lane])).message)
                      for lane in np.flatnonzero(status))
-    return Batch(time=times, status=status, failures=failures, duration=asked.duration, signals=signals,
-                 lanes=lanes)
+    return Batch(time=times, status=status, failures=failures, remarks=lane_remarks(refused, marks, asked.duration),
+                 duration=asked.duration, signals=signals, lanes=lanes)
 
 
 def grid(values: Mapping[str, ArrayLike] | None = None, /, **more: ArrayLike) -> dict[str, NDArray[Any]]:

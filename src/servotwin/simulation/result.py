@@ -16,6 +16,7 @@ from servotwin.models.samples import Samples
 from servotwin.simulation import files
 from servotwin.simulation.energy import Energy, energy_of
 from servotwin.simulation.metrics import StepMetrics, holding_error, mean_current, peak, step_metrics
+from servotwin.simulation.remarks import Remark, remarks_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.trajectory import Trajectory
 
@@ -128,6 +129,11 @@ class Result:
         closed = [not is_step(segment.motion) for segment in self.trajectory.segments]
         method = "closed form" if all(closed) else "integrated" if not any(closed) else "closed form and integrated"
         return Stats(method, len(closed), len(self.events))
+
+    @cached_property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What a completed run leaves to be said, (kind, time [s]): pulses refused, ended on a stop, cannot hold."""
+        return remarks_of(self)
 
     @cached_property
     def energy(self) -> Energy:

@@ -18,6 +18,7 @@ from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
 from servotwin.simulation.engine import Plan, Record, State
+from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.result import Result
 from servotwin.simulation.start import check_start, start_vector
@@ -178,6 +179,12 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
     InputError
         On bad input only; a run that ends early says so in `Result.status`.
 
+    Warns
+    -----
+    UserWarning
+        If the servo's data sheet is impossible, its supply more than twice that of the sheet, or the command changes
+        only after the end.
+
     Examples
     --------
     >>> import servotwin as st
@@ -190,6 +197,14 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
     times = _times(duration, output_step, output_times)
     simulator = Simulator(model, load, seed)
+    simulator.drive(command)  # raises if the model cannot follow it
+    warn_of(model.servo, [command], duration)
+    return simulated(simulator, command, duration, times, initial, progress)
+
+
+def simulated(simulator: Simulator, command: Signal, duration: float, times: NDArray[np.float64],
+              initial: Mapping[str, float] | None, progress: Progress = False) -> Result:
+    """Return what `simulate` does, of arguments that it has looked at."""
     status, ended, cause = Status.COMPLETED, duration, Status.COMPLETED.message
     with shown(progress, _THOUSAND, "simulating") as show:
         record = Record([], [], _thousandths(duration, show) if progress else None)
@@ -197,8 +212,8 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
             simulator._run(simulator.initial(command, initial), duration, command, 0.0, record)
         except SimulationError as error:
             status, ended, cause = Status[error.status], error.time, error.cause
-    return Result(model=model, command=command, load=simulator.load, drive=simulator.drive(command), time=times,
-                  trajectory=Trajectory(tuple(record.segments)), events=tuple(record.events),
+    return Result(model=simulator.model, command=command, load=simulator.load, drive=simulator.drive(command),
+                  time=times, trajectory=Trajectory(tuple(record.segments)), events=tuple(record.events),
                   status=status, ended=ended, cause=cause)
 
 

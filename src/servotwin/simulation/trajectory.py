@@ -18,6 +18,7 @@ from servotwin.simulation.engine import Segment
 Array = NDArray[np.float64]
 _NODES = 12  # Gauss-Legendre nodes per interval
 _AT_ONCE = 1000  # segments
+_SHORTEST = 1e-307  # s: what is over in less has no time of its own
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,8 @@ class Trajectory:
         clipped = [np.clip(t, segment.start, segment.end) for t, segment in zip(times, self.segments, strict=True)]
         return self._states(np.concatenate(clipped), np.repeat(np.arange(len(times)), [t.size for t in times]))
 
-    def _states(self, t: Array, index: NDArray[np.intp]) -> Samples:
+    def _states(self, t: Array, index: NDArray[np.intp], ages: Array | None = None) -> Samples:
+        """Return the states at times by the motions of segments; `ages` are t − anchor without what t rounds away."""
         y = np.full((7, t.size), math.nan)
         mode, wiper, drive, error = np.zeros((4, t.size)), *np.zeros((3, t.size))
         order = np.argsort(index, kind="stable")
@@ -66,7 +68,7 @@ class Trajectory:
             where = those[(t[those] <= segment.end) & (t[those] >= segment.start)]
             if where.size == 0:
                 continue
-            s = t[where] - segment.anchor
+            s = t[where] - segment.anchor if ages is None else ages[where]
             y[:, where] = _states(segment.motion, s)
             mode[:, where] = np.array(segment.motion.mode)[:, None]
             drive[where], error[where] = segment.drive, segment.error
@@ -74,41 +76,46 @@ class Trajectory:
         return Samples.make(t, y, wiper, mode, drive, error, None if self.bus is None else self.bus(t))
 
     def intervals(self, index: int) -> Array:
-        """Return the ends of short intervals of one segment, in each of which all signals are smooth and gentle."""
+        """Return the ends of short intervals of one segment, in each of which all signals are smooth and gentle.
+
+        They count from the segment's anchor [s]: a motion may settle in less than its time of day can tell.
+        """
         segment = self.segments[index]
-        start, end = segment.start, segment.end
-        width = motion.period(segment.motion.u, segment.motion.tau, start, end) / 4.0
+        age, end = segment.start - segment.anchor, segment.end - segment.anchor
+        width = motion.period(segment.motion.u, segment.motion.tau, segment.start, segment.end) / 4.0
         fine, settled = motion.scales(segment.motion)
-        edges = [start]
-        while edges[-1] < end:
-            age = edges[-1] - segment.anchor
-            edges.append(min(end, edges[-1] + min(width, fine if age < settled else max(age, fine))))
+        fine = max(fine, _SHORTEST)
+        edges = [age]
+        while age < end:
+            age = min(end, age + min(width, fine if age < settled else max(age, fine)))
+            edges.append(age)
         return np.array(edges)
 
     def integral(self, integrand: Callable[[Samples], Array]) -> Array:
         """Return the integral over the whole run of a vector of signals; `integrand` returns shape (m, n)."""
         x, weight = np.polynomial.legendre.leggauss(_NODES)
         total: Array | float = 0.0
-        times, weights, index = [], [], []
+        times, ages, weights, index = [], [], [], []
         for k, segment in enumerate(self.segments):
             edges = self.intervals(k)
             half = 0.5 * np.diff(edges)[:, None]
             nodes = (edges[:-1, None] + half + half * x).ravel()
-            times.append(np.clip(nodes, segment.start, segment.end))  # by rounding, one may lie just outside
+            ages.append(nodes)
+            times.append(np.clip(segment.anchor + nodes, segment.start, segment.end))
             weights.append((half * weight).ravel())
             index.append(np.full(nodes.size, k))
             if len(times) == _AT_ONCE or k == len(self.segments) - 1:
-                values = integrand(self._states(np.concatenate(times), np.concatenate(index)))
+                values = integrand(self._states(np.concatenate(times), np.concatenate(index), np.concatenate(ages)))
                 total = total + (values * np.concatenate(weights)).sum(axis=1)
-                times, weights, index = [], [], []
+                times, ages, weights, index = [], [], [], []
         return np.asarray(total)
 
     def dense_times(self, index: int, per_interval: int = 8) -> Array:
-        """Return times that resolve one segment, both its ends included."""
-        edges = self.intervals(index)
+        """Return times that resolve one segment as far as times can, both its ends included."""
+        segment, edges = self.segments[index], self.intervals(index)
         fractions = np.linspace(0.0, 1.0, per_interval, endpoint=False)
-        inner = (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel()
-        return np.append(inner, edges[-1])
+        inner = segment.anchor + (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel()
+        return np.unique(np.clip(np.append(inner, segment.end), segment.start, segment.end))
 
 
 def _states(m: motion.Motion, s: Array) -> Array:

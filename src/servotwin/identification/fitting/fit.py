@@ -158,8 +158,8 @@ class Fit:
         """Return a line for each estimate, and what the logs cannot say."""
         lines = []
         for name, (lower, upper, method) in self.intervals().items():
-            spread = f"{lower:.4g} to {upper:.4g} ({method})" if lower == lower else method
-            lines.append(f"{name} = {self.estimates[name]:.4g} {self.units[name]}, {100 * self.level:g} %: {spread}")
+            spread = f"{lower:z.4g} to {upper:z.4g} ({method})" if lower == lower else method
+            lines.append(f"{name} = {self.estimates[name]:z.4g} {self.units[name]}, {100 * self.level:g} %: {spread}")
         return "\n".join((*lines, *map(str, self.unidentifiable), *self.warnings))
 
     def _interval(self, k: int, name: str, level: float) -> Interval:

@@ -32,8 +32,9 @@ from servotwin.identification.fitting.point import (
 )
 from servotwin.identification.logs.log import Log
 from servotwin.models import Model
-from servotwin.simulation import simulate_many
+from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.lane_loads import LOAD_NAMES
+from servotwin.simulation.many import simulate_lanes
 
 if TYPE_CHECKING:
     pass
@@ -195,11 +196,12 @@ class Forecast:
         names = dict.fromkeys((*(name for name in self.sensors if name in case.places), "output_speed",
                                *(["bus_voltage"] if sags else [])))
         lanes = sum(lane.count for lane in job)
-        batch = simulate_many(
-            self.model, [signal for lane in job for signal in [lane.signal] * lane.count],
-            load=[load for lane in job for load in [lane.case.log.load] * lane.count], parameters=columns,
+        batch = simulate_lanes(
+            lanes_of(self.model, [signal for lane in job for signal in [lane.signal] * lane.count],
+                     [load for lane in job for load in [lane.case.log.load] * lane.count], columns, initial or None,
+                     np.zeros(lanes, np.int64)),
             duration=max(float(asked.max()), case.log.duration), output_times=asked[order], outputs=tuple(names),
-            initial=initial or None, seeds=np.zeros(lanes, np.int64), executor=_HERE)
+            executor=_HERE)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         signals = {name: np.asarray(batch[name][:, back] if later else batch[name], np.float64) for name in names}

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin import signals
 from servotwin.errors import InputError
 from servotwin.identification.logs import log_checks as check
 from servotwin.loads import Load, Recorded, as_load
+from servotwin.signals.shapes import sampled
 
 if TYPE_CHECKING:
     from servotwin.identification.logs.reading import Reading
@@ -178,7 +178,7 @@ class Log:
             If the frame period is not positive.
         """
         unit = KINDS[self.command_kind]
-        made = signals.samples(self.time - self.time[0], self.command, unit=unit, hold=self.command_hold)
+        made = sampled(self.time - self.time[0], self.command, unit=unit, hold=self.command_hold)
         if self.torque_on is None or self.torque_on.all():
             return made
         period = self.parameters.get(_FRAME_PERIOD, 0.02) if frame_period is None else frame_period

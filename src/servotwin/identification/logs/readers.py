@@ -14,6 +14,7 @@ from servotwin.identification.logs.lerobot import dataset_of, read_lerobot_logs
 from servotwin.identification.logs.log import Log
 from servotwin.identification.logs.miuzei import is_miuzei, miuzei_logs
 from servotwin.identification.logs.sidecar import FOLDER_FILE, FORMAT
+from servotwin.signals.time_base import warn_of_time_base
 
 
 class _JsonFormat(NamedTuple):
@@ -59,6 +60,11 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     MissingExtraError
         If it is a LeRobot dataset, and pyarrow is not installed.
 
+    Warns
+    -----
+    UserWarning
+        If the times of a log look as if they were a thousand times too long or too short.
+
     Examples
     --------
     >>> import pathlib, tempfile
@@ -90,6 +96,7 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
             raise InputError(f"{path}: name of a log", allowed="a name for each log",
                              got=f"{log.name} in {seen[log.name]} and in {Path(log.source).name}")
         seen[log.name] = Path(log.source).name
+        warn_of_time_base(log.time, log.command, log.command_kind, f"log {log.name!r}")
     return logs
 
 

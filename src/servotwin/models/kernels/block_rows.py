@@ -70,7 +70,7 @@ class Lanes(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What goes out: (B, T) each, or (0, 0) where it is not wanted; and which lanes were given up."""
+    """What goes out: (B, T) each, or (0, 0) where it is not wanted; which lanes were given up, and where all ended."""
 
     angle: Numbers
     speed: Numbers
@@ -78,6 +78,7 @@ class Outputs(NamedTuple):
     drive: Smalls
     error: Numbers
     given_up: Smalls
+    final: Numbers  # (B, 4), float64: last angle and speed, temperatures of winding and housing
 
 
 def fill_shafts(plants: Numbers, torque: Numbers, start: int, size: int, s: Numbers) -> None:

@@ -67,6 +67,8 @@ def run_block(lanes: Lanes, start: int, size: int, braked: bool, duration: float
         k += 1
     for j in range(size):
         outputs.given_up[start + j] = 1 if s[at.LOST + j] != 0.0 else 0
+        outputs.final[start + j, 0] = s[at.Q + j]
+        outputs.final[start + j, 1] = s[at.W + j]
 
 
 def _needs_all(c: Numbers, lane: int) -> bool:

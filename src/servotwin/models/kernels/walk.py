@@ -130,14 +130,15 @@ def measured(plant: Plant, chip: Chip, curve: Sequence[Sequence[float]] | NDArra
 
 def walk(pulsed: bool, plant: Plant, chip: Chip, curve: NDArray[np.float64], command: NDArray[np.float64],
          torque: NDArray[np.float64], constant_torque: float, period: float, edges: NDArray[np.float64], start: Point,
-         seed: int, duration: float, times: NDArray[np.float64], outputs: NDArray[np.float64]) -> tuple[int, float]:
+         seed: int, duration: float, times: NDArray[np.float64], outputs: NDArray[np.float64],
+         final: NDArray[np.float64]) -> tuple[int, float]:
     """Run one servo from t = 0 to `duration` [s]; return a status and when it ended [s].
 
     `command` and `torque` are tables of pieces, one a row (no row: no torque). Frames start at `edges` [s], or every
     `period` where that is not 0. What stands at `times` goes into `outputs`, shape (13, n): angle, speed, contact,
     drive, error, and what only few servos have: current, temperatures of winding and housing, angle and speed of the
-    motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there. It is left
-    as it was after a failure.
+    motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there. Angle,
+    speed and temperatures at the end go into `final`. Both are left as they were after a failure.
     """
     point = start
     now = frame.AT_START
@@ -195,6 +196,7 @@ def walk(pulsed: bool, plant: Plant, chip: Chip, curve: NDArray[np.float64], com
             outputs[10, done] = frame.wiper_at(plant.half_slack, wiper, y[0])
             outputs[11, done], outputs[12, done] = m.mode.mesh, m.mode.motor
             done += 1
+    final[0], final[1], final[2], final[3] = point.y[0], point.y[1], point.y[3], point.y[4]
     return COMPLETED, duration
 
 

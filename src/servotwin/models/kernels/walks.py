@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
 def walk_lanes(pulsed: bool, lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indices,
                torque_count: Indices, which: Indices, duration: float, times: Numbers, outputs: Numbers,
-               status: Indices, ended: Numbers) -> None:
-    """Run the lanes named in `which`; `outputs` has the shape (n, 13, T), as in `walk`, and is zero."""
+               final: Numbers, status: Indices, ended: Numbers) -> None:
+    """Run the lanes named in `which`; `outputs` has the shape (n, 13, T), as in `walk`, and is zero.
+
+    `final`, shape (n, 4), is where they end.
+    """
     for k in range(which.size):
         lane = which[k]
         first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
@@ -29,7 +32,7 @@ def walk_lanes(pulsed: bool, lanes: Lanes, curve: Numbers, torques: Numbers, tor
                              INSIDE if plant.half_play > 0.0 else RIGID)
         how, when = walk.walk(
             pulsed, plant, chip_at(lanes.chips, lane), curve, lanes.pieces[first:last], torques[begin:end],
-            lanes.torque[lane], period, edges, start, lanes.seeds[lane], duration, times, outputs[k])
+            lanes.torque[lane], period, edges, start, lanes.seeds[lane], duration, times, outputs[k], final[k])
         status[k] = how
         ended[k] = when
 

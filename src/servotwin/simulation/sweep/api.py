@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError
+from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.sweep.folder import Folder
 from servotwin.simulation.sweep.jobs import run_chunk
@@ -82,6 +83,11 @@ def sweep(
     OutputError
         If the folder cannot be written; what is finished is kept.
 
+    Warns
+    -----
+    UserWarning
+        As `simulate` does, once for all lanes.
+
     Examples
     --------
     >>> import servotwin as st
@@ -97,6 +103,7 @@ def sweep(
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     plan = planned(model, command, duration=duration, vary=vary, draws=draws, lanes=lanes, load=load, seed=seed,
                    sampling=sampling, truncate=truncate, metrics=metrics, output_step=output_step, chunk=chunk)
+    warn_of(model.servo, [command], duration, voltages=plan.columns.get("supply.open_circuit_voltage"))
     folder = None
     if directory is not None:
         folder = Folder(directory, plan.definition, file_format=file_format, resume=resume)

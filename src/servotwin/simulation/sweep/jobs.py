@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from servotwin.loads import Load
 from servotwin.models import Model
 from servotwin.signals import Signal
-from servotwin.simulation.many import simulate_many
+from servotwin.simulation.lane_inputs import lanes_of
+from servotwin.simulation.many import simulate_lanes
+from servotwin.simulation.remarks import columns
 from servotwin.simulation.sweep.metrics import lane_metrics, signals_of
 
 _AT_ONCE = 2**17  # numbers of one signal: they stay in a core's cache
@@ -52,19 +54,19 @@ class Job:
 
 
 def run_chunk(job: Job, parameters: Mapping[str, NDArray[Any]], seeds: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
-    """Return the metrics of some lanes, their status (a code of `Status`) and when they ended [s], each (n,).
+    """Return the metrics of some lanes, their status (a code of `Status`), end [s] and remarks, each (n,).
 
     A lane that ends early has no metrics: they are nan.
     """
-    batch = simulate_many(
-        job.model, job.command, duration=job.duration, load=job.load, parameters=parameters, seeds=seeds,
+    batch = simulate_lanes(
+        lanes_of(job.model, job.command, job.load, parameters, None, seeds), duration=job.duration,
         output_times=job.times, outputs=signals_of(job.metrics), executor=Here(), chunk=job.block)
     ended = np.full(len(batch), job.duration)
     for failure in batch.failures:
         ended[failure.lane] = failure.time
     found = lane_metrics(job.metrics, job.times, job.start, batch.signals)
     return {**{name: np.where(batch.status == 0, column, np.nan) for name, column in found.items()},
-            "status": np.asarray(batch.status), "ended": ended}
+            "status": np.asarray(batch.status), "ended": ended, **columns(batch.remarks, len(batch))}
 
 
 class Here:

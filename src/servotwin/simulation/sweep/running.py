@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServotwinError
 from servotwin.simulation.many import _workers
+from servotwin.simulation.remarks import COLUMNS
 from servotwin.simulation.status import Status
 from servotwin.simulation.sweep.jobs import run_chunk
 
@@ -28,7 +29,7 @@ _NAMES = np.array([status.name for status in Status])
 
 def table_names(plan: Plan) -> tuple[str, ...]:
     """Return the names of the columns of the table."""
-    return ("lane", *plan.columns, *plan.followed, *plan.job.metrics, "status", "ended")
+    return ("lane", *plan.columns, *plan.followed, *plan.job.metrics, "status", "ended", *COLUMNS.values())
 
 
 def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[int], object]) -> Columns:
@@ -45,7 +46,8 @@ def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[i
     """
     table: Columns = {"lane": np.arange(plan.lanes), **plan.columns, **plan.followed}
     table |= {name: np.empty(plan.lanes) for name in plan.job.metrics}
-    table |= {"status": np.full(plan.lanes, Status.COMPLETED.name, _NAMES.dtype), "ended": np.empty(plan.lanes)}
+    table |= {"status": np.full(plan.lanes, Status.COMPLETED.name, _NAMES.dtype), "ended": np.empty(plan.lanes),
+              **{name: np.empty(plan.lanes) for name in COLUMNS.values()}}
     names, missing, done = table_names(plan), [], 0
     for k in range(plan.chunks):
         if folder is None or not folder.has(k):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, MissingExtraError, UnknownNameError
+from servotwin.simulation.remarks import KINDS, LaneRemark, of_columns
 from servotwin.simulation.status import Status
 from servotwin.simulation.sweep.folder import Folder
 from servotwin.simulation.sweep.tornado import Tornado, bar_of, tornado_of, variance_share
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from servotwin.simulation.sweep.plan import Plan
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-_MOST_NAMED = 100  # failures in a summary
+_MOST_NAMED = 100  # failures in a summary, and lanes of a kind of remark
 
 
 class LaneFailure(NamedTuple):
@@ -44,7 +46,8 @@ class Study:
         What was run.
     table : mapping of str to ndarray, shape (lanes,)
         "lane", all that is drawn and every parameter that follows from it by dotted name (SI), every metric (SI; nan
-        where a lane has none), "status" (name of a `Status`) and "ended" [s].
+        where a lane has none), "status" (name of a `Status`), "ended" [s], and for each kind of remark its time [s],
+        nan in lanes of which it is not said: "pulses_refused", "ended_on_a_stop", "cannot_hold".
     moved : mapping of str to ndarray
         Each metric in the lanes of the tornado: the nominal lane, then each end of each parameter.
     """
@@ -55,7 +58,7 @@ class Study:
 
     def __repr__(self) -> str:
         return (f"Study({self.plan.job.model!r}, lanes={len(self)}, parameters={self.parameters}, "
-                f"metrics={self.metrics}, failures={len(self.failures)})")
+                f"metrics={self.metrics}, failures={len(self.failures)}, remarks={len(self.remarks)})")
 
     def __len__(self) -> int:
         """Return the number of lanes."""
@@ -87,6 +90,18 @@ class Study:
         status, ended = self.table["status"], self.table["ended"]
         return tuple(LaneFailure(int(k), float(ended[k]), Status[str(status[k])].message)
                      for k in np.flatnonzero(status != Status.COMPLETED.name))
+
+    @cached_property
+    def remarks(self) -> tuple[LaneRemark, ...]:
+        """What is to be said of lanes that reached their end, (lane, kind, time [s]), as `Result.remarks`."""
+        return of_columns(self.table)
+
+    def remarked(self) -> dict[str, tuple[int, ...]]:
+        """Return the lanes of each kind of remark that there is."""
+        found: dict[str, list[int]] = {kind: [] for kind in KINDS}
+        for remark in self.remarks:
+            found[remark.kind].append(remark.lane)
+        return {kind: tuple(lanes) for kind, lanes in found.items() if lanes}
 
     def quantiles(self, probabilities: Sequence[float] = QUANTILES) -> dict[str, dict[float, float]]:
         """Return quantiles of each metric by name and probability.
@@ -137,11 +152,14 @@ class Study:
         return pd.DataFrame(dict(self.table)).set_index("lane")
 
     def summary(self) -> dict[str, Any]:
-        """Return quantiles, tornados and failures, ready for JSON; what is not finite is None."""
+        """Return quantiles, tornados, failures and remarks, ready for JSON; what is not finite is None."""
         quantiles = self.quantiles()
         found: dict[str, Any] = {
             "lanes": len(self), "failed": len(self.failures),
-            "failures": [failure._asdict() for failure in self.failures[:_MOST_NAMED]], "metrics": {}}
+            "failures": [failure._asdict() for failure in self.failures[:_MOST_NAMED]],
+            "remarks": {kind: {"lanes": len(lanes), "first": list(lanes[:_MOST_NAMED])}
+                        for kind, lanes in self.remarked().items()},
+            "metrics": {}}
         for name in self.metrics:
             tornado = self.tornado(name)
             found["metrics"][name] = {

@@ -48,8 +48,13 @@ def encoded(columns: Mapping[str, Column], file_format: str) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    writer.writerows(zip(*(_signless(column).tolist() for column in columns.values()), strict=True))
     return text.getvalue().encode()
+
+
+def _signless(column: Column) -> Column:
+    """Return a column with 0 for -0."""
+    return column + 0.0 if column.dtype.kind == "f" else column
 
 
 def read_columns(path: str | Path) -> dict[str, Column]:

@@ -20,12 +20,14 @@ def readable(value: float | str, dimension: str) -> str:
     --------
     >>> readable(8e-6, "time"), readable(3.04101, "resistance"), readable("coast", "word")
     ('8 µs', '3.041 Ω', 'coast')
+    >>> readable(-0.0, "angle")
+    '0°'
     """
     if isinstance(value, str):
         return value
     unit = unit_for(value, dimension)
     text = label_of(unit)
-    return f"{units.from_si(value, unit, dimension):.4g}{'' if text in ('', '°') else ' '}{text}"
+    return f"{units.from_si(value, unit, dimension):z.4g}{'' if text in ('', '°') else ' '}{text}"
 
 
 def unit_for(value: float, dimension: str) -> str:
@@ -82,9 +84,9 @@ def figure_in(value: float, unit: str, dimension: str, *, within: float = math.n
     shown = units.from_si(value, unit, dimension)
     spread = abs(units.from_si(within, unit, dimension)) if math.isfinite(within) else 0.0
     if spread == 0.0 or spread < 1e-6 * abs(shown):
-        return f"{shown:.4g}"
+        return f"{shown:z.4g}"
     places = 1 - math.floor(math.log10(spread))
     least = 2 - math.floor(math.log10(abs(shown))) if shown else 0  # never fewer than three digits of the value
     places = max(places, min(least, places + 2), 0)
-    text = f"{shown:.{places}f}"
-    return text if len(text) <= 12 else f"{shown:.4g}"
+    text = f"{shown:z.{places}f}"
+    return text if len(text) <= 12 else f"{shown:z.4g}"

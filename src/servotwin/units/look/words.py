@@ -41,10 +41,7 @@ def fixed(value: float, places: int) -> str:
     >>> fixed(-0.9779, 2), fixed(-0.0001, 2)
     ('−0.98', '0.00')
     """
-    text = f"{value:.{places}f}"
-    if float(text) == 0.0:
-        text = text.removeprefix("-")
-    return text.replace("-", MINUS)
+    return f"{value:z.{places}f}".replace("-", MINUS)
 
 
 def with_error(value: float, error: float, unit: str = "") -> str:

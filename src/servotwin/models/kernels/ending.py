@@ -1,0 +1,147 @@
+"""What a user should know of how a run ended: of its last pulses, of end stops, and of the load.
+
+All of it follows from what the servo was told and where it stands at the end, so it costs one look at each run.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from servotwin.models.kernels import contact, frame
+from servotwin.models.kernels.block_rows import plant_at
+from servotwin.models.kernels.frame import Chip
+from servotwin.models.kernels.plant import Plant, at_temperature
+from servotwin.models.kernels.walks import chip_at
+from servotwin.physics.pieces import Piece, piece_value
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from servotwin.models.kernels.block_rows import Indices, Lanes, Numbers, Smalls
+
+ON_STOP, CANNOT_HOLD = 1, 2  # added up
+
+_AT_STOP = 1e-6  # rad, relative beyond 1 rad: single precision
+_ROUNDING = 1e-9  # rad
+
+
+def last_frame(period: float, edges: Sequence[float] | NDArray[np.float64], duration: float) -> int:
+    """Return the number of the last frame that starts before the end of a run; −1 where none does."""
+    if period > 0.0:
+        k = int(duration / period) + 1
+    else:
+        k = len(edges) - 1
+    while k >= 0 and frame.edge_time(period, edges, k) >= duration:
+        k -= 1
+    return k
+
+
+def piece_before(table: NDArray[np.float64], time: float, included: bool) -> Piece:
+    """Return the piece of a table in force at `time` [s], or just before it; the first one before all."""
+    low, high = 0, table.shape[0]
+    while high - low > 1:
+        middle = (low + high) // 2
+        start = table[middle, 0]
+        if start < time or (included and start == time):
+            low = middle
+        else:
+            high = middle
+    return Piece(table[low, 0], table[low, 1], table[low, 2], table[low, 3], table[low, 4], table[low, 5],
+                 table[low, 6])
+
+
+def width_at(command: NDArray[np.float64], time: float) -> float:
+    """Return the width [s] of a pulse that starts at `time` [s]."""
+    return piece_value(piece_before(command, time, True), time)
+
+
+def refused_from(chip: Chip, command: NDArray[np.float64], period: float,
+                 edges: Sequence[float] | NDArray[np.float64], duration: float) -> float:
+    """Return when the first pulse came [s] from which on the chip refuses all; nan where it takes the last one."""
+    first = math.nan
+    k = last_frame(period, edges, duration)
+    while k >= 0:
+        t = frame.edge_time(period, edges, k)
+        if frame.accepted(chip, width_at(command, t)):
+            break
+        first = t
+        k -= 1
+    return first
+
+
+def told(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], period: float,
+         edges: Sequence[float] | NDArray[np.float64], duration: float) -> tuple[float, float]:
+    """Return the angle [rad] that the servo was told last, and how far from it nothing is done."""
+    if not pulsed:
+        voltage = piece_value(piece_before(command, duration, False), duration)
+        return (voltage - plant.b_o) / plant.p, plant.half_deadband / plant.p
+    k = last_frame(period, edges, duration)
+    width = width_at(command, frame.edge_time(period, edges, k) if k >= 0 else duration)
+    return ((width - chip.T_0) / chip.slope - chip.b_o) / chip.p, chip.half_deadband / (chip.slope * chip.p)
+
+
+def standstill_torque(plant: Plant, source: float) -> float:
+    """Return the torque [N m] of full drive at a standstill, from a source of so many volts; friction apart."""
+    if plant.V > 0.0:
+        return plant.K * min(max(source - plant.D_drive, 0.0) / plant.R_drive, plant.I_max)
+    return plant.K * plant.V_max / plant.R
+
+
+def starts(plant: Plant, forward: bool, torque: float, tau: float, q: float) -> bool:
+    """Tell whether a motor's torque [N m] turns a shaft that stands at q, against friction and load."""
+    against = contact.external_torque(plant, tau, q)
+    if forward:
+        return torque - against > contact.holding_bounds(plant, torque, -against)[1]
+    return -torque - against < -contact.holding_bounds(plant, -torque, -against)[0]
+
+
+def marks(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], tau: float, period: float,
+          edges: Sequence[float] | NDArray[np.float64], duration: float, source: float, refused: bool,
+          final: Sequence[float] | NDArray[np.float64]) -> int:
+    """Return what is so at the end of a run, as a sum of `ON_STOP` and `CANNOT_HOLD`.
+
+    `tau` is the part of the load's torque that depends on time alone [N m], `source` the voltage of the supply, other
+    servos' currents apart [V], `final` the last angle and speed, and temperatures of winding and housing.
+    """
+    if plant.p == 0.0:  # a motor is told no angle
+        return 0
+    q, w, T_w, T_h = final[0], final[1], final[2], final[3]
+    target, slack = told(pulsed, plant, chip, command, period, edges, duration)
+    if abs(target - q) <= slack + _ROUNDING:
+        return 0
+    found = 0
+    above = q >= plant.upper - _AT_STOP * max(abs(plant.upper), 1.0)
+    if w == 0.0 and (above or q <= plant.lower + _AT_STOP * max(abs(plant.lower), 1.0)):
+        found += ON_STOP
+    if plant.C_w > 0.0:
+        plant = at_temperature(plant, T_w, T_h)
+    torque = standstill_torque(plant, source)
+    if refused or not torque < math.inf:
+        return found
+    forward = target > q
+    sent = min(max(target, plant.lower), plant.upper)
+    if not (starts(plant, forward, torque, tau, q) and starts(plant, forward, torque, tau, sent)):
+        found += CANNOT_HOLD
+    return found
+
+
+def look_at_lanes(pulsed: bool, lanes: Lanes, torques: Numbers, torque_first: Indices, torque_count: Indices,
+                  duration: float, final: Numbers, refused: Numbers, found: Smalls) -> None:
+    """Look at the end of every lane: fill `refused` with `refused_from`, and `found` with `marks`."""
+    for lane in range(lanes.torque.size):
+        command = lanes.pieces[lanes.piece_first[lane]:lanes.piece_first[lane] + lanes.piece_count[lane]]
+        own = lanes.edge_count[lane]
+        edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
+        plant, chip = plant_at(lanes.plants, lane), chip_at(lanes.chips, lane)
+        period = 0.0 if own >= 0 else chip.frame_period
+        tau = lanes.torque[lane]
+        if torque_count[lane] > 0:
+            own_torque = torques[torque_first[lane]:torque_first[lane] + torque_count[lane]]
+            tau += piece_value(piece_before(own_torque, duration, False), duration)
+        refused[lane] = refused_from(chip, command, period, edges, duration) if pulsed else math.nan
+        found[lane] = marks(pulsed, plant, chip, command, tau, period, edges, duration, plant.V,
+                            not math.isnan(refused[lane]), final[lane])
