@@ -94,7 +94,7 @@ def test_resume(sweep, tmp_path):
     assert "not empty" in sweep(*words).error
     os.remove(tmp_path / "study" / "lanes-00000.csv")
     assert sweep(*words, "--resume").out == first.out
-    assert "lanes: got 31, allowed: 30, as there" in sweep(*STEP, *VARY, "--lanes", "31", "--out", "study",
+    assert "lanes is 31 and was 30" in sweep(*STEP, *VARY, "--lanes", "31", "--out", "study",
                                                            "--resume").error
 
 
@@ -128,7 +128,7 @@ def test_truncation(sweep):
     ([*VARY, "--out", "file"], "file is no folder"),
     ([*VARY, "--out", "none/study"], "none/study cannot be made (no folder none)"),
     ([*VARY, "--out", "study", "--format", "xlsx"], "csv, parquet"),
-    (["--from-file", "--set", "motor.armature_resistance=nan"], "motor.armature_resistance: got nan"),
+    (["--from-file", "--set", "motor.armature_resistance=nan"], "--set motor.armature_resistance: got 'nan'"),
     (["--vary", "sheet.stall_torque=normal:5V"], "unit of a torque: got 'V'"),
     (["--vary", "sheet.gear_efficiency=uniform:0.8..1.2"], "allowed: a positive number, at most 1 [1]"),
     (["--vary", "output_torque_constant=normal:5%"], "from which nothing of 'hitec-hs-755hb' follows"),

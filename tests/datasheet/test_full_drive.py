@@ -1,13 +1,17 @@
 """Speed, current and torque at full drive are those of the paper's formulas, and those that simulations settle at."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
 
 import servotwin as st
+from servotwin.cli.servo_facts import twin_torque
 from servotwin.datasheet import FullDrive
 from servotwin.errors import InputError
+from servotwin.models import default_model
+from servotwin.parameters import printed_points
 
 # Terms of the circuit and of the gear, each alone and all together
 TERMS = {
@@ -120,3 +124,14 @@ def test_what_cannot_lift_does_not_get_there(servo):
 def test_what_has_no_supply_or_does_not_turn_is_refused(servo, kind, change, said):
     with pytest.raises(InputError, match=said):
         FullDrive(kind(servo.replace(change)))
+
+
+def test_the_torque_of_lists_is_that_of_full_drive():
+    """`servotwin catalog list` has the closed form of the balance that full drive solves."""
+    for name in st.catalog_names():
+        servo = st.load_servo(name)
+        volts = printed_points(servo)[0].supply_voltage
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of digital servos and impossible sheets
+            drive = FullDrive(default_model(servo.replace({"supply.open_circuit_voltage": volts})))
+        assert twin_torque(servo) == pytest.approx(drive.stall_torque, rel=1e-12), name

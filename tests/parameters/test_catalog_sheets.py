@@ -54,6 +54,7 @@ def test_no_source_is_a_file_of_ours(servo):
         assert not re.search(r"file id|\.csv|/work|/home|/tmp|servo_specs", text), text
 
 
+@pytest.mark.filterwarnings("ignore:.* contradicts itself")
 @pytest.mark.parametrize("kind", MODELS.values(), ids=list(MODELS))
 @pytest.mark.parametrize("name", MADE[::5])
 def test_the_models_run_them(name, kind):
@@ -65,6 +66,7 @@ def test_the_models_run_them(name, kind):
     assert result[model.layout[0]][-1] - result[model.layout[0]][0] > 0.01
 
 
+@pytest.mark.filterwarnings("ignore:.* contradicts itself")
 def test_simulated_speed_and_stall_torque_are_the_sheets(servo):
     """The pulse servo against the formulas within 1.5 and 3 %, and these against the print within what it disagrees.
 

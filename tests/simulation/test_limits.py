@@ -42,6 +42,7 @@ def test_without_friction_the_servo_is_linear(servo, model_class):
     np.testing.assert_allclose(result["output_angle"] - result["output_angle"][0], 0.6 * response, atol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:.* is more than twice")
 def test_the_bounded_servo_without_bounds_is_the_linear_one(servo):
     wide = servo.replace({"friction.coulomb_torque_forward": 0.0, "friction.coulomb_torque_backward": 0.0,
                           "electronics.voltage_deadband": 0.0, "supply.open_circuit_voltage": 1e6})

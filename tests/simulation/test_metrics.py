@@ -199,6 +199,7 @@ def test_a_step_that_moves_nothing_has_no_times(servo):
     st.signals.step(20.0, 80.0, at=5.0, unit="deg"),
     st.signals.samples([0.0, 0.1], [20.0, 30.0], unit="deg", hold="linear"),
 ])
+@pytest.mark.filterwarnings("ignore:the first change of the command")
 def test_what_is_no_step_within_the_run_is_refused(servo, command):
     result = st.simulate(st.BoundedServo(servo), command, duration=0.3)
     with pytest.raises(InputError, match=r"step metrics: got .*, allowed: ") as caught:

@@ -25,6 +25,7 @@ def test_a_sine_is_followed_through_hundreds_of_stick_phases(servo, amplitude, f
 ])
 def test_bouncing_ends_where_a_bounce_is_lower_than_rounding(servo, change):
     """Tens of thousands of bounces followed each other below the last digit of the angle."""
+    change = {**change, "electronics.pulse_width_max": 4e-3}
     result = st.simulate(st.BoundedServo(servo.replace(change)), st.signals.step(900.0, 3500.0, unit="us"),
                          duration=1.0, load=loads.Constant(-2.0))
     assert result.status.ok

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 _FEWEST = 3  # samples, to tell a rhythm
 _SLOW = 10.0  # s between samples: 20 ms would be 20 s
+_WIDEST = 0.02  # s
 _FAST = {"angle": 350.0, "pulse_width": 0.2}  # rad/s, s/s: hundreds of times what servos follow
 
 
@@ -37,6 +38,8 @@ def warn_of_time_base(time: NDArray[np.float64], value: NDArray[np.float64], kin
                       stacklevel=stacklevel)
     steps = np.abs(np.diff(value))
     span = float(time[-1] - time[0])
+    if kind == "pulse_width" and value.max() > _WIDEST:
+        return  # its unit is another one
     if kind in _FAST and np.count_nonzero(steps) > 1 and steps.sum() > _FAST[kind] * span:
         warnings.warn(f"{what}: its {time.size} samples go to and fro within {1e3 * span:g} ms, faster than any servo; "
                       "were the times given in seconds and read as milliseconds?", stacklevel=stacklevel)

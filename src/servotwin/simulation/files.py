@@ -35,7 +35,7 @@ def save_csv(path: str | Path, signals: Mapping[str, NDArray[np.float64]], si_un
         If it cannot be written.
     """
     shown = shown_columns(signals, si_units)
-    table = np.column_stack(list(shown.values())) + 0.0  # -0 becomes 0
+    table = np.column_stack(list(shown.values()))
     write_file(path, lambda file: np.savetxt(file, table, fmt="%.12g", delimiter=",", header=",".join(shown),
                                              comments="", encoding="utf-8"), overwrite=overwrite)
 
@@ -51,7 +51,8 @@ def shown_columns(signals: Mapping[str, NDArray[Any]], si_units: Mapping[str, st
     found = {}
     for name, values in signals.items():
         suffix, unit, dimension = _OWN.get(name) or _COLUMNS[si_units[name]]
-        found[f"{name}_{suffix}" if suffix else name] = np.asarray(units.from_si(values, unit, dimension))
+        signless = np.asarray(units.from_si(values, unit, dimension)) + 0.0  # -0 becomes 0
+        found[f"{name}_{suffix}" if suffix else name] = signless
     return found
 
 

@@ -113,7 +113,7 @@ def simulate_many(
     (4, 1)
     """
     lanes = lanes_of(model, command, load, parameters, initial, seeds)
-    if is_finite(duration):
+    if is_finite(duration) and duration > 0.0:
         warn_of(lanes.model.servo, lanes.commands, duration,
                 voltages=lanes.numbers.get("supply.open_circuit_voltage"))
     return simulate_lanes(lanes, duration=duration, output_step=output_step, output_times=output_times,

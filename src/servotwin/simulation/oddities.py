@@ -44,7 +44,8 @@ def _of_servo(servo: Servo, voltages: ArrayLike | None) -> Iterator[str]:
         yield (f"{servo.name}: its data sheet contradicts itself ({reason}); no servo has all that it says, nor does "
                "this one")
     given = servo.supply.open_circuit_voltage if voltages is None else float(np.max(voltages))
-    rated = max((point.supply_voltage for point in printed_points(servo) if point.supply_voltage), default=None)
+    printed = [point.supply_voltage for point in printed_points(servo) if point.supply_voltage is not None]
+    rated = max(printed, default=None)
     if given is not None and rated is not None and given > _TOO_MUCH * rated:
         yield f"{servo.name}: a supply of {given:g} V is more than twice the {rated:g} V of its data sheet"
 
