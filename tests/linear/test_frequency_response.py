@@ -85,6 +85,7 @@ def test_sines_of_one_degree_follow_the_transfer_function(name):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.* contradicts itself")
 @pytest.mark.parametrize("name", ANALOG)
 def test_sines_of_one_degree_follow_the_transfer_function_of_every_analog_servo(name):
     follows_its_transfer_function(name)

@@ -122,9 +122,14 @@ def _discard_stdout() -> None:
 def _one_line_warnings() -> Iterator[None]:
     from servotwin.cli.failure import one_line
 
+    said: set[str] = set()
+
     def show(message: Warning | str, category: type[Warning], filename: str, lineno: int,
              file: TextIO | None = None, line: str | None = None) -> None:
-        _try_write(sys.stderr, f"servotwin: warning: {one_line(str(message))}")
+        text = one_line(str(message))
+        if text not in said:  # several runs of one command would repeat it
+            said.add(text)
+            _try_write(sys.stderr, f"servotwin: warning: {text}")
 
     with warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)

@@ -64,6 +64,8 @@ def _of_commands(commands: Sequence[Signal], duration: float) -> Iterator[str]:
 def first_change(command: Signal) -> float | None:
     """Return when a command changes first, or its first pulse comes [s]; None where it never changes.
 
+    A single pulse that comes late is how a servo is left without pulses.
+
     Examples
     --------
     >>> from servotwin.signals import constant, pulse_train, step
@@ -73,7 +75,7 @@ def first_change(command: Signal) -> float | None:
     0.5
     """
     if command.edges is not None:
-        return command.edges[0] if command.edges else None
+        return command.edges[0] if len(command.edges) > 1 else None
     first, *rest = command.pieces.table
     if first.slope or first.amplitude:
         return first.start
