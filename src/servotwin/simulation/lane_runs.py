@@ -28,7 +28,7 @@ _PLAIN_WALKS = Recipe(
 _SWINGING = Recipe(
     "pendulum_walks", _ENTRY, absent=(*((name, x) for name, x in _RARE.items() if name != "gravity"), ("sweep", 0.0)),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
-_ENDING = Recipe("ending", ("servotwin.models.kernels.ending:look_at_lanes",))
+_ENDING = Recipe("ending", ("servotwin.models.kernels.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a walk leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
