@@ -15,7 +15,8 @@ from servotwin.physics.thermal import Temperatures, winding_resistance
 
 @pytest.fixture(scope="module")
 def sheet():
-    return st.curves(st.PulseServo(st.load_servo("towerpro-mg995")), voltage=[4.8, 6.0], bandwidth=False)
+    with pytest.warns(UserWarning, match="contradicts itself"):
+        return st.curves(st.PulseServo(st.load_servo("towerpro-mg995")), voltage=[4.8, 6.0], bandwidth=False)
 
 
 def test_curves_run_from_standing_to_turning_freely(sheet):

@@ -253,6 +253,7 @@ def test_an_impossible_sheet_is_no_servo():
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.filterwarnings("ignore:.*contradicts itself")
 def test_an_impossible_sheet_may_be_allowed_and_stays_flagged():
     servo = servo_from_sheet(IMPOSSIBLE, allow_impossible=True)
     assert servo.sheet["flags"][0] == "impossible: efficiency 1.45 at 8.4 V"

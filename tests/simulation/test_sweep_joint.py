@@ -63,6 +63,7 @@ def test_of_the_nominal_numbers_the_file_follows(kind):
         assert set(found) == together.covers & given
 
 
+@pytest.mark.filterwarnings("ignore:.*contradicts itself")  # the sheet of the Geekservo
 @pytest.mark.parametrize("name", ["hitec-hs-485hb", "geekservo-2kg", "hitec-hs-422"])
 def test_each_lane_has_the_speed_and_the_torque_that_were_drawn(name):
     """A shaft without inertia worth mentioning is at its speed at once; it turns against less than its stall torque."""
@@ -189,6 +190,7 @@ def test_a_motor_that_was_set_is_no_longer_that_of_the_sheet(change):
     assert not set(change) & set(found)
 
 
+@pytest.mark.filterwarnings("ignore:the first change of the command")
 def test_what_is_varied_by_name_is_varied_alone():
     model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
     study = st.sweep(model, STEP_LATER, duration=0.02, lanes=4, vary={"gear.gear_reduction": "normal:10%"})

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 _FEWEST = 3  # samples, to tell a rhythm
 _SLOW = 10.0  # s between samples: 20 ms would be 20 s
 _WIDEST = 0.02  # s
-_FAST = {"angle": 350.0, "pulse_width": 0.2}  # rad/s, s/s: hundreds of times what servos follow
+_FAST = {"angle": 1000.0, "pulse_width": 0.6}  # rad/s, s/s: a hundred times what servos follow
 
 
 def warn_of_time_base(time: NDArray[np.float64], value: NDArray[np.float64], kind: str, what: str, *,
