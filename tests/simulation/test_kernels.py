@@ -30,7 +30,7 @@ def test_each_compiled_form_moves_a_servo_as_it_should(servo, monkeypatch, name)
     model = st.PulseServo(servo.replace(changes))
     column = {"motor.armature_resistance": [2.8, 3.2, 3.6]}
     batch = st.simulate_many(model, STEP, duration=0.15, load=load, parameters=column, output_step=0.01, dtype=dtype)
-    assert set(used) == {name, "ending"}  # which looks at the end of each lane
+    assert set(used) - {"ending"} == {name}  # how a lane ends is looked at by a form of its own
     for lane, R in enumerate(column["motor.armature_resistance"]):
         alone = st.simulate(st.PulseServo(model.servo.replace({"motor.armature_resistance": R})), STEP, duration=0.15,
                             load=load, output_step=0.01)
