@@ -106,7 +106,7 @@ def thermal_masses(servo: Servo) -> Masses | None:
             "winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient", "ambient",
             "magnet_coefficient") if getattr(given, name) is not None}
         return Masses(**{"magnet_coefficient": 0.0, **numbers}, assumed=False)
-    mass = printed_fact(servo.sheet, "mass", "mass")
+    mass = printed_fact(servo.sheet, "mass")
     return None if mass is None else masses_by_mass(mass)
 
 

@@ -126,7 +126,7 @@ def _judged(servo: Servo, mass: float, arm: float, voltage: float, time: float |
     if math.isnan(swing.time) or (time is not None and swing.time > time):
         return Refused(servo=servo, kind="time", reason="creeps" if math.isnan(swing.time) else
                        f"takes {swing.time:.2f} s")
-    weight = printed_fact(servo.sheet, "mass", "mass")
+    weight = printed_fact(servo.sheet, "mass")
     return Candidate(servo=servo, mass=math.nan if weight is None else weight, most_torque=capable,
                      margin=capable / torque, time=swing.time, notes=_notes(servo, voltage, most))
 

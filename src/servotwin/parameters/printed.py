@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin import units
 from servotwin.errors import ServotwinError
+from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE
 
 if TYPE_CHECKING:
     from servotwin.parameters.servo import Servo
+
+_FIGURES = {**POINT, **WHOLE}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,22 +40,25 @@ class PrintedPoint:
     stall_current: float | None
 
 
-def printed_fact(table: Mapping[str, Any], name: str, dimension: str) -> float | None:
-    """Return a figure of a table of a sheet (SI); None where it is not there, or no figure of this dimension.
+def printed_fact(table: Mapping[str, Any], key: str) -> float | None:
+    """Return a figure of a table of a sheet (SI) by its key in the file, such as "mass"; None where it is not one.
+
+    Unlike `sheet_table.figure`, which computes with it, this shows what is there: a person's own [sheet] may hold
+    anything.
 
     Examples
     --------
     >>> from servotwin.parameters import load_servo
-    >>> printed_fact(load_servo("towerpro-mg996r").sheet, "mass", "mass")
+    >>> printed_fact(load_servo("towerpro-mg996r").sheet, "mass")
     0.055
     """
-    entry = table.get(name)
+    entry = table.get(key)
     if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
         return None
     try:
-        value = units.to_si(entry["value"], str(entry.get("unit")), dimension)
+        value = units.to_si(entry["value"], str(entry.get("unit")), _FIGURES[key][1])
     except ServotwinError:
-        return None  # a person's own [sheet] may hold anything
+        return None
     return value if math.isfinite(value) else None
 
 
@@ -65,7 +71,7 @@ def printed_points(servo: Servo) -> tuple[PrintedPoint, ...]:
     >>> [point.stall_torque for point in printed_points(load_servo("emax-es08a"))]
     [0.177, 0.147]
     """
-    others = servo.sheet.get("also_at")
+    others = servo.sheet.get(ELSE)
     tables = [servo.sheet, *(others if isinstance(others, list) else [])]
     return tuple(_point(table) for table in tables if isinstance(table, Mapping))
 
@@ -85,8 +91,8 @@ def printed_flags(servo: Servo) -> tuple[str, ...]:
 
 def _point(table: Mapping[str, Any]) -> PrintedPoint:
     return PrintedPoint(
-        supply_voltage=printed_fact(table, "supply_voltage", "voltage"),
-        stall_torque=printed_fact(table, "stall_torque", "torque"),
-        time_60=printed_fact(table, "speed_per_60deg", "time"),
-        no_load_current=printed_fact(table, "no_load_current", "current"),
-        stall_current=printed_fact(table, "stall_current", "current"))
+        supply_voltage=printed_fact(table, "supply_voltage"),
+        stall_torque=printed_fact(table, "stall_torque"),
+        time_60=printed_fact(table, "speed_per_60deg"),
+        no_load_current=printed_fact(table, "no_load_current"),
+        stall_current=printed_fact(table, "stall_current"))
