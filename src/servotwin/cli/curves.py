@@ -52,7 +52,7 @@ def curves(
         metavar="FILE", help="Draw the curves: .png, .svg or .pdf; for several servos, torque and current "
         "side by side.", rich_help_panel=shared.OUTPUT)] = None,
     csv: Annotated[Path | None, typer.Option(
-        "--csv", metavar="FILE.csv", help="Write the curves, one row per point.", rich_help_panel=shared.OUTPUT)] = None,
+        "--csv", metavar="FILE.csv", help="Write the curves, a row per point.", rich_help_panel=shared.OUTPUT)] = None,
     force: Annotated[bool, typer.Option(
         "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
     as_json: shared.JsonOption = False,
