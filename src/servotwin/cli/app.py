@@ -33,7 +33,7 @@ def _version(wanted: bool) -> None:
 def servotwin(
     context: typer.Context,
     version: Annotated[bool, typer.Option(
-        "--version", is_eager=True, callback=_version, help="Print the version and end.")] = False,
+        "--version", is_eager=True, callback=_version, help="Print the version and exit.")] = False,
 ) -> None:
     """Show the help where no command is given."""
     if context.invoked_subcommand is None:
@@ -45,10 +45,10 @@ app.command("paper", help="Reproduce the paper's figures and tables in a report.
 app.command("simulate", help="Simulate one servo under one command and one load.",
             epilog="Example: servotwin simulate hitec-hs-755hb --step 0:180 --plot run.png\n\n"
                    "Example: servotwin simulate my-servo.toml --sine 1500:200:2 --unit us --out run.csv")(simulate)
-app.command("curves", help="Compute the sheets of servos: torque, speed and current, holding, lifting, warming.",
+app.command("curves", help="Compute the data sheets of servos: torque, speed, current, holding, lifting, warming.",
             epilog="Example: servotwin curves towerpro-mg996r --voltage 4.8,6 --out mg996r.html\n\n"
                    "Example: servotwin curves towerpro-mg996r hitec-hs-422 --voltage 5 --lift 0.5kg --arm 10cm")(curves)
-app.command("sweep", help="Draw the parameters of a servo, simulate all, and say which of them matter.",
+app.command("sweep", help="Draw random parameters for a servo, simulate all, and show which of them matter.",
             epilog="Example: servotwin sweep hitec-hs-755hb --step 0:60 --vary motor.torque_constant=normal:10% "
                    "--vary electronics.deadband=uniform:4us..8us --lanes 10000 --out study --plot")(sweep)
 app.command("fit", help="Find the parameters of a servo, with intervals, from its logs or a bench table.",
@@ -56,6 +56,6 @@ app.command("fit", help="Find the parameters of a servo, with intervals, from it
                    "--out my-servo.toml --report fit.html\n\n"
                    "Example: servotwin fit --table bench.csv --out my-servo.toml\n\n"
                    "Example: servotwin fit --advise --servo hitec-hs-755hb")(fit)
-app.command("validate", help="Run a servo against logs, and say how far it is off.",
+app.command("validate", help="Compare a servo with logs, and say how far it is off.",
             epilog="Example: servotwin validate my-servo.toml new-runs/ --max-error 3deg --report check.html")(validate)
 app.add_typer(catalog, name="catalog")

@@ -21,7 +21,7 @@ _TELLING = ("impossible", "sources disagree", "digital", "currents unknown", "st
 _Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 catalog = typer.Typer(
-    help="Servos that come with servotwin, and checking a servo file.",
+    help="List and show the servos that come with servotwin; make and check servo files.",
     epilog="Example: servotwin catalog show hitec-hs-755hb")
 
 
@@ -32,7 +32,7 @@ def _catalog(context: typer.Context) -> None:
         emit_help(context)
 
 
-@catalog.command("list", help="List the servos of the catalog.", epilog="Example: servotwin catalog list --json")
+@catalog.command("list", help="List the servos in the catalog.", epilog="Example: servotwin catalog list --json")
 def list_servos(as_json: _Json = False) -> None:
     """List the servos of the catalog."""
     from servotwin.cli.servo_facts import headline
@@ -53,7 +53,7 @@ def list_servos(as_json: _Json = False) -> None:
 @catalog.command("show", help="Show every parameter of a servo and its source.",
                  epilog="Example: servotwin catalog show hitec-hs-755hb")
 def show_servo(
-    servo: Annotated[str, typer.Argument(metavar="ID", help="Id in the catalog, or path of a servo file (.toml).")],
+    servo: Annotated[str, typer.Argument(metavar="ID", help="Catalog id, or path of a servo file (.toml).")],
     as_json: _Json = False,
 ) -> None:
     """Show every parameter of a servo."""
@@ -69,7 +69,7 @@ def show_servo(
     show(*heading(loaded), *figures(facts), "", *parameter_table(found))
 
 
-@catalog.command("check", help="Check a servo file, and which models it can run.",
+@catalog.command("check", help="Check a servo file and say which models it can run.",
                  epilog="Example: servotwin catalog check my-servo.toml")
 def check(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A servo file (.toml).")],
@@ -126,9 +126,9 @@ def _number(value: float | None, form: str) -> str:
     return "" if value is None else form.format(value)
 
 
-catalog.command("from-sheet", help="Make a servo file out of what a maker prints.", epilog=(
+catalog.command("from-sheet", help="Make a servo file from a data sheet.", epilog=(
     'Example: servotwin catalog from-sheet --name my-servo --torque "13.2 kgf.cm" --speed "0.23 s/60deg" '
     '--running-current "285 mA" --at 6V --deadband "8 us" --out my-servo.toml\n\n'
     "Example: servotwin catalog from-sheet --csv sheets.csv --out my-catalog"))(from_sheet)
-catalog.command("which", help="List the servos that lift a mass on an arm, lightest first.", epilog=(
+catalog.command("which", help="List the servos that can lift a mass on an arm, lightest first.", epilog=(
     "Example: servotwin catalog which --lift 0.5kg --arm 10cm --voltage 5 --time 0.3"))(which)

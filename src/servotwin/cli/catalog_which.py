@@ -17,14 +17,14 @@ _WHY = {"torque": "lack the torque", "time": "are too slow", "voltage": "are not
 
 
 def which(
-    lift: Annotated[str, typer.Option(metavar="MASS", help="What is to be lifted, such as 0.5kg, 120g, 4oz or 1lb.")],
-    arm: Annotated[str, typer.Option(metavar="LENGTH", help="The length of its arm, such as 10cm, 80mm or 4in.")],
-    voltage: Annotated[str, typer.Option(metavar="VOLTS", help="Of the supply.")] = "6",
+    lift: Annotated[str, typer.Option(metavar="MASS", help="Mass to lift, such as 0.5kg, 120g, 4oz or 1lb.")],
+    arm: Annotated[str, typer.Option(metavar="LENGTH", help="Length of the arm, such as 10cm, 80mm or 4in.")],
+    voltage: Annotated[str, typer.Option(metavar="VOLTS", help="Supply voltage.")] = "6",
     time: Annotated[str | None, typer.Option(
-        metavar="SECONDS", help="The longest that 60 degrees may take, from 30 below the horizontal to 30 above.")]
+        metavar="SECONDS", help="Longest time allowed for 60 degrees, from 30 below the horizontal to 30 above.")]
     = None,
-    why: Annotated[bool, typer.Option("--why", help="List the servos that cannot, and why.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI.")] = False,
+    why: Annotated[bool, typer.Option("--why", help="Also list the servos that cannot, and why.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")] = False,
 ) -> None:
     """List the servos of the catalog that lift a mass on an arm at all angles, lightest first."""
     from servotwin.cli.figures import SECONDS, VOLTAGE, with_usual_unit

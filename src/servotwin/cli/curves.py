@@ -18,27 +18,27 @@ if TYPE_CHECKING:
 _MODELS = ("pulse", "pulse-inductive", "bounded")
 _PICTURES = (".png", ".svg", ".pdf")
 _ZERO_CELSIUS = 273.15
-_ASKED = "What is asked"
+_ASKED = "What to compute"
 
 
 def curves(
     servos: Annotated[list[str], typer.Argument(
-        metavar="ID...", help="Ids in the catalog, or paths of servo files (.toml).")],
+        metavar="ID...", help="Catalog ids, or paths of servo files (.toml).")],
     voltage: Annotated[list[str] | None, typer.Option(
         metavar="VOLTS", help="Supply voltages, such as 4.8,6 (default: the servo's own).",
         rich_help_panel=_ASKED)] = None,
     lift: Annotated[str | None, typer.Option(
-        metavar="MASS", help="A mass to lift, such as 0.5kg, 120g, 4oz or 1lb; with --arm.",
+        metavar="MASS", help="Mass to lift, such as 0.5kg, 120g, 4oz or 1lb; with --arm.",
         rich_help_panel=_ASKED)] = None,
     arm: Annotated[str | None, typer.Option(
-        metavar="LENGTH", help="The length of its arm, such as 10cm, 80mm or 4in.", rich_help_panel=_ASKED)] = None,
+        metavar="LENGTH", help="Length of the arm, such as 10cm, 80mm or 4in.", rich_help_panel=_ASKED)] = None,
     load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help="torque=0.3 shows the point of the curves against 0.3 N m; arm=0.5kg:10cm is "
+        metavar="PART=VALUE", help="torque=0.3 adds the operating point at 0.3 N m; arm=0.5kg:10cm means "
         "--lift 0.5kg --arm 10cm.", rich_help_panel=_ASKED)] = None,
     hot: Annotated[float, typer.Option(
-        metavar="CELSIUS", help="Temperature of the winding in the hot curves.", rich_help_panel=_ASKED)] = 100.0,
+        metavar="CELSIUS", help="Winding temperature for the hot curves.", rich_help_panel=_ASKED)] = 100.0,
     quick: Annotated[bool, typer.Option(
-        "--quick", help="Leave out the bandwidth, whose sines take longer than all else.",
+        "--quick", help="Leave out the bandwidth, which takes longer than everything else.",
         rich_help_panel=_ASKED)] = False,
     model: Annotated[str | None, typer.Option(
         metavar="MODEL", help="pulse, pulse-inductive or bounded (default: by the kind of the servo).",
@@ -49,12 +49,12 @@ def curves(
     out: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with tables and pictures.", rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
-        metavar="FILE", help="Draw the curves: .png, .svg or .pdf; of several servos torque and current beside each "
-        "other.", rich_help_panel=shared.OUTPUT)] = None,
+        metavar="FILE", help="Draw the curves: .png, .svg or .pdf; for several servos, torque and current "
+        "side by side.", rich_help_panel=shared.OUTPUT)] = None,
     csv: Annotated[Path | None, typer.Option(
-        "--csv", metavar="FILE.csv", help="Write the curves, a row a point.", rich_help_panel=shared.OUTPUT)] = None,
+        "--csv", metavar="FILE.csv", help="Write the curves, a row per point.", rich_help_panel=shared.OUTPUT)] = None,
     force: Annotated[bool, typer.Option(
-        "--force", help="Replace files that exist.", rich_help_panel=shared.OUTPUT)] = False,
+        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
     as_json: shared.JsonOption = False,
 ) -> None:
     """Compute the sheets of servos from their parameters, beside what their makers print."""

@@ -19,75 +19,75 @@ if TYPE_CHECKING:
     from servotwin.identification import Advice, Fit, Ladder, Log
     from servotwin.models import Model
 
-_LOGS, _SEARCH, _OUTPUT = log_reading.PANEL, "What is searched, and how", "Output"
+_LOGS, _SEARCH, _OUTPUT = log_reading.PANEL, "What to search for, and how", "Output"
 
 
 def fit(
     logs: Annotated[list[Path] | None, typer.Argument(
         metavar="LOGS", help=log_reading.HELP)] = None,
     servo: Annotated[str | None, typer.Option(
-        metavar="SERVO", help="Where the search begins, and what is not searched: id in the catalog, or path of a "
-        "servo file (.toml).", rich_help_panel=_LOGS)] = None,
+        metavar="SERVO", help="Servo to start from, which also supplies the values that are not fitted: catalog id, or "
+        "path of a servo file (.toml).", rich_help_panel=_LOGS)] = None,
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
-        "in SI.", rich_help_panel=_LOGS)] = None,
+        "in SI units.", rich_help_panel=_LOGS)] = None,
     holdout: Annotated[str | None, typer.Option(
-        metavar="SHARE|NAMES", help="Logs that are predicted and not fitted: a share of each kind of motion such as "
-        "0.25, or names with commas; 0 for none (default: a fourth of each kind with four logs or more).",
+        metavar="SHARE|NAMES", help="Logs to predict rather than fit: a share of each kind of motion, such as "
+        "0.25, or names with commas; 0 for none (default: a quarter of each kind with four logs or more).",
         rich_help_panel=_LOGS)] = None,
     leave_out: Annotated[list[str] | None, typer.Option(
-        "--leave-out", metavar="START..STOP", help="A window of time that says nothing about the servo, in all logs or "
+        "--leave-out", metavar="START..STOP", help="Time window that says nothing about the servo, in all logs or "
         "in one: LOG=START..STOP; repeatable.", rich_help_panel=_LOGS)] = None,
     sensors: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Measured signals that are fitted; repeatable or with commas (default: the angle and all "
+        metavar="NAME", help="Measured signals to fit; repeatable or with commas (default: the angle and all "
         "currents).", rich_help_panel=_LOGS)] = None,
     table: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="Calibrate from a bench table instead of logs.", rich_help_panel=_LOGS)] = None,
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: pulse; bounded where the servo's file has "
+        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: pulse; bounded if the servo file has "
         "no chip).", rich_help_panel=_SEARCH)] = None,
     free: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="What is searched, repeatable or with commas: names of servo and load, and "
+        metavar="NAME", help="Parameters to search for, repeatable or with commas: names of servo and load, and "
         "output_torque_constant, output_inertia, output_coulomb_torque.", rich_help_panel=_SEARCH)] = None,
     bounds: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=LOWEST..HIGHEST", help="Where it is searched, such as motor.armature_resistance=2ohm..5ohm; "
+        metavar="NAME=LOWEST..HIGHEST", help="Range to search, such as motor.armature_resistance=2ohm..5ohm; "
         "repeatable.", rich_help_panel=_SEARCH)] = None,
     prior: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=VALUE±STD", help="What is believed before, such as motor.armature_resistance=3ohm±10%; "
-        "repeatable. The spreads of the servo file hold for the others.", rich_help_panel=_SEARCH)] = None,
+        metavar="NAME=VALUE±STD", help="Prior knowledge, such as motor.armature_resistance=3ohm±10%; "
+        "repeatable. The spreads in the servo file apply to the others.", rich_help_panel=_SEARCH)] = None,
     no_priors: Annotated[bool, typer.Option(
-        "--no-priors", help="The spreads of the servo file do not count.", rich_help_panel=_SEARCH)] = False,
+        "--no-priors", help="Ignore the spreads in the servo file.", rich_help_panel=_SEARCH)] = False,
     nuisance: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="What belongs to the rig: delay, log_delay, angle_offset, angle_sag, initial_state, or "
+        metavar="NAME", help="Effects of the rig to fit: delay, log_delay, angle_offset, angle_sag, initial_state, or "
         "none (default: delay, angle_offset, initial_state).", rich_help_panel=_SEARCH)] = None,
     starts: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Searches, all but the first from random values.", rich_help_panel=_SEARCH)] = 3,
+        metavar="NUMBER", help="Number of searches; all but the first start at random.", rich_help_panel=_SEARCH)] = 3,
     loss: Annotated[str, typer.Option(
         metavar="HOW", help="huber (large residuals count less) or squares.", rich_help_panel=_SEARCH)] = "huber",
     level: Annotated[str, typer.Option(
-        metavar="SHARE", help="Of the intervals.", rich_help_panel=_SEARCH)] = "0.95",
+        metavar="SHARE", help="Level of the intervals.", rich_help_panel=_SEARCH)] = "0.95",
     intervals: Annotated[bool, typer.Option(
-        "--intervals/--no-intervals", help="Without them it is faster.", rich_help_panel=_SEARCH)] = True,
+        "--intervals/--no-intervals", help="Compute intervals; faster without.", rich_help_panel=_SEARCH)] = True,
     seed: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Of random starts and of what is held out.", rich_help_panel=_SEARCH)] = 0,
+        metavar="NUMBER", help="Seed for random starts and the choice of held-out logs.", rich_help_panel=_SEARCH)] = 0,
     compare: Annotated[bool, typer.Option(
-        "--compare/--no-compare", help="Fit simpler models to the same logs, beside it.",
+        "--compare/--no-compare", help="Also fit simpler models to the same logs.",
         rich_help_panel=_SEARCH)] = True,
     ladder: Annotated[bool, typer.Option(
-        "--ladder", help="Fit friction laws M1 to M6 and choose one by the logs that were held out.",
+        "--ladder", help="Fit friction laws M1 to M6 and choose one by the held-out logs.",
         rich_help_panel=_SEARCH)] = False,
     advise: Annotated[bool, typer.Option(
-        "--advise", help="Say which experiment to do next; without logs, which one to begin with.",
+        "--advise", help="Say which experiment to do next; without logs, which one to start with.",
         rich_help_panel=_SEARCH)] = False,
     out: Annotated[Path | None, typer.Option(
-        metavar="FILE.toml", help="Write the servo with what was found.", rich_help_panel=_OUTPUT)] = None,
+        metavar="FILE.toml", help="Write the fitted servo.", rich_help_panel=_OUTPUT)] = None,
     report: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with pictures.", rich_help_panel=_OUTPUT)] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.", rich_help_panel=_OUTPUT)] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI.", rich_help_panel=_OUTPUT)] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.", rich_help_panel=_OUTPUT)] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.", rich_help_panel=_OUTPUT)] = False,
 ) -> None:
     """Find the parameters of a servo, with intervals."""
     _check_words(logs, servo, table, report, advise=advise)

@@ -30,44 +30,44 @@ def _of(metavar: str, text: str) -> Any:
 
 def from_sheet(
     again: Annotated[str | None, typer.Argument(
-        metavar="SERVO", help="A servo whose own \\[sheet] is taken: id in the catalog, or path.")] = None,
+        metavar="SERVO", help="A servo whose own \\[sheet] to use: catalog id, or path.")] = None,
     torque: Annotated[_Figures, _at('"1.29 N m @6.0"', "Stall torque: N m, N cm, kgf.cm, oz.in.")] = None,
-    speed: Annotated[_Figures, _at('"0.23 s/60deg @6.0"', "Speed without load: s/60deg, deg/s, rad/s, rpm.")] = None,
-    running_current: Annotated[_Figures, _at('"285 mA @6.0"', "Current running without load: A, mA.")] = None,
-    stall_current: Annotated[_Figures, _at('"1.8 A @6.0"', "Current with the shaft held: A, mA.")] = None,
+    speed: Annotated[_Figures, _at('"0.23 s/60deg @6.0"', "No-load speed: s/60deg, deg/s, rad/s, rpm.")] = None,
+    running_current: Annotated[_Figures, _at('"285 mA @6.0"', "Current when running without load: A, mA.")] = None,
+    stall_current: Annotated[_Figures, _at('"1.8 A @6.0"', "Current with the shaft held still: A, mA.")] = None,
     idle_current: Annotated[_Figures, _at('"9 mA @6.0"', "Current at rest: A, mA.")] = None,
     at: Annotated[str | None, typer.Option(
-        metavar="VOLTAGE", help="Supply voltage of figures that name none.", rich_help_panel=_POINT)] = None,
+        metavar="VOLTAGE", help="Supply voltage for figures that do not name one.", rich_help_panel=_POINT)] = None,
     name: Annotated[str | None, _of("ID", "Short id, such as my-servo.")] = None,
-    title: Annotated[str | None, _of("TEXT", "Name for people.")] = None,
+    title: Annotated[str | None, _of("TEXT", "Name for human readers.")] = None,
     deadband: Annotated[str | None, _of('"8 us"', "Deadband, taken as its full width.")] = None,
-    pulse_range: Annotated[str | None, _of('"500-2500 us"', "Pulse widths between which it turns.")] = None,
+    pulse_range: Annotated[str | None, _of('"500-2500 us"', "Pulse widths between which the servo turns.")] = None,
     travel: Annotated[str | None, _of('"180 deg"', "Angle between these pulses.")] = None,
     rate: Annotated[str | None, _of('"45 deg/400us"', "Angle per pulse width.")] = None,
-    neutral: Annotated[str | None, _of('"1500 us"', "Pulse of the middle position.")] = None,
+    neutral: Annotated[str | None, _of('"1500 us"', "Pulse width at the middle position.")] = None,
     stops: Annotated[str | None, _of('"200 deg"', "Angle from stop to stop.")] = None,
     mass: Annotated[str | None, _of('"40 g"', "Mass: g, kg, oz.")] = None,
-    gear_ratio: Annotated[str | None, _of("280:1", "Turns of the motor for one of the output.")] = None,
+    gear_ratio: Annotated[str | None, _of("280:1", "Motor turns per output turn.")] = None,
     backlash: Annotated[str | None, _of('"0.5 deg"', "Play of the gear.")] = None,
     motor_type: Annotated[str, _of("TEXT", "Such as 3-pole or coreless.")] = "",
     modulation: Annotated[str, _of("WORD", "analog or digital.")] = "",
-    source: Annotated[str, _of("TEXT", "Where the figures were read.")] = "",
-    note: Annotated[str, _of("TEXT", "For people.")] = "",
+    source: Annotated[str, _of("TEXT", "Where the figures come from.")] = "",
+    note: Annotated[str, _of("TEXT", "Remark for human readers.")] = "",
     list_file: Annotated[Path | None, typer.Option(
         "--csv", metavar="FILE", help="A list of servos, one row for each servo and voltage: maker, model, V, "
         "stall_torque_Nm, speed_s_per_60deg, ... (see the guide).", rich_help_panel=_MANY)] = None,
     plain: Annotated[bool, typer.Option(
-        "--plain", help="Leave out gear losses that grow with the load, and play: faster, and too strong.",
+        "--plain", help="Leave out play and the gear losses that grow with the load: faster, but too strong.",
         rich_help_panel=_OUTPUT)] = False,
     allow_impossible: Annotated[bool, typer.Option(
-        "--allow-impossible", help="Make a servo of a sheet that contradicts itself; it is flagged.",
+        "--allow-impossible", help="Make a servo even from a sheet that contradicts itself, and flag it.",
         rich_help_panel=_OUTPUT)] = False,
     out: Annotated[Path | None, typer.Option(
-        metavar="FILE.toml", help="Write the servo file; with --csv a folder.", rich_help_panel=_OUTPUT)] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite.", rich_help_panel=_OUTPUT)] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI.", rich_help_panel=_OUTPUT)] = False,
+        metavar="FILE.toml", help="Write the servo file; with --csv, a folder.", rich_help_panel=_OUTPUT)] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.", rich_help_panel=_OUTPUT)] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.", rich_help_panel=_OUTPUT)] = False,
 ) -> None:
-    """Make a servo file out of a data sheet."""
+    """Make a servo file from a data sheet."""
     points = {"stall_torque": torque, "no_load_speed": speed, "no_load_current": running_current,
               "stall_current": stall_current, "idle_current": idle_current}
     whole = {"name": name, "title": title, "deadband": deadband, "pulse_range": pulse_range, "travel": travel,

@@ -19,14 +19,14 @@ _MOST_REMARKS = 5
 _QUIET = ("named", "sidecar")  # someone said so before
 
 PANEL = "Logs and servo"
-HELP = "Files or folders of logs: tables (CSV) with or without a sidecar, JSON of BAM or Miuzei, LeRobot datasets."
+HELP = "Log files or folders: tables (CSV) with or without a sidecar, BAM or Miuzei JSON, LeRobot datasets."
 FormatOption = Annotated[str, typer.Option(
-    "--format", metavar="FORMAT", help="Of the logs: auto, csv, bam, miuzei or lerobot.", rich_help_panel=PANEL)]
+    "--format", metavar="FORMAT", help="Format of the logs: auto, csv, bam, miuzei or lerobot.", rich_help_panel=PANEL)]
 ColumnsOption = Annotated[list[str] | None, typer.Option(
-    metavar="SIGNAL=COLUMN:UNIT", help='Which column of a table is what: "time=t:ms angle=pos:deg-90"; kept in the '
-    "sidecar. What is not said is known by its name or guessed, and shown.", rich_help_panel=PANEL)]
+    metavar="SIGNAL=COLUMN:UNIT", help='What the columns of a table mean: "time=t:ms angle=pos:deg-90"; kept in the '
+    "sidecar. Other columns are recognised by name or guessed, and shown.", rich_help_panel=PANEL)]
 JointOption = Annotated[list[str] | None, typer.Option(
-    metavar="NAME[:UNIT]", help="Which joints of a LeRobot dataset, and their unit; repeatable or with commas, *:deg "
+    metavar="NAME[:UNIT]", help="Joints of a LeRobot dataset to read, and their unit; repeatable or with commas, *:deg "
     "for all.", rich_help_panel=PANEL)]
 
 

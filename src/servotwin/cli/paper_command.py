@@ -15,8 +15,8 @@ from servotwin.errors import OutputError
 
 
 def paper(
-    out: Annotated[str, typer.Option(metavar="FOLDER", help="Where the report goes.")] = "paper-report",
-    force: Annotated[bool, typer.Option("--force", help="Replace a report that exists.")] = False,
+    out: Annotated[str, typer.Option(metavar="FOLDER", help="Folder for the report.")] = "paper-report",
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing report.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print paths and headline numbers as JSON.")] = False,
 ) -> None:
     """Reproduce the paper's figures and tables in a report."""

@@ -10,38 +10,38 @@ import typer
 
 COMMAND, PLANT, OUTPUT = "Command (one of)", "Servo and load", "Run and output"  # panels of the help
 
-ServoArgument = Annotated[str, typer.Argument(help="Id in the catalog, or path of a servo file (.toml).")]
+ServoArgument = Annotated[str, typer.Argument(help="Catalog id, or path of a servo file (.toml).")]
 StepOption = Annotated[str | None, typer.Option(
-    metavar="BEFORE:AFTER", help="Step, at --at.", rich_help_panel=COMMAND)]
+    metavar="BEFORE:AFTER", help="Step at time --at.", rich_help_panel=COMMAND)]
 RampOption = Annotated[str | None, typer.Option(
-    metavar="BEFORE:AFTER", help="Ramp from --at on, in --over seconds.", rich_help_panel=COMMAND)]
+    metavar="BEFORE:AFTER", help="Ramp that starts at --at and takes --over seconds.", rich_help_panel=COMMAND)]
 SineOption = Annotated[str | None, typer.Option(
     metavar="MEAN:AMPLITUDE:HZ", help="Sine.", rich_help_panel=COMMAND)]
 ChirpOption = Annotated[str | None, typer.Option(
-    metavar="MEAN:AMPLITUDE:HZ:HZ", help="Sine whose frequency goes from one to the other during the run.",
+    metavar="MEAN:AMPLITUDE:HZ:HZ", help="Sine whose frequency changes from the first to the second during the run.",
     rich_help_panel=COMMAND)]
 PrbsOption = Annotated[str | None, typer.Option(
-    metavar="LOW:HIGH:SECONDS", help="Pseudo-random sequence of two values, with the time of a bit.",
+    metavar="LOW:HIGH:SECONDS", help="Pseudo-random sequence of two values, with the bit time.",
     rich_help_panel=COMMAND)]
 ConstantOption = Annotated[str | None, typer.Option(
-    metavar="VALUE", help="The same all the time.", rich_help_panel=COMMAND)]
+    metavar="VALUE", help="Constant value.", rich_help_panel=COMMAND)]
 PulsesOption = Annotated[Path | None, typer.Option(
-    metavar="FILE.csv", help="Pulses one by one: columns time_s (rising edge), pulse_width_us.",
+    metavar="FILE.csv", help="Individual pulses: columns time_s (rising edge), pulse_width_us.",
     rich_help_panel=COMMAND)]
 CommandOption = Annotated[Path | None, typer.Option(
-    metavar="FILE.csv", help="Samples: time_s and pulse_width_us, command_angle_deg or command_voltage_V.",
+    metavar="FILE.csv", help="Samples: columns time_s and pulse_width_us, command_angle_deg or command_voltage_V.",
     rich_help_panel=COMMAND)]
 AtOption = Annotated[float | None, typer.Option(
-    metavar="SECONDS", help="When a step or ramp begins (default 0.1).", rich_help_panel=COMMAND)]
+    metavar="SECONDS", help="Start time of a step or ramp (default 0.1).", rich_help_panel=COMMAND)]
 OverOption = Annotated[float | None, typer.Option(
-    metavar="SECONDS", help="How long a ramp takes.", rich_help_panel=COMMAND)]
+    metavar="SECONDS", help="Duration of a ramp.", rich_help_panel=COMMAND)]
 HoldOption = Annotated[str | None, typer.Option(
     metavar="HOW", help="Between samples of --command: previous (default) or linear.",
     rich_help_panel=COMMAND)]
 ColumnOption = Annotated[str | None, typer.Option(
-    metavar="NAME", help="Which column of --command, where it has several commands.",
+    metavar="NAME", help="Column of --command to use, if it has several commands.",
     rich_help_panel=COMMAND)]
 DurationOption = Annotated[float, typer.Option(
     metavar="SECONDS", help="Time to simulate.", rich_help_panel=OUTPUT)]
 JsonOption = Annotated[bool, typer.Option(
-    "--json", help="Print the summary as JSON, in SI.", rich_help_panel=OUTPUT)]
+    "--json", help="Print the summary as JSON, in SI units.", rich_help_panel=OUTPUT)]

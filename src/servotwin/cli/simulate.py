@@ -41,29 +41,29 @@ def simulate(
     column: shared.ColumnOption = None,
     model: Annotated[str | None, typer.Option(
         metavar="MODEL", help="pulse, pulse-inductive, bounded, averaged, averaged-inductive, geared-motor or "
-        "dc-motor (default: pulse; bounded where the servo's file has no chip).",
+        "dc-motor (default: pulse; bounded if the servo file has no chip).",
         rich_help_panel=shared.PLANT)] = None,
     load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help="What hangs on the shaft, repeatable or with commas, SI or with a unit: inertia=, "
-        "viscous=, torque=0.5kgf.cm, coulomb=; arm=0.5kg:10cm, horizontal in the middle of the travel; SI alone: "
+        metavar="PART=VALUE", help="Load on the shaft, repeatable or with commas, in SI or with a unit: inertia=, "
+        "viscous=, torque=0.5kgf.cm, coulomb=; arm=0.5kg:10cm, horizontal in the middle of the travel; SI only: "
         "pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
         "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, or give one that the servo lacks, such as "
-        "supply.current_limit=1A; repeatable; with a unit, or in SI.",
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, or add one that the servo lacks, such as "
+        "supply.current_limit=1A; repeatable; with a unit, or in SI units.",
         rich_help_panel=shared.PLANT)] = None,
     seed: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Seed of a pulse servo's noise.", rich_help_panel=shared.PLANT)] = 0,
+        metavar="NUMBER", help="Seed for a pulse servo's noise.", rich_help_panel=shared.PLANT)] = 0,
     duration: shared.DurationOption = 1.5,
     output_step: Annotated[float | None, typer.Option(
-        metavar="SECONDS", help="Distance of the outputs in time (default 0.001); it does not change the solution.",
+        metavar="SECONDS", help="Time between output samples (default 0.001); does not change the solution.",
         rich_help_panel=shared.OUTPUT)] = None,
     out: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="Write all signals.", rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Draw the response: .png, .svg or .pdf.", rich_help_panel=shared.OUTPUT)] = None,
     force: Annotated[bool, typer.Option(
-        "--force", help="Replace files that exist.", rich_help_panel=shared.OUTPUT)] = False,
+        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
     as_json: shared.JsonOption = False,
 ) -> None:
     """Simulate one servo under one command and one load."""

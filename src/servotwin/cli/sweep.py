@@ -31,57 +31,57 @@ def sweep(
     command: shared.CommandOption = None,
     unit: Annotated[str | None, typer.Option(
         metavar="UNIT", help="Unit of the command: deg (default), rad, us, ms, s, V or mV. An angle becomes a pulse "
-        "by each servo's own calibration; us, ms and s are the same pulse for all.",
+        "through each servo's own calibration; us, ms and s give all servos the same pulse.",
         rich_help_panel=shared.COMMAND)] = None,
     at: shared.AtOption = None,
     over: shared.OverOption = None,
     hold: shared.HoldOption = None,
     column: shared.ColumnOption = None,
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: pulse; bounded where the servo's file has "
+        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: pulse; bounded if the servo file has "
         "no chip).", rich_help_panel=shared.PLANT)] = None,
     load: Annotated[list[str] | None, typer.Option(
-        metavar="PART=VALUE", help="What hangs on the shaft, as in servotwin simulate.",
+        metavar="PART=VALUE", help="Load on the shaft, as in servotwin simulate.",
         rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE",
-        help="Change a nominal parameter, or give one that the servo lacks; repeatable; with a unit, or in SI.",
+        help="Change a nominal parameter, or add one that the servo lacks; repeatable; with a unit, or in SI units.",
         rich_help_panel=shared.PLANT)] = None,
     vary: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=DISTRIBUTION", help="Draw a parameter of servo or load, repeatable: normal:10%, uniform:10%, "
+        metavar="NAME=DISTRIBUTION", help="Draw a parameter of the servo or load, repeatable: normal:10%, uniform:10%, "
         "uniform:4us..8us, normal:3ohm±0.3ohm, lognormal:10%, triangular:4us..6us..8us, choice:brake,coast. A single "
-        "number is a spread about the nominal value.", rich_help_panel=_VARIED)] = None,
+        "number is a spread around the nominal value.", rich_help_panel=_VARIED)] = None,
     from_file: Annotated[bool, typer.Option(
-        "--from-file", help="Draw what the servo file states a spread of. What is fixed together is drawn together: "
-        "of a servo made of a sheet the figures of the sheet.",
+        "--from-file", help="Draw every value for which the servo file states a spread. Values that belong together "
+        "are drawn together: for a servo made from a sheet, the figures of the sheet.",
         rich_help_panel=_VARIED)] = False,
     draws: Annotated[Path | None, typer.Option(
-        metavar="FILE", help="Take draws from a table: .csv or .parquet, a column for each dotted name, SI.",
+        metavar="FILE", help="Take the draws from a table: .csv or .parquet, one column per dotted name, in SI units.",
         rich_help_panel=_VARIED)] = None,
     lanes: Annotated[int | None, typer.Option(
-        metavar="NUMBER", help="How many servos (default 1000, or all rows of --draws).",
+        metavar="NUMBER", help="Number of servos (default 1000, or all rows of --draws).",
         rich_help_panel=_VARIED)] = None,
     sampling: Annotated[str, typer.Option(
         metavar="HOW", help="latin-hypercube, sobol or random.", rich_help_panel=_VARIED)] = "latin-hypercube",
     truncate: Annotated[bool, typer.Option(
-        "--truncate", help="Cut distributions off at the physical range.", rich_help_panel=_VARIED)] = False,
+        "--truncate", help="Truncate distributions to the physical range.", rich_help_panel=_VARIED)] = False,
     seed: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Of all that is random.", rich_help_panel=_VARIED)] = 0,
+        metavar="NUMBER", help="Seed for everything random.", rich_help_panel=_VARIED)] = 0,
     duration: shared.DurationOption = 1.5,
     output_step: Annotated[float, typer.Option(
-        metavar="SECONDS", help="How often the metrics look.", rich_help_panel=shared.OUTPUT)] = 0.01,
+        metavar="SECONDS", help="Time between samples used for the metrics.", rich_help_panel=shared.OUTPUT)] = 0.01,
     metric: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Metric of the tornado (the first one), repeatable: overshoot, rise_time, settling_time, "
-        "steady_error, slew_rate, peak_current, rms_error, peak_error, or end_ and the name of a signal.",
+        metavar="NAME", help="Metric to show, the first one in the tornado, repeatable: overshoot, rise_time, "
+        "settling_time, steady_error, slew_rate, peak_current, rms_error, peak_error, or end_ and a signal's name.",
         rich_help_panel=shared.OUTPUT)] = None,
     out: Annotated[Path | None, typer.Option(
         metavar="FOLDER", help="Write all lanes, chunk by chunk.", rich_help_panel=shared.OUTPUT)] = None,
     file_format: Annotated[str, typer.Option(
-        "--format", metavar="FORMAT", help="Of the lanes: csv or parquet.", rich_help_panel=shared.OUTPUT)] = "csv",
+        "--format", metavar="FORMAT", help="Format of lanes: csv or parquet.", rich_help_panel=shared.OUTPUT)] = "csv",
     resume: Annotated[bool, typer.Option(
-        "--resume", help="Go on with the unfinished study in --out.", rich_help_panel=shared.OUTPUT)] = False,
+        "--resume", help="Continue the unfinished study in --out.", rich_help_panel=shared.OUTPUT)] = False,
     plot: Annotated[bool, typer.Option(
-        "--plot", help="Draw tornado.png into --out.", rich_help_panel=shared.OUTPUT)] = False,
+        "--plot", help="Draw tornado.png in --out.", rich_help_panel=shared.OUTPUT)] = False,
     scheduler: Annotated[str | None, typer.Option(
         metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.",
         rich_help_panel=shared.OUTPUT)] = None,

@@ -30,32 +30,32 @@ def validate(
     logs: Annotated[list[Path], typer.Argument(
         metavar="LOGS", help=log_reading.HELP)],
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: that of the servo file's fit, else pulse).")]
+        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: the model of the file's fit, else pulse).")]
     = None,
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
     joint: log_reading.JointOption = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
-        "in SI.")] = None,
+        "in SI units.")] = None,
     nuisance: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="What belongs to the rig and is fitted to these logs: delay, log_delay, angle_offset, "
-        "angle_sag, initial_state; repeatable or with commas (default: none; the others are as the servo file's fit "
-        "recorded them).")] = None,
+        metavar="NAME", help="Effects of the rig to fit to these logs: delay, log_delay, angle_offset, "
+        "angle_sag, initial_state; repeatable or with commas (default: none; the others are as recorded by the fit in "
+        "the servo file).")] = None,
     sensors: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Measured signals that are compared; repeatable or with commas.")] = None,
+        metavar="NAME", help="Measured signals to compare; repeatable or with commas.")] = None,
     leave_out: Annotated[list[str] | None, typer.Option(
-        "--leave-out", metavar="START..STOP", help="A window of time that does not count, in all logs, or in one: "
+        "--leave-out", metavar="START..STOP", help="Time window to ignore, in all logs, or in one: "
         "LOG=START..STOP; repeatable.")] = None,
     max_error: Annotated[list[str] | None, typer.Option(
-        "--max-error", metavar="ERROR", help="Exit with 1 where the rms error of a kind of motion is larger, such as "
+        "--max-error", metavar="ERROR", help="Exit with code 1 if the rms error of a kind of motion is larger, such as "
         "3deg, or prbs=8deg for one kind; repeatable.")] = None,
     report: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with pictures.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")] = False,
 ) -> None:
-    """Run a servo against logs, and say how far it is off."""
+    """Compare a servo with logs, and say how far it is off."""
     targets = _targets(report, [Path(servo), *logs], force=force)
     found = _run(servo, model, change or [], nuisance, sensors, lambda: log_reading.read(
         logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json))
