@@ -162,6 +162,7 @@ def test_logs_of_different_supplies_and_loads():
     near(fitted(logs))
 
 
+@pytest.mark.slow
 def test_a_log_that_begins_in_motion():
     """Cut out of a run: the servo moves when the log begins, and its command acts only after the delay."""
     whole = some(std=0.0, motions=("prbs", "prbs", "prbs", "triangle"), duration=2.0)

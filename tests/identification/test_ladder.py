@@ -51,6 +51,7 @@ def test_load_friction_is_found_where_there_is_some(loaded):
         loaded["M3"].fit.estimates["friction.load_friction"] - 0.35) < 0.02
 
 
+@pytest.mark.slow
 def test_the_criterion_chooses_the_same_here():
     rungs = ("M1", "M3")
     for servo, expected in ((TRUTH, "M1"), (LOADED, "M3")):

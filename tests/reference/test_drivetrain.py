@@ -362,6 +362,7 @@ def test_cases_are_repeatable_and_the_package_takes_them(seed: int) -> None:
         assert float(command(t)) == pytest.approx(a.command.width(t), rel=1e-14)
 
 
+@pytest.mark.slow
 def test_terms_show() -> None:
     """Stops are hit, limits bind, flanks are changed and windings heat in most of the cases that have them."""
     wanted = {"stops": "stop", "limit": "supply", "backlash": "flank"}
