@@ -16,7 +16,7 @@ from reference.drivetrain_cases import TERMS, Case, command_of, load_of, random_
 
 INTEGRATED = {"stribeck", "m3", "m4", "m5", "m6", "backlash", "heat", "pendulum"}
 ANGLE = {True: 1e-10, False: 1e-8}  # rad; in closed form?
-FEW, MANY = 3, 47  # servos of each effect
+FEW, MANY = 3, 40  # servos of each effect
 SHORT = 0.25  # s; of the few
 COARSE = {"max_step": 4e-3, "samples": 6}  # of the reference: half the time for the same angles
 
