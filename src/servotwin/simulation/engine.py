@@ -205,7 +205,6 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
 
 def failure(status: Status, time: float) -> SimulationError:
     """Return the error of a run that ended at `time` [s]."""
-    """Return the error of a run that ended at `time` [s]."""
     return SimulationError(status.name, time, status.message)
 
 
@@ -237,7 +236,6 @@ _DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}
 
 
 def event_name(kind: int, after: Mode) -> str:
-    """Return what to call an event after which this mode holds."""
     """Return what to call an event after which this mode holds."""
     if kind == hybrid.SPEED and at_rest(after.contact):
         return "stick"
