@@ -1,0 +1,111 @@
+"""Fits of the bench's logs, judged by what is true of the bench: intervals that hold it, verdicts that name it."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+import warnings
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import servotwin as st
+
+from . import rig_draws as draws
+from .rig_defects import with_defect
+from .rig_logs import log_of, servo_of
+
+FREE = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
+        "electronics.stretcher_gain", "electronics.deadband")
+NAMES = (*FREE, "delay", "angle_offset")
+RIGHT = {  # names of causes that are right for a defect
+    "load friction": ("load friction",), "play": ("play",), "coast": ("coast",), "wrong t_min": ("minimum drive time",),
+    "digital P servo": ("digital",), "lost pulses": ("lost pulses",), "5 % wrong stamps": ("stamps",),
+    "stamps fast": ("stamps", "frame period"), "reversed sign": ("sign",), "wrapped angle": ("wrap",),
+    "two servos": ("two servos",), "wrong voltage": ("voltage",), "wrong load": ("load",),
+    "dropped samples": ("dropped samples", "stamps"),
+}
+SAID = {  # what names a defect in the sentence or the warnings, before anything is tried
+    "reversed sign": "turns against the command", "wrapped angle": "wrap", "outliers 5 %": "lie far off alone",
+    "5 % wrong stamps": "stamp", "dropped samples": "missing",
+}
+
+
+class Judged(NamedTuple):
+    """One fit: which intervals hold the truth, which have no ends, residuals [rad] and time on the processors [s]."""
+
+    held: dict[str, bool]
+    endless: dict[str, str]  # name -> why
+    off: dict[str, float]  # of the truth, in half widths
+    rms: float
+    seconds: float
+
+
+class Seen(NamedTuple):
+    """What a fit says of a bench."""
+
+    sentence: str
+    holds: bool
+    causes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    seconds: float
+
+
+def truths_of(truth: draws.Truth) -> dict[str, float]:
+    """Return what a fit should find (SI)."""
+    s = truth.servo
+    return dict(zip(NAMES, (s.R, s.K, s.J, s.forward, s.gain, s.deadband, truth.delay, truth.angle_offset),
+                    strict=True))
+
+
+def logs_of(found: list[draws.Run]) -> list[st.Log]:
+    """Return the logs of a bench."""
+    return [log_of(run.said, run.load, f"{k + 1} {run.motion}", run.motion) for k, run in enumerate(found)]
+
+
+def fitted(truth: draws.Truth, found: list[draws.Run], **more: Any) -> st.Fit:
+    """Fit logs from a servo file that is 10 to 30 % off, without priors."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return st.identify(logs_of(found), servo_of(draws.file_of(truth)),
+                           **{"free": FREE, "priors": None, "compare_with": (), **more})
+
+
+def judged(condition: str, seed: int, **more: Any) -> Judged:
+    """Fit the logs of one bench, and look where the truth lies."""
+    truth = draws.random_truth(seed)
+    found = draws.taken(truth, condition)
+    began = clock.process_time()
+    fit = fitted(truth, found, **more)
+    spent = clock.process_time() - began
+    held, endless, off = {}, {}, {}
+    for name, value in truths_of(truth).items():
+        lower, upper, method = fit.intervals()[name]
+        if math.isnan(lower) or math.isnan(upper):
+            endless[name] = method
+            continue
+        held[name] = bool(lower <= value <= upper)
+        off[name] = (value - 0.5 * (lower + upper)) / max(0.5 * (upper - lower), 1e-300)
+    rms = np.sqrt(np.mean(np.concatenate([t.simulated - t.measured for t in fit.traces if not t.held_out]) ** 2))
+    return Judged(held, endless, off, float(rms), spent)
+
+
+def seen(name: str, strength: float, seed: int, **more: Any) -> Seen:
+    """Fit the logs of a bench with a defect, and return what is said of it."""
+    truth = draws.random_truth(seed)
+    found = with_defect(truth, name, strength)
+    began = clock.process_time()
+    fit = fitted(truth, found, **more)
+    verdict = fit.verdict
+    return Seen(verdict.sentence, verdict.holds, tuple(cause.name for cause in verdict.causes), tuple(fit.warnings),
+                clock.process_time() - began)
+
+
+def place(name: str, found: Seen) -> int | None:
+    """Return the place of the true cause, 0 the first; None where it is not named.
+
+    What is said without a trial stands before all causes that are tried.
+    """
+    if name in SAID and any(SAID[name] in line for line in (found.sentence, *found.warnings)):
+        return 0
+    return next((k for k, cause in enumerate(found.causes) if cause in RIGHT.get(name, ())), None)
