@@ -24,7 +24,7 @@ def some(servo=TRUTH, std=STD, motions=MOTIONS, **more):
 
 
 def fitted(logs, servo=TRUTH, **more):
-    plain = {"free": FREE, "priors": None, "starts": 1, "compare_with": (), "holdout": 0}
+    plain = {"free": FREE, "priors": None, "starts": 1, "compare_with": (), "holdout": 0, "diagnose": False}
     return identify(logs, servo, **{**plain, **more})
 
 

@@ -100,10 +100,14 @@ def test_a_current_tells_what_no_unloaded_motion_can(fit):
 def test_a_servo_alone_is_enough_to_begin():
     advice = advise(TRUTH, free=["output_inertia", "motor.armature_resistance"], priors="servo", sensors=())
     prior = TRUTH.source("motor.armature_resistance")
-    share = 0.5 * (prior.upper - prior.lower) / prior.value
+    a, b = math.log(prior.lower / prior.value), math.log(prior.upper / prior.value)
+    share = 1.96 * math.sqrt((a * a + a * b + b * b) / 3.0)  # of a uniform law of the logarithm
     assert advice.now["motor.armature_resistance"] == pytest.approx(share, rel=0.02)
     assert advice.experiments[0].widths["motor.armature_resistance"] < share
+    assert math.isinf(advice.alone["motor.armature_resistance"]) or advice.alone["motor.armature_resistance"] > 10.0
+    assert "by logs alone" in str(advice)
     command = advice.experiments[0].command
+    assert command.time.tolist() == [round(t, 9) for t in command.time.tolist()]
     low, high = TRUTH.stops.lower_angle, TRUTH.stops.upper_angle
     assert low < command.command.min() < command.command.max() < high
 

@@ -17,8 +17,8 @@ def test_traces_and_errors_are_those_of_the_simulation(logs, fit):
         assert trace.log.name == log.name
         np.testing.assert_array_equal(trace.time, log.time)
         np.testing.assert_array_equal(trace.measured, log.measured["output_angle"])
-        at = log.time - fit.estimates["delay"]
-        result = st.simulate(fit.model, log.signal(0.01), load=log.load, duration=float(at[-1]))
+        at = log.time - trace.delay
+        result = st.simulate(fit.model, trace.command, load=log.load, duration=float(at[-1]))
         simulated = result.at("output_angle", np.maximum(at, 0.0)) + fit.estimates["angle_offset"]
         assert np.abs(trace.simulated - simulated).max() < 3e-3  # its start apart
         (error,) = [e for e in fit.training.errors["PulseServo"] if e.log == log.name]
@@ -49,18 +49,20 @@ def test_simpler_models_stand_beside():
 
 
 def test_levels(fit):
-    """Of a normal law: 1.645, 1.960 and 2.576 standard errors."""
-    k = fit.names.index("delay")
+    """Of a normal law 1.645, 1.960 and 2.576 standard errors, and a little more of Student's with few samples."""
+    k = fit.names.index("angle_offset")
     std = math.sqrt(fit.covariance[k, k])
     for level, reach in ((0.90, 1.644854), (0.95, 1.959964), (0.99, 2.575829)):
-        lower, upper, method = fit.intervals(level)["delay"]
+        lower, upper, method = fit.intervals(level)["angle_offset"]
         assert method == "normal"
-        assert 0.5 * (upper - lower) == pytest.approx(reach * std, rel=1e-6)
+        assert 0.5 * (upper - lower) == pytest.approx(fit.doubt.quantile(level, k) * std, rel=1e-6)
+        assert reach <= fit.doubt.quantile(level, k) < 1.05 * reach
         assert all(type(x) is float for x in (lower, upper))
 
 
 def test_correlation(fit):
-    c = fit.correlation
+    known = [k for k, name in enumerate(fit.names) if name != "delay"]  # which pulses tell, within a frame
+    c = fit.correlation[np.ix_(known, known)]
     assert np.diag(c) == pytest.approx(np.ones(len(c)))
     np.testing.assert_allclose(c, c.T, atol=1e-12)
     assert (np.abs(c) <= 1.0 + 1e-12).all()

@@ -1,5 +1,7 @@
 """The searched numbers: lumps, scales, bounds, priors, starts, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -151,14 +153,29 @@ def test_priors_are_those_given_on_the_scale_of_the_search():
 
 
 def test_priors_of_the_servo_are_the_spread_that_its_file_states():
-    """A range holds 95 % of a normal law: it is 2 · 1.96 standard deviations wide."""
+    """A range is uniform: by its mean square distance from the value, of logarithms where these are searched."""
     s = space(["motor.armature_resistance", "potentiometer.feedback_gain", "output_torque_constant", "output_inertia"],
               priors="servo")
     resistance, gain, constant, inertia = (p.prior for p in s.parameters)
-    assert resistance == pytest.approx((3.04101, (3.72429 - 2.75373) / 3.92))
+    def away(value, lower, upper):
+        x = np.linspace(np.log(lower / value), np.log(upper / value), 200001)
+        return value * np.sqrt(np.mean(x**2))
+
+    assert resistance == pytest.approx((3.04101, away(3.04101, 2.75373, 3.72429)), rel=1e-4)
     assert gain == pytest.approx((0.41966, 0.00225858))
-    assert constant == pytest.approx((N * 3.71284e-3, N * (4.0119 - 3.65251) * 1e-3 / 3.92))
-    assert inertia == pytest.approx((N**2 * 7.65306e-8, N**2 * (2.55102 - 0.127551) * 1e-7 / 3.92))
+    assert constant == pytest.approx((N * 3.71284e-3, N * away(3.71284, 3.65251, 4.0119) * 1e-3), rel=1e-4)
+    assert inertia == pytest.approx((N**2 * 7.65306e-8, N**2 * away(0.765306, 0.127551, 2.55102) * 1e-7), rel=1e-4)
+
+
+def test_a_range_about_its_middle_is_its_width_over_the_root_of_twelve():
+    made = TRUTH.replace({"potentiometer.feedback_offset": 0.2})
+    quantity = replace(made.source("potentiometer.feedback_offset"), lower=0.14, upper=0.26)
+    made = replace(made, quantities={**made.quantities, "potentiometer.feedback_offset": quantity})
+    (p,) = space(["potentiometer.feedback_offset"], servo=made, priors="servo").parameters
+    assert p.prior == pytest.approx((0.2, 0.12 / np.sqrt(12.0)))
+    assert p.of_file
+    (p,) = space(["potentiometer.feedback_offset"], servo=made, priors={p.name: (0.2, 0.01)}).parameters
+    assert not p.of_file
 
 
 def test_a_servo_without_spread_gives_no_priors():

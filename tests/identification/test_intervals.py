@@ -38,7 +38,7 @@ def ended(toy, p, own, logs, correlated=1.0, lower=None, upper=None, prior=None,
             zip(toy.at(best.point), beliefs, best.point.own, strict=True)]
     information = np.sum([r.slope.T @ r.slope for r in rows], axis=0)
     covariance = np.linalg.inv(information + np.diag(prior.weight**2))
-    doubt = Uncertainty(information, covariance * correlated**2, covariance, correlated, "", math.inf, 0.0)
+    doubt = Uncertainty(information, covariance * correlated**2, covariance, covariance, correlated, "", math.inf, 0.0)
     search.rows = rows
     return search, best, doubt
 
@@ -60,7 +60,7 @@ def test_a_parabola_whose_correlation_differs_from_its_curvature():
     """The covariance of correlated residuals is not the inverse of the curvature: no reason for a profile."""
     _, search, best, doubt = straight(p=2)
     spread = np.array([[4.0, -1.5], [-1.5, 1.0]]) * doubt.covariance[1, 1]
-    other = Uncertainty(doubt.information, spread, doubt.curvature, 2.0, "", math.inf, 0.3)
+    other = Uncertainty(doubt.information, spread, spread, doubt.curvature, 2.0, "", math.inf, 0.3)
     found = ends(search, best, other, [0, 1], LEVEL)
     for end in found.values():
         assert (end.lower, end.upper) == pytest.approx((-1.959964, 1.959964), rel=0.03)
@@ -77,7 +77,7 @@ def test_only_what_is_asked_for_and_all_of_it_is_told():
 
 def test_students_t_reaches_further():
     _, search, best, doubt = straight(p=1)
-    few = Uncertainty(doubt.information, doubt.covariance, doubt.curvature, 1.0, "", 4.0, 0.0)
+    few = Uncertainty(doubt.information, doubt.covariance, doubt.covariance, doubt.curvature, 1.0, "", 4.0, 0.0)
     assert ends(search, best, few, [0], LEVEL)[0].upper == pytest.approx(2.776445, rel=0.02)
     assert few.quantile(0.95) == pytest.approx(2.776445, rel=1e-6)  # a table of t, 4 degrees of freedom
 
@@ -153,7 +153,7 @@ def test_what_is_held_stays_in_a_profile():
     held = Search(search.forecast, search.loss, search.prior, search.lower, search.upper, None,
                   np.array([True, False]))
     variance = np.diag([0.0, 1.0 / doubt.information[1, 1]])
-    alone = Uncertainty(doubt.information, variance, variance, 1.0, "", math.inf, 0.0)
+    alone = Uncertainty(doubt.information, variance, variance, variance, 1.0, "", math.inf, 0.0)
     end = ends(held, best, alone, [1], LEVEL)[1]
     a, b = best.point.shared
     first = 0.5 * float((((a * (1.0 - np.exp(-b * T)) - y) / 0.06) ** 2).sum())

@@ -9,7 +9,7 @@ import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.errors import InputError
 from servotwin.identification import RUNGS, friction_ladder
-from servotwin.identification.fitting.ladder import Rung, _choice
+from servotwin.identification.fitting.ladder import Rung, _choice, _told
 
 FREE = ["motor.armature_resistance", "output_inertia", "electronics.stretcher_gain"]
 PLAIN = {"starts": 1, "priors": None, "nuisance": ("delay", "angle_offset", "initial_state")}
@@ -80,6 +80,7 @@ def test_errors_are_those_of_the_fits(plain):
     for rung in plain.rungs:
         assert rung.training == rung.fit.training.total()["PulseServo"]
         assert rung.holdout == rung.fit.holdout.total()["PulseServo"]
+    assert 0.0 < plain.error < 1.5 * max(rung.holdout for rung in plain.rungs)
     assert plain["M1"].fit.holdout.logs == plain["M3"].fit.holdout.logs
 
 
@@ -129,6 +130,12 @@ def test_a_small_gain_on_every_log_is_one():
     assert _choice(rungs, "holdout") == ("M2", "smallest error on logs that were held out")
 
 
+def test_two_logs_do_not_say_how_logs_scatter():
+    """A law that is wrong on one of two logs does not pass as one standard error of a scatter of two."""
+    rungs = [rung("M2", [0.0011, 0.0051]), rung("M3", [0.00111, 0.00117]), rung("M4", [0.00111, 0.00116])]
+    assert _choice(rungs, "holdout")[0] == "M3"
+
+
 def test_overfitting_is_shown_and_not_chosen():
     """M6 is best on what it was fitted to, and worse on others."""
     rungs = [rung("M1", [0.011, 0.012, 0.010], training=0.010), rung("M6", [0.030, 0.020, 0.025], training=0.002)]
@@ -139,6 +146,28 @@ def test_overfitting_is_shown_and_not_chosen():
 def test_without_logs_held_out_the_criterion_decides():
     rungs = [rung("M1", [], criterion=-10.0), rung("M2", [], criterion=-12.0)]
     assert _choice(rungs, "holdout") == ("M2", "smallest information criterion")
+
+
+def test_the_error_is_told_by_logs_that_did_not_choose():
+    """Twelve rungs that are alike but for luck: the chosen one looks better than it is, its told error does not."""
+    rng = np.random.default_rng(3)
+    seen, told = [], []
+    for _ in range(200):
+        rungs = [rung(f"M{k}", np.sqrt(rng.chisquare(3, 8) / 3.0).tolist()) for k in range(1, 13)]
+        chosen = _choice(rungs, "holdout")[0]
+        seen.append(next(r.holdout for r in rungs if r.name == chosen) ** 2)
+        told.append(_told(rungs, "holdout").error ** 2)
+    assert np.mean(told) == pytest.approx(1.0, abs=0.06)  # what every rung is worth
+    assert np.mean(seen) < 0.85
+
+
+def test_halves_that_choose_differently_are_named():
+    rungs = [rung("M1", [0.01, 0.03, 0.01, 0.03]), rung("M3", [0.03, 0.01, 0.03, 0.01])]
+    found = _told(rungs, "holdout")
+    assert found.choices == ("M1", "M3")
+    assert found.error == pytest.approx(0.03)
+    assert math.isnan(_told([rung("M1", [0.01])], "holdout").error)
+    assert _told(rungs, "criterion") == (rungs[0].holdout, ())
 
 
 @pytest.mark.parametrize(("more", "words"), [({"rungs": ("M7",)}, "rungs"), ({"rungs": ()}, "at least one rung"),

@@ -12,6 +12,7 @@ import servotwin as st
 from cli import fit_logs
 from servotwin.errors import OutputExistsError
 from servotwin.identification import identify
+from servotwin.identification.fitting.verdict import Cause
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.identification.report import page as report
 from servotwin.identification.report import pictures as report_pictures
@@ -98,13 +99,36 @@ def test_every_log_is_drawn_and_those_held_out_are_marked(fit, page):
     assert re.search(r'<figure class="held"><figcaption><b>step-3</b>', drawn)
 
 
-def test_many_logs_are_cut_with_a_note(fit):
+def test_of_many_logs_the_worst_the_middle_and_the_best_are_open(fit):
+    """The others are folded, the worst of them first, and what is too much is said."""
     traces = tuple(replace(fit.traces[k % 4], log=replace(fit.traces[k % 4].log, name=f"log-{k}"),
-                           held_out=k == 30) for k in range(32))
+                           simulated=fit.traces[k % 4].measured + 1e-3 * (k + 1)) for k in range(32))
     drawn = report.page(replace(fit, traces=traces)).split('id="logs"')[1].split("</section>")[0]
-    assert drawn.count("<figcaption>") == 24
-    assert "24 of 32 logs" in drawn
-    assert "<b>log-30</b>" in drawn
+    opened, *folded = drawn.split("<details>")
+    assert re.findall(r"<figcaption><b>(log-\d+)</b>", opened) == ["log-31", "log-15", "log-0"]
+    assert [re.search(r"<summary><b>(log-\d+)</b>", one)[1] for one in folded[:2]] == ["log-30", "log-29"]
+    assert f"{29 - len(folded)} further logs" in drawn
+
+
+def test_the_window_with_the_largest_difference_is_enlarged(fit):
+    trace = fit.traces[0]
+    simulated = trace.measured.copy()
+    simulated[20] += 1.0
+    low, high = report_traces.worst_window(replace(trace, simulated=simulated))
+    assert low <= trace.time[20] <= high
+    assert high - low < 0.6 * (trace.time[-1] - trace.time[0])
+
+
+def test_the_verdict_is_on_top(fit, page):
+    bad = replace(fit.verdict, holds=False, sentence="residuals are 4 times < the noise",
+                  causes=(Cause("load friction", "", 4e-3, 1e-3, "climb the ladder"),))
+    for verdict, sections in ((fit.verdict, ("note verdict good", "What is left")),
+                              (bad, ("Residuals are 4 times &lt; the noise.", "load friction", "climb the ladder"))):
+        text = report.page(replace(fit, verdict=verdict))
+        assert re.search(r'<section id="([a-z]+)"', text)[1] == "verdict"
+        top = text.split('id="verdict"')[1].split("</section>")[0]
+        assert all(words in top for words in sections)
+        read(text)
 
 
 def test_what_is_not_determined_is_said(fit):

@@ -1,6 +1,7 @@
 """A servo made of a sheet does what the sheet says, and says where every number comes from."""
 
 import math
+import re
 import warnings
 
 import pytest
@@ -18,8 +19,9 @@ from servotwin.identification import (
     sheet_of,
     write_servo_text,
 )
+from servotwin.identification.sheets.contradictions import torque_question
 from servotwin.models import MODELS
-from servotwin.parameters import load_servo
+from servotwin.parameters import catalog_names, load_servo
 
 BARE = Sheet(name="bare", points=(SheetPoint(supply_voltage=6.0, stall_torque=0.4, no_load_speed=5.5),))
 ONE = SheetPoint(supply_voltage=6.0, stall_torque=1.2945, no_load_speed=math.pi / 3 / 0.23, no_load_current=0.285)
@@ -325,3 +327,24 @@ def test_flags_say_what_is_missing_and_what_is_odd():
     assert "sources disagree: torque x1.16" in sheet_flags(Sheet(name="a", points=(ONE, other)))
     alike = SheetPoint(supply_voltage=6.0, stall_torque=1.292, no_load_speed=ONE.no_load_speed, source="a forum")
     assert not any("disagree" in flag for flag in sheet_flags(Sheet(name="a", points=(ONE, alike))))
+
+
+@pytest.mark.parametrize(("torque", "mass", "asked"), [
+    (13.0, None, "13 N m, or 13 kgf cm = 1.27 N m"), (13.0, 0.045, "1.27 N m"), (1.8, 0.009, "0.177 N m"),
+    (1.29, None, None), (1.29, 0.11, None), (3.35, None, None), (3.3539, 0.0645, None), (30.0, 0.9, None)])
+def test_newton_metres_typed_for_kilogram_centimetres_are_asked_about(torque, mass, asked):
+    """Without currents nothing contradicts a giant; its mass does, or that no catalog servo is so strong."""
+    sheet = Sheet(name="mine", points=(SheetPoint(supply_voltage=6.0, stall_torque=torque, no_load_speed=4.5),),
+                  mass=mass)
+    if asked is None:
+        servo_from_sheet(sheet)  # a warning would be an error here
+        return
+    with pytest.warns(UserWarning, match=re.escape(asked)):
+        servo_from_sheet(sheet)
+
+
+def test_what_the_catalog_has_is_not_asked_about():
+    for name in catalog_names():
+        servo = st.load_servo(name)
+        if servo.sheet:
+            assert torque_question(sheet_of(servo)) is None, name

@@ -30,11 +30,11 @@ def test_a_reduction_has_no_interval_from_motion_alone():
         assert intervals[name].method == "undetermined"
         assert math.isnan(intervals[name].lower)
         assert math.isnan(intervals[name].upper)
-    assert intervals["delay"].method in ("normal", "profile")
+    assert intervals["angle_offset"].method in ("normal", "profile")
     assert found.undetermined == item.parameters
     row = found.names.index(RAW[0])
     assert np.isnan(found.covariance[row]).all()
-    assert math.isfinite(found.covariance[found.names.index("delay"), found.names.index("delay")])
+    assert math.isfinite(found.covariance[found.names.index("angle_offset"), found.names.index("angle_offset")])
 
 
 @pytest.fixture(scope="module")
@@ -57,12 +57,12 @@ def test_without_a_load_torques_are_known_up_to_a_factor(free_shaft):
 
 
 def test_a_current_that_is_sampled_between_pulses_misleads_no_search(free_shaft):
-    """Beside the angle a pulsed current, noise and all: the delay is found as well as from the angle alone."""
+    """Beside the angle a pulsed current, noise and all: pulses are found as well as from the angle alone."""
     rng = np.random.default_rng(6)
     logs = [replace(log, measured={**log.measured, "supply_current": log.measured["supply_current"]
                                    + 0.02 * rng.normal(size=len(log))}) for log in free_shaft]
     found = fitted(logs, free=SCALED)
-    assert found.estimates["delay"] == pytest.approx(0.05, abs=1e-3)
+    assert found.intervals()["delay"].upper == pytest.approx(0.05, abs=1e-3)
     assert found.noise["output_angle"] < 2.0 * STD
 
 

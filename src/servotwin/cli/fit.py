@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,6 +40,7 @@ def fit(
     leave_out: Annotated[list[str] | None, typer.Option(
         "--leave-out", metavar="START..STOP", help="Time window that says nothing about the servo, in all logs or "
         "in one: LOG=START..STOP; repeatable.", rich_help_panel=_LOGS)] = None,
+    mend: log_reading.MendOption = None,
     sensors: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Measured signals to fit; repeatable or with commas (default: the angle and all "
         "currents).", rich_help_panel=_LOGS)] = None,
@@ -61,8 +61,9 @@ def fit(
     no_priors: Annotated[bool, typer.Option(
         "--no-priors", help="Ignore the spreads in the servo file.", rich_help_panel=_SEARCH)] = False,
     nuisance: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Effects of the rig to fit: delay, log_delay, angle_offset, angle_sag, initial_state, or "
-        "none (default: delay, angle_offset, initial_state).", rich_help_panel=_SEARCH)] = None,
+        metavar="NAME", help="Effects of the rig to fit: delay, log_delay, frame_phase, frame_period, angle_offset, "
+        "angle_sag, initial_state, or none (default: delay, frame_phase, angle_offset, initial_state).",
+        rich_help_panel=_SEARCH)] = None,
     starts: Annotated[int, typer.Option(
         metavar="NUMBER", help="Number of searches; all but the first start at random.", rich_help_panel=_SEARCH)] = 3,
     loss: Annotated[str, typer.Option(
@@ -76,6 +77,9 @@ def fit(
     compare: Annotated[bool, typer.Option(
         "--compare/--no-compare", help="Also fit simpler models to the same logs.",
         rich_help_panel=_SEARCH)] = True,
+    diagnose: Annotated[bool, typer.Option(
+        "--diagnose/--no-diagnose", help="Where what is left is not noise, try what may be the matter; takes up to "
+        "four times as long as the fit itself.", rich_help_panel=_SEARCH)] = True,
     ladder: Annotated[bool, typer.Option(
         "--ladder", help="Fit friction laws M1 to M6 and choose one by the held-out logs.",
         rich_help_panel=_SEARCH)] = False,
@@ -102,8 +106,9 @@ def fit(
         _show_advice(_first_advice(search), as_json=as_json)
         return
     _check_ladder(search.model, ladder=ladder)
-    options = {"holdout": holdout, "nuisance": nuisance, "sensors": sensors, "starts": starts, "loss": loss,
-               "level": level, "intervals": intervals, "seed": seed, "compare": compare}
+    options = {"holdout": holdout, "mend": mend, "nuisance": nuisance, "sensors": sensors, "starts": starts,
+               "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
+               "diagnose": diagnose}
     chosen = _options(options)
     given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json)
     found = _run(search, given, chosen, ladder=ladder)
@@ -190,11 +195,12 @@ def _options(given: dict[str, Any]) -> dict[str, Any]:
     from servotwin.identification.fitting.identify import NUISANCE
 
     return {
-        "holdout": fit_words.held_out(given["holdout"]), "sensors": fit_words.names(given["sensors"]),
+        "holdout": fit_words.held_out(given["holdout"]), "mend": fit_words.kinds(given["mend"]),
+        "sensors": fit_words.names(given["sensors"]),
         "nuisance": fit_words.some_or_none("--nuisance", given["nuisance"], NUISANCE),
         "level": fit_words.share("--level", given["level"]), "starts": given["starts"], "loss": given["loss"],
         "intervals": given["intervals"], "seed": given["seed"],
-        "compare_with": ("slew", "M1") if given["compare"] else ()}
+        "diagnose": given["diagnose"], "compare_with": ("slew", "M1") if given["compare"] else ()}
 
 
 def _run(search: _Search, logs: list[Log], options: dict[str, Any], *, ladder: bool) -> _Found:
@@ -216,14 +222,14 @@ def _run(search: _Search, logs: list[Log], options: dict[str, Any], *, ladder: b
 
 @contextlib.contextmanager
 def _progress() -> Iterator[Callable[[float, str], None]]:
-    """Give what shows the progress on a terminal, and ends the search after an interrupt, with the best so far.
+    """Give what shows the progress, and ends the search after an interrupt, with the best so far.
 
     Before the first step there is no best, and an interrupt ends the process.
     """
     from servotwin.cli.interrupts import finishing
     from servotwin.identification.fitting.checks import shown
 
-    with shown(sys.stderr is not None and sys.stderr.isatty()) as show, contextlib.ExitStack() as stack:
+    with shown(True) as show, contextlib.ExitStack() as stack:
         checks: list[Callable[[], None]] = []
 
         def tell(share: float, text: str) -> None:

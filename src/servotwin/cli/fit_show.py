@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from servotwin.identification import Advice, Fit, Ladder
     from servotwin.identification.fitting.fit import Trace
     from servotwin.identification.fitting.holdout import ErrorTable
+    from servotwin.identification.fitting.yielding import Yielded
 
 _MOST_EXPERIMENTS = 8
 
@@ -33,7 +34,7 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
     held = sum(trace.held_out for trace in fit.traces)
     head = f"{fit.servo.title or fit.servo.name} ({fit.servo.name}), {type(fit.model).__name__}, " \
            f"{len(fit.traces)} logs, {held} of them held out, {fit.seconds:.1f} s"
-    parts: list[RenderableType] = [head]
+    parts: list[RenderableType] = [head, *_verdict(fit)]
     if fit.interrupted:
         parts.append("INTERRUPTED: the best so far, without intervals")
     parts += ["", _estimates(fit), ""]
@@ -42,12 +43,28 @@ def sections(fit: Fit, files: Sequence[str]) -> list[RenderableType]:
               else f"- {name} ended at a bound of the search" for name in fit.at_bound]
     parts += [""] if fit.unidentifiable or fit.at_bound else []
     parts.append(errors(tables_of(fit), fit.traces, "motion"))
-    if fit.warnings:
-        parts += ["", *[f"! {text}" for text in fit.warnings]]
+    said = [text for text in fit.warnings if fit.verdict is None or text != fit.verdict.sentence]
+    if said:
+        parts += ["", *[f"! {text}" for text in said]]
     given = was_set(fit.model)
     if given or files:
         parts += ["", pairs([*([("set", dotted(given))] if given else []), *_written(files)])]
     return parts
+
+
+def _verdict(fit: Fit) -> list[RenderableType]:
+    """Return the verdict, and the causes that explain it, in two lines or a table."""
+    if fit.verdict is None:
+        return []
+    mark = "" if fit.verdict.holds else "! "
+    lines: list[RenderableType] = [f"{mark}{fit.verdict.sentence}"]
+    if fit.verdict.causes:
+        factor, unit = error_shown(fit.traces)
+        rows = [(cause.name, f"{cause.before * factor:.3g}", f"{cause.after * factor:.3g}", cause.remedy)
+                for cause in fit.verdict.causes]
+        lines += ["", table(("what may be the matter", f"error ({unit})", f"with it ({unit})", "what to do"), rows,
+                            wraps="what to do")]
+    return lines
 
 
 def written(files: Sequence[str]) -> RenderableType:
@@ -63,9 +80,10 @@ def _estimates(fit: Fit) -> RenderableType:
     rows = []
     for line in estimate_lines(fit):
         found_by = line.method if line.interval != line.method else ""
-        rows.append((line.name, line.value, line.interval, line.unit, found_by, "rig" if line.nuisance else line.sheet))
+        rows.append((line.name, line.value, line.interval, line.unit, found_by, line.prior,
+                     "rig" if line.nuisance else line.sheet))
     level = f"{100.0 * fit.level:g} % interval"
-    return table(("parameter", "value", level, "unit", "found by", "before"), rows, wraps="parameter")
+    return table(("parameter", "value", level, "unit", "found by", "prior", "before"), rows, wraps="parameter")
 
 
 def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], label: str) -> RenderableType:
@@ -93,7 +111,8 @@ def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
     found = fit.intervals()
     estimates = {name: {
         "value": fit.estimates[name], "unit": fit.units[name], "lower": float(found[name].lower),
-        "upper": float(found[name].upper), "method": found[name].method, "before": nominal_of(fit, name)}
+        "upper": float(found[name].upper), "method": found[name].method, "prior_share": fit.prior_share.get(name),
+        "before": nominal_of(fit, name)}
         for name in fit.names}
     return {
         "servo": fit.servo.name, "model": type(fit.model).__name__, "logs": len(fit.traces),
@@ -103,13 +122,25 @@ def facts(fit: Fit, files: Sequence[str]) -> dict[str, Any]:
             "parameters": list(item.parameters), "direction": list(item.direction),
             "combinations": list(item.combinations), "remedies": list(item.remedies), "words": str(item)}
             for item in fit.unidentifiable],
-        "at_bound": list(fit.at_bound),
+        "at_bound": list(fit.at_bound), "yielded": [_yielded(one) for one in fit.yielded],
         "errors": {which.replace(" ", "_"): error_facts(held) for which, held in tables_of(fit).items()},
         "noise": {name: float(value) for name, value in fit.noise.items()}, "warnings": list(fit.warnings),
+        "verdict": None if fit.verdict is None else {
+            "sentence": fit.verdict.sentence, "holds": fit.verdict.holds, "ratio": fit.verdict.ratio,
+            "noise": dict(fit.verdict.noise), "autocorrelation": fit.verdict.autocorrelation,
+            "odds": dict(fit.verdict.odds), "outliers": fit.verdict.outliers,
+            "causes": [{"name": cause.name, "sentence": cause.sentence, "before": cause.before, "after": cause.after,
+                        "remedy": cause.remedy} for cause in fit.verdict.causes]},
         "starts": [{"cost": float(start.cost), "converged": bool(start.converged)} for start in fit.starts],
         "data": fit.servo.fit.get("data"), "seconds": fit.seconds, "interrupted": fit.interrupted,
         "set": was_set(fit.model), "files": list(files),
     }
+
+
+def _yielded(one: Yielded) -> dict[str, Any]:
+    return {"parameter": one.name, "unit": one.unit, "file": one.file, "file_std": one.file_std, "logs": one.logs,
+            "logs_std": one.logs_std, "logs_lower": one.logs_lower, "logs_upper": one.logs_upper, "apart": one.apart,
+            "of_file": one.of_file, "others": list(one.others), "words": str(one)}
 
 
 def error_facts(held: ErrorTable) -> dict[str, Any]:
@@ -132,12 +163,23 @@ def ladder_table(ladder: Ladder) -> list[RenderableType]:
                      f"{rung.holdout * factor:.3g}" if math.isfinite(rung.holdout) else "–", f"{rung.criterion:.1f}",
                      ", ".join(said)))
     return [table(("friction", "parameters", f"fitted ({unit})", f"held out ({unit})", "information criterion", ""),
-                  rows), f"{ladder.chosen}: {ladder.reason}", ""]
+                  rows), f"{ladder.chosen}: {ladder.reason}", *_told(ladder, factor, unit), ""]
+
+
+def _told(ladder: Ladder, factor: float, unit: str) -> list[str]:
+    """Return the error that the choice did not see."""
+    if not math.isfinite(ladder.error):
+        return []
+    said = f"error on logs that had no say in the choice: {ladder.error * factor:.3g} {unit}"
+    if ladder.choices:
+        said += f" (held-out logs in two halves, which choose {' and '.join(ladder.choices)})"
+    return [said]
 
 
 def ladder_facts(ladder: Ladder) -> dict[str, Any]:
     """Return a friction ladder as plain data."""
-    return {"chosen": ladder.chosen, "reason": ladder.reason, "rungs": [
+    return {"chosen": ladder.chosen, "reason": ladder.reason, "error": ladder.error,
+            "choices": list(ladder.choices), "rungs": [
         {"name": rung.name, "training": rung.training, "holdout": rung.holdout, "criterion": rung.criterion,
          "overfits": rung.overfits, "estimates": dict(rung.fit.estimates)} for rung in ladder.rungs]}
 
@@ -145,19 +187,26 @@ def ladder_facts(ladder: Ladder) -> dict[str, Any]:
 def advice_table(advice: Advice) -> list[RenderableType]:
     """Return the next experiments, the best first, with the predicted half width of the worst-known parameters."""
     worst = sorted(advice.now, key=lambda name: -advice.now[name])[:3]
-    rows: list[tuple[str, ...]] = [("as it is now", *(_width(advice.now[name]) for name in worst),
-                                    _width(max(advice.now.values())))]
-    rows += [(str(experiment), *(_width(experiment.widths[name]) for name in worst), _width(experiment.widest))
+    rows: list[tuple[str, ...]] = [("as it is now", *_widths(advice.now, worst))]
+    rows += [(str(experiment), *_widths(experiment.widths, worst))
              for experiment in advice.experiments[:_MOST_EXPERIMENTS]]
+    if any(_width(advice.alone[name]) != _width(advice.now[name]) for name in advice.now):
+        rows.insert(1, ("as it is now, by logs alone, without priors", *_widths(advice.alone, worst)))
+        best = advice.experiments[0]
+        rows.insert(3, ("the same, by logs alone, without priors", *_widths(best.alone, worst)))
     return ["next experiments, and how surely what is known worst would be known with them (half a 95 % interval)",
             table(("experiment", *worst, "widest"), rows, wraps="experiment"), str(advice)]
 
 
+def _widths(widths: Mapping[str, float], names: Sequence[str]) -> tuple[str, ...]:
+    return (*(_width(widths[name]) for name in names), _width(max(widths.values())))
+
+
 def advice_facts(advice: Advice) -> dict[str, Any]:
     """Return advice as plain data; widths are relative."""
-    return {"now": dict(advice.now), "widest": advice.widest, "experiments": [
+    return {"now": dict(advice.now), "alone": dict(advice.alone), "widest": advice.widest, "experiments": [
         {"motion": one.motion, "load": one.load, "voltage": one.voltage, "sensors": list(one.sensors),
-         "widths": dict(one.widths), "widest": one.widest} for one in advice.experiments]}
+         "widths": dict(one.widths), "alone": dict(one.alone), "widest": one.widest} for one in advice.experiments]}
 
 
 def _width(share: float) -> str:

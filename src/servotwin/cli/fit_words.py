@@ -35,6 +35,17 @@ def names(words: Sequence[str] | None) -> tuple[str, ...] | None:
     return tuple(part.strip() for word in words for part in word.split(",") if part.strip())
 
 
+def kinds(words: Sequence[str] | None) -> tuple[str, ...]:
+    """Return kinds of findings, whose words may be joined.
+
+    Examples
+    --------
+    >>> kinds(["wrap,not-followed"]), kinds(None)
+    (('wrap', 'not followed'), ())
+    """
+    return tuple(name.replace("-", " ") for name in names(words) or ())
+
+
 def some_or_none(option: str, words: Sequence[str] | None, usual: tuple[str, ...]) -> tuple[str, ...]:
     """Return names, no name at all for the word "none", and the usual ones where the option was not given.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -84,7 +85,8 @@ def from_sheet(
     if again is not None:
         _one_way("SERVO", [word for word in typed if word not in ("--name", "--title")], None)
     sheet = _again(again, name, title) if again is not None else _sheet(points, whole, at)
-    _one(sheet, how, out, force=force, as_json=as_json)
+    weighed = any(unit in text for text in torque or () for unit in ("kg", "oz"))
+    _one(sheet, how, out, weighed=weighed, force=force, as_json=as_json)
 
 
 def _one_way(way: str, typed: list[str], again: str | None) -> None:
@@ -153,11 +155,14 @@ def _points(given: dict[str, _Figures], usual: float | None) -> tuple[Any, ...]:
     return tuple(SheetPoint(supply_voltage=volts, **values) for volts, values in sorted(found.items()))
 
 
-def _one(sheet: Sheet, how: dict[str, bool], out: Path | None, *, force: bool, as_json: bool) -> None:
+def _one(sheet: Sheet, how: dict[str, bool], out: Path | None, *, weighed: bool, force: bool, as_json: bool) -> None:
     from servotwin.cli.servo_page import parameter_table
     from servotwin.identification import servo_from_sheet, write_servo_text
 
-    servo = servo_from_sheet(sheet, **how)
+    with warnings.catch_warnings():
+        if weighed:
+            warnings.filterwarnings("ignore", message=".*kgf cm")  # who typed these meant them
+        servo = servo_from_sheet(sheet, **how)
     if out is not None:
         write_servo_text(servo, out, overwrite=force)
     found = _found(sheet, servo)

@@ -29,6 +29,10 @@ JointOption = Annotated[list[str] | None, typer.Option(
     metavar="NAME[:UNIT]", help="Joints of a LeRobot dataset to read, and their unit; repeatable or with commas, *:deg "
     "for all.", rich_help_panel=PANEL)]
 
+MendOption = Annotated[list[str] | None, typer.Option(
+    metavar="KIND", help="What to put right in the logs first, of what is said to be wrong with them: wrap, stamps, "
+    "sign, span, rows, not-followed; repeatable or with commas.", rich_help_panel=PANEL)]
+
 
 def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None, joints: Sequence[str] | None,
          leave_out: Sequence[str], *, force: bool = False, quiet: bool = False) -> list[Log]:

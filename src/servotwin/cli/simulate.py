@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -112,7 +111,7 @@ def _run(model: Model, words: CommandWords, load: list[str], duration: float, ou
         raise InputError("--duration", got=duration,
                          allowed=f"at most {_MOST_FRAMES:g} frames of {1e3 * chip.frame_period:g} ms")
     result = run(model, signal, duration=duration, load=load_from(load, model), output_step=output_step, seed=seed,
-                 progress=sys.stderr is not None and sys.stderr.isatty())
+                 progress=True)
     return result.raise_if_failed()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -153,7 +152,7 @@ def _run(model: Model, words: Any, load: list[str], metric: list[str], options: 
     metrics = tuple(dict.fromkeys([*metric, *checked_metrics(None, model, signal, duration)]))
     with executor_at(scheduler) as executor, last_words(lambda: _how_to_go_on(options["directory"])):
         return run(model, signal, load=load_from(load, model), metrics=metrics, executor=executor,
-                   progress=sys.stderr is not None and sys.stderr.isatty(), **options)
+                   progress=True, **options)
 
 
 def _how_to_go_on(folder: Path | None) -> str | None:

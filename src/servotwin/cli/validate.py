@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -39,14 +38,16 @@ def validate(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI units.")] = None,
     nuisance: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Effects of the rig to fit to these logs: delay, log_delay, angle_offset, "
-        "angle_sag, initial_state; repeatable or with commas (default: none; the others are as recorded by the fit in "
+        metavar="NAME", help="Effects of the rig to fit to these logs: delay, log_delay, frame_phase, "
+        "frame_period, angle_offset, angle_sag, initial_state; repeatable or with commas (default: none; the others "
+        "are as recorded by the fit in "
         "the servo file).")] = None,
     sensors: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Measured signals to compare; repeatable or with commas.")] = None,
     leave_out: Annotated[list[str] | None, typer.Option(
         "--leave-out", metavar="START..STOP", help="Time window to ignore, in all logs, or in one: "
         "LOG=START..STOP; repeatable.")] = None,
+    mend: log_reading.MendOption = None,
     max_error: Annotated[list[str] | None, typer.Option(
         "--max-error", metavar="ERROR", help="Exit with code 1 if the rms error of a kind of motion is larger, such as "
         "3deg, or prbs=8deg for one kind; repeatable.")] = None,
@@ -57,7 +58,7 @@ def validate(
 ) -> None:
     """Compare a servo with logs, and say how far it is off."""
     targets = _targets(report, [Path(servo), *logs], force=force)
-    found = _run(servo, model, change or [], nuisance, sensors, lambda: log_reading.read(
+    found = _run(servo, model, change or [], nuisance, sensors, mend, lambda: log_reading.read(
         logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json))
     limits = _limits(found, max_error or [])
     files = _write(found, targets, force=force)
@@ -76,7 +77,7 @@ def _targets(report: Path | None, inputs: list[Path], *, force: bool) -> list[Ta
 
 
 def _run(servo: str, model: str | None, change: list[str], nuisance: list[str] | None, sensors: list[str] | None,
-         read: Callable[[], list[Log]]) -> Validation:
+         mend: list[str] | None, read: Callable[[], list[Log]]) -> Validation:
     from servotwin.cli import fit_words
     from servotwin.cli.model_words import class_of, servo_of
     from servotwin.identification.fitting.validate import validate as run
@@ -84,8 +85,8 @@ def _run(servo: str, model: str | None, change: list[str], nuisance: list[str] |
     kind = None if model is None else class_of(model, fit_words.MODEL_NAMES)
     changed = servo_of(servo, change)
     fitted = fit_words.some_or_none("--nuisance", nuisance, ())
-    return run(read(), changed, kind, nuisance=fitted, sensors=fit_words.names(sensors),
-               progress=sys.stderr is not None and sys.stderr.isatty())
+    return run(read(), changed, kind, mend=fit_words.kinds(mend), nuisance=fitted, sensors=fit_words.names(sensors),
+               progress=True)
 
 
 def _limits(found: Validation, words: list[str]) -> Mapping[str | None, float]:
@@ -132,7 +133,7 @@ def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str |
             "servo": found.servo.name, "model": type(found.model).__name__, "logs": len(found.traces),
             "reading": log_reading.facts([trace.log for trace in found.traces]),
             "nuisance": dict(found.nuisance), "fitted": list(found.fitted),
-            "errors": fit_show.error_facts(found.errors), "noise": dict(found.noise),
+            "errors": fit_show.error_facts(found.errors), "noise": dict(found.noise), "warnings": list(found.warnings),
             "max_error": {motion or "all": limit for motion, limit in limits.items()}, "above": dict(above),
             "files": files})
         return
@@ -153,6 +154,7 @@ def _sections(found: Validation, above: Mapping[str, float], limits: Mapping[str
     for label in found.errors.labels():
         parts += ["", fit_show.errors(tables, found.traces, label)]
     parts += ["", _log_table(found)]
+    parts += ["", *[f"! {text}" for text in found.warnings]] if found.warnings else []
     factor, unit = error_shown(found.traces)
     parts += [""] if above else []
     for motion, error in above.items():

@@ -1,6 +1,7 @@
 """What a servo is, from logs of what it did: parameters with intervals."""
 
 from servotwin.identification.fitting.advise import Advice, Experiment, advise
+from servotwin.identification.fitting.findings import Finding, findings
 from servotwin.identification.fitting.fit import Fit, Interval, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
@@ -10,7 +11,9 @@ from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, frictio
 from servotwin.identification.fitting.point import LogPart, Point
 from servotwin.identification.fitting.uncertainty import Uncertainty
 from servotwin.identification.fitting.validate import Validation, validate
+from servotwin.identification.fitting.verdict import Cause, Verdict
 from servotwin.identification.fitting.words import Unidentifiable
+from servotwin.identification.fitting.yielding import Yielded
 from servotwin.identification.logs.bam_convention import BamConvention
 from servotwin.identification.logs.bam_logs import read_bam_log, write_bam_log
 from servotwin.identification.logs.bam_parameters import read_bam_parameters, write_bam_parameters
@@ -33,9 +36,11 @@ __all__ = [
     "RUNGS",
     "Advice",
     "BamConvention",
+    "Cause",
     "Contradiction",
     "ErrorTable",
     "Experiment",
+    "Finding",
     "Fit",
     "Forecast",
     "FreeParameter",
@@ -59,7 +64,10 @@ __all__ = [
     "Uncertainty",
     "Unidentifiable",
     "Validation",
+    "Verdict",
+    "Yielded",
     "advise",
+    "findings",
     "friction_ladder",
     "identify",
     "keep_columns",

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 _DURATION, _STEP = 4.0, 0.02  # s, of a log that is tried, unless there are logs to go by
 _ENCODER = 1e-3  # rad, noise of an angle, assumed where no log says it
 _FURTHER = 0.01  # of its largest value: noise of a sensor that no log has, assumed
+_TOLD = 1.1
 _UNKNOWN = 20.0  # standard error of what nothing tells, scaled
 _SENSORS = {"supply_current": "supply current", "armature_current": "motor current"}
 _VOLTAGE = "supply.open_circuit_voltage"
@@ -51,6 +52,8 @@ class Experiment:
         Signals that are measured.
     widths : mapping of str to float
         Predicted half width of each 95 % interval, relative to the value (or to a typical one where that is 0).
+    alone : mapping of str to float
+        The same of the logs alone, priors left out.
     command : Log
         The command itself, at its times.
     """
@@ -60,6 +63,7 @@ class Experiment:
     voltage: float
     sensors: tuple[str, ...]
     widths: Mapping[str, float]
+    alone: Mapping[str, float]
     command: Log
 
     @property
@@ -79,7 +83,9 @@ class Advice:
     Parameters
     ----------
     now : mapping of str to float
-        Half widths of the 95 % intervals as they are, as in `Experiment.widths`; inf where nothing is known.
+        Half widths of the 95 % intervals as they are, as in `Experiment.widths`: logs and priors together.
+    alone : mapping of str to float
+        The same of the logs alone: what the priors say is left out.
     widest : str
         The parameter that is known worst.
     experiments : tuple of Experiment
@@ -87,12 +93,17 @@ class Advice:
     """
 
     now: Mapping[str, float]
+    alone: Mapping[str, float]
     widest: str
     experiments: tuple[Experiment, ...]
 
     def __str__(self) -> str:
-        best = self.experiments[0]
-        return f"next: {best}; {self.widest} from {_share(self.now[self.widest])} to {_share(best.widths[self.widest])}"
+        best, name = self.experiments[0], self.widest
+        text = f"next: {best}; {name} from {_share(self.now[name])} to {_share(best.widths[name])}"
+        # Where priors say more than a tenth of it, what the logs say is told apart
+        if self.alone[name] <= _TOLD * self.now[name] and best.alone[name] <= _TOLD * best.widths[name]:
+            return text
+        return f"{text}; by logs alone, without priors, from {_share(self.alone[name])} to {_share(best.alone[name])}"
 
 
 def _share(width: float) -> str:
@@ -152,7 +163,7 @@ def advise(known: Fit | Servo, *, model: type[Model] | None = None, free: Sequen
             continue
         size = len(log.time)
         for count in range(len(sensors) + 1):
-            information = start.information.copy()
+            information = np.zeros_like(start.information)
             for at, name in enumerate((start.sensor, *sensors[:count])):
                 rows = slice(at * size, (at + 1) * size)
                 largest = float(np.abs(part.residual[rows]).max(initial=0.0))
@@ -160,14 +171,15 @@ def advise(known: Fit | Servo, *, model: type[Model] | None = None, free: Sequen
                 slope = part.shared[rows] / max(sigma, 1e-12)
                 information += slope.T @ slope
             experiments.append(Experiment(motion, text, level, (start.sensor, *sensors[:count]),
-                                          start.widths(information), log))
+                                          start.widths(start.information + information),
+                                          start.widths(start.of_logs + information), log))
     if not experiments:
         raise InputError("experiments", got="none that could be simulated to its end", allowed="another servo or load")
     now = start.widths(start.information)
     widest = max(now, key=lambda name: now[name])
     # Of experiments that bring the same, the one with the fewest sensors
     ranked = sorted(experiments, key=lambda e: (round(math.log(max(e.widest, 1e-9)), 1), len(e.sensors), e.widest))
-    return Advice(now, widest, tuple(ranked))
+    return Advice(now, start.widths(start.of_logs), widest, tuple(ranked))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,6 +191,7 @@ class _Known:
     nuisance: tuple[str, ...]
     shared: Array
     information: Array  # of logs and priors
+    of_logs: Array  # of logs alone
     scale: Array  # from a scaled number to a share of its value
     names: tuple[str, ...]
     noise: Mapping[str, float]
@@ -190,14 +203,9 @@ class _Known:
         if fit.doubt is None:
             raise InputError("advise", got="a fit without intervals", allowed="one with intervals=True that was not "
                              "interrupted")
-        weight = np.zeros(len(fit.names))
-        for k, p in enumerate(fit.space.parameters):
-            if p.scaled_prior is not None:
-                weight[k] = 1.0 / p.scaled_prior[1]
-        information = _information(fit, weight)
         sensor = "output_angle" if "output_angle" in fit.noise else "feedback_voltage"
-        return cls(fit.model, fit.space, fit.names[len(fit.space):], fit.best, information,
-                   _scales(fit.space, fit.best), fit.names, fit.noise, sensor,
+        return cls(fit.model, fit.space, fit.names[len(fit.space):], fit.best, _information(fit),
+                   _information(fit, alone=True), _scales(fit.space, fit.best), fit.names, fit.noise, sensor,
                    tuple(logs) or tuple(trace.log for trace in fit.traces))
 
     @classmethod
@@ -209,8 +217,8 @@ class _Known:
         shared = np.concatenate([space.start, [0.02 / DELAY_SCALE, 0.0]])
         beliefs = [p.scaled_prior for p in space.parameters]
         weight = np.array([*(1.0 / b[1] if b else 0.0 for b in beliefs), 0.0, 0.0])
-        return cls(model, space, nuisance, shared, np.diag(weight**2), _scales(space, shared),
-                   (*space.names, *nuisance), {}, "output_angle", tuple(logs))
+        return cls(model, space, nuisance, shared, np.diag(weight**2), np.zeros((len(shared),) * 2),
+                   _scales(space, shared), (*space.names, *nuisance), {}, "output_angle", tuple(logs))
 
     def widths(self, information: Array) -> dict[str, float]:
         """Return the half widths of the 95 % intervals of the searched parameters."""
@@ -219,17 +227,27 @@ class _Known:
         return {name: 1.96 * float(std[k] * self.scale[k]) for k, name in enumerate(self.space.names)}
 
 
-def _information(fit: Fit, weight: Array) -> Array:
-    """Return what logs and priors say, as surely as the intervals of a fit do."""
+def _information(fit: Fit, *, alone: bool = False) -> Array:
+    """Return what logs and priors say, or logs alone, as surely as the intervals of a fit do."""
+    dropped = {one.name for one in fit.yielded}
+    weight = np.zeros(len(fit.names))
+    for k, p in enumerate(fit.space.parameters):
+        if p.scaled_prior is not None and p.name not in dropped and not alone:
+            weight[k] = 1.0 / p.scaled_prior[1]
     doubt = fit.doubt
     if doubt is None:
         return np.diag(weight**2)
-    known = np.diag(doubt.covariance) > 0.0
+    covariance = doubt.alone if alone else doubt.covariance
+    known = np.diag(covariance) > 0.0
     ratio = np.diag(doubt.curvature)[known] / np.diag(doubt.covariance)[known]
-    information = doubt.information * float(np.median(ratio)) + np.diag(weight**2)
+    information = doubt.information * float(np.median(ratio))
+    if fit.allowed is not None and fit.unidentifiable:  # what rounding says of what is open is nothing
+        closed = np.eye(len(weight)) - fit.allowed.open @ np.linalg.pinv(fit.allowed.open)
+        information = closed @ information @ closed
+    information = information + np.diag(weight**2)
     if not fit.unidentifiable:
         inner = np.ix_(known, known)
-        information[inner] = np.linalg.inv(doubt.covariance[inner])
+        information[inner] = np.linalg.inv(covariance[inner])
     return information
 
 
@@ -267,7 +285,9 @@ def _range(known: _Known) -> tuple[float, float]:
 
 def _times(known: _Known) -> Array:
     step = float(np.median([np.median(np.diff(log.time)) for log in known.logs])) if known.logs else _STEP
-    return np.arange(0.0, _DURATION, max(step, 1e-3))
+    step = max(round(step, 9), 1e-3)
+    # Whole nanoseconds, so that an edge of a frame is where a log writes it
+    return np.round(np.arange(math.ceil(_DURATION / step)) * step, 9)
 
 
 def _loads(known: _Known) -> dict[str, Load]:

@@ -171,7 +171,7 @@ class Search:
     def run(self, start: Point, *, most: int = 60, tell: Tell | None = None,
             least_gain: float = _LEAST_GAIN) -> Outcome:
         """Search from a point; the best so far is told after each step."""
-        point = Point(np.clip(start.shared, self.lower, self.upper), start.own)
+        point = start._replace(shared=np.clip(start.shared, self.lower, self.upper))
         parts = self.forecast.at(point, cases=self.cases)
         best = Outcome(point, self.cost_of(point, parts), False, 0)
         if not math.isfinite(best.cost):
@@ -245,4 +245,4 @@ class Search:
                 step = -np.linalg.solve(_safe(b.H_oo), b.g_o + b.H_so.T @ change)
                 own[k] = point.own[k] + step
                 largest = max(largest, float(np.abs(step).max()))
-        return Point(x + change, tuple(own)), largest
+        return point._replace(shared=x + change, own=tuple(own)), largest

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+_FRAME_PERIOD = "electronics.frame_period"
 _UNKNOWN = 0.1  # s, more than the delay of a servo and its bus
 
 
@@ -47,6 +48,8 @@ class Case:
         Whether the start speed differs from 0 visibly.
     key : tuple
         Cases of one key run in one batch.
+    period : float
+        T_f that log or servo say [s]; 0 of a model without pulses.
     """
 
     log: Log
@@ -58,6 +61,7 @@ class Case:
     scatter: float
     moving: bool
     key: tuple[Any, ...] = field(repr=False)
+    period: float = 0.0
 
     @property
     def count(self) -> int:
@@ -96,7 +100,7 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     key = (times.tobytes(), log.duration, log.command_kind, overridden, tuple(sorted(places)),
            log.torque_on is None or bool(log.torque_on.all()))
     return Case(log=log, signal=_signal(log, model), times=times, places=places, values=values, start=(angle, speed),
-                scatter=scatter, moving=moving, key=key)
+                scatter=scatter, moving=moving, key=key, period=_period(log, model))
 
 
 def _usable(log: Log, model: Model, name: str) -> NDArray[np.bool_]:
@@ -128,7 +132,14 @@ def _start(log: Log, model: Model) -> tuple[float, float, float, bool]:
     return float(values[0]), 0.0, scatter, False
 
 
+def _period(log: Log, model: Model) -> float:
+    """Return T_f that log or servo say [s]; 0 of a model without pulses."""
+    if isinstance(model, BoundedServo):
+        return 0.0
+    return float(log.parameters.get(_FRAME_PERIOD, getattr(model, "frame_period", 0.0)))
+
+
 def _signal(log: Log, model: Model) -> Signal:
     """Return the command as a model takes it; only a pulse servo knows missing pulses."""
-    made = log.signal(log.parameters.get("electronics.frame_period", getattr(model, "frame_period", None)))
+    made = log.signal(_period(log, model) or None)
     return replace(made, edges=None) if made.edges is not None and isinstance(model, BoundedServo) else made

@@ -12,25 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.arrow import Prior
-from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.point import Point
 from servotwin.identification.logs.log import Log
 from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive, default_model
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES
+from servotwin.simulation.progress import lines, on_terminal
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.comparison import Tables
-    from servotwin.identification.fitting.uncertainty import Uncertainty
+    from servotwin.identification.fitting.yielding import Yielded
 
 Array = NDArray[np.float64]
 
 _KINDS = (PulseServo, PulseServoInductive, BoundedServo)
 _FITTED = ("output_angle", "feedback_voltage", "armature_current", "supply_current")
 _TOO_FAST = 4.0  # times the speed without load
-_CONTRADICTS = 3.5  # standard errors between sheet and logs
 _OVERFITTED = 1.6  # error of new logs over that of the fitted ones
 
 
@@ -160,6 +157,13 @@ def checked_words(what: str, words: Any, allowed: Sequence[str]) -> tuple[str, .
     return tuple(words)
 
 
+def checked_flag(what: str, flag: Any) -> bool:
+    """Return whether something is wanted."""
+    if not isinstance(flag, bool):
+        raise InputError(what, got=flag, allowed="True or False")
+    return flag
+
+
 def checked_level(level: Any) -> float:
     """Return the level of intervals."""
     if isinstance(level, bool) or not isinstance(level, int | float) or not 0.0 < level < 1.0:
@@ -200,30 +204,17 @@ def checked_count(what: str, number: Any, *, least: int) -> int:
     return int(number)
 
 
-def warnings_of(prior: Prior, point: Point, doubt: Uncertainty | None, space: Space,
-                tables: Tables) -> tuple[str, ...]:
+def warnings_of(yielded: Sequence[Yielded], tables: Tables) -> tuple[str, ...]:
     """Return what a reader has to know of a fit, a line each."""
-    found = []
-    if doubt is not None:
-        for k, p in enumerate(space.parameters):
-            weight = prior.weight[k]
-            if weight == 0.0 or p.prior is None:
-                continue
-            # The sheet's belief is in the estimate; what the logs alone would say lies further off
-            left = 1.0 / weight**2 - min(doubt.std[k] ** 2, 0.96 / weight**2)
-            off = (point.shared[k] - prior.mean[k]) / math.sqrt(left)
-            if abs(off) > _CONTRADICTS:
-                value = float(p.value(point.shared[k]))
-                found.append(f"the logs contradict the servo file: {p.name} is {value:.4g} {p.unit}, it says "
-                             f"{p.prior[0]:.4g} ± {p.prior[1]:.2g} ({abs(off):.0f} standard errors apart)")
+    found = [str(one) for one in yielded]
     if tables.holdout and tables.training:
         model = tables.holdout.models[0]
         new, old = tables.holdout.by(), tables.training.by()
         for motion in new:
             if motion in old and new[motion][model] > _OVERFITTED * old[motion][model]:
                 ratio = new[motion][model] / old[motion][model]
-                found.append(f"{motion}: logs that were held out are off {ratio:.2g} times as far as fitted ones: the "
-                             "fit follows what does not repeat")
+                found.append(f"{motion}: logs that were held out are off {ratio:.2g} times as far as fitted ones: they "
+                             "show what those do not, or those are too few for so many numbers")
     return tuple(found)
 
 
@@ -237,6 +228,9 @@ def shown(progress: Any) -> Iterator[Callable[[float, str], None]]:
         raise InputError("progress", got=progress, allowed="True, False or a function of the share done and a text")
     if not progress:
         yield lambda share, text: None
+        return
+    if not on_terminal():
+        yield lines("fit")
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn

@@ -14,8 +14,10 @@ from servotwin.identification.fitting.baselines import fit_slew_lag
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import LUMPED, Space
+from servotwin.identification.fitting.held_out import with_pulses_of
 from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
-from servotwin.identification.fitting.task import Task, by_sensor
+from servotwin.identification.fitting.scatter import by_sensor
+from servotwin.identification.fitting.task import Task
 from servotwin.identification.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
@@ -60,13 +62,13 @@ def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo:
     """
     model, fitted = task.forecast.model, task.fitted
     own = type(model).__name__
-    errors: dict[str, dict[int, LogError]] = {own: {k: log_error(t.log, t.residual) for k, t in enumerate(traces)}}
+    errors: dict[str, dict[int, LogError]] = {own: {k: t.error for k, t in enumerate(traces)}}
     if "slew" in beside:
         slew = _of_slew([trace.log for trace in traces], fitted, traces, task.loss.limit)
         if slew:
             errors[SLEW] = slew
     if "M1" in beside:
-        simple = _of_m1(task, traces, type(model)(servo), tell)
+        simple = _of_m1(task, held_out, traces, type(model)(servo), tell)
         if simple:
             errors[M1] = simple
     models = tuple(errors)
@@ -87,12 +89,13 @@ def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace]
         predicted = np.asarray(simple.predict(log))
         at = np.searchsorted(log.time, trace.time)
         difference = predicted[at] - trace.measured
-        known = np.isfinite(difference)
+        known = np.isfinite(difference) & trace.judged
         found[k] = log_error(log, difference[known] if known.any() else np.array([math.nan]))
     return found
 
 
-def _of_m1(whole: Task, traces: Sequence[Trace], model: Model, tell: Callable[[], object]) -> dict[int, LogError]:
+def _of_m1(whole: Task, held_out: Sequence[int], traces: Sequence[Trace], model: Model,
+           tell: Callable[[], object]) -> dict[int, LogError]:
     """Return the errors of the servo with Coulomb and viscous friction; none where it is that already."""
     space, logs = whole.forecast.space, [trace.log for trace in traces]
     beyond = [f"friction.{name}" for name in _BEYOND_M1]
@@ -105,14 +108,17 @@ def _of_m1(whole: Task, traces: Sequence[Trace], model: Model, tell: Callable[[]
         return {}
     plain = type(model)(model.servo.replace(dict.fromkeys(given)))
     own_bounds = {p.name: (p.lower, p.upper) for p in space.parameters if p.bounded and p.name in free}
-    beliefs = {p.name: p.prior for p in space.parameters if p.prior is not None and p.name in free}
+    beliefs = {p.name: p.prior for k, p in enumerate(space.parameters)
+               if p.prior is not None and p.name in free and whole.prior.weight[k] > 0.0}  # those that did not yield
     load = {p.name: p.start for p in space.parameters if p.name.startswith("load.")}
     simple = Space(plain, [*free, *more], bounds=own_bounds, priors=beliefs or None, load=load)
     forecast = Forecast(logs, plain, simple, whole.forecast.nuisance, whole.forecast.sensors)
     task = Task(forecast, whole.loss, whole.fitted, whole.seed, 1, whole.noise)
     found, _ = task.search(lambda share, text: (tell(), None)[1])
     errors = {}
-    for k, part in enumerate(forecast.at(found.point, derivatives=False)):
+    forecast = task.forecast
+    point = with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted)
+    for k, part in enumerate(forecast.at(point, derivatives=False)):
         residual = by_sensor(forecast, k, part)[traces[k].signal]
-        errors[k] = log_error(logs[k], residual)
+        errors[k] = log_error(logs[k], residual[traces[k].judged])
     return errors

@@ -12,17 +12,24 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.holdout import ErrorTable
+from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.identification.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
 
 if TYPE_CHECKING:
+    from servotwin.identification.fitting.draws import Allowed
     from servotwin.identification.fitting.intervals import Ends
     from servotwin.identification.fitting.uncertainty import Uncertainty
+    from servotwin.identification.fitting.verdict import Verdict
+    from servotwin.identification.fitting.yielding import Yielded
+    from servotwin.signals import Signal
 
 Array = NDArray[np.float64]
+
+LEAST_SHARE = 0.005
+"""Of an interval: less prior than this is not worth a word."""
 
 
 class Interval(NamedTuple):
@@ -33,7 +40,8 @@ class Interval(NamedTuple):
     lower, upper : float
         nan where the logs do not determine the value.
     method : str
-        "normal", "profile", "at bound", "undetermined", or "not sought".
+        "normal", "profile", "by pulses" (a delay: what commands and pulses allow), "at bound", "undetermined", or "not
+        sought".
     """
 
     lower: float
@@ -53,6 +61,14 @@ class Trace:
         The measured signal that is compared.
     time, measured, simulated : ndarray, shape (n,)
         Where it counts [s], SI.
+    judged : ndarray of bool, shape (n,)
+        Which of these say how good the fit is: of a log that was held out its second half, where its first half says
+        when its pulses come.
+    command : Signal
+        As the servo got it, pulses and all; its t = 0 is the first sample, or some pulses before.
+    delay : float
+        The servo at a time t after the first sample is that which this command leads to at t − delay [s]; negative
+        where the command begins before the first sample.
     """
 
     log: Log
@@ -61,11 +77,19 @@ class Trace:
     time: Array = field(repr=False)
     measured: Array = field(repr=False)
     simulated: Array = field(repr=False)
+    judged: NDArray[np.bool_] = field(repr=False)
+    command: Signal = field(repr=False)
+    delay: float = 0.0
 
     @property
     def residual(self) -> Array:
         """Simulated less measured."""
         return self.simulated - self.measured
+
+    @property
+    def error(self) -> LogError:
+        """How far the servo is off the samples that judge it."""
+        return log_error(self.log, self.residual[self.judged])
 
 
 @dataclass(frozen=True)
@@ -108,8 +132,21 @@ class Fit:
     warnings : tuple of str
         What a reader has to know, a line each.
     doubt : Uncertainty
+    spans : mapping of str to tuple of float
+        Ranges (SI) of what is told by pulses: the delay.
+    phased : bool
+        Whether the pulses of each log came when the log wanted.
+    yielded : tuple of Yielded
+        Priors that were dropped because the logs contradict them, in the order in which they went.
+    prior_share : mapping of str to float
+        How much of what is known of each number is prior, from 0 to 1: 1 less its variance over that which the logs
+        alone would leave; nan of a number at a bound. Empty without intervals.
+    allowed : Allowed
+        The law that `draw` draws from.
     interrupted : bool
         Whether it was stopped before its end: then this is the best so far, without intervals.
+    verdict : Verdict, optional
+        Whether what is left is noise; None of a fit that was stopped.
     """
 
     servo: Servo
@@ -135,6 +172,12 @@ class Fit:
     level: float = 0.95
     seconds: float = 0.0
     interrupted: bool = False
+    verdict: Verdict | None = None
+    spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    phased: bool = False
+    yielded: tuple[Yielded, ...] = ()
+    prior_share: Mapping[str, float] = field(default_factory=dict)
+    allowed: Allowed | None = field(default=None, repr=False)
 
     def intervals(self, level: float | None = None) -> dict[str, Interval]:
         """Return the interval of every name (SI).
@@ -155,15 +198,22 @@ class Fit:
         return {name: self._interval(k, name, wanted) for k, name in enumerate(self.names)}
 
     def __str__(self) -> str:
-        """Return a line for each estimate, and what the logs cannot say."""
+        """Return the verdict, a line for each estimate with how much of it is prior, and what the logs cannot say."""
         lines = []
         for name, (lower, upper, method) in self.intervals().items():
             spread = f"{lower:z.4g} to {upper:z.4g} ({method})" if lower == lower else method
-            lines.append(f"{name} = {self.estimates[name]:z.4g} {self.units[name]}, {100 * self.level:g} %: {spread}")
-        return "\n".join((*lines, *map(str, self.unidentifiable), *self.warnings))
+            share = self.prior_share.get(name, 0.0)
+            prior = f", {100 * share:.0f} % of it prior" if share >= LEAST_SHARE and lower == lower else ""
+            lines.append(f"{name} = {self.estimates[name]:z.4g} {self.units[name]}, {100 * self.level:g} %: "
+                         f"{spread}{prior}")
+        first = () if self.verdict is None else (str(self.verdict),)
+        said = [text for text in self.warnings if text not in "\n".join(first).split("\n")]
+        return "\n".join((*first, *lines, *map(str, self.unidentifiable), *said))
 
     def _interval(self, k: int, name: str, level: float) -> Interval:
         nowhere = float("nan")
+        if name in self.spans:
+            return Interval(*self.spans[name], "by pulses")
         if name in self.undetermined:
             return Interval(nowhere, nowhere, "undetermined")
         if name in self.at_bound:
@@ -171,7 +221,7 @@ class Fit:
         if self.doubt is None or k not in self.ends:
             return Interval(nowhere, nowhere, "not sought")
         ends, std = self.ends[k], float(self.doubt.std[k])
-        factor = self.doubt.quantile(level) / self.doubt.quantile(self.level)
+        factor = self.doubt.quantile(level, k) / self.doubt.quantile(self.level, k)
         values = [self._value(k, self.best[k] + factor * end * std) for end in (ends.lower, ends.upper)]
         return Interval(min(values), max(values), ends.method)
 
@@ -196,8 +246,10 @@ class Fit:
     def draw(self, number: int, seed: int = 0) -> dict[str, Array]:
         """Return servos that the logs allow, as arrays for `parameters=` of `simulate_many`.
 
-        Drawn from the normal approximation on the scale of the search, within its bounds; what is undetermined or at a
-        bound keeps its value.
+        Drawn on the scale of the search, within its bounds, from the normal approximation of what logs and priors say
+        together. Along what the logs leave open the priors count; where there is none, any point within the bounds is
+        as likely as any other. Combinations that the logs do determine are as certain as ever, and a number at a bound
+        is drawn from this side of it. Without intervals all keep their values.
 
         Parameters
         ----------
@@ -214,14 +266,9 @@ class Fit:
             raise InputError("draw", got=number, allowed="a whole number of at least 1")
         p = len(self.space)
         x = np.repeat(self.best[None, :p], int(number), axis=0)
-        if self.doubt is not None:
-            free = [k for k in range(p) if k in self.ends]
-            part = self.doubt.covariance[np.ix_(free, free)]
-            values, vectors = np.linalg.eigh(part)
-            normal = np.random.default_rng(seed).standard_normal((int(number), len(free)))
-            x[:, free] += normal * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
-        x = np.clip(x, self.space.lower, self.space.upper)
-        return self.space.columns(x)
+        if self.allowed is not None:
+            x = self.allowed.draw(int(number), np.random.default_rng(seed))[:, :p]
+        return self.space.columns(np.clip(x, self.space.lower, self.space.upper))
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write an HTML page: estimates, what is undetermined, errors, measured over simulated, residuals.

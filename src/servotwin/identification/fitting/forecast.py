@@ -10,13 +10,14 @@ import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.case import Case, make_case
+from servotwin.identification.fitting.frames import gaps, signal, widest
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.lanes import LogLanes
 from servotwin.identification.fitting.point import (
@@ -27,21 +28,25 @@ from servotwin.identification.fitting.point import (
     SHARED,
     SPEED_SCALE,
     STEP,
+    Frames,
     LogPart,
     Point,
 )
 from servotwin.identification.logs.log import Log
 from servotwin.models import Model
+from servotwin.parameters.output_side import output_value
+from servotwin.signals import Signal
 from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.lane_loads import LOAD_NAMES
 from servotwin.simulation.many import simulate_lanes
 
-if TYPE_CHECKING:
-    pass
-
 Array = NDArray[np.float64]
 
 _VOLTAGE = "supply.open_circuit_voltage"
+_PERIOD = "electronics.frame_period"
+_BEFORE = 5  # pulses: by then a servo hunts as it will
+_HOLDS = 0.5  # of the friction that a servo file says: what it surely holds without drives
+_HELD = 1e-6  # of its scale: how far a number moves that stays
 _POTENTIOMETER = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")
 
 
@@ -66,8 +71,9 @@ class Forecast:
     model : Model
     space : Space
     nuisance : sequence of str
-        Of "delay" (one for all logs), "log_delay" (what each log adds to it), "angle_offset" (measured less true
-        angle), "angle_sag" (how far the measured angle moves with the bus voltage) and "initial_state" (of each log).
+        Of "delay" (one for all logs), "log_delay" (what each log adds to it), "frame_phase" (when each log's pulses
+        come), "frame_period" (of all), "angle_offset" (measured less true angle), "angle_sag" (how far the measured
+        angle moves with the bus voltage) and "initial_state" (of each log).
     sensors : sequence of str
         Names of measured signals that are compared.
 
@@ -84,32 +90,49 @@ class Forecast:
                 raise InputError("nuisance", got=name, allowed=", ".join(NUISANCES))
         self.model, self.space, self.nuisance = model, space, tuple(nuisance)
         self.sensors = tuple(sensors)
-        self.extra = tuple(name for name in SHARED if name in nuisance)
         if "angle_sag" in nuisance and ("bus_voltage" not in model.available
                                         or not model.value_or("supply.internal_resistance", 0.0) > 0.0):
             raise InputError("nuisance: angle_sag", got=f"{model!r} whose bus voltage stays",
                              allowed="a pulse servo with supply.internal_resistance")
         self.noise = dict.fromkeys(self.sensors, 1.0)
-        delayed = "delay" in nuisance or "log_delay" in nuisance
+        delayed = any(name in nuisance for name in ("delay", "log_delay", "frame_phase"))
         self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
         self.strict = True
+        self.work = 0.0  # seconds of one lane that were simulated
+        self.phased = "frame_phase" in nuisance and _PERIOD not in space.names and all(c.period for c in self.cases)
+        self.extra = tuple(name for name in SHARED if name in nuisance and (name != "frame_period" or self.phased))
+        self.own_phases = "delay" not in self.extra  # whether each log's pulses come when they want
+        self.held = False  # whether servos had held their first command for long when their log began
+        self.frames = tuple(widest(case.log, case.period) for case in self.cases) if self.phased else ()
+        if "frame_period" in self.extra and len({case.period for case in self.cases}) > 1:
+            raise InputError("nuisance: frame_period", got="logs with several frame periods", allowed="one in all logs")
 
     @property
     def size(self) -> int:
         """Number of shared numbers."""
         return len(self.space) + len(self.extra)
 
+    def goes_on_from(self, other: Forecast) -> None:
+        """Take over where the search of another forecast stands: its noise, and what it found out of clocks."""
+        self.noise, self.strict, self.held = dict(other.noise), other.strict, other.held
+        if self.phased and other.phased:
+            self.own_phases = other.own_phases
+
     def names_of_own(self, case: Case) -> tuple[str, ...]:
         """Return which numbers a log has for itself."""
         names = []
         if "initial_state" in self.nuisance:
             names += ["output_angle", "output_speed"] if case.moving else ["output_angle"]
+        if self.phased:  # which holds a delay of the log's own too
+            return (*names, "frame_phase")
         return (*names, "log_delay") if "log_delay" in self.nuisance else tuple(names)
 
     def own_start(self, case: Case) -> Array:
         """Return a log's own numbers as measured."""
         first = {"output_angle": case.start[0] / OFFSET_SCALE, "output_speed": case.start[1] / SPEED_SCALE,
-                 "log_delay": 0.0}
+                 "log_delay": 0.0, "frame_phase": 0.0}
+        if self.phased and len(gaps(case.log, case.period)) > 1:
+            first["frame_phase"] = widest(case.log, case.period).phase / DELAY_SCALE
         return np.array([first[name] for name in self.names_of_own(case)])
 
     def own_belief(self, case: Case) -> tuple[Array, Array]:
@@ -121,13 +144,49 @@ class Forecast:
         # The start angle is that of when the first command acts: a shaft in motion is elsewhere by then. And what a
         # potentiometer reads is no angle while its gain is searched
         unsure = case.moving or (case.log.angle_name == "feedback_voltage"
-                                 and any(name in self.space.names for name in _POTENTIOMETER))
+                                 and any(name in self.space.names for name in _POTENTIOMETER)) or self.lead(case) > 0.0
         spread = {"output_angle": math.inf if unsure else case.scatter / OFFSET_SCALE, "output_speed": math.inf,
-                  "log_delay": 0.5 * float(np.median(np.diff(case.log.time))) / DELAY_SCALE}
+                  "log_delay": 0.5 * float(np.median(np.diff(case.log.time))) / DELAY_SCALE,
+                  "frame_phase": math.inf if self.own_phases else _HELD}
         return self.own_start(case), np.array([1.0 / spread[name] for name in self.names_of_own(case)])
 
+    def frames_of(self, point: Point, k: int) -> Frames:
+        """Return which commands the pulses of a log carry at a point; the period is that of the point where it has one.
+
+        Raises
+        ------
+        IndexError
+            If pulses have no phase here.
+        """
+        return point.frames[k] if point.frames else self.frames[k]
+
+    def command_at(self, point: Point, k: int) -> Signal:
+        """Return the command of a log with its pulses as they come at a point; its t = 0 is the first sample."""
+        case = self.cases[k]
+        if not self.phased:
+            return case.signal
+        first = float(point.own[k][self.names_of_own(case).index("frame_phase")]) * DELAY_SCALE
+        frames = self.frames_of(point, k)
+        period = self.nuisance_of(point.shared, "frame_period") or frames.period
+        return signal(case.log, frames, first, period, self.lead(case))
+
+    def lead(self, case: Case) -> float:
+        """Return how long before the first sample the simulation of a log begins [s]."""
+        return _BEFORE * case.period if self.held and self.hunts(case) else 0.0
+
+    def hunts(self, case: Case) -> bool:
+        """Tell whether the servo could not rest at the start of a log without drives, but begins there at rest."""
+        log, servo = case.log, self.model.servo
+        if not self.phased or case.moving or log.load.recorded or log.torque_on is not None:
+            return False
+        q = case.start[0]
+        pull = log.load.torque + sum(s.stiffness * (q - s.rest_angle) for s in log.load.springs) + sum(
+            p.mass * p.gravity * p.length * math.sin(q - p.hanging_angle) for p in log.load.pendulums)
+        friction = output_value(servo, "output_coulomb_torque") or 0.0
+        return abs(pull) > _HOLDS * friction
+
     def nuisance_of(self, shared: Array, name: str) -> float:
-        """Return delay [s], angle offset [rad] or sag [rad/V] of a point; 0 where it is none of its numbers."""
+        """Return delay, angle offset, sag or frame period (SI) of a point; 0 where it is none of its numbers."""
         if name not in self.extra:
             return 0.0
         return float(shared[len(self.space) + self.extra.index(name)]) * SHARED[name][0]
@@ -141,11 +200,16 @@ class Forecast:
         return self.at_all([point], derivatives=derivatives, central=central, step=step, cases=cases)[0]
 
     def at_all(self, points: Sequence[Point], *, derivatives: bool = False, central: bool = False,
-               step: float = STEP, cases: Sequence[int] | None = None) -> list[list[LogPart]]:
-        """Return what the logs say at several points, in one batch; for each point, log by log."""
+               step: float = STEP, cases: Sequence[int] | None = None, rates: bool = False) -> list[list[LogPart]]:
+        """Return what the logs say at several points, in one batch; for each point, log by log.
+
+        `rates` gives what a delay changes without derivatives, for all signals.
+        """
         which = range(len(self.cases)) if cases is None else cases
         sides = (1 + central) * derivatives
-        lanes = [LogLanes(self, k, at, point, sides=sides, step=step) for k in which for at, point in enumerate(points)]
+        lanes = [LogLanes(self, k, at, point, sides=sides, step=step, rates=rates)
+                 for k in which for at, point in enumerate(points)]
+        self.work += sum(lane.cost for lane in lanes)
         groups: dict[tuple[Any, ...], list[LogLanes]] = {}
         for lane in lanes:
             groups.setdefault((lane.case.key, lane.delay), []).append(lane)
@@ -197,7 +261,7 @@ class Forecast:
                                *(["bus_voltage"] if sags else [])))
         lanes = sum(lane.count for lane in job)
         batch = simulate_lanes(
-            lanes_of(self.model, [signal for lane in job for signal in [lane.signal] * lane.count],
+            lanes_of(self.model, [signal for lane in job for signal in lane.signals],
                      [load for lane in job for load in [lane.case.log.load] * lane.count], columns, initial or None,
                      np.zeros(lanes, np.int64)),
             duration=max(float(asked.max()), case.log.duration), output_times=asked[order], outputs=tuple(names),

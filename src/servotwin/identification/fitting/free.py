@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -65,6 +65,8 @@ class FreeParameter:
         Bounds of the value (SI).
     prior : tuple of float, optional
         Mean and standard deviation of the value (SI).
+    of_file : bool
+        Whether the prior is what the servo's file states, not one that the caller gave.
     bounded : bool
         Whether the caller gave the bounds; random starts then fill them.
     """
@@ -77,6 +79,7 @@ class FreeParameter:
     lower: float
     upper: float
     prior: tuple[float, float] | None = None
+    of_file: bool = False
     bounded: bool = False
 
     def scaled(self, value: float) -> float:
@@ -140,8 +143,10 @@ class Space:
             for name in names:
                 if name not in free:
                     raise InputError(f"{what}: {name}", got="a name that is not free", allowed=", ".join(free))
-        self.parameters = tuple(_parameter(model.servo, name, limits.get(name), beliefs.get(name), load or {})
-                                for name in free)
+        stated = {name: _stated(model.servo, name) for name in beliefs if name not in LOAD_NAMES}
+        self.parameters = tuple(
+            replace(_parameter(model.servo, name, limits.get(name), beliefs.get(name), load or {}),
+                    of_file=name in beliefs and beliefs[name] == stated.get(name)) for name in free)
         self.names = tuple(free)
         self.start = np.array([p.scaled(p.start) for p in self.parameters])
         self.lower = np.array([p.scaled(p.lower) if p.lower > 0.0 or not p.logarithmic else -math.inf
@@ -343,7 +348,13 @@ def _beliefs(servo: Servo, free: Sequence[str], priors: Priors | str | None) -> 
 
 
 def _stated(servo: Servo, name: str) -> tuple[float, float] | None:
-    """Return mean and standard deviation that the servo's file states; a range counts as 95 % of a normal law."""
+    """Return mean and standard deviation that the servo's file states.
+
+    An interval of an earlier fit is one of a normal law. Any other range says no more than from where to where: it is
+    uniform, and counts by its mean square distance from the value, on the scale of the search.
+    """
+    from scipy.special import ndtri
+
     member = LUMPED[name][0][0] if name in LUMPED else name
     value = servo.get(member)
     if not isinstance(value, int | float):
@@ -355,7 +366,19 @@ def _stated(servo: Servo, name: str) -> tuple[float, float] | None:
         return factor * float(value), factor * quantity.std
     if quantity.lower is None or quantity.upper is None or quantity.upper <= quantity.lower:
         return None
-    mean = float(value)
+    mean, lower, upper = float(value), quantity.lower, quantity.upper
     if mean == 0.0:
-        mean = 0.5 * (quantity.lower + quantity.upper)
-    return factor * mean, factor * (quantity.upper - quantity.lower) / 3.92
+        mean = 0.5 * (lower + upper)
+    if quantity.origin == "identified":
+        level = float(servo.fit.get("level", 0.95))
+        std = (upper - lower) / (2.0 * float(ndtri(0.5 + 0.5 * level)))
+    elif _rule(name) == "a positive number" and lower > 0.0:
+        std = mean * _uniform(math.log(lower / mean), math.log(upper / mean))
+    else:
+        std = _uniform(lower - mean, upper - mean)
+    return factor * mean, factor * std
+
+
+def _uniform(lower: float, upper: float) -> float:
+    """Return the root of the mean square of what is uniform between two numbers: width / √12 if 0 is their middle."""
+    return math.sqrt((lower**2 + lower * upper + upper**2) / 3.0)

@@ -14,34 +14,46 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
+from servotwin.identification.fitting.common_cause import common_cause
 from servotwin.identification.fitting.comparison import BESIDE, compare
+from servotwin.identification.fitting.counts import counts_of
+from servotwin.identification.fitting.delay_range import delay_range, phase_errors, unsure_commands
+from servotwin.identification.fitting.doubts import Doubts, allowed, prior_share
+from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Bounds, Priors, Space
+from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import split
-from servotwin.identification.fitting.intervals import Ends, ends
-from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, Point
+from servotwin.identification.fitting.intervals import ends
+from servotwin.identification.fitting.judging import with_verdict
+from servotwin.identification.fitting.phases import credible
+from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, LogPart, Point
 from servotwin.identification.fitting.record import identified_servo, with_record, with_what_logs_say
 from servotwin.identification.fitting.remedies import with_remedies
-from servotwin.identification.fitting.task import HUBER, Task, by_sensor
+from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
-from servotwin.identification.fitting.words import Unidentifiable, explain, vague_directions
+from servotwin.identification.fitting.words import explain, simplest, vague_directions
+from servotwin.identification.fitting.yielding import Dropped, Yielded, settle, yielded
 from servotwin.identification.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
 
 Array = NDArray[np.float64]
+_VOLTAGE = "supply.open_circuit_voltage"
 Progress = bool | Callable[[float, str], object]
 
-NUISANCE = ("delay", "angle_offset", "initial_state")
+NUISANCE = ("delay", "frame_phase", "angle_offset", "initial_state")
 
 
 def identify(
     logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] | None = None,
     free: Sequence[str] | None = None, nuisance: Sequence[str] = NUISANCE, priors: Priors | str | None = "servo",
-    *, bounds: Bounds | None = None, holdout: float | Sequence[str] | None = None, sensors: Sequence[str] | None = None,
+    *, mend: Sequence[str] = (), bounds: Bounds | None = None, holdout: float | Sequence[str] | None = None,
+    sensors: Sequence[str] | None = None,
     starts: int = 3, loss: str = "huber", noise: Mapping[str, float] | None = None, level: float = 0.95,
     intervals: bool = True, compare_with: Sequence[str] = ("slew", "M1"), seed: int = 0, progress: Progress = False,
+    diagnose: bool = True,
 ) -> Fit:
     """Fit parameters of a servo to logs.
 
@@ -61,11 +73,15 @@ def identify(
         What is searched: dotted names of servo and load, and the lumped names `output_torque_constant` (motor and
         back-EMF constant times the gear reduction), `output_inertia`, `output_coulomb_torque`.
     nuisance : sequence of str
-        Of "delay" (the command acts so much later), "log_delay" (what each log adds to it), "angle_offset" (measured
-        less true angle), "angle_sag" (the measured angle moves with the bus voltage) and "initial_state" (each log's
-        start; else the servo stands where its first command says).
+        Of "delay" (the command acts so much later), "log_delay" (what each log adds to it), "frame_phase" (when the
+        pulses of each log come; of models with pulses), "frame_period" (how far apart they are in all logs; added
+        where pulses drift), "angle_offset" (measured less true angle), "angle_sag" (the measured angle moves with the
+        bus voltage) and "initial_state" (each log's start; else the servo stands where its first command says).
     priors : "servo", mapping or None
         Normal beliefs, mean and standard deviation by name (SI); "servo" takes the spread that the servo file states.
+    mend : sequence of str
+        What of `findings(logs, model)` is put right in all logs before the fit: of "wrap", "stamps", "sign", "span",
+        "rows" and "not followed". All that is found is said first among the warnings, mended or not.
     bounds : mapping, optional
         Lowest and highest value by name (SI); random starts fill them. Wide ones unless given.
     holdout : float or sequence of str, optional
@@ -90,6 +106,9 @@ def identify(
         Of random starts and of what is held out.
     progress : bool or callable
         True shows a bar with the time left; a callable is called with the share that is done and what goes on.
+    diagnose : bool
+        Where what is left is no noise, causes are tried: at most four times what the fit itself took. False leaves
+        that out; the verdict stays.
 
     Returns
     -------
@@ -115,9 +134,9 @@ def identify(
     True
     """
     began = clock.monotonic()
-    given = checks.checked_logs(logs)
+    read = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, model)
-    checks.check_speeds(given, plain)
+    given, noticed = first_looks(read, plain, mend)
     names = checks.usual_free(plain) if free is None else checks.checked_list("free", free)
     beside = checks.checked_words("compare_with", compare_with, BESIDE)
     level, seed = checks.checked_level(level), checks.checked_count("seed", seed, least=0)
@@ -126,32 +145,38 @@ def identify(
     fitted, held_out = split(given, holdout, seed)
     forecast = Forecast(given, plain, space, checks.checked_words("nuisance", nuisance, NUISANCES), seen)
     checks.check_fitted(given, fitted, seen, len(names) + len(nuisance))
+    trials = checks.checked_flag("diagnose", diagnose)
     task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed,
                 checks.checked_count("starts", starts, least=1), checks.checked_noise(noise, seen))
-    with checks.shown(progress) as show:
-        fit = _run(task, held_out, beside, level, show, intervals=intervals)
-    return with_record(replace(fit, seconds=clock.monotonic() - began), given, fitted)
+    with explained(noticed), checks.shown(progress) as show:
+        fit = _run(task, held_out, beside, level, show, intervals=intervals, trials=trials)
+    fit = replace(fit, warnings=(*noticed, *fit.warnings), seconds=clock.monotonic() - began)
+    return with_record(fit, read, fitted, mend)
 
 
 def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: float, show: Callable[[float, str], None],
-         *, intervals: bool) -> Fit:
+         *, intervals: bool, trials: bool) -> Fit:
     """Search, doubt, and compare; an interrupt ends the stage that it meets and leaves the others out."""
     forecast, interrupted = task.forecast, False
     try:
-        found, ended = task.search(lambda share, text: show(0.75 * share, text))
+        found, ended = task.search(lambda share, text: show(0.7 * share, text))
     except KeyboardInterrupt:
         found, ended, interrupted = task.best_so_far(), [], True
-    doubt = None
-    reaching: dict[int, Ends] = {}
-    vague: tuple[Unidentifiable, ...] = ()
+    forecast = task.forecast  # which may have one more number than it began with
+    left: tuple[Dropped, ...] = ()
+    doubts = Doubts()
     try:
+        if not interrupted:
+            found, left = settle(task, found, lambda share, text: show(0.7 + 0.06 * share, text))
         if intervals and not interrupted:
             show(0.76, "intervals")
-            doubt, reaching, vague = _doubts(task, found, level, show)
+            doubts = _doubts(task, found, level, show)
     except KeyboardInterrupt:
         interrupted = True
-    traces = _traces(forecast, found.point, held_out)
-    final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubt, reaching, level)
+    dropped = yielded(task, found, left, doubts)
+    traces = _traces(forecast, with_pulses_of(forecast, task.loss, found.point, held_out, task.fitted), held_out)
+    final = identified_servo(forecast.model.servo, forecast.space, found.point.shared, doubts, level,
+                             [one.name for one in dropped])
     final = with_what_logs_say(final, [forecast.cases[k].log for k in task.fitted], forecast.space.names)
     try:
         show(0.95, "errors")
@@ -159,24 +184,28 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
                          lambda: show(0.95, "errors of simpler models"))
     except KeyboardInterrupt:
         interrupted, tables = True, compare(task, held_out, traces, final, ())
-    fit = _fit(task, found, doubt, reaching, vague, task.at_bound(found), final, traces, tables, ended)
-    return replace(fit, level=level, interrupted=interrupted)
+    fit = _fit(task, found, doubts, dropped, final, traces, tables, ended)
+    middles = {name: 0.5 * (low + high) for name, (low, high) in doubts.spans.items()}
+    fit = replace(fit, level=level, interrupted=interrupted, phased=forecast.phased,
+                  estimates={**fit.estimates, **middles})
+    return fit if interrupted else with_verdict(task, found.point, fit, show, trials=trials)
 
 
-def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str], None],
-            ) -> tuple[Uncertainty, dict[int, Ends], tuple[Unidentifiable, ...]]:
-    """Return covariance, ends of the intervals, and what is not determined."""
+def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str], None]) -> Doubts:
+    """Return covariance, ends of the intervals, what is not determined, and what is prior."""
     forecast = task.forecast
     parts = forecast.at(found.point, central=True, cases=task.fitted)
     beliefs = [Prior(*forecast.own_belief(forecast.cases[k])) for k in task.fitted]
-    rows: list[Rows] = [rows_of(part, task.loss, own, found.point.own[k])
+    rows: list[Rows] = [rows_of(part, task.loss, own, found.point.own[k], counts_of(forecast, k))
                         for k, part, own in zip(task.fitted, parts, beliefs, strict=True)]
-    stuck = task.at_bound(found)
+    stuck = task.at_bound(found) | task.held
     x, searched = found.point.shared, forecast.space.parameters
     sizes = np.maximum(np.abs(x), 1.0)
     sizes[:len(searched)][[p.logarithmic for p in searched]] = 1.0
     doubt = uncertainty(rows, task.prior, stuck)
-    flags, directions = vague_directions(_information(task, found, beliefs), doubt.inflation, sizes)
+    information = _information(task, found, beliefs)
+    flags, directions = _vague(information, doubt.inflation, sizes, ~task.held)
+    directions = simplest(directions)
     if flags.any():
         doubt = uncertainty(rows, task.prior, stuck, directions)
     names = (*forecast.space.names, *forecast.extra)
@@ -187,7 +216,32 @@ def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str
     count = max(len(which), 1)
     reaching = ends(search, found, doubt, which, level, rows=rows,
                     tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
-    return doubt, reaching, with_remedies(forecast, found.point, vague, names)
+    return Doubts(doubt, reaching, with_remedies(forecast, found.point, vague, names),
+                  prior_share(names, doubt, reaching, flags, directions, task.prior.weight),
+                  allowed(task, found, rows, directions, information, flags, doubt, reaching, level),
+                  _spans(task, found, parts, rows, doubt, level))
+
+
+def _spans(task: Task, found: Outcome, parts: Sequence[LogPart], rows: Sequence[Rows], doubt: Uncertainty,
+           level: float) -> dict[str, tuple[float, float]]:
+    """Return the range of the delay (SI) where each log's pulses say when they take effect."""
+    if not task.held.any():
+        return {}
+    reach = doubt.quantile(1.0 - (1.0 - level) / len(task.fitted))  # all of the logs have to hold
+    errors = phase_errors(task.forecast, task.fitted, parts, rows, task.loss, doubt)
+    scan = task.scan(found.point)
+    pulses = credible(scan, task.fitted)
+    task.remarks.extend(unsure_commands(scan, pulses))
+    return {"delay": delay_range(scan, pulses, [
+        reach * error + task.stamps_off.get(k, 0.0) for k, error in zip(task.fitted, errors, strict=True)])}
+
+
+def _vague(information: Array, inflation: float, sizes: Array, asked: NDArray[np.bool_]) -> tuple[Any, Array]:
+    """Return what is not determined of the numbers that are asked about, and the directions."""
+    flags, directions = vague_directions(information[np.ix_(asked, asked)], inflation, sizes[asked])
+    all_flags, all_directions = np.zeros(len(asked), np.bool_), np.zeros((len(asked), directions.shape[1]))
+    all_flags[asked], all_directions[asked] = flags, directions
+    return all_flags, all_directions
 
 
 def _information(task: Task, found: Outcome, beliefs: Sequence[Prior]) -> Array:
@@ -200,20 +254,23 @@ def _information(task: Task, found: Outcome, beliefs: Sequence[Prior]) -> Array:
 
 def _traces(forecast: Forecast, point: Point, held_out: Sequence[int]) -> tuple[Trace, ...]:
     """Return every log beside the simulation; a log that was held out starts as it was measured."""
-    traces = []
-    for k, part in enumerate(forecast.at(point, derivatives=False)):
-        case = forecast.cases[k]
-        residuals = by_sensor(forecast, k, part)
-        name = next(name for name in case.places if name in ("output_angle", "feedback_voltage"))
-        measured = case.values[name]
-        traces.append(Trace(case.log, k in set(held_out), name, case.log.time[0] + case.times[case.places[name]],
-                            measured, measured + residuals[name]))
-    return tuple(traces)
+    return tuple(trace_of(forecast, point, k, part, held_out=k in held_out)
+                 for k, part in enumerate(forecast.at(point, derivatives=False)))
 
 
-def _fit(task: Task, found: Outcome, doubt: Uncertainty | None, reaching: Mapping[int, Ends],
-         vague: tuple[Unidentifiable, ...], stuck: NDArray[np.bool_], servo: Servo, traces: tuple[Trace, ...],
-         tables: Any, ended: Sequence[Outcome]) -> Fit:
+def _explained(task: Task, dropped: Sequence[Yielded]) -> tuple[str, ...]:
+    """Return one voltage or one load that would explain all contradictions, in words; nothing without one."""
+    model = task.forecast.model
+    said = {task.forecast.cases[k].log.parameters.get(_VOLTAGE, model.value(_VOLTAGE)) for k in task.fitted}
+    if len(said) > 1:
+        return ()
+    cause = common_cause(dropped, voltage=said.pop(), drop_voltage=model.value_or("supply.bridge_drop_voltage", 0.0))
+    return () if cause is None else (cause,)
+
+
+def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...], servo: Servo,
+         traces: tuple[Trace, ...], tables: Any, ended: Sequence[Outcome]) -> Fit:
+    doubt, reaching, stuck = doubts.doubt, doubts.ends, task.at_bound(found)
     forecast, space = task.forecast, task.forecast.space
     names = (*space.names, *forecast.extra)
     scales = {name: scale for name, (scale, _) in SHARED.items()}
@@ -229,9 +286,11 @@ def _fit(task: Task, found: Outcome, doubt: Uncertainty | None, reaching: Mappin
     return Fit(
         servo=servo, model=type(forecast.model)(servo), names=names,
         estimates={name: float(value) for name, value in zip(names, values, strict=True)},
-        units={name: units[name] for name in names}, covariance=covariance, unidentifiable=vague,
+        units={name: units[name] for name in names}, covariance=covariance, unidentifiable=doubts.unidentifiable,
         at_bound=tuple(name for name, at in zip(names, stuck, strict=True) if at),
         holdout=tables.holdout, training=tables.training, traces=traces,
         starts=tuple(Start(outcome.cost, outcome.converged) for outcome in ended), noise=dict(forecast.noise),
-        cost=found.cost, warnings=checks.warnings_of(task.prior, found.point, doubt, space, tables), space=space,
-        best=x, doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra})
+        cost=found.cost, space=space, best=x,
+        warnings=(*task.remarks, *checks.warnings_of(dropped, tables), *_explained(task, dropped)),
+        doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra}, yielded=dropped,
+        prior_share=doubts.prior_share, allowed=doubts.allowed, spans=doubts.spans)

@@ -20,7 +20,7 @@ from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
 Array = NDArray[np.float64]
 
 _FAITHFUL = (0.7, 1.4)  # of the expected rise of the cost: standard errors right within about a sixth
-_ROUNDS = 6  # of the search for an end
+_ROUNDS = 9  # of the search for an end
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,14 @@ class Ends:
         In standard errors of the normal approximation, from the best value (lower is negative).
     method : str
         "normal" or "profile".
+    prior : float
+        Of a profile: which part of the rise of the cost at its ends is that of the priors; else nan.
     """
 
     lower: float
     upper: float
     method: str
+    prior: float = math.nan
 
 
 def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int], level: float, *,
@@ -59,12 +62,13 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
     tell : callable, optional
         Is told how many are done.
     """
-    reach = doubt.quantile(level)
+    reaches = {k: doubt.quantile(level, k) for k in which}
     both = [(k, side) for k in which for side in (-1.0, 1.0)]
-    points = [_moved(search, best, doubt, k, side * reach, rows) for k, side in both]
+    points = [moved(search, best, doubt, k, side * reaches[k], rows) for k, side in both]
     rises = dict(zip(both, (cost - best.cost for cost in search.costs(points)), strict=True)) if both else {}
     found = {}
     for done, k in enumerate(which, start=1):
+        reach = reaches[k]
         expected = {side: _expected(doubt, k, reach) for side in (-1.0, 1.0)}
         inside = all(search.lower[k] <= best.point.shared[k] + side * reach * doubt.std[k] <= search.upper[k]
                      for side in (-1.0, 1.0))
@@ -72,10 +76,33 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
         if inside and faithful:
             found[k] = Ends(-reach, reach, "normal")
         else:
-            low, high = (_end(search, best, doubt, k, side, reach, rows) for side in (-1.0, 1.0))
-            found[k] = Ends(-low, high, "profile")
+            (low, of_low), (high, of_high) = (_end(search, best, doubt, k, side, reach, rows) for side in (-1.0, 1.0))
+            share = (low * of_low + high * of_high) / max(low + high, 1e-300)
+            found[k] = Ends(-low, high, "profile", min(max(share, 0.0), 1.0))
         tell(done)
     return found
+
+
+def moved(search: Search, best: Outcome, doubt: Uncertainty, k: int, steps: float, rows: Sequence[Rows]) -> Point:
+    """Return the best point with one number moved by some standard errors, and all others where they then are best."""
+    along = doubt.curvature[:, k] / max(doubt.curvature[k, k], 1e-300)
+    shared = np.clip(best.point.shared + along * steps * doubt.std[k], search.lower, search.upper)
+    own = list(best.point.own)
+    for case, row in zip(search.cases, rows, strict=False):
+        if row.follow is not None:
+            own[case] = own[case] + row.follow @ (shared - best.point.shared)
+    return best.point._replace(shared=shared, own=tuple(own))
+
+
+def begins(search: Search, best: Outcome, doubt: Uncertainty, k: int, steps: float, rows: Sequence[Rows],
+           ) -> tuple[Point, Point]:
+    """Return two points with one number moved far: all others where the parabola wants them, and where they are.
+
+    Beyond a kink the parabola knows nothing.
+    """
+    shared = best.point.shared.copy()
+    shared[k] = np.clip(shared[k] + steps * doubt.std[k], search.lower[k], search.upper[k])
+    return moved(search, best, doubt, k, steps, rows), best.point._replace(shared=shared)
 
 
 def _expected(doubt: Uncertainty, k: int, reach: float) -> float:
@@ -86,20 +113,12 @@ def _expected(doubt: Uncertainty, k: int, reach: float) -> float:
     return float(0.5 * (reach * doubt.std[k]) ** 2 / max(doubt.curvature[k, k], 1e-300))
 
 
-def _moved(search: Search, best: Outcome, doubt: Uncertainty, k: int, steps: float, rows: Sequence[Rows]) -> Point:
-    """Return the best point with one number moved by some standard errors, and all others where they then are best."""
-    along = doubt.curvature[:, k] / max(doubt.curvature[k, k], 1e-300)
-    shared = np.clip(best.point.shared + along * steps * doubt.std[k], search.lower, search.upper)
-    own = list(best.point.own)
-    for case, row in zip(search.cases, rows, strict=False):
-        if row.follow is not None:
-            own[case] = own[case] + row.follow @ (shared - best.point.shared)
-    return Point(shared, tuple(own))
-
-
 def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float, reach: float,
-         rows: Sequence[Rows]) -> float:
-    """Return how far the profile of the cost reaches on one side, in standard errors; a bound ends it."""
+         rows: Sequence[Rows]) -> tuple[float, float]:
+    """Return how far a profile of the cost reaches on one side [standard errors], and the share of the priors in that.
+
+    A bound ends it.
+    """
     held = search.held.copy()
     held[k] = True
     inner = Search(search.forecast, search.loss, search.prior, search.lower, search.upper, search.cases, held)
@@ -107,20 +126,28 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
     farthest = float(abs(bound - best.point.shared[k]) / max(doubt.std[k], 1e-300))
     wanted = _expected(doubt, k, reach)
     low, of_low, high, of_high = 0.0, 0.0, math.inf, math.inf
-    at = float(min(reach, farthest))
+    at, share = float(min(reach, farthest)), 0.0
     for _ in range(_ROUNDS):
-        rise = inner.run(_moved(search, best, doubt, k, side * at, rows), most=3).cost - best.cost
+        starts = begins(search, best, doubt, k, side * at, rows)
+        costs = inner.costs(starts) if at > reach else [0.0]
+        there = inner.run(starts[int(np.argmin(costs))], most=3)
+        rise = there.cost - best.cost
+        of_priors = search.prior.cost(there.point.shared) - search.prior.cost(best.point.shared)
+        share = of_priors / max(rise, wanted)
         root = math.sqrt(max(rise, 0.0) / wanted)  # grows in proportion where the cost is a parabola
         if abs(root - 1.0) < 0.02:
-            return at
+            break
         if root < 1.0:
             low, of_low = at, root
             if at >= farthest:
-                return farthest
+                break
         else:
             high, of_high = at, root
         if math.isinf(high):
-            at = min(at * (1.0 / root if root > 0.4 else 2.5), farthest)
+            flat = root < 0.4 and at > reach  # twice nothing: perhaps the logs allow all that there is on this side
+            at = farthest if flat else min(at * (1.0 / root if root > 0.4 else 2.5), farthest)
+        elif high > 10.0 * max(low, 0.1):
+            at = math.sqrt(max(low, 0.1) * high)
         else:
             at = low + (high - low) * min(max((1.0 - of_low) / (of_high - of_low), 0.1), 0.9)
-    return at
+    return at, share

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.free import nominal
-from servotwin.identification.fitting.holdout import LogError
+from servotwin.identification.fitting.holdout import LogError, pooled
 from servotwin.identification.fitting.identify import identify
 from servotwin.identification.logs.log import Log
 from servotwin.models.base import Model
@@ -47,6 +47,7 @@ _FIRST = {  # where a term begins that the rung before does not have: little of 
     "friction.load_friction_motor_quad": 0.01, "friction.load_friction_external_quad": 0.01,
 }
 _ALIKE = {"friction.load_friction": _DIRECTED, "friction.load_friction_stribeck": _DIRECTED_STRIBECK}
+_FEWEST = 3  # held out logs, whose scatter is believed
 _STRIBECK_SPEED = 0.2  # rad/s at the output, where Stribeck friction begins to fade
 
 
@@ -87,11 +88,19 @@ class Ladder:
     rungs : tuple of Rung
     chosen : str
     reason : str
+    error : float
+        Rms error on logs that had no say in the choice [rad], smaller ones being luck: the logs that were held out are
+        halved, each half chooses a rung, and the other half tells its error. Where the criterion chose, that of all
+        logs that were held out; nan with fewer than two.
+    choices : tuple of str
+        The rungs that the halves chose: two that differ are a close call.
     """
 
     rungs: tuple[Rung, ...]
     chosen: str
     reason: str
+    error: float = math.nan
+    choices: tuple[str, ...] = ()
 
     @property
     def fit(self) -> Fit:
@@ -144,7 +153,7 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
     plain = checks.checked_servo(servo, model)
     others = [name for name in (free or checks.usual_free(plain))
               if name not in _TERMS and name not in _BASE and not name.startswith("friction.")]
-    options = {"compare_with": (), **options}
+    options = {"compare_with": (), **options, "diagnose": False}  # the ladder is the trial
     found: list[Rung] = []
     ordered = [name for name in RUNGS if name in rungs]
     with checks.shown(progress) as show:
@@ -159,7 +168,8 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
             if fit.interrupted:
                 break
     chosen, reason = _choice(found, select)
-    return Ladder(tuple(found), chosen, reason)
+    told = _told(found, select)
+    return Ladder(tuple(found), chosen, reason, told.error, told.choices)
 
 
 def _share(show: Any, k: int, count: int, name: str) -> Any:
@@ -199,14 +209,40 @@ def _rung(name: str, fit: Fit) -> Rung:
     return Rung(name, fit, training, holdout, criterion)
 
 
-def _choice(rungs: Sequence[Rung], select: str) -> tuple[str, str]:
-    """Return the chosen rung, and why."""
-    if select == "criterion" or any(math.isnan(rung.holdout) for rung in rungs):
+class _Told(NamedTuple):
+    """An error that the choice did not see, and which rungs were chosen without it."""
+
+    error: float
+    choices: tuple[str, ...]
+
+
+def _told(rungs: Sequence[Rung], select: str) -> _Told:
+    """Return the error on logs that did not choose: those held out in two halves, each told by the other's choice."""
+    if _by_criterion(rungs, select):
+        chosen, _ = _choice(rungs, select)
+        return _Told(next(rung.holdout for rung in rungs if rung.name == chosen), ())
+    count = len(_errors(rungs[0]))
+    if count < 2:
+        return _Told(math.nan, ())
+    halves = [range(k, count, 2) for k in range(2)]  # logs of one kind of motion lie side by side
+    named = {rung.name: rung for rung in rungs}
+    choices = tuple(_choice(rungs, select, half)[0] for half in halves)
+    told = [_errors(named[name])[k] for name, other in zip(choices, reversed(halves), strict=True) for k in other]
+    return _Told(pooled(told), choices)
+
+
+def _by_criterion(rungs: Sequence[Rung], select: str) -> bool:
+    return select == "criterion" or any(math.isnan(rung.holdout) for rung in rungs)
+
+
+def _choice(rungs: Sequence[Rung], select: str, some: Sequence[int] | None = None) -> tuple[str, str]:
+    """Return the rung that some of the held out logs choose, or all, and why."""
+    if _by_criterion(rungs, select):
         best = min(rungs, key=lambda rung: rung.criterion)
         return best.name, "smallest information criterion"
-    best = min(rungs, key=lambda rung: rung.holdout)
+    best = min(rungs, key=lambda rung: pooled(_errors(rung, some)))
     for rung in rungs:  # from the simplest on
-        worse, doubt = _difference(rung, best)
+        worse, doubt = _difference(rung, best, some)
         if worse <= doubt:
             reason = "smallest error on logs that were held out" if rung is best else (
                 f"simplest law within one standard error of {best.name}, the smallest error on logs that were held out")
@@ -214,13 +250,18 @@ def _choice(rungs: Sequence[Rung], select: str) -> tuple[str, str]:
     return best.name, "smallest error on logs that were held out"
 
 
-def _difference(rung: Rung, best: Rung) -> tuple[float, float]:
-    """Return by how much a rung's mean square error of held out logs is above the best, and its standard error."""
-    gaps = np.array([a.rms**2 - b.rms**2 for a, b in zip(_errors(rung), _errors(best), strict=True)])
-    if len(gaps) < 2:
-        return float(gaps.sum()), 0.0
+def _difference(rung: Rung, best: Rung, some: Sequence[int] | None) -> tuple[float, float]:
+    """Return by how much a rung's mean square error of held out logs is above the best, and its standard error.
+
+    Two logs do not say how logs scatter; with so few it is the standard error of a mean square of their samples.
+    """
+    theirs = _errors(best, some)
+    gaps = np.array([a.rms**2 - b.rms**2 for a, b in zip(_errors(rung, some), theirs, strict=True)])
+    if len(gaps) < _FEWEST:
+        return float(gaps.mean()), pooled(theirs) ** 2 * math.sqrt(2.0 / sum(e.samples for e in theirs))
     return float(gaps.mean()), float(gaps.std(ddof=1) / math.sqrt(len(gaps)))
 
 
-def _errors(rung: Rung) -> tuple[LogError, ...]:
-    return rung.fit.holdout.errors[type(rung.fit.model).__name__]
+def _errors(rung: Rung, some: Sequence[int] | None = None) -> tuple[LogError, ...]:
+    errors = rung.fit.holdout.errors[type(rung.fit.model).__name__]
+    return errors if some is None else tuple(errors[k] for k in some)

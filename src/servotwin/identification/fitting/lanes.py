@@ -7,27 +7,40 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.fitting.frames import signal
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.point import DELAY_SCALE, OFFSET_SCALE, SAG_SCALE, SPEED_SCALE, LogPart, Point
+from servotwin.identification.fitting.point import (
+    DELAY_SCALE,
+    OFFSET_SCALE,
+    PERIOD_SCALE,
+    SAG_SCALE,
+    SPEED_SCALE,
+    LogPart,
+    Point,
+)
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.forecast import Forecast
 
 Array = NDArray[np.float64]
 
+_DELAYS = ("log_delay", "frame_phase")  # a log's own: what they change follows from the speed, without a lane
+
 
 class LogLanes:
     """The lanes of one log at one point: the nominal one, and one for each number that is varied."""
 
-    def __init__(self, forecast: Forecast, k: int, at: int, point: Point, *, sides: int, step: float) -> None:
+    def __init__(self, forecast: Forecast, k: int, at: int, point: Point, *, sides: int, step: float,
+                 rates: bool = False) -> None:
         self.forecast, self.case, self.at, self.sides = forecast, forecast.cases[k], at, sides
         p, names = len(forecast.space), forecast.names_of_own(self.case)
         self.names, own = names, dict(zip(names, point.own[k], strict=True))
         self.delay = forecast.nuisance_of(point.shared, "delay") + own.get("log_delay", 0.0) * DELAY_SCALE
         self.offset = forecast.nuisance_of(point.shared, "angle_offset")
         self.sag = forecast.nuisance_of(point.shared, "angle_sag")
-        self.varied = [name for name in names if name != "log_delay"]
-        numbers = p + len(self.varied)
+        self.varied = [name for name in names if name not in _DELAYS]
+        self.shaped = [name for name in forecast.extra if name == "frame_period"]
+        numbers = p + len(self.varied) + len(self.shaped)
         self.count = 1 + sides * numbers
         self.cost = self.count * self.case.log.duration
         self.x = np.repeat(point.shared[None, :p], self.count, axis=0)
@@ -41,23 +54,36 @@ class LogLanes:
             for i, name in enumerate(self.varied):
                 column, scale = (self.angle, OFFSET_SCALE) if name == "output_angle" else (self.speed, SPEED_SCALE)
                 column[first + p + i] += self.steps[side, p + i] * scale
-        self.signal = self.case.signal
-        self.delayed = sides > 0 and ("delay" in forecast.extra or "log_delay" in names)
-        self.needs_rate = self.delayed and any(name != "output_angle" for name in self.case.places)
+        self.signals = [self.case.signal] * self.count
+        if forecast.phased:
+            self._send_pulses(k, point, own["frame_phase"] * DELAY_SCALE, numbers)
+        delayed = sides > 0 and ("delay" in forecast.extra or any(name in names for name in _DELAYS))
+        self.needs_rate = (delayed or rates) and any(name != "output_angle" for name in self.case.places)
         self.part: LogPart
+
+    def _send_pulses(self, k: int, point: Point, first: float, numbers: int) -> None:
+        """Give every lane its pulses; those of one whose period is varied come a little later one by one."""
+        forecast, log = self.forecast, self.case.log
+        frames, lead = forecast.frames_of(point, k), forecast.lead(self.case)
+        self.delay -= lead
+        period = forecast.nuisance_of(point.shared, "frame_period") or frames.period
+        self.signals = [forecast.command_at(point, k)] * self.count
+        for side in range(self.sides if self.shaped else 0):
+            longer = period + self.steps[side, numbers - 1] * PERIOD_SCALE
+            self.signals[(1 + side) * numbers] = signal(log, frames, first, longer, lead)
 
     def fail(self) -> None:
         """Make a part that is nan."""
         m, own = self.case.count, len(self.names)
         width = self.forecast.size if self.sides else 0
         self.part = LogPart(np.full(m, np.nan), np.full((m, width), np.nan),
-                         np.full((m, own if self.sides else 0), np.nan))
+                            np.full((m, own if self.sides else 0), np.nan), np.full(m, np.nan))
 
     def take(self, signals: dict[str, Array], early: Array, later: float) -> None:
         """Make the part of the log from the lanes' signals."""
         forecast, case, p = self.forecast, self.case, len(self.forecast.space)
         k = len(case.times)
-        residuals, shared, own = [], [], []
+        residuals, shared, own, delayed = [], [], [], []
         for name, place in case.places.items():
             values = signals[name][:, :k]
             speed = signals["output_speed"][0, :k]
@@ -72,9 +98,10 @@ class LogLanes:
             sigma = forecast.noise[name]
             y = values[:, place] / sigma
             residuals.append(y[0] - case.values[name] / sigma)
+            of_delay = -rate[place] * DELAY_SCALE / sigma
+            delayed.append(of_delay)
             if not self.sides:
                 continue
-            of_delay = -rate[place] * DELAY_SCALE / sigma
             sloped = self._sloped(y).T
             # An angle that is read too high: the shaft's own start is as much lower
             of_offset = np.full(len(place), OFFSET_SCALE / sigma if name == "output_angle" else 0.0)
@@ -82,17 +109,17 @@ class LogLanes:
             if "sag" in signals:
                 there = signals["sag"][0, place] if name == "output_angle" else np.zeros(len(place))
                 extra["angle_sag"] = there * (SAG_SCALE / sigma)
+            extra |= {which: sloped[:, p + len(self.varied) + i] for i, which in enumerate(self.shaped)}
             starts = {which: sloped[:, p + i] for i, which in enumerate(self.varied)}
             if "output_angle" in starts:
                 extra["angle_offset"] = of_offset - starts["output_angle"]
             shared.append(np.column_stack([sloped[:, :p], *(extra[n] for n in forecast.extra)]))
             columns = [starts[n] if n in starts else of_delay for n in self.names]
             own.append(np.column_stack(columns) if columns else np.zeros((len(place), 0)))
-        residual = np.concatenate(residuals)
-        if not self.sides:
-            self.part = LogPart(residual, np.zeros((len(residual), 0)), np.zeros((len(residual), 0)))
-            return
-        self.part = LogPart(residual, np.concatenate(shared), np.concatenate(own))
+        residual, later_by = np.concatenate(residuals), np.concatenate(delayed)
+        nothing = np.zeros((len(residual), 0))
+        self.part = LogPart(residual, np.concatenate(shared) if self.sides else nothing,
+                            np.concatenate(own) if self.sides else nothing, later_by)
 
     def _sloped(self, y: Array) -> Array:
         """Return the derivatives of the lanes' signals by every varied number, a row each."""

@@ -9,15 +9,25 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-NUISANCES = ("delay", "log_delay", "angle_offset", "angle_sag", "initial_state")
-SHARED = {"delay": (0.01, "s"), "angle_offset": (0.01, "rad"), "angle_sag": (0.1, "rad/V")}
+NUISANCES = ("delay", "log_delay", "frame_phase", "frame_period", "angle_offset", "angle_sag", "initial_state")
+SHARED = {"delay": (0.01, "s"), "angle_offset": (0.01, "rad"), "angle_sag": (0.1, "rad/V"), "frame_period": (1e-3, "s")}
 """Nuisances that all logs share: the step that matters, and the unit."""
-DELAY_SCALE, OFFSET_SCALE, SAG_SCALE = (SHARED[name][0] for name in SHARED)
+DELAY_SCALE, OFFSET_SCALE, SAG_SCALE, PERIOD_SCALE = (SHARED[name][0] for name in SHARED)
 SPEED_SCALE = 0.1  # rad/s
 MOST_DELAY = 0.5  # s
 STEP = 1e-4  # of a searched number: over the kinks that sticking makes
 FINE = 1e-6  # so little that hardly a kink lies within
 LATER = 1e-5  # s, for the time derivative of signals that are no angles
+
+
+class Frames(NamedTuple):
+    """Which command each pulse of a log carries: pulse k that of `phase` + k · `period`, from the first sample [s].
+
+    When the pulses themselves come is another matter, and continuous; here every command changes at a jump.
+    """
+
+    phase: float
+    period: float
 
 
 class Point(NamedTuple):
@@ -26,13 +36,17 @@ class Point(NamedTuple):
     Parameters
     ----------
     shared : ndarray, shape (p,)
-        The searched numbers of `Space`, then delay and angle offset where these are nuisances (scaled).
+        The searched numbers of `Space`, then those of `SHARED` that are nuisances (scaled).
     own : tuple of ndarray
-        Of each log: angle and speed at its start, its own delay (scaled), as far as they are nuisances.
+        Of each log: angle and speed at its start, its own delay, when its first pulse comes (scaled), as far as they
+        are nuisances.
+    frames : tuple of Frames
+        Of each log, where pulses have a phase; those that a forecast begins with unless given.
     """
 
     shared: Array
     own: tuple[Array, ...]
+    frames: tuple[Frames, ...] = ()
 
 
 class LogPart(NamedTuple):
@@ -44,8 +58,12 @@ class LogPart(NamedTuple):
         In units of each sensor's noise.
     shared : ndarray, shape (m, p) or (m, 0)
     own : ndarray, shape (m, l) or (m, 0)
+    later : ndarray, shape (m,)
+        What a delay changes: derivative by a scaled delay. Of signals that are no angles only where derivatives or
+        rates were asked for.
     """
 
     residual: Array
     shared: Array
     own: Array
+    later: Array = np.zeros(0)

@@ -5,14 +5,15 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.free import LUMPED, Space
+from servotwin.identification.fitting.fit import LEAST_SHARE
+from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
 from servotwin.identification.logs.log import Log
 from servotwin.parameters import Servo
 from servotwin.parameters.output_side import N
@@ -20,39 +21,83 @@ from servotwin.parameters.quantity import Quantity
 from servotwin.simulation.lane_loads import LOAD_NAMES
 
 if TYPE_CHECKING:
+    from servotwin.identification.fitting.doubts import Doubts
     from servotwin.identification.fitting.fit import Fit
-    from servotwin.identification.fitting.intervals import Ends
-    from servotwin.identification.fitting.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 
+_MOVED = "this value goes with the others of a fit, whose logs do not determine it, see [fit]"
 
-def identified_servo(servo: Servo, space: Space, shared: Array, doubt: Uncertainty | None, ends: Mapping[int, Ends],
-                     level: float) -> Servo:
-    """Return a servo with the values of a point; their origin is "identified", their range the interval."""
+
+def identified_servo(servo: Servo, space: Space, shared: Array, doubts: Doubts, level: float,
+                     yielded: Sequence[str] = ()) -> Servo:
+    """Return a servo with the values of a point.
+
+    What the logs determine is "identified", and its range is the interval. What they leave open keeps its origin, its
+    source and its spread; its value is the one that goes with the others.
+
+    Parameters
+    ----------
+    servo : Servo
+        Before the fit.
+    space : Space
+    shared : ndarray, shape (p,)
+    doubts : Doubts
+    level : float
+        Of the intervals.
+    yielded : sequence of str
+        Names whose prior was dropped: what the file said of them does not hold, and is not kept.
+    """
     found = space.servo_at(shared[:len(space)])
     quantities = dict(found.quantities)
+    open_ = {name for item in doubts.unidentifiable for name in item.parameters}
     for k, p in enumerate(space.parameters):
         if p.name in LOAD_NAMES:
             continue
         members, power, _ = LUMPED.get(p.name, ((p.name,), 0, ""))
-        spread: tuple[float, float] | None = None
-        if doubt is not None and k in ends:
-            a, b = (float(np.clip(p.value(shared[k] + end * doubt.std[k]), p.lower, p.upper))
-                    for end in (ends[k].lower, ends[k].upper))
-            spread = min(a, b), max(a, b)
         factor = float(found.get(N) or 1.0) ** power  # type: ignore[arg-type]
+        spread = _spread(p, k, shared, doubts, factor)
         for member in members:
-            value = found.get(member)
-            given: dict[str, Any] = {}
-            if spread is not None and isinstance(value, int | float) and math.isfinite(spread[0] + spread[1]):
-                given = {"lower": min(spread[0] / factor, float(value)), "upper": max(spread[1] / factor, float(value))}
-            said = f"{100 * level:g} % interval" if given else "not determined by the logs alone"
+            value, unit = float(found.get(member)), found.quantities[member].unit  # type: ignore[arg-type]
+            if p.name in open_ and p.name not in yielded:
+                quantities[member] = _kept(servo.quantities.get(member), value, unit)
+                continue
+            given = {"lower": min(spread[0], value), "upper": max(spread[1], value)} if spread else {}
+            said = f"{100 * level:g} % interval" if given else _unsure(doubts, p.name in open_)
             if p.name in LUMPED:
                 said = f"as {p.name}; {said}"
-            quantities[member] = Quantity(value=value, unit=found.quantities[member].unit,  # type: ignore[arg-type]
-                                          origin="identified", source=f"fit to logs, see [fit]; {said}", **given)
+            quantities[member] = Quantity(value=value, unit=unit, origin="identified",
+                                          source=f"fit to logs, see [fit]; {said}", **given)
     return replace(found, quantities=quantities)
+
+
+def _unsure(doubts: Doubts, left_open: bool) -> str:
+    """Return why a value that a fit found has no range."""
+    if left_open:
+        return "the logs alone do not determine it, and contradict what the file said of it"
+    return "no interval was sought" if doubts.doubt is None else "ended at a bound of the search"
+
+
+def _spread(p: FreeParameter, k: int, shared: Array, doubts: Doubts, factor: float) -> tuple[float, float] | None:
+    """Return the interval of a number's members; None where it has none."""
+    if doubts.doubt is None or k not in doubts.ends:
+        return None
+    ends, std = doubts.ends[k], float(doubts.doubt.std[k])
+    a, b = (float(np.clip(p.value(shared[k] + end * std), p.lower, p.upper)) / factor
+            for end in (ends.lower, ends.upper))
+    return (min(a, b), max(a, b)) if math.isfinite(a + b) else None
+
+
+def _kept(before: Quantity | None, value: float, unit: str) -> Quantity:
+    """Return what was known of a number that a fit did not determine, with the value that goes with the others."""
+    if before is None:
+        return Quantity(value=value, unit=unit, origin="assumed", source=f"no source; {_MOVED}")
+    if not isinstance(before.value, float) or before.value == value:
+        return before
+    said = (before.source or "no source").removesuffix(f"; {_MOVED}")
+    lower = None if before.lower is None else min(before.lower, value)
+    upper = None if before.upper is None else max(before.upper, value)
+    return replace(before, value=value, source=f"{said}; {_MOVED}", lower=lower, upper=upper)
 
 
 def with_what_logs_say(servo: Servo, logs: Sequence[Log], searched: Sequence[str]) -> Servo:
@@ -102,8 +147,19 @@ def data_hash(logs: Sequence[Log]) -> str:
     return digest.hexdigest()
 
 
-def with_record(fit: Fit, logs: Sequence[Log], fitted: Sequence[int]) -> Fit:
-    """Return a fit whose servo holds the record: data, model, version, bounds, errors, conditions."""
+def with_record(fit: Fit, logs: Sequence[Log], fitted: Sequence[int], mend: Sequence[str] = ()) -> Fit:
+    """Return a fit whose servo holds the record: data, model, version, bounds, errors, conditions.
+
+    Parameters
+    ----------
+    fit : Fit
+    logs : sequence of Log
+        As they were given.
+    fitted : sequence of int
+        Which of them were fitted.
+    mend : sequence of str
+        Kinds of findings that were mended in them.
+    """
     import servotwin
 
     motions = Counter(log.motion or "other" for log in logs)
@@ -113,13 +169,21 @@ def with_record(fit: Fit, logs: Sequence[Log], fitted: Sequence[int]) -> Fit:
         "free": list(fit.space.names),
         "bounds": {p.name: [p.lower, p.upper] for p in fit.space.parameters},
         "at_bound": list(fit.at_bound), "undetermined": [str(item) for item in fit.unidentifiable],
+        "yielded": [str(one) for one in fit.yielded],
+        "prior_share": {name: round(share, 3) for name, share in fit.prior_share.items() if share >= LEAST_SHARE},
         "nuisance": {name: fit.estimates[name] for name in fit.names if name not in fit.space.names},
         "load": {p.name: fit.estimates[p.name] for p in fit.space.parameters if p.name in LOAD_NAMES},
         "noise": dict(fit.noise),
+        "mended": list(mend),
         "conditions": {"motions": dict(motions), **_conditions(logs)},
         "training_error": fit.training.by().copy() if fit.training else {},
         "holdout_error": fit.holdout.by().copy() if fit.holdout else {},
     }
+    if fit.phased:
+        record["frame_phase"] = "of each log"
+    if fit.verdict is not None:
+        record["verdict"] = {"sentence": fit.verdict.sentence, "holds": fit.verdict.holds, "ratio": fit.verdict.ratio,
+                             "causes": [cause.name for cause in fit.verdict.causes]}
     if fit.interrupted:
         record["interrupted"] = True
     servo = replace(fit.servo, fit={key: value for key, value in record.items() if value not in ({}, [])})

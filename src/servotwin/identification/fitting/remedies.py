@@ -38,7 +38,7 @@ def _remedies(forecast: Forecast, point: Point, item: Unidentifiable, names: Seq
     some = range(0, len(forecast.cases), max(1, len(forecast.cases) // _MOST))
     logs = [forecast.cases[k].log for k in some]
     own = tuple(point.own[k] for k in some)
-    here = Point(point.shared, own)
+    here = Point(point.shared, own, tuple(point.frames[k] for k in some) if point.frames else ())
     found = [text for sensor, text in _SENSORS.items()
              if sensor not in forecast.sensors and sensor in forecast.model.available
              and _tells(forecast, [_measuring(log, sensor) for log in logs], sensor, here, direction)]
@@ -67,7 +67,7 @@ def _tells(forecast: Forecast, logs: Sequence[Log], sensor: str, point: Point, d
     try:
         tried = Forecast(logs, forecast.model, forecast.space, forecast.nuisance, [sensor])
         tried.strict = False
-        ends = [Point(point.shared + side * _STEP * direction, point.own) for side in (1.0, -1.0)]
+        ends = [point._replace(shared=point.shared + side * _STEP * direction) for side in (1.0, -1.0)]
         ahead, behind = ([part.residual for part in parts] for parts in tried.at_all(ends))
     except InputError:
         return False

@@ -13,8 +13,19 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
 from servotwin.identification.fitting.case import Case
+from servotwin.identification.fitting.clocks import with_clocks
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.point import DELAY_SCALE, MOST_DELAY, OFFSET_SCALE, SAG_SCALE, LogPart, Point
+from servotwin.identification.fitting.phases import Scan, widening
+from servotwin.identification.fitting.point import (
+    DELAY_SCALE,
+    MOST_DELAY,
+    OFFSET_SCALE,
+    PERIOD_SCALE,
+    SAG_SCALE,
+    LogPart,
+    Point,
+)
+from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.identification.logs.log import ANGLES
 from servotwin.models import Model
 
@@ -29,9 +40,12 @@ _MOST_OFFSET = 12.0  # rad, nearly two turns: an encoder's zero may be anywhere
 _NEAR = 0.3  # rad, an offset that the search finds by itself
 _LOOKS = 25  # of each log, for a first offset
 _MOST_SAG = 3.0  # rad/V
-_DELAY = 0.02  # s, where the search for it begins
+_DELAY = 0.02  # s, where the search for it begins, or at the best of some others
+_DELAYS = (_DELAY, 0.0, 0.04, 0.06, 0.09)
 _STARTS = 0.6  # of the way: rough searches from several starts
 _MOST = {"rough": 12, "all": 25}  # steps
+_ABOUT = 0.3  # of a searched number: how far off a servo file may be, while clocks are sought
+_PAYS = 10.0  # of the cost, for each independent residual: what another clock has to gain
 
 Told = Callable[[float, str], None]
 
@@ -49,7 +63,8 @@ class Task:
 
     def __post_init__(self) -> None:
         space, extra = self.forecast.space, self.forecast.extra
-        reach = {"delay": (0.0, MOST_DELAY / DELAY_SCALE),
+        period = self.period / PERIOD_SCALE
+        reach = {"delay": (0.0, MOST_DELAY / DELAY_SCALE), "frame_period": (0.9 * period, 1.1 * period),
                  "angle_offset": (-_MOST_OFFSET / OFFSET_SCALE, _MOST_OFFSET / OFFSET_SCALE),
                  "angle_sag": (-_MOST_SAG / SAG_SCALE, _MOST_SAG / SAG_SCALE)}
         self.lower = np.concatenate([space.lower, [reach[name][0] for name in extra]])
@@ -57,15 +72,42 @@ class Task:
         beliefs = [p.scaled_prior for p in space.parameters] + [None] * len(extra)
         self.prior = Prior(np.array([b[0] if b else 0.0 for b in beliefs]),
                            np.array([1.0 / b[1] if b else 0.0 for b in beliefs]))
+        self.remarks: list[str] = []  # on what the search found out about clocks
+        self.stamps_off: dict[int, float] = {}  # by how much the beat that replaced a log's stamps may lie off [s]
         self._best: Outcome | None = None  # of the search that goes on
         self._ended: list[Outcome] = []  # where rough searches ended, each in its own noise
 
+    @property
+    def period(self) -> float:
+        """T_f that the logs or the servo say [s]."""
+        return self.forecast.cases[0].period
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Which shared numbers stay: the delay, where each log's own pulses say when they take effect."""
+        own = self.forecast.phased and self.forecast.own_phases
+        return np.array([False] * len(self.forecast.space) + [own and name == "delay" for name in self.forecast.extra])
+
     def nominal(self) -> Point:
         """Return where the servo's values stand."""
-        first = {"delay": _DELAY / DELAY_SCALE, "angle_offset": self._offset() / OFFSET_SCALE, "angle_sag": 0.0}
+        first = {"delay": _DELAY / DELAY_SCALE, "angle_offset": self._offset() / OFFSET_SCALE, "angle_sag": 0.0,
+                 "frame_period": self.period / PERIOD_SCALE}
         shared = np.concatenate([self.forecast.space.start, [first[name] for name in self.forecast.extra]])
         return Point(np.clip(shared, self.lower, self.upper),
                      tuple(self.forecast.own_start(case) for case in self.forecast.cases))
+
+    def _at_likely_delay(self, point: Point) -> Point:
+        """Return the point with the delay of which the residuals are smallest, of some usual ones."""
+        if "delay" not in self.forecast.extra:
+            return point
+        place, tried = len(self.forecast.space) + self.forecast.extra.index("delay"), []
+        for delay in _DELAYS:
+            shared = point.shared.copy()
+            shared[place] = delay / DELAY_SCALE
+            tried.append(point._replace(shared=shared))
+        found = self.forecast.at_all(tried, cases=self._few())
+        sizes = [sum(float(np.abs(part.residual).sum()) for part in parts) for parts in found]
+        return tried[int(np.argmin([size if math.isfinite(size) else math.inf for size in sizes]))]
 
     def _offset(self) -> float:
         """Return how far the measured angles lie from the commanded ones in the middle; 0 where that is near [rad]."""
@@ -95,7 +137,7 @@ class Task:
 
     def search(self, tell: Told) -> tuple[Outcome, list[Outcome]]:
         """Return the best point, and where the search from each start ended; the way is told after each step."""
-        nominal = self.nominal()
+        nominal = self._at_likely_delay(self.nominal())
         self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
         self.forecast.strict = False  # from here on, what no servo is counts as failed
         ended: list[Outcome] = []
@@ -109,8 +151,52 @@ class Task:
             nominal = self._search(self.fitted).run(
                 nominal, most=_MOST["all"], tell=self._kept(tell, began, began, "all", "all logs")).point
             self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
+        if self.forecast.phased:
+            nominal = with_clocks(self, nominal, tell, began)
         best = self._refined(nominal, self.fitted, rounds=6, tell=tell, began=began)
         return best, ended or [best]
+
+    def ran(self, start: Point, tell: Told, began: float) -> Outcome:
+        """Search from a point on all logs that are fitted."""
+        keep = self._kept(tell, began, began, "all", "all logs")
+        return self._search(self.fitted).run(start, most=_MOST["all"], tell=keep)
+
+    def measure(self, point: Point) -> None:
+        """Take the noise of each sensor from its residuals at a point."""
+        self._set_noise(self.forecast.at(point, derivatives=False, cases=self.fitted), self.fitted)
+
+    def scan(self, point: Point) -> Scan:
+        """Return what tries pulses at a point."""
+        parts = self.forecast.at(point, derivatives=False, cases=self.fitted)
+        return Scan(self.forecast, self.loss, point, widening(parts, self.loss))
+
+    def like(self, forecast: Forecast, prior: Prior | None = None) -> Task:
+        """Return the same search over another forecast in the same noise, perhaps with another prior."""
+        forecast.goes_on_from(self.forecast)
+        made = Task(forecast, self.loss, self.fitted, self.seed, self.starts, self.noise)
+        made.prior = self.prior if prior is None and len(self.prior.mean) == forecast.size else prior or made.prior
+        return made
+
+    def near_start(self) -> Prior:
+        """Return the belief that parameters are about where the search begins."""
+        rest = len(self.forecast.extra)
+        return Prior(np.append(self.forecast.space.start, np.zeros(rest)),
+                     np.append(np.full(len(self.forecast.space), 1.0 / _ABOUT), np.zeros(rest)))
+
+    def become(self, other: Task, remark: str) -> None:
+        """Go on with the forecast of another search, and say why."""
+        other.forecast.work += self.forecast.work
+        self.forecast, self.lower, self.upper, self.prior = other.forecast, other.lower, other.upper, other.prior
+        self.remarks.append(remark)
+
+    def cost(self, point: Point) -> float:
+        """Return the cost of a point."""
+        return self._search(self.fitted).costs([point])[0]
+
+    def pays(self, point: Point, other: Task, found: Outcome) -> bool:
+        """Tell whether what another search found is better by more than chance."""
+        parts = other.forecast.at(found.point, derivatives=False, cases=other.fitted)
+        return found.cost < self.cost(point) - _PAYS * widening(parts, self.loss)
 
     def _rough(self, nominal: Point, tell: Told) -> list[Outcome]:
         """Search from several starts on some logs; return where that ended, the best first."""
@@ -129,7 +215,7 @@ class Task:
         return ended
 
     def _search(self, cases: Sequence[int]) -> Search:
-        return Search(self.forecast, self.loss, self.prior, self.lower, self.upper, cases)
+        return Search(self.forecast, self.loss, self.prior, self.lower, self.upper, cases, self.held)
 
     def _refined(self, start: Point, cases: Sequence[int], *, rounds: int, tell: Told, began: float) -> Outcome:
         """Search, estimate the noise anew, and search on until it stays."""
@@ -147,6 +233,14 @@ class Task:
                 break
         search = self._search(cases)
         return replace(best, cost=search.costs([best.point])[0])
+
+    def again(self, start: Point, tell: Told) -> Outcome:
+        """Return where a search on all logs ends that begins at the end of another one."""
+        return self._refined(start, self.fitted, rounds=6, tell=tell, began=0.0)
+
+    def take_noise(self, point: Point) -> None:
+        """Take the noise of each sensor from its residuals at a point."""
+        self._set_noise(self.forecast.at(point, derivatives=False, cases=self.fitted), self.fitted)
 
     def _kept(self, tell: Told, begin: float, end: float, stage: str, text: str) -> Callable[[int, Outcome], None]:
         """Return what keeps the best so far after each step, and tells how far the search is."""
@@ -179,7 +273,8 @@ class Task:
         rng = np.random.default_rng(self.seed)
         tried, offset = [], self._offset() / OFFSET_SCALE
         for _ in range(_TRIED * (self.starts - 1)):
-            extra = {"delay": rng.uniform(0.0, 3.0 * _DELAY / DELAY_SCALE), "angle_offset": offset, "angle_sag": 0.0}
+            extra = {"delay": rng.choice(_DELAYS) / DELAY_SCALE, "angle_offset": offset, "angle_sag": 0.0,
+                     "frame_period": self.period / PERIOD_SCALE}
             shared = np.concatenate([self.forecast.space.random(rng), [extra[n] for n in self.forecast.extra]])
             tried.append(Point(np.clip(shared, self.lower, self.upper), nominal.own))
         costs = self._search(few).costs(tried)
@@ -195,7 +290,7 @@ class Task:
         spread = []
         for outcome in good:
             parts = self.forecast.at(outcome.point, derivatives=False, cases=few)
-            spread.append(math.fsum(math.log(v) for v in self._spread(parts, few).values()))
+            spread.append(math.fsum(math.log(v) for v in scatter_of(self.forecast, parts, few).values()))
         best = good[int(np.argmin(spread))]
         self._set_noise(self.forecast.at(best.point, derivatives=False, cases=few), few)
         costs = self._search(few).costs([outcome.point for outcome in good])
@@ -207,7 +302,7 @@ class Task:
         if self.noise is not None:
             new = {name: self.noise.get(name, self.forecast.noise[name]) for name in self.forecast.sensors}
         else:
-            new = self._spread(parts, cases)
+            new = scatter_of(self.forecast, parts, cases)
         if rough and len(new) > 1:
             # Sampled between pulses a current is jagged over the delay: the angle alone leads near first
             new = {name: value if name in ANGLES else _BLIND * value for name, value in new.items()}
@@ -215,34 +310,7 @@ class Task:
         self.forecast.noise = self.forecast.noise | new
         return change
 
-    def _spread(self, parts: Sequence[LogPart], cases: Sequence[int]) -> dict[str, float]:
-        """Return the noise of each sensor: the median magnitude of its residuals, as of a normal law (SI)."""
-        gathered: dict[str, list[Array]] = {}
-        for k, part in zip(cases, parts, strict=True):
-            for name, residual in by_sensor(self.forecast, k, part).items():
-                gathered.setdefault(name, []).append(residual)
-        found = {}
-        for name, pieces in gathered.items():
-            values = np.concatenate(pieces)
-            if not np.isfinite(values).all():
-                found[name] = self.forecast.noise[name]
-                continue
-            middle = 1.4826 * float(np.median(np.abs(values)))
-            plain = float(np.sqrt(np.mean(values**2)))
-            # Where a servo mostly stands still, the median alone would call all motion an outlier
-            found[name] = max(middle, 0.3 * plain, 1e-9)
-        return found
-
     def at_bound(self, outcome: Outcome) -> NDArray[np.bool_]:
         """Tell which shared numbers stand at a bound."""
         x = outcome.point.shared
         return np.asarray((x <= self.lower + 1e-9) | (x >= self.upper - 1e-9))
-
-
-def by_sensor(forecast: Forecast, k: int, part: LogPart) -> dict[str, Array]:
-    """Return the residuals of a log by sensor (SI)."""
-    found, first = {}, 0
-    for name, place in forecast.cases[k].places.items():
-        found[name] = part.residual[first:first + len(place)] * forecast.noise[name]
-        first += len(place)
-    return found

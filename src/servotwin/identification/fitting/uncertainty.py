@@ -15,12 +15,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Loss, Prior
+from servotwin.identification.fitting.memory import Memory, memory_of
 from servotwin.identification.fitting.point import LogPart
 
 Array = NDArray[np.float64]
 
 _MANY_LOGS = 5  # as many logs for each number
 _HARDLY, _SURELY = 1.5, 3.0  # standard errors of a correlation of 0
+_MOST_LEVER = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """What an instrument that counts does to the residuals of a log.
+
+    Parameters
+    ----------
+    reading : ndarray of int, shape (m,)
+        Number of the reading that a sample belongs to: samples in a row with the same value.
+    power : ndarray, shape (m,)
+        Variance of the error of its reading, in units of noise: a twelfth of the squared step, 0 where nothing counts.
+    belief : ndarray, shape (own,)
+        By how much the beliefs about the log's own numbers are off where the first reading is off by one of noise.
+    """
+
+    reading: NDArray[np.int64]
+    power: Array
+    belief: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +60,12 @@ class Rows:
         How many of the last rows are beliefs about the log's own numbers.
     follow : ndarray, shape (own, p), optional
         How the own numbers follow when the shared ones move.
+    lever : ndarray, shape (m,), optional
+        Share of each residual that the log's own numbers take away.
+    counts : Counts, optional
+        Where an instrument that counts read the same value for a while.
+    alone : ndarray, shape (m, l), optional
+        Derivatives to the log's own numbers, beliefs apart.
     """
 
     score: Array
@@ -46,6 +73,9 @@ class Rows:
     inside: Array
     own: int = 0
     follow: Array | None = None
+    lever: Array | None = None
+    counts: Counts | None = None
+    alone: Array | None = None
 
     @property
     def residual(self) -> Array:
@@ -63,6 +93,8 @@ class Uncertainty:
         Of the data alone, per unit of noise.
     covariance : ndarray, shape (p, p)
         With priors.
+    alone : ndarray, shape (p, p)
+        Covariance that the logs alone would leave; that of what they do not determine is 0 too.
     curvature : ndarray, shape (p, p)
         Inverse curvature of the cost, priors included.
     inflation : float
@@ -73,30 +105,35 @@ class Uncertainty:
         Degrees of freedom of Student's t; inf for a normal law.
     autocorrelation : float
         Of neighbouring residuals.
+    freedoms : ndarray, shape (p,), optional
+        The same for each number, where they differ.
     """
 
     information: Array
     covariance: Array
+    alone: Array
     curvature: Array
     inflation: float
     method: str
     freedom: float
     autocorrelation: float
+    freedoms: Array | None = None
 
     @property
     def std(self) -> Array:
         """Standard errors."""
         return np.sqrt(np.diag(self.covariance))
 
-    def quantile(self, level: float) -> float:
-        """Return how many standard errors an interval reaches either way."""
+    def quantile(self, level: float, k: int | None = None) -> float:
+        """Return how many standard errors an interval reaches either way: that of a number, or of most of them."""
         from scipy.special import ndtri, stdtrit
 
         tail = 0.5 + 0.5 * level
-        return float(ndtri(tail)) if math.isinf(self.freedom) else float(stdtrit(self.freedom, tail))
+        freedom = self.freedom if k is None or self.freedoms is None else float(self.freedoms[k])
+        return float(ndtri(tail)) if math.isinf(freedom) else float(stdtrit(freedom, tail))
 
 
-def rows_of(part: LogPart, loss: Loss, own: Prior, at: Array) -> Rows:
+def rows_of(part: LogPart, loss: Loss, own: Prior, at: Array, counts: Counts | None = None) -> Rows:
     """Return what a log says of the shared numbers.
 
     Parameters
@@ -108,6 +145,8 @@ def rows_of(part: LogPart, loss: Loss, own: Prior, at: Array) -> Rows:
         Beliefs about the log's own numbers.
     at : ndarray, shape (l,)
         These numbers.
+    counts : Counts, optional
+        Where its instruments count.
     """
     inside = (np.abs(part.residual) <= loss.limit).astype(np.float64)
     score = np.clip(part.residual, -loss.limit, loss.limit)
@@ -120,9 +159,11 @@ def rows_of(part: LogPart, loss: Loss, own: Prior, at: Array) -> Rows:
         alone = np.concatenate([part.own, belief])
         weighted = alone * inside[:, None]
         H = weighted.T @ alone
-        follow = np.linalg.solve(H + 1e-12 * np.eye(len(at)) * max(H.max(), 1.0), weighted.T @ slope)
-        return Rows(score, slope - alone @ follow, inside, len(at), -follow)
-    return Rows(score, slope, inside)
+        H = H + 1e-12 * np.eye(len(at)) * max(H.max(), 1.0)
+        follow = np.linalg.solve(H, weighted.T @ slope)
+        lever = np.sum(weighted * np.linalg.solve(H, alone.T).T, axis=1)
+        return Rows(score, slope - alone @ follow, inside, len(at), -follow, lever, counts, part.own)
+    return Rows(score, slope, inside, counts=counts)
 
 
 def uncertainty(rows: Sequence[Rows], prior: Prior, held: NDArray[np.bool_],
@@ -150,62 +191,138 @@ def uncertainty(rows: Sequence[Rows], prior: Prior, held: NDArray[np.bool_],
     p = rows[0].slope.shape[1]
     information = np.sum([(r.slope * r.inside[:, None]).T @ r.slope for r in rows], axis=0)
     count = sum(len(r.residual) for r in rows)
-    correlation, lag = _correlation([r.residual for r in rows])
-    plain = _meat(rows, 0)
-    freedom = math.inf
+    Q = _varying(held, vague)
+    memory = memory_of(rows, Q)
+    beliefs = np.diag(prior.weight**2)
+    bread, bare = _inverse(Q.T @ (information + beliefs) @ Q), _inverse(Q.T @ information @ Q)
+    curvature = Q @ bread @ Q.T
+    plain = _meat(rows, 0, [_lever(r, curvature) for r in rows])
+    freedom, freedoms, uneven = math.inf, None, False
     if len(rows) >= _MANY_LOGS * p:
         # Whatever varies within logs or from log to log is in this
         scores = np.array([r.slope.T @ r.score for r in rows])
-        meat, method = scores.T @ scores * len(rows) / (len(rows) - 1.0), "between logs"
-        freedom = len(rows) - 1.0
-    elif abs(correlation) < _HARDLY / math.sqrt(count):
-        meat, method = plain, "independent residuals"
+        meats = [scores.T @ scores * len(rows) / (len(rows) - 1.0) * count / max(count - p, 1)]
+        method, freedom = "between logs", len(rows) - 1.0
+    elif abs(memory.excess) < _HARDLY / math.sqrt(count):
+        meats, method, freedoms = [plain], "independent residuals", _freedom(rows, curvature)
+        freedom = float(np.median(freedoms[~held])) if not held.all() else math.inf
     else:
-        meat, freedom = _first_order(rows, correlation)
-        if abs(correlation) > _SURELY / math.sqrt(count):  # perhaps a longer memory than that
-            longer = _meat(rows, lag)
-            more = np.sqrt(np.maximum(np.diag(longer) / np.maximum(np.diag(meat), 1e-300), 1.0))
-            meat = meat * np.outer(more, more)
-        method = "correlated residuals"
-    meat = meat * count / max(count - p, 1)
-    free = ~held
-    stiff = np.zeros((p, p))
-    if vague is not None and vague.shape[1]:
-        stiff = 1e6 * max(float(np.diag(information).max()), 1.0) * vague @ vague.T
-    beliefs = np.diag(prior.weight**2)
-    curvature, covariance, simple = (np.zeros((p, p)) for _ in range(3))
-    inner = np.ix_(free, free)
-    curvature[inner] = _inverse((information + stiff + beliefs)[inner])
-    covariance[inner] = _sandwich(curvature[inner], (meat + beliefs)[inner])
-    simple[inner] = _sandwich(curvature[inner], (plain + beliefs)[inner])
+        meats, freedom = [_first_order(rows, memory)], _independent(rows, memory)
+        method, uneven = "correlated residuals", True
+        if abs(memory.excess) > _SURELY / math.sqrt(count):  # perhaps a longer memory than that
+            meats.append(_meat(rows, _lag([r.residual for r in rows])))
+    if any(r.counts is not None for r in rows):
+        meats.append(np.sum([_counted(r) for r in rows], axis=0))
+
+    chance = 1.0 + 2.0 * np.sqrt(2.0 / _freedom(rows, curvature))
+
+    def spread(inverse: Array, more: Array) -> Array:
+        def of(meat: Array) -> Array:
+            return np.asarray(Q @ _sandwich(inverse, Q.T @ (meat + more) @ Q) @ Q.T)
+
+        found = _widest([of(meat) for meat in meats])
+        if not uneven:
+            return found
+        # Errors that are larger where more is learnt, such as those of stamps while the shaft moves
+        wider = _ratio(of(plain), of(_first_order(rows, memory._replace(correlation=0.0, power=memory.plain))))
+        return _times(found, np.where(wider > chance, wider, 1.0))
+
+    if freedoms is not None:  # a prior's part of a variance is known (Welch 1947)
+        whole, data = (np.diag(Q @ _sandwich(bread, Q.T @ m @ Q) @ Q.T) for m in (plain + beliefs, plain))
+        freedoms = np.where(data > 0.0, freedoms * (whole / np.maximum(data, 1e-300))**2, math.inf)
+    covariance, simple = spread(bread, beliefs), Q @ _sandwich(bread, Q.T @ (plain + beliefs) @ Q) @ Q.T
     known = np.diag(simple) > 0.0
     ratio = np.sqrt(np.diag(covariance)[known] / np.diag(simple)[known])
     inflation = max(float(np.median(ratio)), 1.0) if known.any() else 1.0
-    return Uncertainty(information, covariance, curvature, inflation, method, freedom, correlation)
+    return Uncertainty(information, covariance, spread(bare, np.zeros_like(beliefs)), curvature, inflation, method,
+                       freedom, memory.correlation if memory.excess > 0.0 else memory.excess, freedoms)
 
 
-def _first_order(rows: Sequence[Rows], correlation: float) -> tuple[Array, float]:
-    """Return the covariance of the gradient if residuals are first-order autoregressive, and degrees of freedom.
+def _varying(held: NDArray[np.bool_], vague: Array | None) -> Array:
+    """Return directions of unit length, a column each, in which anything varies: neither held nor vague.
 
-    The fit itself takes slow residuals away; their correlation is corrected for that (Kendall 1954), and so is their
-    size.
+    Vague directions are left out rather than made stiff: the smallest part of a determined number in one of them, by
+    rounding, would make that number stiff too.
     """
+    Q = np.eye(len(held))[:, ~held]
+    if vague is None or not vague.shape[1] or not Q.shape[1]:
+        return Q
+    vectors, sizes, _ = np.linalg.svd(Q.T @ vague)
+    return np.asarray(Q @ vectors[:, int((sizes > 1e-9).sum()):])
+
+
+def _first_order(rows: Sequence[Rows], memory: Memory) -> Array:
+    """Return the covariance of the gradient if residuals are first-order autoregressive."""
     from scipy.signal import lfilter
 
-    p, own = rows[0].slope.shape[1], float(np.mean([r.own for r in rows]))
-    sizes = [len(r.residual) for r in rows]
-    fitted, mean = own + p / len(rows), float(np.mean(sizes))
-    rho = min(max(correlation + (1.0 + 3.0 * max(correlation, 0.0)) * fitted / mean, 0.0), 0.98)
-    apart = (1.0 - rho) / (1.0 + rho)  # independent residuals for each that there is
-    power = sum(float(r.residual @ r.residual) for r in rows) / sum(sizes)
-    power /= max(1.0 - fitted / (apart * mean), 0.3)
-    total = np.zeros((p, p))
+    total = np.zeros((rows[0].slope.shape[1],) * 2)
     for r in rows:
         m = len(r.residual)
-        g = (r.slope * r.inside[:, None])[:m]
-        echo = lfilter([1.0], [1.0, -rho], g, axis=0)
-        total += power * (echo.T @ g + g.T @ echo - g.T @ g) + r.slope[m:].T @ r.slope[m:]
-    return total, max(sum(sizes) * apart - p - own * len(rows), 3.0)
+        g = r.slope[:m]
+        echo = lfilter([1.0], [1.0, -memory.correlation], g, axis=0)
+        total += memory.power * (echo.T @ g + g.T @ echo - g.T @ g) + r.slope[m:].T @ r.slope[m:]
+    return total
+
+
+def _independent(rows: Sequence[Rows], memory: Memory) -> float:
+    """Return how many independent residuals there are, less the numbers that were fitted."""
+    count = sum(len(r.residual) for r in rows) * (1.0 - memory.correlation) / (1.0 + memory.correlation)
+    return float(max(count - rows[0].slope.shape[1] - sum(r.own for r in rows), 3.0))
+
+
+def _lever(r: Rows, curvature: Array) -> Array:
+    """Return which share of each residual the fit takes away."""
+    own = r.lever if r.lever is not None else np.zeros(len(r.score))
+    return np.asarray(np.clip(own + r.inside * np.sum(r.slope @ curvature * r.slope, axis=1), 0.0, _MOST_LEVER))
+
+
+def _freedom(rows: Sequence[Rows], curvature: Array) -> Array:
+    """Return how many residuals tell the standard error of each number (Satterthwaite 1946).
+
+    Where a few samples of a fast motion say most of it, they are few.
+    """
+    shares = [(r.slope @ curvature)**2 * r.inside[:, None] for r in rows]
+    once, twice = (np.sum([np.sum(x**k, axis=0) for x in shares], axis=0) for k in (1, 2))
+    return np.asarray(np.maximum(once**2 / np.maximum(twice, 1e-300), 3.0))
+
+
+def _widest(covariances: Sequence[Array]) -> Array:
+    """Return the first covariance with those variances larger that another has larger.
+
+    What is compared is what numbers vary by: of gradients, whose parts largely cancel, one must not be changed alone.
+    """
+    first, *others = covariances
+    for other in others:
+        first = _times(first, _ratio(other, first))
+    return first
+
+
+def _ratio(one: Array, other: Array) -> Array:
+    """Return the ratio of two covariances' variances, at least 1."""
+    return np.maximum(np.diag(one) / np.maximum(np.diag(other), 1e-300), 1.0)
+
+
+def _times(covariance: Array, wider: Array) -> Array:
+    """Return a covariance with its variances times something, and the correlations as they were."""
+    more = np.sqrt(wider)
+    return np.asarray(covariance * np.outer(more, more))
+
+
+def _counted(r: Rows) -> Array:
+    """Return the covariance of the gradient if each reading of an instrument that counts has an error of its own.
+
+    Readings that stay are wrong by the same. The first of them is also what the log's start is believed to be.
+    """
+    m = len(r.residual)
+    if r.counts is None:
+        g = r.slope * r.score[:, None]
+        return np.asarray(g.T @ g)
+    c = r.counts
+    total = np.zeros((int(c.reading.max()) + 1, r.slope.shape[1]))
+    np.add.at(total, c.reading, r.slope[:m] * np.sqrt(c.power)[:, None])
+    total[0] += math.sqrt(c.power[0]) * c.belief @ r.slope[m:]
+    rest = max(float(np.mean(r.residual**2 - c.power)), 0.0)  # noise beside
+    return np.asarray(total.T @ total + rest * r.slope[:m].T @ r.slope[:m])
 
 
 def _sandwich(bread: Array, meat: Array) -> Array:
@@ -223,11 +340,15 @@ def _inverse(H: Array) -> Array:
     return np.asarray((vectors / values) @ vectors.T * np.outer(scale, scale))
 
 
-def _meat(rows: Sequence[Rows], lag: int) -> Array:
-    """Return the covariance of the gradient, residuals up to `lag` samples apart being related (Bartlett weights)."""
+def _meat(rows: Sequence[Rows], lag: int, levers: Sequence[Array] = ()) -> Array:
+    """Return the covariance of the gradient, residuals up to `lag` samples apart being related (Bartlett weights).
+
+    With levers residuals are as large as before the fit took a share of each away (MacKinnon & White 1985, HC2).
+    """
     total = np.zeros((rows[0].slope.shape[1],) * 2)
-    for r in rows:
-        g = r.slope * r.score[:, None]
+    for n, r in enumerate(rows):
+        score = r.score / np.sqrt(1.0 - levers[n]) if len(levers) else r.score
+        g = r.slope * score[:, None]
         total += g.T @ g
         for k in range(1, min(lag, len(g) - 1) + 1):
             part = g[k:].T @ g[:-k]
@@ -235,14 +356,10 @@ def _meat(rows: Sequence[Rows], lag: int) -> Array:
     return total
 
 
-def _correlation(scores: Sequence[Array]) -> tuple[float, int]:
-    """Return the correlation of neighbouring residuals, and after how many samples little of it is left."""
-    longest = max(len(s) for s in scores)
-    power = sum(float(s @ s) for s in scores)
-    if power == 0.0:
-        return 0.0, 0
-    first = sum(float(s[1:] @ s[:-1]) for s in scores) / power
+def _lag(scores: Sequence[Array]) -> int:
+    """Return twice the number of samples after which little of the residuals' correlation is left."""
+    longest, power = max(len(s) for s in scores), sum(float(s @ s) for s in scores)
     lag = 1
     while lag < longest // 2 and sum(float(s[lag:] @ s[:-lag]) for s in scores if len(s) > lag) > 0.1 * power:
         lag += 1
-    return first, min(2 * lag, longest // 2)
+    return min(2 * lag, longest // 2)

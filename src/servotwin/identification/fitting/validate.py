@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, ServoFileError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Prior, Search
+from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
-from servotwin.identification.fitting.holdout import ErrorTable, log_error
+from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
+from servotwin.identification.fitting.holdout import ErrorTable
 from servotwin.identification.fitting.point import NUISANCES, SHARED, LogPart, Point
-from servotwin.identification.fitting.task import HUBER, Task, by_sensor
-from servotwin.identification.logs.log import ANGLES, Log
+from servotwin.identification.fitting.scatter import scatter_of
+from servotwin.identification.fitting.task import HUBER, Task
+from servotwin.identification.logs.log import Log
 from servotwin.models import MODELS, Model
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES
@@ -50,6 +53,8 @@ class Validation:
         Which nuisances were fitted to these logs; the others come from the servo file's record of its fit, or are 0.
     noise : mapping of str to float
         How far the residuals of each sensor scatter, robust (SI).
+    warnings : tuple of str
+        What is probably wrong with the logs, a line each.
     """
 
     servo: Servo
@@ -59,6 +64,7 @@ class Validation:
     nuisance: Mapping[str, float]
     fitted: tuple[str, ...]
     noise: Mapping[str, float]
+    warnings: tuple[str, ...] = ()
 
     @property
     def total(self) -> float:
@@ -79,12 +85,13 @@ class Validation:
 
 
 def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] | None = None, *,
-             nuisance: Sequence[str] = (), sensors: Sequence[str] | None = None,
+             mend: Sequence[str] = (), nuisance: Sequence[str] = (), sensors: Sequence[str] | None = None,
              progress: Progress = False) -> Validation:
     """Run a servo against logs, and return how far it is off.
 
     Every log starts at the angle and speed that it shows. Delay and angle offset are those that the servo file's [fit]
-    recorded, where it has any.
+    recorded, where it has any. Where pulses have a phase, the first half of each log says when they come, and the
+    errors are those of the second.
 
     Parameters
     ----------
@@ -93,6 +100,8 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     model : type of Model, optional
         `PulseServo`, `PulseServoInductive` or `BoundedServo`; that of the servo file's [fit] unless given, else
         the one that stands for the servo (`models.default_class`).
+    mend : sequence of str
+        What is put right in the logs first, as of `identify`.
     nuisance : sequence of str
         What belongs to the rig and is fitted to these logs: as of `identify`.
     sensors : sequence of str, optional
@@ -116,28 +125,28 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     >>> validate([log], servo).total < 1e-6
     True
     """
-    given = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, recorded_model(servo) if model is None else model)
-    checks.check_speeds(given, plain)
+    given, noticed = first_looks(checks.checked_logs(logs), plain, mend)
     seen = checks.checked_sensors(given, sensors, plain)
     for name in nuisance:
         if name not in NUISANCES:
             raise InputError("nuisance", got=name, allowed=", ".join(NUISANCES))
     known = recorded_nuisance(servo)
-    used = [name for name in NUISANCES if name in known or name in nuisance or name == "initial_state"]
+    always = ("initial_state", "frame_phase") if "frame_phase" in servo.fit else ("initial_state",)
+    used = [name for name in NUISANCES if name in known or name in nuisance or name in always]
     forecast = Forecast(given, plain, _space(plain, given), used, seen)
-    with checks.shown(progress) as show:
+    with explained(noticed), checks.shown(progress) as show:
         show(0.0, "simulating")
-        point = _point(forecast, known, nuisance, show)
+        point = with_pulses_of(forecast, Loss(HUBER), _point(forecast, known, nuisance, show), range(len(given)))
         parts = forecast.at(point, derivatives=False)
     _failures(forecast, parts)
-    traces = tuple(_trace(forecast, k, part) for k, part in enumerate(parts))
+    traces = tuple(trace_of(forecast, point, k, part, held_out=True) for k, part in enumerate(parts))
     own = type(plain).__name__
     return Validation(
         servo=servo, model=plain, traces=traces, fitted=tuple(name for name in NUISANCES if name in nuisance),
-        errors=ErrorTable((own,), {own: tuple(log_error(trace.log, trace.residual) for trace in traces)}),
+        errors=ErrorTable((own,), {own: tuple(trace.error for trace in traces)}),
         nuisance={name: forecast.nuisance_of(point.shared, name) for name in forecast.extra},
-        noise=_noise(forecast, parts))
+        noise=_noise(forecast, parts), warnings=noticed)
 
 
 def recorded_model(servo: Any) -> type[Model] | None:
@@ -186,7 +195,7 @@ def _point(forecast: Forecast, known: Mapping[str, float], nuisance: Sequence[st
     shared = start.shared.copy()
     for k, name in enumerate(forecast.extra):
         shared[size + k] = known[name] / SHARED[name][0] if name in known else shared[size + k]
-    point = Point(shared, start.own)
+    point = start._replace(shared=shared)
     if not nuisance:
         return point
     held = np.array([True] * size + [name not in nuisance for name in forecast.extra])
@@ -207,7 +216,7 @@ def _as_measured(forecast: Forecast, point: Point, start: Point) -> Point:
     own = []
     for case, found, first in zip(forecast.cases, point.own, start.own, strict=True):
         own.append(np.where([name == "log_delay" for name in forecast.names_of_own(case)], found, first))
-    return Point(point.shared, tuple(own))
+    return point._replace(own=tuple(own))
 
 
 def _failures(forecast: Forecast, parts: Sequence[LogPart]) -> None:
@@ -218,21 +227,6 @@ def _failures(forecast: Forecast, parts: Sequence[LogPart]) -> None:
 
 
 def _noise(forecast: Forecast, parts: Sequence[LogPart]) -> dict[str, float]:
-    """Return how far the residuals of each sensor scatter (SI): their median magnitude, as of a normal law."""
-    gathered: dict[str, list[Array]] = {}
-    for k, part in enumerate(parts):
-        for name, residual in by_sensor(forecast, k, part).items():
-            gathered.setdefault(name, []).append(residual)
-    found = {}
-    for name, pieces in gathered.items():
-        values = np.concatenate(pieces)
-        found[name] = max(1.4826 * float(np.median(np.abs(values))), 0.3 * float(np.sqrt(np.mean(values**2))), 1e-9)
-    return {**forecast.noise, **found}
+    """Return how far the residuals of each sensor scatter (SI)."""
+    return {**forecast.noise, **scatter_of(forecast, parts, range(len(parts)))}
 
-
-def _trace(forecast: Forecast, k: int, part: LogPart) -> Trace:
-    case = forecast.cases[k]
-    name = next(name for name in ANGLES if name in case.places)
-    measured = case.values[name]
-    return Trace(case.log, True, name, case.log.time[0] + case.times[case.places[name]], measured,
-                 measured + by_sensor(forecast, k, part)[name])

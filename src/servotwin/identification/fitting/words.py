@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ Array = NDArray[np.float64]
 _VAGUE = 1.0  # standard error of a direction that is not determined: a factor e, or as much as is typical
 _SHARE = 0.25  # what such a direction may add to the standard error of a number that counts as determined
 _PART = 0.05  # of a direction
+_FAR = _SHARE / _PART  # e-folds that anything may go at most in a direction that is open: the bounds are nearer
+_HIGHEST = 2  # power in a product that is put into words
+_NEAR = 0.03  # to such a power
 _GEAR = "gear.gear_reduction"  # what most products are with
 
 
@@ -52,7 +56,8 @@ class Unidentifiable:
         return f"{text}; {_or(self.remedies)} would {'tell' if len(self.parameters) == 1 else 'separate them'}"
 
 
-def vague_directions(information: Array, inflation: float = 1.0, sizes: Array | None = None) -> tuple[Array, Array]:
+def vague_directions(information: Array, inflation: float = 1.0,
+                     sizes: Array | None = None) -> tuple[NDArray[np.bool_], Array]:
     """Return which numbers are not determined by the data, and the directions that are not (columns of unit length).
 
     Parameters
@@ -76,12 +81,12 @@ def vague_directions(information: Array, inflation: float = 1.0, sizes: Array | 
     std = inflation / np.sqrt(np.maximum(values, 1e-300))
     vague = (std > _VAGUE) | (values < floor)
     directions = vectors[:, vague]
-    added = np.sqrt(((directions * np.minimum(std[vague], 1e6)) ** 2).sum(axis=1))
+    added = np.sqrt(((directions * np.minimum(std[vague], _FAR)) ** 2).sum(axis=1))
     moved = directions * whole[:, None]
     return added > _SHARE, moved / np.maximum(np.linalg.norm(moved, axis=0), 1e-300)
 
 
-def explain(names: Sequence[str], shares: Sequence[float], flags: Array,
+def explain(names: Sequence[str], shares: Sequence[float], flags: NDArray[np.bool_],
             directions: Array) -> tuple[Unidentifiable, ...]:
     """Return the undetermined directions in words, the simplest ones first.
 
@@ -96,10 +101,14 @@ def explain(names: Sequence[str], shares: Sequence[float], flags: Array,
     """
     if not flags.any() or not directions.shape[1]:
         return ()
+    simple = simplest(directions)
+    parts = np.abs(simple) / np.abs(simple).max(axis=0)
+    members = (parts > _PART) & flags[:, None]
+    for k in np.flatnonzero(flags & ~members.any(axis=1)):  # a little of several: none is left without words
+        members[k, np.argmax(parts[k])] = True
     found = []
-    for v in _simple(directions).T:
-        size = np.abs(v).max()
-        which = [k for k in range(len(names)) if abs(v[k]) > _PART * size and flags[k]]
+    for v, those in zip(simple.T, members.T, strict=True):
+        which = np.flatnonzero(those).tolist()
         if not which:
             continue
         combinations: tuple[str, ...] = ()
@@ -109,8 +118,18 @@ def explain(names: Sequence[str], shares: Sequence[float], flags: Array,
     return tuple(sorted(found, key=lambda item: (len(item.parameters), item.parameters)))
 
 
-def _simple(directions: Array) -> Array:
-    """Return directions that span the same space with few numbers in each: rows reduced one after the other."""
+def simplest(directions: Array) -> Array:
+    """Return directions that span the same space with few numbers in each: rows reduced one after the other.
+
+    Parameters
+    ----------
+    directions : ndarray, shape (p, q)
+
+    Examples
+    --------
+    >>> simplest(np.array([[1.0, 1.0], [1.0, -1.0], [0.0, 0.0]])).T.tolist()
+    [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    """
     basis = directions.T.copy()
     for row in range(len(basis)):
         pivot = row + int(np.argmax(np.abs(basis[row:]).max(axis=1)))
@@ -124,25 +143,39 @@ def _simple(directions: Array) -> Array:
 
 
 def _products(names: list[str], v: Sequence[float]) -> tuple[str, ...]:
-    """Return products of powers that a direction leaves alone: each other number with the one that moves least."""
-    pivot = names.index(_GEAR) if _GEAR in names else int(np.argmin(np.abs(v)))
-    found = []
+    """Return products of small whole powers that a direction leaves alone; none where there are none such."""
+    tried = [found for pivot in range(len(names)) if (found := _about(pivot, names, v)) is not None]
+    # With the reduction where that will do, else with the smallest powers, else with what moves least
+    order = sorted(tried, key=lambda f: (names[f.pivot] != _GEAR, f.powers, abs(v[f.pivot])))
+    return order[0].texts if order else ()
+
+
+class _Products(NamedTuple):
+    """Products of each number with one of them, the sum of their powers, and which one that is."""
+
+    texts: tuple[str, ...]
+    powers: int
+    pivot: int
+
+
+def _about(pivot: int, names: list[str], v: Sequence[float]) -> _Products | None:
+    """Return products of each other number with one; None where a power is no small whole number."""
+    texts, powers = [], 0
     for k, name in enumerate(names):
         if k == pivot:
             continue
-        power = Fraction(-v[k] / v[pivot]).limit_denominator(4)
-        if abs(float(power) + v[k] / v[pivot]) > 0.05:
-            return ()
-        found.append(f"{name}{' / ' if power < 0 else ' · '}{names[pivot]}{_power(abs(power))}")
-    return tuple(found)
+        exact = -v[k] / v[pivot]
+        power = Fraction(exact).limit_denominator(_HIGHEST)
+        if not 0 < abs(power.numerator) <= _HIGHEST or abs(float(power) - exact) > _NEAR:
+            return None
+        sign = " / " if power < 0 else " · "
+        texts.append(f"{name}{_power(power.denominator)}{sign}{names[pivot]}{_power(abs(power.numerator))}")
+        powers += power.denominator + abs(power.numerator)
+    return _Products(tuple(texts), powers, pivot)
 
 
-def _power(power: Fraction) -> str:
-    if power == 1:
-        return ""
-    if power.denominator == 1:
-        return "".join("⁰¹²³⁴⁵⁶⁷⁸⁹"[int(digit)] for digit in str(power.numerator))
-    return f"^({power})"
+def _power(power: int) -> str:
+    return "" if power == 1 else "⁰¹²³⁴⁵⁶⁷⁸⁹"[power]
 
 
 def _and(words: Sequence[str]) -> str:

@@ -10,7 +10,7 @@ from servotwin.identification.report import parts as report_parts
 from servotwin.identification.report import pictures as report_pictures
 from servotwin.identification.report import tables as report_tables
 from servotwin.identification.report.parts import STYLE, figure, space
-from servotwin.identification.report.shown import error_shown, estimate_lines, share_text, tables_of
+from servotwin.identification.report.shown import error_shown, error_unit, estimate_lines, share_text, tables_of
 from servotwin.parameters import write_file
 from servotwin.units.look import document, escape, number
 
@@ -44,10 +44,11 @@ def write_report(fit: Fit, path: Path, *, overwrite: bool = False) -> Path:
 def page(fit: Fit) -> str:
     """Return the report as HTML."""
     sections = (
+        *((("verdict", "Verdict", _verdict(fit)),) if fit.verdict is not None else ()),
         ("summary", "Summary", _summary(fit)), ("estimates", "Parameters", _estimates(fit)),
         ("unknown", "What the logs cannot say", _unknown(fit)),
         ("errors", "Errors beside simpler models", _errors(fit)),
-        ("logs", "Measured and simulated", report_parts.trace_grid(fit.traces)),
+        ("logs", "Measured and simulated", report_parts.trace_list(fit.traces)),
         ("residuals", "What is left", _residuals(fit)),
         ("correlation", "Correlation of the estimates", _correlation(fit)), ("search", "The search", _search(fit)),
         ("reading", "How to read this page", _reading(fit)),
@@ -69,6 +70,16 @@ def _short(fit: Fit) -> str:
 
 def _count(number_of: int, what: str) -> str:
     return f"{number_of} {what}{'' if number_of == 1 else 's'}"
+
+
+def _verdict(fit: Fit) -> str:
+    """Return the verdict in a box, green where it holds, and the causes that were tried."""
+    if fit.verdict is None:
+        return ""
+    good = " good" if fit.verdict.holds else ""
+    words = escape(fit.verdict.sentence[:1].upper() + fit.verdict.sentence[1:])
+    box = f'<div class="note verdict{good}"><p><strong>{words}.</strong></p></div>\n'
+    return box + (report_tables.causes(fit) if fit.verdict.causes else "")
 
 
 def _summary(fit: Fit) -> str:
@@ -93,7 +104,8 @@ def _summary(fit: Fit) -> str:
         cards.append((f"{same} of {len(fit.starts)}",
                       "searches from different starts ended within 1 % of the best cost"))
     listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
-    notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in fit.warnings)
+    notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in fit.warnings
+                    if fit.verdict is None or text != fit.verdict.sentence)
     if fit.interrupted:
         notes = ('<div class="note"><p><strong>The fit was interrupted.</strong> This is the best that it had found; '
                  "there may be better values, and there are no intervals.</p></div>\n") + notes
@@ -147,12 +159,16 @@ def _residuals(fit: Fit) -> str:
     if fit.doubt is None:
         return drawn
     if fit.doubt.method == "independent residuals":
-        words = "Neighbouring residuals are independent: what is left looks like noise."
+        words = "Neighbouring residuals are independent."
     else:
-        words = (f"Neighbouring residuals follow each other (correlation {number(fit.doubt.autocorrelation, 2)}): what "
-                 "is left is not noise alone, the model lacks something. The intervals allow for that "
-                 f"({escape(fit.doubt.method)}; {number(fit.doubt.inflation, 2)} times as wide as for independent "
-                 "residuals), but not for a model that is wrong in the mean.")
+        words = (f"Neighbouring residuals follow each other (correlation {number(fit.doubt.autocorrelation, 2)}). The "
+                 f"intervals allow for that ({escape(fit.doubt.method)}; {number(fit.doubt.inflation, 2)} times as "
+                 "wide as for independent residuals), but not for a model that is wrong in the mean.")
+    if fit.verdict is not None:
+        sensor = next(iter(fit.verdict.noise))
+        factor, unit = error_unit(sensor)
+        words += (f" They are {number(fit.verdict.ratio, 2)} times the noise that needs no model, "
+                  f"{number(fit.verdict.noise[sensor] * factor, 2)}{space(unit)}.")
     return drawn + f"<p>{words}</p>\n"
 
 
@@ -176,7 +192,9 @@ def _reading(fit: Fit) -> str:
 parabola near its minimum. “Profile”: it is not, so the ends were found by fixing the number and fitting all
 others.</li>
 <li><b>Held out.</b> These logs took no part in the fit. Their error is what to expect of the next log of that kind. An
-error that is much smaller on fitted logs means that the fit follows what does not repeat.</li>
+error that is much smaller on fitted logs means that the others show what these do not, or that these are too few.</li>
+<li><b>Verdict.</b> Residuals beside noise that needs no model: of a shaft that stands, of neighbouring samples, of
+counts. Causes are tried on a few logs; their errors are those of samples that took no part in the trial.</li>
 <li><b>Simpler models.</b> “delay + slew + lag” has no physics. “M1” is this servo with Coulomb and viscous friction
 only. What does not beat them is not worth its parameters.</li>
 <li><b>At a bound, not determined.</b> Such a number is not measured by these logs. Do not carry it to another

@@ -18,18 +18,17 @@ if TYPE_CHECKING:
     from servotwin.identification.fitting.fit import Trace
     from servotwin.identification.fitting.holdout import ErrorTable
 
-_MOST_LOGS = 24  # that are drawn
+_MOST_LOGS = 21  # that are drawn folded
 _MOST_BARS = 12  # groups of one picture
 STYLE = """
-.logs{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,18rem),1fr));gap:.7rem;margin:.8rem 0}
-.logs figure{margin:0;padding:.4rem}.logs figure.held{border-color:#d55e00;background:#fff6ef}
-.logs figcaption{margin:0 0 .2rem;color:var(--ink);font-size:.85rem;overflow-wrap:anywhere}
+.logs figure{margin:.7rem 0}#logs figure{padding:.4rem}#logs figure.held{border-color:#d55e00;background:#fff6ef}
+#logs figcaption{margin:0 0 .2rem;color:var(--ink);font-size:.85rem;overflow-wrap:anywhere}
 .tag{border-radius:4px;padding:0 .35rem;font-size:.8rem;background:#d55e00;color:#fff;white-space:nowrap}
 .key{display:inline-block;width:1.6rem;border-top:3px solid;vertical-align:middle;margin:0 .3rem 0 .8rem}
-figure img.drawing{width:100%;max-width:42rem}.logs figure img{width:100%}
-.good{border-left-color:#009e73;background:#f0faf6}
+figure img.drawing{width:100%;max-width:42rem}#logs figure img{width:100%}
+.verdict{font-size:1.1rem}.good{border-left-color:#009e73;background:#f0faf6}
 details{margin:.8rem 0}summary{cursor:pointer;color:var(--blue)}
-@media print{.logs{grid-template-columns:repeat(3,1fr)}.logs figure{break-inside:avoid}
+@media print{#logs figure{break-inside:avoid}
 figure img.drawing{max-width:27rem}}
 """
 
@@ -59,32 +58,38 @@ def errors(tables: Mapping[str, ErrorTable], traces: Sequence[Trace], words: str
     return f"{''.join(parts)}<details><summary>Log by log</summary>{every}</details>\n"
 
 
-def trace_grid(traces: Sequence[Trace]) -> str:
-    """Return measured and simulated of some logs, side by side, by kind of motion."""
-    shown = report_traces.chosen(traces, _MOST_LOGS)
+def trace_list(traces: Sequence[Trace]) -> str:
+    """Return measured and simulated log by log: the worst, the middle and the best open, the others folded."""
+    first = report_traces.shown_first(traces)
+    others = [trace for trace in report_traces.by_error(traces) if not any(trace is one for one in first)]
     mixed = len({trace.held_out for trace in traces}) > 1
-    note = ""
-    if len(shown) < len(traces):
-        note = (f"<p>{len(shown)} of {len(traces)} logs: of every kind of motion in turn, those that were held out "
-                "and are furthest off first.</p>")
-    lines = (("#999", "measured"), ("#0072b2", "simulated"), ("#d55e00", "simulated − measured, on a scale of its own"))
+    lines = (("#999", "measured"), ("#0072b2", "simulated"), ("#d55e00", "simulated − measured"))
     key = ('<p>' + "".join(f'<span class="key" style="border-color:{colour}"></span>{words}' for colour, words in lines)
+           + '. Below each: the yellow window, in which they differ most'
            + (' &nbsp; <span class="tag">held out</span> not fitted</p>' if mixed else "</p>"))
-    parts = []
-    for motion in dict.fromkeys(trace.log.motion for trace in shown):
-        drawn = "".join(_small(trace, tagged=mixed and trace.held_out) for trace in shown if trace.log.motion == motion)
-        parts.append(f"<h3>{escape(motion or 'other')}</h3><div class=\"logs\">{drawn}</div>\n")
-    return note + key + "".join(parts)
+    note = ("<p>The log that is furthest off, the one in the middle and the nearest; all others are folded below.</p>\n"
+            if others else "")
+    drawn = "".join(_one(trace, tagged=mixed and trace.held_out) for trace in first)
+    kept = others[:_MOST_LOGS]
+    folded = "".join(f"<details><summary>{_caption(trace, tagged=mixed and trace.held_out)}</summary>"
+                     f"{_one(trace, tagged=mixed and trace.held_out)}</details>\n" for trace in kept)
+    left = (f"<p>{len(others) - len(kept)} further logs, nearer than these, are in the table of errors only.</p>\n"
+            if len(others) > len(kept) else "")
+    return f'{key}{note}<div class="logs">{drawn}</div>\n{folded}{left}'
 
 
-def _small(trace: Trace, *, tagged: bool) -> str:
+def _caption(trace: Trace, *, tagged: bool) -> str:
     factor, unit = error_unit(trace.signal)
     rms = math.sqrt(float((trace.residual**2).mean())) * factor
     tag = ' <span class="tag">held out</span>' if tagged else ""
-    words = f"<b>{escape(trace.log.name)}</b> {number(rms, 3)}{space(unit)} rms"
+    kind = f", {escape(trace.log.motion)}" if trace.log.motion else ""
+    return f"<b>{escape(trace.log.name)}</b>{kind}: {number(rms, 3)}{space(unit)} rms{tag}"
+
+
+def _one(trace: Trace, *, tagged: bool) -> str:
     drawn = picture(to_bytes(report_traces.beside(trace), "svg"), f"{trace.log.name}, measured and simulated")
     kind = ' class="held"' if tagged else ""
-    return f"<figure{kind}><figcaption>{words}{tag}</figcaption><div>{drawn}</div></figure>\n"
+    return f"<figure{kind}><figcaption>{_caption(trace, tagged=tagged)}</figcaption><div>{drawn}</div></figure>\n"
 
 
 def residuals(traces: Sequence[Trace], noise: Mapping[str, float]) -> str:

@@ -42,6 +42,8 @@ class Line:
         How the interval was found: "normal", "profile", "at bound", "undetermined" or "not sought".
     nuisance : bool
         Whether it belongs to the rig and not to the servo.
+    prior : str
+        How much of the interval is prior: a share, "–" where there is no interval, or "dropped".
     """
 
     name: str
@@ -52,6 +54,7 @@ class Line:
     unit: str
     method: str
     nuisance: bool
+    prior: str = "–"
 
     @property
     def interval(self) -> str:
@@ -93,7 +96,16 @@ def _line(fit: Fit, name: str, interval: Interval) -> Line:
     shown, lower, upper = (figure_in(float(x), unit, dimension, within=float(within))
                            for x in (value, interval.lower, interval.upper))
     said = "–" if sheet is None else figure_in(sheet, unit, dimension)
-    return Line(name, shown, lower, upper, said, label_of(unit) + _PER.get(name, ""), method, name in _NUISANCE)
+    return Line(name, shown, lower, upper, said, label_of(unit) + _PER.get(name, ""), method, name in _NUISANCE,
+                _prior(fit, name))
+
+
+def _prior(fit: Fit, name: str) -> str:
+    """Return in words how much of what is known of a number is prior."""
+    if any(one.name == name for one in fit.yielded):
+        return "dropped"
+    share = fit.prior_share.get(name, math.nan)
+    return f"{100.0 * share:.0f} %" if math.isfinite(share) else "–"
 
 
 def nominal_of(fit: Fit, name: str) -> float | None:

@@ -31,10 +31,40 @@ def estimates(fit: Fit) -> str:
         ends = ["–", "–"] if line.interval == line.method else [line.lower, line.upper]
         numbers = [text.replace("-", MINUS) for text in (line.value, *ends, line.sheet)]
         rows.append([f"<code>{escape(line.name)}</code>", *numbers, escape(line.unit),
-                     _HOW.get(line.method, line.method)])
+                     _HOW.get(line.method, line.method), line.prior])
     level = f"{100 * fit.level:g} %"
-    return table(("parameter", "value", f"{level} from", "to", "before", "unit", "interval by"), rows,
-                 caption="“Before” is the value of the servo file; delay and angle offset belong to the rig.")
+    return table(("parameter", "value", f"{level} from", "to", "before", "unit", "interval by", "prior"), rows,
+                 caption="“Before” is the value of the servo file; delay and angle offset belong to the rig. “Prior”: "
+                         "how much of what is known is the servo file's range or a prior that was given, not data.") \
+        + _yielded(fit)
+
+
+def _yielded(fit: Fit) -> str:
+    """Return the priors that were dropped beside what the logs say; nothing where there are none."""
+    rows = []
+    for one in fit.yielded:
+        dimension = dimension_of_free(one.name)
+        unit = unit_for(one.logs or one.file, dimension)
+        known = math.isfinite(one.logs_std)
+        numbers = (figure_in(one.file, unit, dimension), figure_in(one.file_std, unit, dimension),
+                   figure_in(one.logs, unit, dimension, within=one.logs_std) if known else "–",
+                   *(figure_in(x, unit, dimension, within=one.logs_std) if known else "–"
+                     for x in (one.logs_lower, one.logs_upper)))
+        rows.append([f"<code>{escape(one.name)}</code>", *(text.replace("-", MINUS) for text in numbers),
+                     escape(label_of(unit)), number(one.apart, 2)])
+    head = ("parameter", "prior", "±", "logs", f"{100 * fit.level:g} % from", "to", "unit", "standard errors apart")
+    return table(head, rows, caption="Priors that the logs contradict: the fit goes without them.") if rows else ""
+
+
+def causes(fit: Fit) -> str:
+    """Return what was tried and explains a bad verdict, the best first."""
+    if fit.verdict is None:
+        return ""
+    factor, unit = error_unit(next(iter(fit.verdict.noise)))
+    rows = [[escape(cause.name), number(cause.before * factor, 3), number(cause.after * factor, 3),
+             escape(cause.remedy)] for cause in fit.verdict.causes]
+    return table(("cause", f"error without it ({unit})", f"with it ({unit})", "what to do"), rows,
+                 caption="Rms errors on parts of the logs that took no part in the trial.")
 
 
 def errors(tables: Mapping[str, ErrorTable], label: str, factor: float, unit: str) -> str:

@@ -20,50 +20,82 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_SMALL = (3.5, 2.25)  # inch
+_TALL = 4.6  # inch
+_FEW = 3  # logs, up to which all are shown open
+_ZOOM = 16  # samples
 _GAP = 4.0  # times the usual step, beyond which a line is broken
 _MOST_LAG = 100  # samples
 _BINS = 40  # of time
 _WORDS = {"output_angle": "angle", "feedback_voltage": "feedback"}
 
 
-def chosen(traces: Sequence[Trace], most: int) -> list[Trace]:
-    """Return traces of every kind of motion in turn, of each those that were held out and are furthest off first."""
-    kinds: dict[str, list[Trace]] = {}
-    for trace in traces:
-        kinds.setdefault(trace.log.motion, []).append(trace)
-    for members in kinds.values():
-        members.sort(key=lambda trace: (not trace.held_out, -_rms(trace.residual)))
-    picked: list[Trace] = []
-    for turn in range(max((len(members) for members in kinds.values()), default=0)):
-        picked += [members[turn] for members in kinds.values() if turn < len(members)]
-    kept = {id(trace) for trace in picked[:most]}
-    return [trace for members in kinds.values() for trace in members if id(trace) in kept]
+def by_error(traces: Sequence[Trace]) -> list[Trace]:
+    """Return traces, those furthest off first."""
+    return sorted(traces, key=lambda trace: -_rms(trace.residual))
+
+
+def shown_first(traces: Sequence[Trace]) -> list[Trace]:
+    """Return of many logs the one that is furthest off, the middle one and the nearest; up to three all of them."""
+    ordered = by_error(traces)
+    if len(ordered) <= _FEW:
+        return ordered
+    return [ordered[0], ordered[len(ordered) // 2], ordered[-1]]
+
+
+def worst_window(trace: Trace) -> tuple[float, float]:
+    """Return from when to when the residuals are largest: a window of a tenth of the log, of some samples at least."""
+    n = len(trace.time)
+    width = min(n, max(_ZOOM, n // 10))
+    power = np.convolve(trace.residual**2, np.ones(width), "valid")
+    first = int(np.argmax(power))
+    return float(trace.time[first]), float(trace.time[first + width - 1])
 
 
 def beside(trace: Trace) -> Figure:
-    """Return what one log measured, the simulation over it, and below their difference."""
+    """Return what one log measured, the simulation over it, their difference below, and where that is largest."""
     factor, unit = sensor_shown(trace.signal)
     time, measured, simulated = _broken(trace.time, trace.measured * factor, trace.simulated * factor)
+    low, high = worst_window(trace)
+    with context():
+        figure = new_figure(WIDTH, _TALL)
+        grid = figure.add_gridspec(3, 2, height_ratios=(2.2, 1.0, 1.6))
+        above = figure.add_subplot(grid[0, :])
+        below = figure.add_subplot(grid[1, :], sharex=above)
+        near, left = figure.add_subplot(grid[2, 0]), figure.add_subplot(grid[2, 1])
+        for ax, marker in ((above, ""), (near, ".")):
+            ax.plot(time, measured, color=COLOURS["black"], linewidth=2.4, alpha=0.45, marker=marker, markersize=3.0,
+                    label="measured")
+            ax.plot(time, simulated, color=COLOURS["blue"], linewidth=1.2, label="simulated")
+        for ax in (below, left):
+            ax.axhline(0.0, color=COLOURS["grey"], linewidth=0.8)
+            ax.plot(time, simulated - measured, color=COLOURS["vermilion"], linewidth=1.0)
+        for ax in (above, below):
+            ax.axvspan(low, high, color=COLOURS["yellow"], alpha=0.25, linewidth=0.0)
+        above.legend(loc="upper right")
+        above.margins(x=0.01)
+        above.tick_params(labelbottom=False)
+        above.set_ylabel(f"{_WORDS.get(trace.signal, trace.signal)} ({unit})")
+        below.set(xlabel="time (s)", ylabel=f"difference ({unit})")
+        _zoom(near, time, low, high, measured, simulated)
+        _zoom(left, time, low, high, simulated - measured)
+        near.set(xlabel="time (s)", ylabel=f"{_WORDS.get(trace.signal, trace.signal)} ({unit})")
+        left.set(xlabel="time (s)", ylabel=f"difference ({unit})")
+    return finished(figure)
+
+
+def _zoom(ax: Axes, time: Array, low: float, high: float, *curves: Array) -> None:
+    """Show a window, with the range that the curves have in it."""
     from matplotlib.ticker import MaxNLocator
 
-    with context():
-        figure = new_figure(*_SMALL, layout=None)
-        figure.subplots_adjust(left=0.19, right=0.965, top=0.97, bottom=0.185, hspace=0.12)
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
-        above.plot(time, measured, color=COLOURS["black"], linewidth=2.4, alpha=0.45, label="measured")
-        above.plot(time, simulated, color=COLOURS["blue"], linewidth=1.2, label="simulated")
-        above.set_ylabel(f"{_WORDS.get(trace.signal, trace.signal)} ({unit})")
-        above.margins(x=0.01)
-        below.axhline(0.0, color=COLOURS["grey"], linewidth=0.8)
-        below.plot(time, simulated - measured, color=COLOURS["vermilion"], linewidth=1.0)
-        below.set_ylabel(f"diff. ({unit})")
-        below.set_xlabel("time (s)")
-        below.xaxis.set_major_locator(MaxNLocator(6))
-        for ax in (above, below):
-            ax.tick_params(labelsize=7.0)
-            ax.yaxis.set_label_coords(-0.155, 0.5)
-        return figure
+    inside = (time >= low) & (time <= high)
+    values = np.concatenate([curve[inside] for curve in curves])
+    values = values[np.isfinite(values)]
+    bottom, top = float(values.min(initial=0.0 if not len(values) else math.inf)), float(values.max(
+        initial=0.0 if not len(values) else -math.inf))
+    margin = 0.08 * max(top - bottom, 1e-9)
+    ax.set_xlim(low, high if high > low else low + 1e-9)
+    ax.set_ylim(bottom - margin, top + margin)
+    ax.xaxis.set_major_locator(MaxNLocator(5))
 
 
 def residuals(traces: Sequence[Trace], noise: Mapping[str, float]) -> Figure:

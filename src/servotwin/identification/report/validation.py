@@ -33,7 +33,7 @@ def page(found: Validation) -> str:
     sections = (
         ("summary", "Summary", _summary(found)),
         ("errors", "Errors", report_parts.errors(tables, found.traces, "Every log starts where it was measured.")),
-        ("logs", "Measured and simulated", report_parts.trace_grid(found.traces)),
+        ("logs", "Measured and simulated", report_parts.trace_list(found.traces)),
         ("residuals", "What is left", report_parts.residuals(found.traces, found.noise)),
     )
     contents = "".join(f'<li><a href="#{key}">{title}</a></li>' for key, title, _ in sections)
@@ -58,4 +58,5 @@ def _summary(found: Validation) -> str:
         how = "fitted to these logs" if name in found.fitted else "as the servo file's fit recorded it"
         cards.append((escape(rig_text(name, value)), how))
     listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in cards)
-    return f'<ul class="numbers">{listed}</ul>\n'
+    notes = "".join(f'<div class="note"><p>{escape(text)}</p></div>\n' for text in found.warnings)
+    return f'<ul class="numbers">{listed}</ul>\n{notes}'

@@ -24,6 +24,10 @@ _SLIGHT = 0.4  # growth with the voltage to this power, of motors 1 and of most 
 _STEEP_DROP, _STEEP_RATIO = 0.4, 0.35  # what makes torque and speed grow fastest
 _SAME = 0.04  # relative: figures of two sources that only differ in rounding
 _USUAL_SCATTER = 2.05  # twice the scatter 1.43 of the rule of mass
+_KGF_CM = 0.0980665  # N m
+_STRONGEST = 3.3539  # N m, the largest stall torque of the catalog (FT-7235)
+_STRONG = 3.86  # times what is usual for its mass: that of the same servo, and no other of the catalog comes near
+_WEAK = 1.43**3  # three times the scatter of the rule of mass
 _NUMBERS = {"stall_torque": "torque", "no_load_speed": "speed", "no_load_current": "running current",
             "stall_current": "stall current"}
 
@@ -239,6 +243,32 @@ def usual_torque(mass: float) -> float:
     0.62
     """
     return float(0.0173 * (1000.0 * mass) ** 0.94)
+
+
+def torque_question(sheet: Sheet) -> str | None:
+    """Return a question where newton metres were probably said for kilogram-force centimetres; None where not.
+
+    It is asked where no stall current tells, and the torque is more than any servo of the catalog has for its mass, or
+    at all where no mass is given, while the same number of kgf cm would be usual.
+
+    Examples
+    --------
+    >>> point = SheetPoint(supply_voltage=6.0, stall_torque=13.0, no_load_speed=4.5)
+    >>> print(torque_question(Sheet(name="a", points=(point,), mass=0.045)))
+    13 N m, or 13 kgf cm = 1.27 N m? For 45 g about 0.62 N m are usual
+    """
+    torque = float(sheet.nominal.stall_torque or 0.0)
+    if stall_current_is_known(sheet):
+        return None
+    if sheet.mass is None:
+        unlikely, usual = torque > _STRONGEST, f"the strongest servo of the catalog has {_STRONGEST:.3g} N m"
+    else:
+        common = usual_torque(sheet.mass)
+        unlikely = torque > _STRONG * common and common / _WEAK < torque * _KGF_CM < common * _WEAK
+        usual = f"for {1000.0 * sheet.mass:.3g} g about {common:.2g} N m are usual"
+    if not unlikely:
+        return None
+    return f"{torque:.4g} N m, or {torque:.4g} kgf cm = {torque * _KGF_CM:.3g} N m? {usual[0].upper()}{usual[1:]}"
 
 
 def _silent(sheet: Sheet) -> Sequence[str]:

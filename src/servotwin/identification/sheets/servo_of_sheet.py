@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import math
 import textwrap
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from servotwin.errors import InputError
-from servotwin.identification.sheets.contradictions import Contradiction, sheet_contradictions, sheet_flags
+from servotwin.identification.sheets.contradictions import (
+    Contradiction,
+    sheet_contradictions,
+    sheet_flags,
+    torque_question,
+)
 from servotwin.identification.sheets.motor_range import MotorRange, Range, motor_range
 from servotwin.identification.sheets.sheet import Sheet
 from servotwin.identification.sheets.sheet_file import sheet_table
@@ -82,6 +88,11 @@ def servo_from_sheet(sheet: Sheet, *, load_friction: bool = True, backlash: bool
     Servo
         Angle 0 is the middle position. Ranges hold all combinations of what is assumed, all voltages and all sources.
 
+    Warns
+    -----
+    UserWarning
+        If a torque so large that kgf cm were probably meant is given in N m.
+
     Raises
     ------
     InputError
@@ -99,6 +110,9 @@ def servo_from_sheet(sheet: Sheet, *, load_friction: bool = True, backlash: bool
     if found and not allow_impossible:
         more = f" ({len(found) - 1} more of this kind)" if len(found) > 1 else ""
         raise InputError(f"impossible sheet of {sheet.name!r}: {found[0].text}{more}")
+    question = torque_question(sheet)
+    if question is not None:
+        warnings.warn(f"sheet of {sheet.name!r}: a stall torque of {question}", stacklevel=2)
     made = _Made(sheet=sheet, motor=motor_range(sheet), load_friction=load_friction, backlash=backlash)
     quantities: dict[str, Quantity] = {}
     for part in (_motor, _gear, _friction, _electronics, _potentiometer, _supply, _stops):

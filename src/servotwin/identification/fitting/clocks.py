@@ -1,0 +1,159 @@
+"""The clocks of logger and generator: when pulses come, how far apart, and whether stamps tell when samples were."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.noise import Series, noise_of
+from servotwin.identification.fitting.phases import Scan, drifts, likely_periods, settled, with_period
+from servotwin.identification.fitting.point import PERIOD_SCALE, Point
+from servotwin.identification.fitting.scatter import by_sensor
+from servotwin.identification.logs.beat import beat, on_beat
+from servotwin.identification.logs.log import ANGLES
+
+if TYPE_CHECKING:
+    from servotwin.identification.fitting.task import Task
+
+Told = Callable[[float, str], None]
+
+_ROUNDS = 2  # of assignment and search
+_HELD_PAYS = 3.0  # of the cost: an odds ratio of 20
+_MORE = 1.3  # times the noise: what pulses of a wrong period leave, if they matter
+_SCATTER = 2e-5  # s, of stamps: less is a tenth of a milliradian at 5 rad/s
+
+
+def with_clocks(task: Task, start: Point, tell: Told, began: float) -> Point:
+    """Search with pulses that come alike for all logs, and then for what the clocks of these logs do.
+
+    Parameters
+    ----------
+    task : Task
+        Goes on with another forecast where the logs want another clock, and says so in its remarks.
+    start : Point
+    tell : callable
+    began : float
+        Share of the search that is done.
+    """
+    point = task.ran(start, tell, began).point
+    task.measure(point)
+    task.forecast.own_phases = True
+    for _ in range(_ROUNDS):
+        before = [task.forecast.frames_of(point, k) for k in task.fitted]
+        tell(began, "pulses")
+        point = task.ran(settled(task.scan(point), task.fitted), tell, began).point
+        task.measure(point)
+        if [task.forecast.frames_of(point, k) for k in task.fitted] == before:
+            break
+    point = _held(task, point, tell, began)
+    return _with_period(task, _with_beat(task, point, tell, began), tell, began)
+
+
+def _held(task: Task, point: Point, tell: Told, began: float) -> Point:
+    """Let servos that cannot rest under their load hold their first command from before the log on, if they did."""
+    forecast = task.forecast
+    if not any(forecast.hunts(forecast.cases[k]) for k in task.fitted):
+        return point
+    before = task.ran(point, tell, began)
+    forecast.held = True
+    after = task.ran(before.point, tell, began)
+    if not after.cost < before.cost - _HELD_PAYS:
+        forecast.held = False
+        return before.point
+    task.measure(after.point)
+    return after.point
+
+
+def _with_beat(task: Task, point: Point, tell: Told, began: float) -> Point:
+    """Take the samples of all logs on their beat where stamps scatter about it and the motion does not."""
+    beats = [beat(case.log.time) for case in task.forecast.cases]
+    scatter = max((b.scatter for b in beats if b is not None), default=0.0)
+    if scatter < _SCATTER:
+        return point
+    tell(began, "stamps")
+    old = task.forecast
+    regular = Forecast([on_beat(case.log) for case in old.cases], old.model, old.space, old.nuisance, old.sensors)
+    other = task.like(regular)
+    found = other.ran(point._replace(frames=regular.frames), tell, began)
+    found = other.ran(settled(other.scan(found.point), task.fitted), tell, began)
+    if not task.pays(point, other, found):
+        return point
+    task.become(other, f"stamps scatter by {1e3 * scatter:.2g} ms about their beat, the motion does not: samples count "
+                       "as taken on the beat")
+    task.stamps_off = {k: 2.0 * b.scatter / math.sqrt(len(b.times)) for k, b in enumerate(beats) if b is not None}
+    task.measure(found.point)
+    return found.point
+
+
+def _with_period(task: Task, point: Point, tell: Told, began: float) -> Point:
+    """Search for the period of the pulses too where it is asked for, or where they drift.
+
+    A period that is wrong by some per cent bends all parameters, so that no other would fit better with these. So they
+    are held near where they began until it is found.
+    """
+    old = task.forecast
+    asked = "frame_period" in old.extra
+    if not asked and not (_is_more_than_noise(task, point) and drifts(old, task.loss, point, task.fitted)):
+        return point
+    tell(began, "period of the pulses")
+    near = task.like(old, prior=task.near_start())
+    scan = near.scan(near.ran(settled(near.scan(_from_start(task, point)), task.fitted), tell, began).point)
+    likely = likely_periods(scan, task.fitted, asked=asked)
+    if not likely:
+        return point
+    wider = task if asked else task.like(Forecast(
+        [case.log for case in old.cases], old.model, old.space, (*old.nuisance, "frame_period"), old.sensors))
+    near = wider.like(wider.forecast, prior=wider.near_start())
+    tried = [near.ran(_moved(scan, task.fitted, period, asked=asked), tell, began) for period in likely]
+    found = min(tried, key=lambda outcome: outcome.cost)
+    for _ in range(_ROUNDS):
+        exact = _at_period(wider.forecast, found.point)
+        found = wider.ran(settled(wider.scan(exact), task.fitted), tell, began)
+    if not asked:
+        if not task.pays(point, wider, found):
+            return point
+        there = wider.forecast.nuisance_of(found.point.shared, "frame_period")
+        task.become(wider, f"pulses come every {1e3 * there:.6g} ms by the logs, not every {1e3 * task.period:.6g} ms: "
+                           "their period was fitted too")
+    task.measure(found.point)
+    return found.point
+
+
+def _is_more_than_noise(task: Task, point: Point) -> bool:
+    """Tell whether residuals are larger than the sensor's own noise by so much that clocks may be the reason."""
+    forecast, series = task.forecast, []
+    if len({case.period for case in forecast.cases}) > 1:
+        return False
+    for k, part in zip(task.fitted, forecast.at(point, derivatives=False, cases=task.fitted), strict=True):
+        case, residuals = forecast.cases[k], by_sensor(forecast, k, part)
+        name = next(name for name in ANGLES if name in case.places)
+        measured = case.values[name]
+        series.append(Series(case.log, case.log.start + case.times[case.places[name]], measured,
+                             measured + residuals[name]))
+    left = float(np.sqrt(np.mean(np.concatenate([one.residual for one in series]) ** 2)))
+    return left > _MORE * noise_of(series).size
+
+
+def _from_start(task: Task, point: Point) -> Point:
+    """Return a point with the parameters that the search began with; clocks and offsets stay."""
+    size = len(task.forecast.space)
+    return point._replace(shared=np.concatenate([task.nominal().shared[:size], point.shared[size:]]))
+
+
+def _moved(scan: Scan, cases: Sequence[int], period: float, *, asked: bool) -> Point:
+    """Return the point with pulses of another period, the last of its shared numbers."""
+    moved = with_period(scan, cases, period)
+    shared = moved.shared.copy() if asked else np.append(moved.shared, 0.0)
+    shared[-1] = period / PERIOD_SCALE
+    return moved._replace(shared=shared)
+
+
+def _at_period(forecast: Forecast, point: Point) -> Point:
+    """Return a point whose commands go to pulses of the period that it found."""
+    period = forecast.nuisance_of(point.shared, "frame_period")
+    frames = [forecast.frames_of(point, k) for k in range(len(forecast.cases))]
+    return point._replace(frames=tuple(f._replace(period=period) for f in frames))

@@ -1,0 +1,147 @@
+"""Single events in logs, pulses that never came and rows that were not written: tried one by one, kept where they pay.
+
+All places of a log are tried in one batch at the present numbers, by what soon follows them, until no more is found;
+then the numbers are searched again. Every second sample chooses, the others judge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.fitting.diagnosis.bench import Bench, Gain, Told, gain, teaching
+from servotwin.identification.fitting.point import Point
+from servotwin.identification.logs.log import Log
+from servotwin.models import BoundedServo
+
+Array = NDArray[np.float64]
+
+_MOST = 12  # events of a log and round
+_SOON = 10  # samples after an event, by which it is judged
+_ROUNDS, _TIMES = 3, 4  # of choosing and searching, and of choosing in each
+_PAYS = 8.0  # in units of noise: what one of some hundred places has to gain (their logarithm, twice)
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """One kind of event: where it may be in a log, and the log with some of them."""
+
+    places: Callable[[Log], Sequence[int]]
+    put: Callable[[Log, Sequence[int]], Log]
+
+
+def lost_pulses(bench: Bench) -> Told | None:
+    """Return what pulses that are left out gain."""
+    if isinstance(bench.setting.model, BoundedServo):
+        return None
+    period = bench.cases[0].period
+
+    def width(log: Log) -> int:
+        return max(1, round(period / float(np.median(np.diff(log.time)))))
+
+    def put(log: Log, starts: Sequence[int]) -> Log:
+        if not starts:
+            return log
+        on = np.ones(len(log), np.bool_) if log.torque_on is None else log.torque_on.copy()
+        for start in starts:
+            on[start:start + width(log)] = False
+        return replace(log, torque_on=on)
+
+    count, gained = _tried(bench, _Kind(lambda log: range(1, len(log) - 1, width(log)), put))
+    frames = sum(log.duration for log in bench.setting.logs) / period
+    return None if gained is None else Told(
+        "lost pulses", f"{count} of {round(frames)} pulses that never reached the servo", "look for a loose contact, "
+        "or a generator that skips; mark them with torque_on", gained)
+
+
+def dropped_samples(bench: Bench) -> Told | None:
+    """Return what gaps of one sample gain, where stamps say that there is none.
+
+    Where the command changes, the row that is missing had the old one, or the new one (its place is then negative).
+    """
+    def places(log: Log) -> Sequence[int]:
+        changed = np.flatnonzero(np.diff(log.command)) + 1
+        return [*range(1, len(log) - 1), *(-changed[changed < len(log) - 1]).tolist()]
+
+    def put(log: Log, starts: Sequence[int]) -> Log:
+        return _with_rows(log, sorted(starts, key=abs))
+
+    count, gained = _tried(bench, _Kind(places, put))
+    rows = sum(map(len, bench.setting.logs))
+    return None if gained is None else Told(
+        "dropped samples", f"{count} rows that are missing among {rows}, though the stamps go on evenly", "have the "
+        "logger stamp each row when it is measured", gained)
+
+
+def _with_rows(log: Log, places: Sequence[int]) -> Log:
+    """Return a log with rows put in that say nothing but a command."""
+    if not places:
+        return log
+    step, at = float(np.median(np.diff(log.time))), np.abs(places)
+    late = np.sum([np.arange(len(log)) >= place for place in at], axis=0)
+    time = log.time + step * late
+    return replace(
+        log, time=np.insert(time, at, time[at] - step), measured={
+            name: np.insert(values, at, math.nan) for name, values in log.measured.items()},
+        command=np.insert(log.command, at, [log.command[p - 1] if p > 0 else log.command[-p] for p in places]),
+        torque_on=None if log.torque_on is None else np.insert(log.torque_on, at, log.torque_on[at]))
+
+
+def _tried(bench: Bench, kind: _Kind) -> tuple[int, Gain | None]:
+    """Return how many events were found, and what they gain."""
+    base = bench.searched(bench.setting, bench.base.point, alternate=True)
+    found: list[list[int]] = [[] for _ in bench.setting.logs]
+    trial = base
+    for _ in range(_ROUNDS):
+        before, point = found, trial.point
+        found = [_settled(bench, point, k, kind, already) for k, already in enumerate(found)]
+        if found == before:
+            break
+        logs = tuple(kind.put(log, starts) for log, starts in zip(bench.setting.logs, found, strict=True))
+        trial = bench.searched(replace(bench.setting, logs=logs), point, alternate=True)
+    if not any(found) or not all(np.isfinite(r).all() for r in trial.residuals):
+        return 0, None
+    return sum(map(len, found)), gain(base.residuals, trial.residuals, bench.noise, alternate=True)
+
+
+def _settled(bench: Bench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
+    """Return the events of one log, chosen until they stay: only then do numbers move that could make up for some."""
+    for _ in range(_TIMES):
+        chosen = _chosen(bench, point, k, kind, already)
+        if chosen == already:
+            break
+        already = chosen
+    return already
+
+
+def _chosen(bench: Bench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
+    """Return the events of one log: those that are known, less those that pay no more, and further ones."""
+    log = bench.setting.logs[k]
+    every = [place for place in kind.places(log) if abs(place) not in [abs(one) for one in already]]
+    tried = [already, *([*already, place] for place in every),
+             *([place for place in already if place != one] for one in already)]
+    copies = [replace(kind.put(log, places), name=f"{log.name} {i}") for i, places in enumerate(tried)]
+    here, *parts = bench.copies(k, copies, point)
+    if not all(np.isfinite(part).all() for part in (here, *parts)):
+        return already
+    used = np.flatnonzero(log.used(log.angle_name))
+    worth = [_worth(bench, here, part, int(np.searchsorted(used, abs(place))))
+             for part, place in zip(parts, [*every, *already], strict=True)]
+    chosen = [place for place, gained in zip(already, worth[len(every):], strict=True) if gained < -_PAYS]
+    for i in np.argsort(worth[:len(every)])[::-1]:
+        far = all(abs(abs(every[i]) - abs(place)) > 2 * _SOON for place in chosen if place not in already)
+        if worth[i] > _PAYS and far and len(chosen) < _MOST + len(already):
+            chosen.append(every[i])
+    return sorted(chosen)
+
+
+def _worth(bench: Bench, before: Array, after: Array, first: int) -> float:
+    """Return by how much an event lowers the cost of the samples soon after it: later ones may be of others."""
+    soon = slice(first, first + _SOON)
+    teaches = teaching(np.arange(len(before), dtype=np.float64), alternate=True)[soon]
+    costs = [bench.task.loss.cost(r[soon][teaches] / bench.noise) for r in (before, after)]
+    return costs[0] - costs[1]

@@ -1,0 +1,111 @@
+"""The last stage of a fit: its verdict, and where that is bad the trials of what may be the matter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from servotwin.identification.fitting.arrow import Prior
+from servotwin.identification.fitting.diagnosis import diagnose
+from servotwin.identification.fitting.fit import Fit, Trace
+from servotwin.identification.fitting.noise import Series, noise_of
+from servotwin.identification.fitting.point import Point
+from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.uncertainty import Rows, rows_of
+from servotwin.identification.fitting.verdict import Cause, Verdict, judge, shown
+
+_EFFORT = 3.0  # times that of the fit, for all trials: the verdict itself and their start are not counted
+
+
+def with_verdict(task: Task, point: Point, fit: Fit, show: Callable[[float, str], None], *, trials: bool) -> Fit:
+    """Return a fit with its verdict, and with the causes that explain a bad one.
+
+    Parameters
+    ----------
+    task : Task
+    point : Point
+        Where it ended.
+    fit : Fit
+    show : callable
+        Told the share done, and what goes on.
+    trials : bool
+        Whether causes are tried.
+    """
+    effort = task.forecast.work
+    fitted = [trace for trace in fit.traces if not trace.held_out]
+    sensors = {trace.signal for trace in fitted}
+    if len(sensors) != 1:
+        return fit
+    sensor = sensors.pop()
+    verdict = judge([_series(trace) for trace in fitted], sensor, _rows(task, point), len(fit.names))
+    verdict = replace(verdict, noise={**verdict.noise, **_others(task)})
+    causes: tuple[Cause, ...] = ()
+    try:
+        if trials:
+            causes = _outliers(verdict, fitted, sensor)
+        if trials and (verdict.undecided or not verdict.holds):
+            causes += diagnose(task, point, fit.traces, verdict, sensor, _EFFORT * effort,
+                               lambda share, text: show(0.96 + 0.04 * share, text))
+    except KeyboardInterrupt:
+        trials = False
+    if verdict.undecided and any(cause.name != "outliers" for cause in causes):
+        # What a number of the model tells of samples that it was not fitted to is no noise
+        verdict = replace(verdict, holds=False, sentence=f"residuals are {verdict.ratio:.2g} times the noise of "
+                          f"{shown(verdict.noise[sensor], sensor)} that neighbours show, and follow a better model: "
+                          "this one lacks something; the intervals below do not hold")
+    verdict = replace(verdict, causes=causes, sentence=_with_causes(verdict, causes, tried=trials))
+    said = () if verdict.holds and not verdict.undecided else (verdict.sentence,)
+    return replace(fit, verdict=verdict, warnings=(*said, *fit.warnings))
+
+
+_OUTLIERS = 0.005  # of the samples: then they are told
+
+
+def _with_causes(verdict: Verdict, causes: Sequence[Cause], *, tried: bool) -> str:
+    if verdict.holds or not tried:
+        return verdict.sentence
+    if not causes:
+        return f"{verdict.sentence}; none of the causes that were tried explains it"
+    return f"{verdict.sentence}; what explains most is {causes[0].sentence}"
+
+
+def _outliers(verdict: Verdict, traces: Sequence[Trace], sensor: str) -> tuple[Cause, ...]:
+    """Return samples that lie far off alone as a cause, without any trial."""
+    import numpy as np
+
+    if verdict.outliers < _OUTLIERS:
+        return ()
+    every = np.concatenate([trace.residual for trace in traces])
+    before = float(np.sqrt(np.mean(every**2)))
+    after = verdict.ratio * verdict.noise[sensor]
+    return (Cause("outliers", f"outliers: {100.0 * verdict.outliers:.2g} % of the samples lie far off alone; without "
+                  f"them the error is {shown(after, sensor)} instead of {shown(before, sensor)} (look for a loose "
+                  "contact of the sensor; loss \"huber\" bears them)", before, after, "leave these samples out"),)
+
+
+def _rows(task: Task, point: Point) -> list[Rows]:
+    """Return what each fitted log says of the shared numbers."""
+    forecast = task.forecast
+    parts = forecast.at(point, cases=task.fitted)
+    return [rows_of(part, task.loss, Prior(*forecast.own_belief(forecast.cases[k])), point.own[k])
+            for k, part in zip(task.fitted, parts, strict=True)]
+
+
+def _others(task: Task) -> dict[str, float]:
+    """Return the noise of sensors that are no angles, as far as neighbours show it (SI)."""
+    import numpy as np
+
+    found = {}
+    for name in task.forecast.sensors:
+        if name in ("output_angle", "feedback_voltage"):
+            continue
+        cases = [case for case in (task.forecast.cases[k] for k in task.fitted) if name in case.places]
+        flat = [Series(case.log, case.times[case.places[name]] + case.log.start, case.values[name],
+                       np.zeros(len(case.values[name]))) for case in cases]
+        if flat:
+            found[name] = noise_of(flat).size
+    return found
+
+
+def _series(trace: Trace) -> Series:
+    return Series(trace.log, trace.time, trace.measured, trace.simulated)

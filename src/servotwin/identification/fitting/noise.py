@@ -1,0 +1,325 @@
+"""The noise of a sensor as measured values show it without any model: while the shaft stands, from neighbours, counts.
+
+White noise shows in second differences, also while the shaft moves smoothly; noise that remembers itself only while the
+shaft stands, or where the same command was recorded twice; an instrument that counts scatters by its step over √12.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.logs.log import Log
+
+Array = NDArray[np.float64]
+
+_SETTLED = 0.2  # s after the last change of the command: a servo of 60°/0.1 s has done a large step
+_LEAST, _MOST = 8, 40  # samples of a stretch in which the shaft stands
+_FAR = 5.0  # robust standard deviations beyond which a stretch or a sample is not like the others
+_ENOUGH = 24  # samples at rest, from which on they tell the noise's memory
+_NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
+_BENT = 0.3  # of what is measured: how far a simulation that stands may leave a line
+_GUESSES = 9
+_COUNTED = 0.9  # memory of counts of a shaft that stands
+_DITHER = 0.02  # rad or V: a servo that stands moves less, pulse by pulse
+_FAST = 0.3  # of the largest speed
+_GAP = 1.75  # times the usual step, beyond which neighbours are none
+_RHO = np.linspace(0.0, 0.96, 25)
+_BY_BENDS = 0.2  # how surely second differences tell the noise's power, in its logarithm
+
+
+@dataclass(frozen=True)
+class Series:
+    """What one sensor measured in one log, where it counts.
+
+    Parameters
+    ----------
+    log : Log
+    time, measured, simulated : ndarray, shape (n,)
+        [s], SI.
+    """
+
+    log: Log
+    time: Array
+    measured: Array
+    simulated: Array
+
+    @property
+    def residual(self) -> Array:
+        """Simulated less measured."""
+        return np.asarray(self.simulated - self.measured)
+
+    @property
+    def joined(self) -> NDArray[np.bool_]:
+        """Whether each sample follows the one before without a gap, shape (n,); the first does not."""
+        steps = np.diff(self.time)
+        if not len(steps):
+            return np.zeros(len(self.time), np.bool_)
+        return np.append(False, steps < _GAP * float(np.median(steps)))
+
+    @property
+    def speed(self) -> Array:
+        """Of the simulation, per second."""
+        return np.gradient(self.simulated, self.time) if len(self.time) > 1 else np.zeros(len(self.time))
+
+
+class Guess(NamedTuple):
+    """One of several equally likely noises: standard deviation (SI) and correlation of neighbours."""
+
+    size: float
+    memory: float
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise that needs no model (SI).
+
+    Parameters
+    ----------
+    size : float
+        Its standard deviation, of the best source that there is.
+    memory : float
+        Correlation of neighbouring samples, known from where the shaft stands; nan where it hardly does.
+    white : float
+        From second differences alone, which noise that remembers itself hides from.
+    guesses : tuple of Guess
+        How sure that is: noises that what stands makes equally likely; none where it hardly does.
+    repeats : float
+        How far logs of the same command are apart, as of one sample; nan where there are none.
+    count : float
+        Step of an instrument that counts; 0 where none is seen.
+    jitter : float
+        How far time stamps are off, as far as they are uneven and fast samples show it [s].
+    """
+
+    size: float
+    memory: float
+    white: float
+    guesses: tuple[Guess, ...]
+    repeats: float
+    count: float
+    jitter: float
+
+    @property
+    def known(self) -> bool:
+        """Whether the noise's memory is known."""
+        return bool(self.guesses)
+
+    def of(self, one: Series, size: float | None = None) -> Array:
+        """Return the noise of each sample of a log: stamps that are off make it larger while the shaft moves."""
+        return np.asarray(np.hypot(self.size if size is None else size, one.speed * self.jitter))
+
+
+def noise_of(series: Sequence[Series]) -> Noise:
+    """Return the noise of one sensor in several logs.
+
+    Examples
+    --------
+    >>> time = np.arange(400) * 0.01
+    >>> angle = 1e-3 * np.random.default_rng(0).normal(size=400)
+    >>> log = Log(name="stands", time=time, command=np.full(400, 1.5e-3), command_kind="pulse_width",
+    ...           measured={"output_angle": angle})
+    >>> found = noise_of([Series(log, time, angle, np.zeros(400))])
+    >>> round(1e3 * found.size, 1), abs(found.memory) < 0.1, found.count
+    (1.0, True, 0.0)
+    """
+    count, repeats, white = _count(series), _repeats(series), _white(series)
+    floor = max(count / math.sqrt(12.0), 1e-12)
+    guesses = _at_rest([window for one in series for window in _windows(one)], white)
+    if not guesses:
+        size = next((value for value in (repeats, white) if math.isfinite(value)), 0.0)
+        return Noise(max(size, floor), math.nan, white, (), repeats, count, _jitter(series))
+    # What stands is counted off by the same each time
+    found = tuple(Guess(max(g.size, floor), g.memory if g.size > 0.5 * count else max(g.memory, _COUNTED))
+                  for g in guesses)
+    middle = found[len(found) // 2]
+    return Noise(middle.size, middle.memory, white, found, repeats, count, _jitter(series))
+
+
+def _jitter(series: Sequence[Series]) -> float:
+    """Return how far stamps are off: as they scatter about their neighbours' middle, and as fast samples do [s]."""
+    uneven, seen = [], []
+    for one in series:
+        if len(one.time) < 5:
+            continue
+        whole = one.joined[1:-1] & one.joined[2:]
+        uneven.append(np.diff(one.time, n=2)[whole] / math.sqrt(6.0))
+        speed = np.abs(one.speed[1:-1][whole])
+        fast = speed > max(_FAST * float(speed.max(initial=0.0)), 1e-9)
+        seen.append(bends(one)[fast] / speed[fast])
+    if not uneven or not len(np.concatenate(seen)):
+        return 0.0
+    stamps, shaft = (_NORMAL * float(np.median(np.abs(np.concatenate(x)))) for x in (uneven, seen))
+    return min(stamps, shaft)
+
+
+def _count(series: Sequence[Series]) -> float:
+    """Return the step of an instrument that counts: all values are multiples of it, and many are the same."""
+    values = np.concatenate([one.measured for one in series])
+    apart = np.diff(np.unique(values))
+    apart = apart[apart > 1e-9 * max(float(np.abs(values).max(initial=0.0)), 1e-12)]
+    if not len(apart) or len(apart) > 0.8 * len(values):
+        return 0.0
+    step = float(np.median(apart[apart < 1.5 * apart.min()]))
+    off = np.abs(apart / step - np.round(apart / step))
+    return step if float(np.quantile(off, 0.98)) < 0.02 * max(1.0, float(np.median(apart / step))) else 0.0
+
+
+def _white(series: Sequence[Series]) -> float:
+    """Return white noise from second differences; nan of too few samples."""
+    every = np.concatenate([bends(one) for one in series if len(one.time) >= 5] or [np.zeros(0)])
+    return _NORMAL * float(np.median(np.abs(every))) if len(every) >= _LEAST else math.nan
+
+
+def bends(one: Series) -> Array:
+    """Return each sample less the line between its neighbours, as large as one sample's noise."""
+    t, y = one.time, one.residual
+    first = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
+    bend = y[1:-1] - first * y[:-2] - (1.0 - first) * y[2:]
+    return np.asarray((bend / np.sqrt(1.0 + first**2 + (1.0 - first)**2))[one.joined[1:-1] & one.joined[2:]])
+
+
+def _windows(one: Series) -> list[Array]:
+    """Return the scatter while the shaft stood, in stretches of some samples: the command has been the same long."""
+    at = np.searchsorted(one.log.time, one.time)
+    command = one.log.command[np.minimum(at, len(one.log.command) - 1)]
+    changed = np.append(True, np.diff(command) != 0.0)
+    changed |= ~one.joined
+    first = np.maximum.accumulate(np.where(changed, np.arange(len(command)), 0))
+    since = one.time - one.time[first]
+    begins_still = first == 0  # a log may begin at rest
+    still = (since >= _SETTLED) | (begins_still & (np.abs(one.simulated - one.simulated[0]) == 0.0))
+    found: list[Array] = []
+    alone = ~isolated(one)
+    k = 0
+    while k < len(still):
+        if not still[k]:
+            k += 1
+            continue
+        stop = k
+        while stop < len(still) and still[stop] and first[stop] == first[k]:
+            stop += 1
+        pieces = max(1, math.ceil((stop - k) / _MOST))
+        for piece in np.array_split(np.arange(k, stop), pieces):
+            quiet = _quiet(one, piece, alone) if len(piece) >= _LEAST else None
+            if quiet is not None:
+                found.append(quiet)
+        k = stop
+    return found
+
+
+def _quiet(one: Series, piece: NDArray[np.int64], near: NDArray[np.bool_]) -> Array | None:
+    """Return the scatter about a line of a stretch in which the shaft stands, creeps or dithers evenly.
+
+    None if the simulation goes somewhere. Of a servo that dithers from frame to frame, what the simulation leaves.
+    """
+    piece = piece[near[piece]]
+    if len(piece) < _LEAST:
+        return None
+    left, bent = _level(one.measured[piece]), _level(one.simulated[piece])
+    if float(bent @ bent) <= _BENT**2 * float(left @ left) or not bent.any():
+        return left
+    rest = _level(one.residual[piece])
+    less = rest if float(rest @ rest) < float(left @ left) else left
+    return less if np.ptp(one.simulated[piece]) < _DITHER else None
+
+
+def isolated(one: Series, jitter: float = 0.0) -> NDArray[np.bool_]:
+    """Return which samples are outliers: far from the four around them, which are near each other.
+
+    Examples
+    --------
+    >>> time, values = np.arange(40) * 0.02, np.random.default_rng(0).normal(size=40)
+    >>> values[7] += 50.0
+    >>> log = Log(name="one", time=time, command=time, command_kind="angle", measured={"output_angle": values})
+    >>> np.flatnonzero(isolated(Series(log, time, values, np.zeros(40)))).tolist()
+    [7]
+    """
+    r = one.residual
+    if len(r) < _LEAST:
+        return np.zeros(len(r), np.bool_)
+    padded = np.pad(r, 2, mode="reflect")
+    around = np.stack([padded[k:k + len(r)] for k in (0, 1, 3, 4)])
+    middle = np.median(around, axis=0)
+    apart = np.sort(np.abs(around - middle), axis=0)[2]  # of the third nearest: one more outlier may be beside
+    rough = bends(one)
+    usual = _NORMAL * float(np.median(np.abs(rough))) if len(rough) else 0.0
+    return np.asarray(np.abs(r - middle) > _FAR * np.hypot(1.3 * usual, one.speed * jitter) + 3.0 * apart)
+
+
+def _level(values: Array) -> Array:
+    """Return values less their straight line: a stick-slip servo creeps where it stands."""
+    return np.asarray(values - _line(len(values)) @ values)
+
+
+def _line(m: int) -> Array:
+    """Return the matrix, shape (m, m), that draws the straight line through m values."""
+    x = np.linspace(-1.0, 1.0, m)
+    return np.full((m, m), 1.0 / m) + np.outer(x, x) / float(x @ x)
+
+
+def _at_rest(windows: Sequence[Array], white: float) -> tuple[Guess, ...]:
+    """Return noises that are equally likely, first-order autoregressive ones, the smaller ones first; none if unknown.
+
+    As likely as they make stretches whose lines were taken away (Patterson & Thompson 1971), and second differences.
+    """
+    if not windows or sum(len(w) for w in windows) < _ENOUGH:
+        return ()
+    powers = np.array([float(np.mean(w**2)) for w in windows])
+    kept = [w for w, power in zip(windows, powers, strict=True) if power <= _FAR * float(np.median(powers))]
+    free = float(sum(len(w) - 2 for w in kept))
+    squares, volumes = _forms(kept)
+    usual = squares[0] / free
+    if usual == 0.0:
+        return (Guess(0.0, 0.0),)
+    power = usual * np.geomspace(0.2, 20.0, 80)[None, :]
+    rho = _RHO[:, None]
+    likely = -0.5 * (free * np.log(power) + volumes[:, None] + squares[:, None] / power)
+    if white > 0.0:
+        off = np.log(white**2 / (power * (6.0 - 8.0 * rho + 2.0 * rho**2) / 6.0)) / _BY_BENDS
+        likely = likely - np.log1p(0.25 * off**2)  # heavy tails: where it moves, a wrong model bends too
+    weight = np.exp(likely - likely.max())
+    weight /= weight.sum()
+    by_power = weight.sum(axis=0)
+    memory = (weight * rho).sum(axis=0) / np.maximum(by_power, 1e-300)
+    middle = np.interp((np.arange(_GUESSES) + 0.5) / _GUESSES, np.cumsum(by_power) - 0.5 * by_power, power[0])
+    return tuple(Guess(math.sqrt(p), float(np.interp(p, power[0], memory))) for p in middle.tolist())
+
+
+def _forms(windows: Sequence[Array]) -> tuple[Array, Array]:
+    """Return quadratic forms and log determinants of all stretches, by memory."""
+    squares, volumes = np.zeros(len(_RHO)), np.zeros(len(_RHO))
+    for m in sorted({len(w) for w in windows}):
+        basis = np.linalg.svd(_line(m))[0][:, 2:]
+        reduced = np.array([w for w in windows if len(w) == m]) @ basis
+        apart = np.abs(np.subtract.outer(np.arange(m), np.arange(m)))
+        for k, rho in enumerate(_RHO):
+            C = basis.T @ rho**apart @ basis
+            squares[k] += float(np.sum(reduced * np.linalg.solve(C, reduced.T).T))
+            volumes[k] += len(reduced) * float(np.linalg.slogdet(C)[1])
+    return squares, volumes
+
+
+def _repeats(series: Sequence[Series]) -> float:
+    """Return how far logs of the same command under the same load are apart, as of one sample."""
+    groups: dict[tuple[object, ...], list[Series]] = {}
+    for one in series:
+        log = one.log
+        key = (log.command.tobytes(), np.round(one.time - log.start, 6).tobytes(), repr(log.load),
+               tuple(sorted(log.parameters.items())))
+        groups.setdefault(key, []).append(one)
+    found = []
+    for members in groups.values():
+        if len(members) > 1:
+            values = np.array([one.measured for one in members])
+            apart = (values - values.mean(axis=0)) * math.sqrt(len(members) / (len(members) - 1.0))
+            found.append(apart.ravel())
+    if not found:
+        return math.nan
+    every = np.concatenate(found)
+    return _NORMAL * float(np.median(np.abs(every)))

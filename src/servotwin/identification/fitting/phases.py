@@ -1,0 +1,285 @@
+"""The search for what jumps: which command each pulse of a log carries, and with which period pulses come.
+
+The cost is smooth in everything else, so it is scanned here and fitted there. A trial is one simulation of a log; when
+its pulses come is corrected to first order, by what a delay would change.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.fitting.arrow import Loss
+from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.frames import Gap, gap_of, gaps, latency
+from servotwin.identification.fitting.point import DELAY_SCALE, Frames, LogPart, Point
+
+Array = NDArray[np.float64]
+Mask = Callable[[int], NDArray[np.bool_]]
+
+_MOST_GAPS = 24  # of a log, that are tried at first
+_TIMES, _FINE_TIMES = 4, 16  # steps of a frame, either way
+_BEST = 3  # that are tried again where they then are best
+_FIRST_LOGS = 3  # of a scan of periods
+_MOST_PERIODS = 160
+_MOST_PHASES = 16  # for each period
+_REACH = 0.06  # of a period, either way: more than a PCA9685's clock is off by its data sheet
+_FINE = (1e-5, 3e-5, 1e-4, 2e-4, 4e-4, 8e-4)  # of a period: quartz clocks
+_WINDOWS = 6  # of a log, that are compared
+_PAYS = 3.0  # of the cost: what another period has to gain for another look
+_UNLIKELY = 100.0  # times the weight of the best: pulses that count no more
+_DRIFTS = 1e-3  # how often pulses that do not drift would look as if
+
+
+class Choice(NamedTuple):
+    """A trial of one log: the assignment, and when its first pulse comes (scaled, as its own number)."""
+
+    frames: Frames
+    first: float
+
+
+class Trial(NamedTuple):
+    """What a trial found: its cost, and the time of the first pulse at which that was.
+
+    The cost counts how narrow the gap is in which the phase has to lie: less the logarithm of its share of a frame.
+    """
+
+    cost: float
+    choice: Choice
+
+
+class Scan:
+    """Trials at a point of the search.
+
+    Parameters
+    ----------
+    forecast : Forecast
+    loss : Loss
+    point : Point
+    widening : float
+        How many residuals stand for one that is independent.
+    mask : callable, optional
+        Returns which residuals of a log count; all unless given.
+    """
+
+    def __init__(self, forecast: Forecast, loss: Loss, point: Point, widening: float = 1.0,
+                 mask: Mask | None = None) -> None:
+        self.forecast, self.loss, self.point = forecast, loss, point
+        self.widening, self.mask = widening, mask
+
+    def place(self, k: int) -> int:
+        """Return where a log's own numbers hold the time of its first pulse."""
+        return self.forecast.names_of_own(self.forecast.cases[k]).index("frame_phase")
+
+    def now(self, k: int) -> Choice:
+        """Return what the point has for a log."""
+        return Choice(self.forecast.frames_of(self.point, k), float(self.point.own[k][self.place(k)]))
+
+    def like(self, k: int, gap: Gap, period: float | None = None) -> Choice:
+        """Return a trial of other phases whose commands wait as long in the mean as they do now."""
+        now, log = self.now(k), self.forecast.cases[k].log
+        frames = Frames(gap.middle, now.frames.period if period is None else period)
+        waits = now.first * DELAY_SCALE - now.frames.phase + latency(log, now.frames)
+        return Choice(frames, (frames.phase + waits - latency(log, frames)) / DELAY_SCALE)
+
+    def later(self, k: int, steps: int) -> list[Choice]:
+        """Return trials of the present assignment whose pulses come earlier and later, up to a frame."""
+        now = self.now(k)
+        step = now.frames.period / steps / DELAY_SCALE
+        return [now, *(Choice(now.frames, now.first + i * step) for i in range(-steps, steps + 1) if i)]
+
+    def moved(self, choices: Mapping[int, Choice]) -> Point:
+        """Return the point with other pulses of some logs."""
+        own = list(self.point.own)
+        frames = [self.forecast.frames_of(self.point, k) for k in range(len(own))]
+        for k, choice in choices.items():
+            own[k] = own[k].copy()
+            own[k][self.place(k)] = choice.first
+            frames[k] = choice.frames
+        return self.point._replace(own=tuple(own), frames=tuple(frames))
+
+    def tried(self, choices: Mapping[int, Sequence[Choice]], *, moves: bool = True) -> dict[int, list[Trial]]:
+        """Run all trials of some logs in one batch; each comes back with its pulses moved to where they fit best.
+
+        `moves=False` leaves them where they are.
+        """
+        most = max(map(len, choices.values()))
+        points = [self.moved({k: some[min(i, len(some) - 1)] for k, some in choices.items()}) for i in range(most)]
+        parts = self.forecast.at_all(points, cases=list(choices), rates=True)
+        return {k: [self._corrected(k, choice, parts[i][j], 6 * moves) for i, choice in enumerate(some)]
+                for j, (k, some) in enumerate(choices.items())}
+
+    def best(self, choices: Mapping[int, Sequence[Choice]], rounds: int = 2) -> dict[int, list[Trial]]:
+        """Run all trials, and the best of them again where they then fit best; return the latter, the best first."""
+        found = {k: sorted(some, key=lambda trial: trial.cost)[:_BEST] for k, some in self.tried(choices).items()}
+        for _ in range(rounds):
+            again = self.tried({k: [trial.choice for trial in some] for k, some in found.items()})
+            found = {k: sorted(some, key=lambda trial: trial.cost) for k, some in again.items()}
+        return found
+
+    def _corrected(self, k: int, choice: Choice, part: LogPart, rounds: int) -> Trial:
+        """Return the cost that a trial would have with its pulses moved, to first order, at most half a frame."""
+        r, g = part.residual, part.later
+        if self.mask is not None:
+            r, g = r[self.mask(k)], g[self.mask(k)]
+        if not np.isfinite(r).all():
+            return Trial(math.inf, choice)
+        step, most = 0.0, 0.5 * choice.frames.period / DELAY_SCALE
+        for _ in range(rounds):
+            w = self.loss.weight(r + g * step)
+            power = float(w @ g**2)
+            if power <= 0.0:
+                break
+            step = min(max(-float(w @ (g * r)) / power, -most), most)
+        cost, moved = min((self.loss.cost(r + g * s), s) for s in (0.0, step))
+        width = max(gap_of(self.forecast.cases[k].log, choice.frames).width, 1e-12)
+        cost -= self.widening * math.log(width / choice.frames.period)
+        return Trial(cost, Choice(choice.frames, choice.first + moved))
+
+
+def settled(scan: Scan, cases: Sequence[int]) -> Point:
+    """Return the point with the best pulses for every log: when they come, and which command each of them carries."""
+    several = {k: gaps(scan.forecast.cases[k].log, scan.now(k).frames.period) for k in cases}
+    first = scan.best({k: [*scan.later(k, _TIMES), *(scan.like(k, gap) for gap in _spread(some) if len(some) > 1)]
+                       for k, some in several.items()})
+    found = {k: trials[0].choice for k, trials in first.items()}
+    many = [k for k, some in several.items() if len(some) > _MOST_GAPS]
+    if many:
+        there = Scan(scan.forecast, scan.loss, scan.moved(found), scan.widening, scan.mask)
+        near = there.best({k: [found[k], *(there.like(k, gap) for gap in _near(there, k, several[k]))] for k in many})
+        found |= {k: trials[0].choice for k, trials in near.items()}
+    return scan.moved(found)
+
+
+def credible(scan: Scan, cases: Sequence[int]) -> dict[int, list[Choice]]:
+    """Return the pulses that each log allows: of at least a hundredth of the weight of the best.
+
+    Where the shaft rests at all samples about which pulses come earlier or later, the cost has a plateau; so they are
+    tried as they are.
+    """
+    logs = [scan.forecast.cases[k].log for k in cases]
+    several = {k: gaps(log, scan.now(k).frames.period) for k, log in zip(cases, logs, strict=True)}
+    fixed = scan.tried({k: scan.later(k, _FINE_TIMES) for k in cases}, moves=False)
+    others = {k: [scan.like(k, gap) for gap in _near(scan, k, some)] for k, some in several.items() if len(some) > 1}
+    moved = scan.tried(others) if others else {}
+    found = {}
+    for k in cases:
+        trials = [*fixed[k], *moved.get(k, [])]
+        reach = min(trial.cost for trial in trials) + scan.widening * math.log(_UNLIKELY)
+        found[k] = [trial.choice for trial in trials if trial.cost <= reach]
+    return found
+
+
+def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int]) -> bool:
+    """Tell whether the pulses of some logs come later or earlier and earlier in the course of a log.
+
+    What each window of a log says of its delay scatters as independent residuals make it, or more (chi squared). Other
+    residuals make it too, so that this says only whether it is worth to look.
+    """
+    from scipy.special import chdtrc
+
+    total, freedom = 0.0, 0
+    parts = forecast.at_all([point], cases=cases, rates=True)[0]
+    if not all(np.isfinite(part.residual).all() for part in parts):
+        return False
+    r = [np.clip(part.residual, -loss.limit, loss.limit) for part in parts]
+    power = sum(float(x @ x) for x in r) / max(sum(map(len, r)), 1)
+    for x, part in zip(r, parts, strict=True):
+        g = part.later
+        share = np.cumsum(g**2)
+        if not share[-1] > 0.0:
+            continue
+        window = np.minimum((_WINDOWS * share / share[-1] * (1.0 - 1e-12)).astype(int), _WINDOWS - 1)
+        weight = np.bincount(window, g**2, _WINDOWS)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            late = -np.bincount(window, g * x, _WINDOWS) / weight
+        known = weight > 0.0
+        middle = float(np.average(late[known], weights=weight[known]))
+        total += float((weight[known] * (late[known] - middle) ** 2).sum()) / max(power, 1e-300)
+        freedom += int(known.sum()) - 1
+    return freedom > 0 and float(chdtrc(freedom, total)) < _DRIFTS
+
+
+def likely_periods(scan: Scan, cases: Sequence[int], *, asked: bool) -> list[float]:
+    """Return the frame periods that some logs fit best, the best first [s]; none where the present one does as well."""
+    forecast = scan.forecast
+    rich = sorted(cases, key=lambda k: -len(gaps(forecast.cases[k].log, scan.now(k).frames.period)))[:_FIRST_LOGS]
+    nominal = scan.now(rich[0]).frames.period
+    longest = max(forecast.cases[k].log.duration for k in rich)
+    choices: dict[int, list[Choice]] = {k: [] for k in rich}
+    of_period: dict[int, list[float]] = {k: [] for k in rich}
+    for period in _periods(nominal, longest):
+        for k in rich:
+            there = _spread(gaps(forecast.cases[k].log, period), _MOST_PHASES)
+            choices[k] += [scan.like(k, gap, period) for gap in there]
+            of_period[k] += [period] * len(there)
+    costs: dict[float, float] = {}
+    for k, trials in scan.tried(choices).items():
+        least: dict[float, float] = {}
+        for period, trial in zip(of_period[k], trials, strict=True):
+            least[period] = min(trial.cost, least.get(period, math.inf))
+        for period, cost in least.items():
+            costs[period] = costs.get(period, 0.0) + cost
+    if not asked and min(costs.values()) > costs[nominal] - _PAYS:
+        return []
+    found: list[float] = []
+    for period in sorted(costs, key=lambda period: costs[period]):
+        if all(abs(period - other) > 2.0 * _step(nominal, longest) for other in found):
+            found.append(period)
+    return found[:_BEST]
+
+
+def with_period(scan: Scan, cases: Sequence[int], period: float) -> Point:
+    """Return the point with pulses of another period."""
+    choices = {k: [scan.like(k, gap, period) for gap in _spread(gaps(scan.forecast.cases[k].log, period))]
+               for k in cases}
+    return scan.moved({k: trials[0].choice for k, trials in scan.best(choices).items()})
+
+
+def _periods(nominal: float, duration: float) -> list[float]:
+    """Return periods that put pulses off by an eighth of a frame at most, and finer about the middle."""
+    step = _step(nominal, duration)
+    count = math.floor(_REACH * nominal / step)
+    coarse = [nominal + k * step for k in range(-count, count + 1)]
+    return [*coarse, *(nominal * (1.0 + side * share) for share in _FINE for side in (-1.0, 1.0))]
+
+
+def _step(nominal: float, duration: float) -> float:
+    return max(0.25 * nominal / max(duration / nominal, 1.0), 2.0 * _REACH * nominal / _MOST_PERIODS)
+
+
+def _spread(some: Sequence[Gap], most: int = _MOST_GAPS) -> list[Gap]:
+    """Return some gaps that cover the frame: the widest of each part of it."""
+    if len(some) <= most:
+        return list(some)
+    length = some[-1].low - some[0].low
+    parts: dict[int, Gap] = {}
+    for gap in some:
+        part = int((gap.low - some[0].low) / length * most * (1.0 - 1e-12))
+        if part not in parts or gap.width > parts[part].width:
+            parts[part] = gap
+    return list(parts.values())
+
+
+def _near(scan: Scan, k: int, some: Sequence[Gap]) -> list[Gap]:
+    """Return the gaps next to the present phase, and the widest of all."""
+    frames = scan.now(k).frames
+    order = sorted(some, key=lambda gap: abs(_wrapped(gap.middle - frames.phase, frames.period)))
+    return list(dict.fromkeys([*order[:_MOST_GAPS // 2], max(some, key=lambda gap: gap.width)]))
+
+
+def widening(parts: Sequence[LogPart], loss: Loss) -> float:
+    """Return how many residuals stand for one that is independent, if each follows the one before it."""
+    r = [np.clip(part.residual, -loss.limit, loss.limit) for part in parts]
+    rho = sum(float(x[1:] @ x[:-1]) for x in r) / max(sum(float(x @ x) for x in r), 1e-300)
+    return (1.0 + max(rho, 0.0)) / max(1.0 - max(rho, 0.0), 0.02)
+
+
+def _wrapped(time: float, period: float) -> float:
+    """Return a time moved by whole periods to within half of one about 0 [s]."""
+    return (time + 0.5 * period) % period - 0.5 * period
+

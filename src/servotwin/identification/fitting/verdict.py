@@ -1,0 +1,287 @@
+"""Is what a fit leaves noise? Its residuals beside noise that needs no model, and what that says of the model.
+
+Three tests, each with a false alarm in a thousand fits: whether residuals are larger, sample after sample, than the
+sensor's own noise at rest; whether they follow the motion, judged on stretches other than those that taught how; and
+whether logs want different numbers. None of them is harmed by noise that remembers itself or by stamps that jitter.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.fitting.noise import Guess, Noise, Series, isolated, noise_of
+from servotwin.identification.fitting.uncertainty import Rows
+
+Array = NDArray[np.float64]
+
+FALSE_ALARM = 1e-3
+"""Of each test."""
+UNDECIDED = 1.5
+"""Times the noise that neighbours show, where none is known that remembers itself: beyond it nothing is sure."""
+_SMALL = 0.04  # of the noise's power: a slow part of a fifth of the noise is left unsaid
+_CLIP = 3.0  # times the noise: nothing counts more
+_CLIPPED = 0.9950  # mean square of a normal law's values that are cut off there
+_UNKNOWN = 0.8  # memory of noise of which nothing is known: that of a smoothed sensor, assumed
+_LEAST = 20  # samples that a test needs
+_BLOCK = 20  # samples at least that are judged together
+_BLOCKS = 8  # that a test needs
+_SHORTLY = 0.15  # s
+
+
+@dataclass(frozen=True)
+class Cause:
+    """What would explain residuals that are not noise, tried on the logs.
+
+    Parameters
+    ----------
+    name : str
+        Such as "load friction".
+    sentence : str
+    before, after : float
+        Rms error on logs, or parts of logs, that took no part in the trial [rad; V where no angle was measured].
+    remedy : str
+        What to do about it.
+    """
+
+    name: str
+    sentence: str
+    before: float
+    after: float
+    remedy: str
+
+    @property
+    def gain(self) -> float:
+        """Share of the error that goes."""
+        return 1.0 - self.after / self.before if self.before > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the model can do what the logs show.
+
+    Parameters
+    ----------
+    sentence : str
+    holds : bool
+        Whether what is left is noise, so that the intervals hold.
+    ratio : float
+        Rms residual over the noise that needs no model, of the angle.
+    noise : mapping of str to float
+        That noise by sensor (SI).
+    autocorrelation : float
+        Of neighbouring residuals.
+    causes : tuple of Cause
+        The best first.
+    odds : mapping of str to float
+        How often a true model would fail each test by as much, such as "size".
+    outliers : float
+        Share of samples that lie far off alone.
+    """
+
+    sentence: str
+    holds: bool
+    ratio: float
+    noise: Mapping[str, float]
+    autocorrelation: float
+    causes: tuple[Cause, ...] = ()
+    odds: Mapping[str, float] = field(default_factory=dict)
+    outliers: float = 0.0
+
+    @property
+    def undecided(self) -> bool:
+        """Whether residuals may be noise that remembers itself, or what the model lacks: trials may tell."""
+        return self.holds and "size" not in self.odds and self.ratio > UNDECIDED
+
+    def __str__(self) -> str:
+        """Return the sentence, and those of the causes."""
+        return "\n".join((self.sentence, *(cause.sentence for cause in self.causes)))
+
+
+@dataclass(frozen=True)
+class Excess:
+    """One test: how large what it looks for is, as a share of the noise's power, and the odds of that by chance."""
+
+    size: float
+    odds: float
+
+    @property
+    def fails(self) -> bool:
+        """Whether it is neither small nor chance."""
+        return self.size > _SMALL and self.odds < FALSE_ALARM
+
+
+def judge(series: Sequence[Series], sensor: str, rows: Sequence[Rows] = (), numbers: int = 0) -> Verdict:
+    """Return the verdict on a fit, without causes.
+
+    Parameters
+    ----------
+    series : sequence of Series
+        The angle in every fitted log.
+    sensor : str
+        Its name, for the words.
+    rows : sequence of Rows, optional
+        What each log says of the shared numbers.
+    numbers : int
+        How many were fitted.
+    """
+    noise = noise_of(series)
+    inner = [~isolated(one, noise.jitter) for one in series]
+    # What also the measured values alone show: fast errors of a wrong model are no outliers
+    plain = [replace(one, simulated=np.zeros(len(one.time))) for one in series]
+    lost = sum(float((isolated(one) & ~k).sum()) for one, k in zip(plain, inner, strict=True)) / sum(map(len, inner))
+    scaled = [one.residual / noise.of(one) for one in series]
+    ratio = math.sqrt(float(np.mean(np.concatenate([u[k] for u, k in zip(scaled, inner, strict=True)])**2)))
+    tests = {"size": _size(series, inner, noise), "memory": _memory(series, inner, noise),
+             "motion": None if noise.known else _motion(series, scaled, inner), "logs": _between(rows, noise, numbers)}
+    power = sum(float(one.residual @ one.residual) for one in series)
+    first = sum(float(one.residual[1:] @ one.residual[:-1]) for one in series) / power if power > 0.0 else 0.0
+    failed = [name for name, test in tests.items() if test is not None and test.fails]
+    sentence = _sentence(failed, ratio, noise, sensor)
+    if lost > 0.005:
+        sentence += f"; {100.0 * lost:.2g} % of the samples lie far off alone and are no noise of that kind"
+    return Verdict(sentence, not failed, ratio, {sensor: noise.size}, first,
+                   odds={name: test.odds for name, test in tests.items() if test is not None}, outliers=lost)
+
+
+def _sentence(failed: Sequence[str], ratio: float, noise: Noise, sensor: str) -> str:
+    size = shown(noise.size, sensor)
+    if not failed:
+        if not noise.known and ratio > UNDECIDED:
+            return (f"residuals are {ratio:.2g} times the noise of {size} that neighbours show: the sensor's noise "
+                    "remembers itself, or the model lacks something; no log stands still long enough to tell")
+        if not noise.known:
+            return (f"what is left does not follow the motion; the sensor's noise is {size} where neighbours tell it, "
+                    "but no log stands still long enough to compare")
+        return f"what is left is noise of {size}: the model can do what these logs show"
+    lacks = "the model lacks something; the intervals below do not hold"
+    if ratio >= 1.3:
+        return f"residuals are {ratio:.2g} times the sensor's noise of {size}: {lacks}"
+    if "memory" in failed or "size" in failed:
+        return f"residuals are hardly larger than the sensor's noise of {size}, but follow each other: {lacks}"
+    if "motion" in failed:
+        return f"residuals are hardly larger than the sensor's noise of {size}, but follow the motion: {lacks}"
+    return f"each log is followed to {size}, but they want different numbers: {lacks}"
+
+
+def shown(value: float, sensor: str) -> str:
+    """Return an error of a sensor in words.
+
+    Examples
+    --------
+    >>> shown(1.04e-3, "output_angle"), shown(2e-3, "feedback_voltage")
+    ('1.0 mrad', '2.0 mV')
+    """
+    unit = {"output_angle": "mrad", "feedback_voltage": "mV"}.get(sensor, "mA")
+    thousand = 1e3 * value
+    return f"{thousand:.1f} {unit}" if 0.95 <= thousand < 100.0 else f"{thousand:.2g} {unit}"
+
+
+def _blocks(parts: Sequence[Array]) -> tuple[Array, Array]:
+    """Return sums over stretches of some samples, and how many each has: what chance is judged by."""
+    blocks = [block for part in parts for block in np.array_split(part, max(1, len(part) // _BLOCK)) if len(block)]
+    return np.array([float(block.sum()) for block in blocks]), np.array([float(len(block)) for block in blocks])
+
+
+def _test(parts: Sequence[Array], expected: float, sure: float) -> Excess | None:
+    """Test whether a mean is above what is expected, which is known to `sure`: Student's t over stretches."""
+    from scipy.special import stdtr
+
+    sums, sizes = _blocks(parts)
+    if len(sums) < _BLOCKS:
+        return None
+    mean = float(sums.sum() / sizes.sum())
+    spread = math.hypot(math.sqrt(float(((sums - mean * sizes)**2).sum())) / float(sizes.sum()), sure)
+    more = mean - expected
+    if spread <= 0.0:
+        return Excess(more, 0.0 if more > 0.0 else 1.0)
+    return Excess(more, float(stdtr(len(sums) - 1.0, -more / spread)))
+
+
+def _size(series: Sequence[Series], inner: Sequence[NDArray[np.bool_]], noise: Noise) -> Excess | None:
+    """Test whether residuals are larger than the noise; nothing counts more than three times it."""
+    def more(guess: Guess) -> Array:
+        parts = [np.minimum((one.residual / noise.of(one, guess.size))[keep]**2, _CLIP**2)
+                 for one, keep in zip(series, inner, strict=True)]
+        return np.concatenate(parts) - _CLIPPED
+    return _over(noise, more)
+
+
+def _memory(series: Sequence[Series], inner: Sequence[NDArray[np.bool_]], noise: Noise) -> Excess | None:
+    """Test whether neighbouring residuals are more alike than noise at rest is."""
+    def more(guess: Guess) -> Array:
+        parts = []
+        for one, keep in zip(series, inner, strict=True):
+            v = np.clip(one.residual / noise.of(one, guess.size), -_CLIP, _CLIP)
+            parts.append((v[1:] * v[:-1])[keep[1:] & keep[:-1] & one.joined[1:]])
+        return np.concatenate(parts) - guess.memory
+    return _over(noise, more)
+
+
+def _over(noise: Noise, more: Callable[[Guess], Array]) -> Excess | None:
+    """Test whether a mean is above 0, which it is at most of true noise; all likely noises are asked in turn."""
+    from scipy.special import ndtr
+
+    if not noise.known:
+        return None
+    odds, sizes = [], []
+    for guess in noise.guesses:
+        values = more(guess)
+        if len(values) < _LEAST:
+            return None
+        rho = guess.memory
+        # Products of neighbours, and squares, of first-order noise (Bartlett 1946)
+        spread = math.sqrt(2.0 * (1.0 + rho**2) / max(1.0 - rho**2, 0.02) / len(values))
+        sizes.append(float(values.mean()))
+        odds.append(float(ndtr(-sizes[-1] / spread)))
+    return Excess(sizes[len(sizes) // 2], float(np.mean(odds)))
+
+
+def _motion(series: Sequence[Series], scaled: Sequence[Array], inner: Sequence[NDArray[np.bool_]]) -> Excess | None:
+    """Test whether residuals are larger while the shaft moves or has just moved, of whatever noise."""
+    power = [np.minimum(u[keep]**2, _CLIP**2) for u, keep in zip(scaled, inner, strict=True)]
+    moves = [_moves(one)[keep] for one, keep in zip(series, inner, strict=True)]
+    order = np.concatenate(moves).argsort(kind="stable").argsort(kind="stable") / max(sum(map(len, moves)) - 1, 1)
+    ranks = np.split(2.0 * math.sqrt(3.0) * (order - 0.5), np.cumsum([len(m) for m in moves])[:-1])
+    mean = float(np.mean(np.concatenate(power)))
+    return _test([rank * (p / mean - 1.0) for rank, p in zip(ranks, power, strict=True)], 0.0, 0.0)
+
+
+def _moves(one: Series) -> Array:
+    """Return how much the shaft moves in the simulation at each sample and shortly before."""
+    speed = np.abs(one.speed)
+    step = float(np.median(np.diff(one.time))) if len(one.time) > 1 else _SHORTLY
+    width = max(1, min(len(speed), round(_SHORTLY / step)))
+    return np.convolve(speed, np.ones(width), "full")[:len(speed)]
+
+
+def _between(rows: Sequence[Rows], noise: Noise, numbers: int) -> Excess | None:
+    """Test whether what each log wants of the shared numbers scatters more than its own residuals explain."""
+    from scipy.special import chdtrc
+
+    if len(rows) < 2:
+        return None
+    total, freedom = 0.0, 0.0
+    for r in rows:
+        m = len(r.residual)
+        g = r.slope[:m] * r.score[:m, None]
+        F = r.slope.T @ r.slope
+        values, vectors = np.linalg.eigh(F)
+        known = vectors[:, values > 1e-6 * max(float(values.max(initial=0.0)), 1e-12)]
+        score = (r.slope.T @ r.score) @ known
+        M = known.T @ (g.T @ g) @ known + known.T @ (r.slope[m:].T @ r.slope[m:]) @ known
+        if m <= 3 * known.shape[1]:
+            continue
+        total += float(score @ np.linalg.lstsq(M, score, rcond=1e-10)[0])
+        freedom += known.shape[1]
+    freedom -= min(numbers, freedom / max(len(rows), 1))
+    if freedom < 1.0:
+        return None
+    # Noise that remembers itself makes scores scatter more, by as much as the likely ones do
+    shares = [(1.0 - memory) / (1.0 + memory) for memory in ([g.memory for g in noise.guesses] or [_UNKNOWN])]
+    odds = float(np.mean([chdtrc(freedom, share * total) for share in shares]))
+    return Excess(shares[len(shares) // 2] * total / freedom - 1.0, odds)

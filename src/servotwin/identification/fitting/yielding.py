@@ -1,0 +1,260 @@
+"""Priors that yield: where logs and servo file disagree too far, the logs are believed.
+
+A prior is a normal law whose cost does not rise any further beyond 3.5 standard deviations: what is outside is wrong by
+any amount. So a prior stays where the fit with it is the better one by far, and goes where the fit without it is better
+or lies within the interval. That is judged by the cost, from searches without the prior that begin at the end of the
+fit and at values far from it: the logs need not be a parabola, and see nothing wrong from near the prior.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.fitting.arrow import Outcome, Prior, Search
+from servotwin.identification.fitting.doubts import Doubts
+from servotwin.identification.fitting.intervals import begins
+from servotwin.identification.fitting.point import Point
+from servotwin.identification.fitting.task import Task
+from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
+
+Array = NDArray[np.float64]
+
+APART = 3.5
+"""Standard errors between logs and prior from which on the prior is not believed: 1 of 2000 that are right."""
+_REACH = 1.92  # rise of the cost at the ends of a 95 % interval
+_OPEN = 0.5 * APART**2 - _REACH  # gain from which on the fit without a prior lies within the interval
+_FACTORS = (0.25, 0.4, 0.63, 0.8, 1.25, 1.6, 2.5, 4.0)  # of the value: where the logs are asked once more
+_STEPS = 8  # of a search that only has to show whether it goes down
+_HINT = 0.5  # of the gain that counts: the noise is not known yet
+
+Told = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Yielded:
+    """A prior that was dropped because the logs contradict it.
+
+    Parameters
+    ----------
+    name : str
+    file, file_std : float
+        What the prior says (SI).
+    logs, logs_std : float
+        What the fit finds without it, and its standard error (SI); the latter is nan where the logs do not determine
+        the number, or it has no interval.
+    apart : float
+        Standard errors between the two, by how much better the logs are fitted without the prior.
+    logs_lower, logs_upper : float
+        Its interval (SI); nan where it has none.
+    unit : str
+        SI.
+    of_file : bool
+        Whether the servo file said so, or else the caller.
+    others : tuple of str
+        Numbers with which together alone the logs determine this one: then all that is certain is that the priors of
+        all of them cannot be right, and this is the one that is easiest to give up.
+    """
+
+    name: str
+    file: float
+    file_std: float
+    logs: float
+    logs_std: float
+    apart: float
+    logs_lower: float = math.nan
+    logs_upper: float = math.nan
+    unit: str = ""
+    of_file: bool = True
+    others: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        said = f"{self.file:.4g} ± {self.file_std:.2g} {self.unit}".rstrip()
+        far = f"{self.apart:.2g} standard errors apart"
+        if self.others:
+            who, say = ("the servo file", "it says") if self.of_file else ("the priors that were given", "they say")
+            return (f"the logs contradict {who}: {', '.join(self.others)} and {self.name} cannot all be as {say} "
+                    f"({far}); {self.name} is fitted without its prior, {said}")
+        who = "the servo file" if self.of_file else "the prior that was given"
+        if math.isnan(self.logs_std):
+            return (f"the logs contradict {who}: {self.name} is not {said} ({far}); it is fitted without that prior, "
+                    "and the logs alone do not determine it")
+        return (f"the logs contradict {who}: {self.name} is {self.logs:.4g} {self.unit} ({self.logs_lower:.4g} to "
+                f"{self.logs_upper:.4g}), it says {said} ({far}); it is fitted without that prior")
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """A shared number whose prior was dropped: which one, the prior on the scale of the search, and how far off."""
+
+    which: int
+    mean: float
+    std: float
+    apart: float
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """A fit without the prior of one number: where it ends, how far it is from the prior, in which units."""
+
+    dropped: Dropped
+    end: Outcome
+    gain: float
+    moved: float
+
+
+def settle(task: Task, found: Outcome, tell: Told) -> tuple[Outcome, tuple[Dropped, ...]]:
+    """Drop the priors that the logs contradict, one after the other; return where the fit ends then, and which.
+
+    The task goes on without them.
+
+    Parameters
+    ----------
+    task : Task
+    found : Outcome
+        The end of its search.
+    tell : callable
+        Is told the share that is done, and what goes on.
+    """
+    left: list[Dropped] = []
+    count = int((task.prior.weight > 0.0).sum())
+    for k in range(count):
+        tell(k / count, "priors")
+        trials = _trials(task, found)
+        if not trials:
+            break
+        best = max(trial.gain for trial in trials)
+        # What fits as well is told apart by how far its own prior has to be left
+        chosen = min((t for t in trials if t.gain > best - _REACH), key=lambda t: t.moved)
+        task.prior = _without(task.prior, [chosen.dropped.which])
+        found = task.again(chosen.end.point, _part_of(tell, k, count))
+        left.append(chosen.dropped)
+    return found, tuple(left)
+
+
+def yielded(task: Task, found: Outcome, left: Sequence[Dropped], doubts: Doubts) -> tuple[Yielded, ...]:
+    """Return the dropped priors with what the fit says instead.
+
+    Parameters
+    ----------
+    task : Task
+        As it goes on without them.
+    found : Outcome
+    left : sequence of Dropped
+    doubts : Doubts
+        Of the fit without them.
+    """
+    result = []
+    for one in left:
+        p, x = task.forecast.space.parameters[one.which], float(found.point.shared[one.which])
+        group = [name for item in doubts.unidentifiable if p.name in item.parameters for name in item.parameters]
+        mates = tuple(dict.fromkeys(name for name in group if name != p.name and _believed(task, name)))
+        std, interval = math.nan, (math.nan, math.nan)
+        if doubts.doubt is not None and one.which in doubts.ends:
+            ends = doubts.ends[one.which]
+            std = float(doubts.doubt.std[one.which])
+            a, b = (float(np.clip(p.value(x + end * std), p.lower, p.upper)) for end in (ends.lower, ends.upper))
+            std, interval = abs(p.slope(x)) * std, (min(a, b), max(a, b))
+        said = p.prior if p.prior is not None else (math.nan, math.nan)
+        result.append(Yielded(p.name, *said, float(p.value(x)), std, one.apart, *interval, p.unit, p.of_file, mates))
+    return tuple(result)
+
+
+def _believed(task: Task, name: str) -> bool:
+    names = task.forecast.space.names
+    return name in names and bool(task.prior.weight[names.index(name)] > 0.0)
+
+
+def _part_of(tell: Told, k: int, count: int) -> Told:
+    return lambda share, text: tell((k + share) / count, text)
+
+
+def _without(prior: Prior, which: Sequence[int]) -> Prior:
+    weight = prior.weight.copy()
+    weight[list(which)] = 0.0
+    return Prior(prior.mean, weight)
+
+
+def _search(task: Task, prior: Prior) -> Search:
+    return Search(task.forecast, task.loss, prior, task.lower, task.upper, task.fitted, task.held)
+
+
+def _trials(task: Task, found: Outcome) -> list[_Trial]:
+    """Return the fits without one prior each that are better by so much that the prior is not believed."""
+    stuck = task.at_bound(found) | task.held
+    believed = [k for k in range(len(task.forecast.space)) if task.prior.weight[k] > 0.0]
+    free = [k for k in believed if not stuck[k]]
+    base = _search(task, task.prior).costs([found.point])[0]
+    if not believed or not math.isfinite(base):
+        return []
+    far = _far(task, found, free, base)
+    without = _search(task, _without(task.prior, believed)).run(found.point, most=_STEPS)
+    if not far and base - without.cost < _HINT * _OPEN:
+        return []
+    trials = []
+    for k in believed:
+        search = _search(task, _without(task.prior, [k]))
+        ends = (search.run(start, most=_STEPS) for start in (found.point, *far.get(k, ())))
+        judged = [trial for end in ends if (trial := _judged(task, found, k, end, base)) is not None]
+        trials += [max(judged, key=lambda trial: trial.gain)] if judged else []
+    return trials
+
+
+def _far(task: Task, found: Outcome, which: Sequence[int], base: float) -> Mapping[int, tuple[Point, ...]]:
+    """Return points far from the prior of one number that fit as well, all else following: the best one of each."""
+    doubt, rows = _doubt(task, found.point, task.prior)
+    search = _search(task, task.prior)
+    asked = [(k, point) for k in which for x in _values(task, k) for point in begins(
+        search, found, doubt, k, (x - found.point.shared[k]) / max(float(doubt.std[k]), 1e-12), rows)]
+    best: dict[int, tuple[float, Point]] = {}
+    for (k, point), cost in zip(asked, search.costs([point for _, point in asked]) if asked else [], strict=True):
+        u = (point.shared[k] - task.prior.mean[k]) * task.prior.weight[k]
+        alone = cost - 0.5 * u**2
+        if alone < base and (k not in best or alone < best[k][0]):
+            best[k] = (alone, point)
+    return {k: (point,) for k, (_, point) in best.items()}
+
+
+def _values(task: Task, k: int) -> list[float]:
+    """Return values of a number at which it is asked whether the logs fit there as well (scaled)."""
+    p, mean, weight = task.forecast.space.parameters[k], task.prior.mean[k], task.prior.weight[k]
+    middle = float(p.value(mean))
+    values = [p.scaled(factor * middle) for factor in _FACTORS] if middle else \
+        [side * factor for side in (-1.0, 1.0) for factor in (0.1, 0.3, 1.0, 3.0)]
+    return [x for x in values if task.lower[k] < x < task.upper[k] and abs(x - mean) * weight > APART]
+
+
+def _doubt(task: Task, point: Point, prior: Prior) -> tuple[Uncertainty, list[Rows]]:
+    forecast = task.forecast
+    parts = forecast.at(point, cases=task.fitted)
+    rows = [rows_of(part, task.loss, Prior(*forecast.own_belief(forecast.cases[k])), point.own[k])
+            for k, part in zip(task.fitted, parts, strict=True)]
+    stuck = task.at_bound(Outcome(point, math.inf, False, 0)) | task.held
+    return uncertainty(rows, prior, stuck), rows
+
+
+def _judged(task: Task, found: Outcome, k: int, end: Outcome, base: float) -> _Trial | None:
+    """Return a fit without the prior of a number, if that is not believed; in the noise that is left without it."""
+    mean, weight = float(task.prior.mean[k]), float(task.prior.weight[k])
+    off, std = abs(float(end.point.shared[k]) - mean), 1.0 / weight
+    if base - end.cost < _HINT * _OPEN or off < APART * std:
+        return None
+    alone, before = _without(task.prior, [k]), task.forecast.noise
+    task.take_noise(end.point)
+    try:
+        gain = _search(task, task.prior).costs([found.point])[0] - _search(task, alone).costs([end.point])[0]
+        widening = _doubt(task, end.point, alone)[0].inflation
+    finally:
+        task.forecast.noise = before
+    if gain <= 0.0:
+        return None
+    # Twice the gain is off² / (std² + that of the logs²); the latter is wider where residuals are correlated
+    of_logs = max(off**2 / (2.0 * gain) - std**2, 0.0)
+    apart = off / math.hypot(std, widening * math.sqrt(of_logs))
+    if 0.5 * apart**2 < _OPEN:
+        return None
+    return _Trial(Dropped(k, mean, std, apart), replace(end), gain, off / std)
