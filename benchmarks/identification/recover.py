@@ -3,9 +3,9 @@
 import os
 import time as clock
 
+import fixed_step
 from logs import DURATION, FREE, LOGS, NOISE, SAMPLE, Task, error, make
 
-import reference
 import servotwin as st
 from servotwin.models import Model
 
@@ -39,7 +39,7 @@ def row(kind: type[Model], seed: int) -> tuple[float, float]:
 def peer(seed: int, own: float) -> None:
     """Print what the fixed-step simulator makes of the same logs, and the ratio of times."""
     task = make(st.BoundedServo, seed)
-    found = reference.fit(task, seed)
+    found = fixed_step.fit(task, seed)
     print(f"  fixed step    {seed:4d} {found.seconds:8.1f} s {'':9} {1e3 * found.error:10.4f} "
           f"{off(found.values, task.truth):11.1e}   {found.seconds / own:.1f}x the time of BoundedServo")
     print(f"{'':24}at the true parameters it is {1e3 * found.own_error:.1f} mrad off, for its step of "

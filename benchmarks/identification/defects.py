@@ -1,0 +1,40 @@
+"""Part 4: whether the verdict of a fit names what is wrong, for fourteen defects of an independent bench.
+
+Each defect on several random benches, from hardly to be seen to gross. The table says how often the verdict finds no
+fault, and where it does, how often the true cause is the first that it names, among the first three, or not among them.
+A cause may be found in more than one way: lost pulses and late stamps are both frames that came otherwise.
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+
+from reference.rig_defects import DEFECTS
+from reference.rig_fits import place, seen
+
+STRENGTHS = (0.2, 0.5, 0.8)
+
+
+def main(*seeds: int, only: tuple[str, ...] = ()) -> None:
+    chosen = range(seeds[0] if seeds else 4) if len(seeds) < 2 else seeds
+    print(f"{len(chosen)} random benches, strengths {', '.join(f'{s:g}' for s in STRENGTHS)} of 1")
+    rows = []
+    for name in only or DEFECTS:
+        every = [seen(name, strength, seed) for strength in STRENGTHS for seed in chosen]
+        said = [one for one in every if not one.holds or place(name, one) == 0]
+        places = [place(name, one) for one in said]
+        first, three = sum(p == 0 for p in places), sum(p is not None and p < 3 for p in places)
+        rows.append(f"  {name:18} {len(every):4d} {len(every) - len(said):9d} {first:7d} {three:9d} "
+                    f"{len(said) - three:7d} {sum(one.seconds for one in every) / len(every):8.1f}")
+        shown = next((one for one, p in zip(said, places, strict=True) if p == 0), said[0] if said else every[0])
+        print(f"{name}: {shown.sentence}", flush=True)
+        for line in (*(f"cause: {cause}" for cause in shown.causes[:3]), *shown.warnings[:2]):
+            print(f"    {line}", flush=True)
+    print(f"\n  {'defect':18} fits  no fault   first  of three   other  s of CPU")
+    print("\n".join(rows), flush=True)
+
+
+if __name__ == "__main__":
+    main(*(int(word) for word in sys.argv[1:] if word.isdecimal()),
+         only=tuple(word for word in sys.argv[1:] if not word.isdecimal()))
