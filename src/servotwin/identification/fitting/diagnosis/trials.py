@@ -23,7 +23,6 @@ Try = Callable[[Bench], Told | None]
 _LOGS = 4  # that are tried
 _EXPLAINED = 1.2  # times the sensor's noise: then nothing else is tried
 _ALIKE = 1.05  # times the least error: then the simpler is named first
-_MANY = 4  # settings of a candidate: then only the most promising is searched
 _MOST = 5  # causes that are told
 _KINDS = {"sign": ("sign", "an angle that counts against the command", 'mend=("sign",)'),
           "wrap": ("wrap", "an angle that wraps", 'mend=("wrap",)'),
@@ -122,7 +121,7 @@ def _of_findings(bench: Bench, traces: Sequence[Trace]) -> list[Candidate]:
 
 
 def _tried(bench: Bench, candidate: Candidate, settings: Sequence[Setting]) -> Told | None:
-    """Return what a candidate gains, searched from its settings; where that is dear or many, from the best of them."""
+    """Return what a candidate gains, searched from the most promising of its settings."""
     trials = [bench.searched(setting, bench.base.point) for setting in _promising(bench, settings)]
     trials += [bench.afresh(setting) for setting in settings if setting.afresh]
     good = [trial for trial in trials if all(np.isfinite(r).all() for r in trial.residuals)]
@@ -133,7 +132,7 @@ def _tried(bench: Bench, candidate: Candidate, settings: Sequence[Setting]) -> T
 
 
 def _promising(bench: Bench, settings: Sequence[Setting]) -> Sequence[Setting]:
-    if len(settings) < 2 or (len(settings) < _MANY and settings[0].price <= DEAR):
+    if len(settings) < 2:
         return settings
     costs = [bench.promise(setting) for setting in settings]
     return [settings[int(np.argmin(costs))]] if np.isfinite(costs).any() else []
