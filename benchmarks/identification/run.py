@@ -7,7 +7,8 @@
 import sys
 from importlib import import_module
 
-PARTS = {"jacobian": "jacobian", "recover": "recover", "coverage": "interval_coverage", "defects": "defects"}
+PARTS = {"jacobian": "jacobian", "recover": "recover", "coverage": "interval_coverage", "defects": "defects",
+         "speed": "speed"}
 
 
 def main() -> None:

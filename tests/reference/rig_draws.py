@@ -31,6 +31,7 @@ class Truth(NamedTuple):
     load: Load
     delay: float  # s
     angle_offset: float  # rad
+    crystal: float  # which way its clock is off: 1 or -1
     seed: int
 
 
@@ -61,7 +62,7 @@ def random_truth(seed: int) -> Truth:
     """Return a bench; every fifth has an arm, the others a disc."""
     rng = np.random.default_rng([seed, 1])
     return Truth(random_servo(rng), random_load(rng, "arm" if seed % 5 == 4 else "disc"), rng.uniform(0.01, 0.05),
-                 rng.uniform(-0.02, 0.02), seed)
+                 rng.uniform(-0.02, 0.02), _either(np.random.default_rng([seed, 4])), seed)
 
 
 def motion(kind: str, duration: float, rng: np.random.Generator, sample: float = SAMPLE) -> Array:
@@ -84,12 +85,17 @@ def motion(kind: str, duration: float, rng: np.random.Generator, sample: float =
 
 def runs(truth: Truth, taking: Callable[[np.random.Generator], Taking], *, duration: float | None = None,
          motions: tuple[str, ...] = MOTIONS) -> list[Run]:
-    """Return a log of each motion, taken as a condition says, which is asked anew for each."""
+    """Return a log of each motion, taken as a condition says, which is asked anew for each.
+
+    A clock is one of the bench's parts and runs alike in all its logs.
+    """
     found = []
     for k, kind in enumerate(motions):
         rng = np.random.default_rng([truth.seed, 2, k])
         widths = motion(kind, rng.uniform(2.0, 4.0) if duration is None else duration, rng)
         told = {"delay": truth.delay, "angle_offset": truth.angle_offset, **taking(rng)}
+        if "clock" in told:
+            told["clock"] *= truth.crystal
         said = record(truth.servo, truth.load, widths, **told, seed=int(rng.integers(2**31)))
         found.append(Run(kind, truth.load, said))
     return found
@@ -101,7 +107,7 @@ def _either(rng: np.random.Generator) -> float:
 
 def free_running(rng: np.random.Generator) -> Taking:
     """Frames of a generator that no loop triggers: any phase, a crystal of its own, turns that begin late or early."""
-    return {"phase": rng.uniform(0.0, 0.02), "loop_jitter": 3e-4, "clock": rng.normal(0.0, 2e-5)}
+    return {"phase": rng.uniform(0.0, 0.02), "loop_jitter": 3e-4, "clock": 2e-5}
 
 
 CONDITIONS: dict[str, Callable[[np.random.Generator], Taking]] = {
@@ -112,8 +118,8 @@ CONDITIONS: dict[str, Callable[[np.random.Generator], Taking]] = {
     "stamps 1 us": lambda rng: {"stamp_jitter": 1e-6},
     "stamps 2 ms": lambda rng: {"stamp_jitter": 2e-3},
     "free-running": free_running,
-    "clock 1 ppm": lambda rng: {"clock": 1e-6 * _either(rng)},
-    "clock 200 ppm": lambda rng: {"clock": 2e-4 * _either(rng)},
+    "clock 1 ppm": lambda rng: {"clock": 1e-6},
+    "clock 200 ppm": lambda rng: {"clock": 2e-4},
     "frame 20.48 ms": lambda rng: {"period": 0.02048, "phase": rng.uniform(0.0, 0.02)},
 }
 SHORT = 0.8  # s, of a short log

@@ -9,12 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.noise import Series, noise_of
 from servotwin.identification.fitting.phases import Scan, drifts, likely_periods, settled, with_period
 from servotwin.identification.fitting.point import PERIOD_SCALE, Point
-from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.identification.logs.beat import beat, on_beat
-from servotwin.identification.logs.log import ANGLES
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.task import Task
@@ -23,7 +20,7 @@ Told = Callable[[float, str], None]
 
 _ROUNDS = 2  # of assignment and search
 _HELD_PAYS = 3.0  # of the cost: an odds ratio of 20
-_MORE = 1.3  # times the noise: what pulses of a wrong period leave, if they matter
+_NEAR_PAYS = 4.0  # of the cost, for each independent residual: what one more number has to gain, a chance of 0.5 %
 _SCATTER = 2e-5  # s, of stamps: less is a tenth of a milliradian at 5 rad/s
 
 
@@ -80,7 +77,7 @@ def _with_beat(task: Task, point: Point, tell: Told, began: float) -> Point:
     other = task.like(regular)
     found = other.ran(point._replace(frames=regular.frames), tell, began)
     found = other.ran(settled(other.scan(found.point), task.fitted), tell, began)
-    if not task.pays(point, other, found):
+    if not task.pays(point, other, found.point):
         return point
     task.become(other, f"stamps scatter by {1e3 * scatter:.2g} ms about their beat, the motion does not: samples count "
                        "as taken on the beat")
@@ -92,50 +89,53 @@ def _with_beat(task: Task, point: Point, tell: Told, began: float) -> Point:
 def _with_period(task: Task, point: Point, tell: Told, began: float) -> Point:
     """Search for the period of the pulses too where it is asked for, or where they drift.
 
+    A period that is off by as little as quartz clocks are is found from where the fit stands.
+    """
+    old = task.forecast
+    if "frame_period" in old.extra:
+        return _at_likely_period(task, task, point, tell, began)
+    if len({case.period for case in old.cases}) > 1 or not drifts(old, task.loss, point, task.fitted):
+        return point
+    tell(began, "period of the pulses")
+    wider = task.like(Forecast(
+        [case.log for case in old.cases], old.model, old.space, (*old.nuisance, "frame_period"), old.sensors))
+    near = wider.ran(_with_its_period(point, task.period), tell, began).point
+    found = near if task.pays(point, wider, near, _NEAR_PAYS) else point
+    if found is point or drifts(wider.forecast, task.loss, near, task.fitted):
+        far = _at_likely_period(task, wider, point, tell, began)
+        if far is not point and wider.cost(far) < wider.cost(near) and task.pays(point, wider, far):
+            found = far
+    if found is point:
+        return point
+    there = wider.forecast.nuisance_of(found.shared, "frame_period")
+    task.become(wider, f"pulses come every {1e3 * there:.6g} ms by the logs, not every {1e3 * task.period:.6g} ms: "
+                       "their period was fitted too")
+    task.measure(found)
+    return found
+
+
+def _at_likely_period(task: Task, wider: Task, point: Point, tell: Told, began: float) -> Point:
+    """Return where a search ends that begins at the periods which explain most; the same point where none does.
+
     A period that is wrong by some per cent bends all parameters, so that no other would fit better with these. So they
     are held near where they began until it is found.
     """
-    old = task.forecast
-    asked = "frame_period" in old.extra
-    if not asked and not (_is_more_than_noise(task, point) and drifts(old, task.loss, point, task.fitted)):
-        return point
+    asked = wider is task
     tell(began, "period of the pulses")
-    near = task.like(old, prior=task.near_start())
+    near = task.like(task.forecast, prior=task.near_start())
     scan = near.scan(near.ran(settled(near.scan(_from_start(task, point)), task.fitted), tell, began).point)
     likely = likely_periods(scan, task.fitted, asked=asked)
     if not likely:
         return point
-    wider = task if asked else task.like(Forecast(
-        [case.log for case in old.cases], old.model, old.space, (*old.nuisance, "frame_period"), old.sensors))
     near = wider.like(wider.forecast, prior=wider.near_start())
     tried = [near.ran(_moved(scan, task.fitted, period, asked=asked), tell, began) for period in likely]
-    found = min(tried, key=lambda outcome: outcome.cost)
+    found = min(tried, key=lambda outcome: outcome.cost).point
     for _ in range(_ROUNDS):
-        exact = _at_period(wider.forecast, found.point)
-        found = wider.ran(settled(wider.scan(exact), task.fitted), tell, began)
-    if not asked:
-        if not task.pays(point, wider, found):
-            return point
-        there = wider.forecast.nuisance_of(found.point.shared, "frame_period")
-        task.become(wider, f"pulses come every {1e3 * there:.6g} ms by the logs, not every {1e3 * task.period:.6g} ms: "
-                           "their period was fitted too")
-    task.measure(found.point)
-    return found.point
-
-
-def _is_more_than_noise(task: Task, point: Point) -> bool:
-    """Tell whether residuals are larger than the sensor's own noise by so much that clocks may be the reason."""
-    forecast, series = task.forecast, []
-    if len({case.period for case in forecast.cases}) > 1:
-        return False
-    for k, part in zip(task.fitted, forecast.at(point, derivatives=False, cases=task.fitted), strict=True):
-        case, residuals = forecast.cases[k], by_sensor(forecast, k, part)
-        name = next(name for name in ANGLES if name in case.places)
-        measured = case.values[name]
-        series.append(Series(case.log, case.log.start + case.times[case.places[name]], measured,
-                             measured + residuals[name]))
-    left = float(np.sqrt(np.mean(np.concatenate([one.residual for one in series]) ** 2)))
-    return left > _MORE * noise_of(series).size
+        exact = _at_period(wider.forecast, found)
+        found = wider.ran(settled(wider.scan(exact), task.fitted), tell, began).point
+    if asked:
+        task.measure(found)
+    return found
 
 
 def _from_start(task: Task, point: Point) -> Point:
@@ -147,9 +147,12 @@ def _from_start(task: Task, point: Point) -> Point:
 def _moved(scan: Scan, cases: Sequence[int], period: float, *, asked: bool) -> Point:
     """Return the point with pulses of another period, the last of its shared numbers."""
     moved = with_period(scan, cases, period)
-    shared = moved.shared.copy() if asked else np.append(moved.shared, 0.0)
-    shared[-1] = period / PERIOD_SCALE
-    return moved._replace(shared=shared)
+    return _with_its_period(moved._replace(shared=moved.shared[:-1]) if asked else moved, period)
+
+
+def _with_its_period(point: Point, period: float) -> Point:
+    """Return a point with the period of its pulses as the last of its shared numbers."""
+    return point._replace(shared=np.append(point.shared, period / PERIOD_SCALE))
 
 
 def _at_period(forecast: Forecast, point: Point) -> Point:

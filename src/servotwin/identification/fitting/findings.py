@@ -68,24 +68,35 @@ class Mended(NamedTuple):
     findings: tuple[Finding, ...]
 
 
+class _Checked(NamedTuple):
+    """Logs with all that is found mended, what is found, and the logs with jumps and stamps mended only."""
+
+    logs: tuple[Log, ...]
+    findings: tuple[Finding, ...]
+    steadied: tuple[Log, ...]
+
+
 def mended(logs: Sequence[Log], model: Model, kinds: Sequence[str]) -> Mended:
     """Return logs with these kinds of findings mended, in the order of `KINDS`."""
     done = _checked(logs, model, [kind for kind in KINDS if kind in kinds])
     return Mended(done.logs, tuple(one for one in done.findings if one.mended is not None))
 
 
-def _checked(logs: Sequence[Log], model: Model, kinds: Sequence[str]) -> Mended:
-    """Return the logs with all that is found mended, and what is found, kind by kind."""
+def _checked(logs: Sequence[Log], model: Model, kinds: Sequence[str]) -> _Checked:
+    """Check logs for some kinds of findings, one kind after the other."""
     found: list[Finding] = []
-    looks = {log.name: look(log, model) for log in logs}
+    looks = {log.name: look(log, model) for log in logs} if kinds else {}
     now = {log.name: log for log in logs}
+    steadied = tuple(logs)
     for kind in kinds:
         for one in (seen := _CHECKS[kind]([one for one in looks.values() if one is not None and one.counts.any()])):
             if one.mended is not None:
                 now[one.log] = one.mended
                 looks[one.log] = look(one.mended, model)
         found += seen
-    return Mended(tuple(now.values()), tuple(found))
+        if kind in _STEADIED:
+            steadied = tuple(now.values())
+    return _Checked(tuple(now.values()), tuple(found), steadied)
 
 
 def first_looks(logs: Sequence[Log], model: Model, mend: Sequence[str]) -> tuple[tuple[Log, ...], tuple[str, ...]]:
@@ -99,7 +110,7 @@ def first_looks(logs: Sequence[Log], model: Model, mend: Sequence[str]) -> tuple
     kinds = checks.checked_words("mend", mend, MENDED)
     done = mended(logs, model, kinds)
     left = _checked(done.logs, model, KINDS)
-    checks.check_speeds(_checked(done.logs, model, _STEADIED).logs, model)
+    checks.check_speeds(left.steadied, model)
     return done.logs, (*(f"mended: {one.sentence}" for one in done.findings),
                        *(one.sentence for one in left.findings))
 

@@ -32,7 +32,7 @@ _FINE = (1e-5, 3e-5, 1e-4, 2e-4, 4e-4, 8e-4)  # of a period: quartz clocks
 _WINDOWS = 6  # of a log, that are compared
 _PAYS = 3.0  # of the cost: what another period has to gain for another look
 _UNLIKELY = 100.0  # times the weight of the best: pulses that count no more
-_DRIFTS = 1e-3  # how often pulses that do not drift would look as if
+_DRIFTS = 1e-2  # how often pulses that do not drift would look as if
 
 
 class Choice(NamedTuple):
@@ -177,8 +177,8 @@ def credible(scan: Scan, cases: Sequence[int]) -> dict[int, list[Choice]]:
 def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int]) -> bool:
     """Tell whether the pulses of some logs come later or earlier and earlier in the course of a log.
 
-    What each window of a log says of its delay scatters as independent residuals make it, or more (chi squared). Other
-    residuals make it too, so that this says only whether it is worth to look.
+    What each window of a log says of its delay scatters as residuals that remember each other make it, or more (chi
+    squared). What a model lacks makes it too, so that this says only whether it is worth to look.
     """
     from scipy.special import chdtrc
 
@@ -187,7 +187,7 @@ def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int]) -
     if not all(np.isfinite(part.residual).all() for part in parts):
         return False
     r = [np.clip(part.residual, -loss.limit, loss.limit) for part in parts]
-    power = sum(float(x @ x) for x in r) / max(sum(map(len, r)), 1)
+    power = widening(parts, loss) * sum(float(x @ x) for x in r) / max(sum(map(len, r)), 1)
     for x, part in zip(r, parts, strict=True):
         g = part.later
         share = np.cumsum(g**2)

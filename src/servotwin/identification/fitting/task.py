@@ -193,10 +193,10 @@ class Task:
         """Return the cost of a point."""
         return self._search(self.fitted).costs([point])[0]
 
-    def pays(self, point: Point, other: Task, found: Outcome) -> bool:
-        """Tell whether what another search found is better by more than chance."""
-        parts = other.forecast.at(found.point, derivatives=False, cases=other.fitted)
-        return found.cost < self.cost(point) - _PAYS * widening(parts, self.loss)
+    def pays(self, point: Point, other: Task, found: Point, least: float = _PAYS) -> bool:
+        """Tell whether what another search found gains at least so much, for each independent residual."""
+        parts = other.forecast.at(found, derivatives=False, cases=other.fitted)
+        return other.cost(found) < self.cost(point) - least * widening(parts, self.loss)
 
     def _rough(self, nominal: Point, tell: Told) -> list[Outcome]:
         """Search from several starts on some logs; return where that ended, the best first."""

@@ -31,7 +31,7 @@ _MOST_OF = 0.98  # of the samples, beyond which a larger error counts no more
 _STEPS, _FEW_STEPS = 25, 10  # of what is cheap to simulate, and of what is not
 DEAR = 3.0  # times a simulation of closed form
 _ROUNDS = 4  # of search and noise
-_LEAST = 5e-4  # of the cost: what a step has to gain
+_LEAST = 2e-3  # of the cost: what a step has to gain
 _FINER = 0.7  # of the noise: then a search goes on with less
 _NORMAL = 1.4826  # standard deviation over median magnitude of a normal law
 _REACH = 0.5  # of a searched number: how far the others are moved before a trial is searched
@@ -60,7 +60,7 @@ class Purse:
 
 
 class Watched(Forecast):
-    """A forecast whose search sees some samples only, and that pays for what it simulates."""
+    """A forecast whose search sees some samples only, and that pays for what it simulates; to be judged is free."""
 
     def __init__(self, purse: Purse, price: float, *arguments: Any) -> None:
         super().__init__(*arguments)
@@ -71,7 +71,8 @@ class Watched(Forecast):
     def at_all(self, points: Sequence[Point], **how: Any) -> list[list[LogPart]]:
         """Return what the logs say at several points; samples that are not seen say nothing."""
         which = range(len(self.cases)) if how.get("cases") is None else how["cases"]
-        self.purse.check()
+        if self.seen is not None:
+            self.purse.check()
         before = self.work
         found = super().at_all(points, **how)
         self.purse.left -= self.price * (self.work - before)
@@ -241,16 +242,27 @@ class Bench:
         return self.task.loss.cost(np.concatenate(kept) / self.noise)
 
     def _run(self, forecast: Watched, start: Point) -> Point:
-        """Search, and search on in the noise of what is left."""
-        cheap, found = forecast.price <= DEAR, start
-        for _ in range(_ROUNDS if cheap else 1):
-            search = self.search(forecast)
-            least = _LEAST * max(search.costs([found])[0], 1.0)
-            found = search.run(found, most=_STEPS if cheap else _FEW_STEPS,
-                               least_gain=least if math.isfinite(least) else 1.0).point
-            if not _finer(forecast, found):
-                break
-        return found
+        """Search, and search on in the noise of what is left; a search that may not go on ends at its best so far.
+
+        Raises
+        ------
+        Spent
+            If it may not even begin.
+        """
+        cheap, reached = forecast.price <= DEAR, [start]
+        try:
+            for _ in range(_ROUNDS if cheap else 1):
+                search = self.search(forecast)
+                least = _LEAST * max(search.costs(reached[-1:])[0], 1.0)
+                reached.append(search.run(reached[-1], most=_STEPS if cheap else _FEW_STEPS,
+                                          tell=lambda _, best: reached.append(best.point),
+                                          least_gain=least if math.isfinite(least) else 1.0).point)
+                if not _finer(forecast, reached[-1]):
+                    break
+        except Spent:
+            if len(reached) == 1:
+                raise
+        return reached[-1]
 
     def judged(self, forecast: Watched, point: Point) -> tuple[Array, ...]:
         """Return the residuals of the angle at all samples, log by log (SI)."""
@@ -261,6 +273,7 @@ class Bench:
 
     def copies(self, k: int, logs: Sequence[Log], point: Point) -> list[Array]:
         """Return the residuals of the angle of copies of one log with other commands or times, in one batch (SI)."""
+        self.purse.check()
         old = self.base.forecast
         forecast = Watched(self.purse, 1.0, logs, old.model, old.space, old.nuisance, old.sensors)
         forecast.goes_on_from(old)

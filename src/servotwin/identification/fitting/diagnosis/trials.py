@@ -24,6 +24,7 @@ _LOGS = 4  # that are tried
 _EXPLAINED = 1.2  # times the sensor's noise: then nothing else is tried
 _ALIKE = 1.05  # times the least error: then the simpler is named first
 _MOST = 5  # causes that are told
+_SHARES = 2.0  # of what is left for a group: what one trial may take
 _KINDS = {"sign": ("sign", "an angle that counts against the command", 'mend=("sign",)'),
           "wrap": ("wrap", "an angle that wraps", 'mend=("wrap",)'),
           "stamps": ("stamps", "stamps that run at another rate than the servo", 'mend=("stamps",)'),
@@ -65,9 +66,10 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
     groups = _ordered(bench, traces)
     count, k, left = sum(map(len, groups)), 0, purse.left
     for group in groups:
-        # No group can use up what the next one needs
-        purse.left = allowed = left if group is groups[-1] else 0.5 * left
-        for name, try_it in group:
+        # No group can use up what the next one needs, and no trial what those after it need
+        allowed = left if group is groups[-1] else 0.5 * left
+        for waiting, (name, try_it) in zip(range(len(group), 0, -1), group, strict=True):
+            purse.left = given = min(_SHARES / waiting, 1.0) * allowed
             tell(k / count, f"trying: {name}")
             told = _told(bench, try_it)
             k += 1
@@ -75,7 +77,7 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
                 found.append((_cause(told, sensor), k))
                 if told.gain.after < _EXPLAINED * noise:
                     return _ranked(found)
-        left -= allowed - purse.left
+            left, allowed = left - given + purse.left, allowed - given + purse.left
     return _ranked(found)
 
 
