@@ -13,7 +13,7 @@ from servotwin.errors import InputError
 from servotwin.identification import findings, identify, validate
 from servotwin.identification.fitting.findings import MENDED, mended
 from servotwin.identification.fitting.suspicions.beat import beat_of
-from servotwin.identification.fitting.suspicions.look import look, noise_of
+from servotwin.identification.fitting.suspicions.look import look, rough_noise
 
 MODEL = st.PulseServo(TRUTH)
 MOTIONS = ("step", "prbs", "triangle")
@@ -226,8 +226,8 @@ def test_noise_needs_no_model():
     """A moving signal, white noise: its standard deviation; counts: that of a step."""
     t = np.arange(400) * 0.02
     rng = np.random.default_rng(1)
-    assert noise_of(np.sin(3.0 * t) + 2e-3 * rng.standard_normal(400)) == pytest.approx(2e-3, rel=0.15)
-    assert noise_of(ENCODER * np.round(np.sin(3.0 * t) / ENCODER)) >= 0.99 * ENCODER / np.sqrt(12.0)
+    assert rough_noise(np.sin(3.0 * t) + 2e-3 * rng.standard_normal(400)) == pytest.approx(2e-3, rel=0.15)
+    assert rough_noise(ENCODER * np.round(np.sin(3.0 * t) / ENCODER)) >= 0.99 * ENCODER / np.sqrt(12.0)
 
 
 def test_a_look_at_a_potentiometer_tap(logs):

@@ -10,7 +10,7 @@ from identification.fits import FREE, TRUTH, WRONG, fitted, some
 from servotwin.identification import Log
 from servotwin.identification.fitting.frames import gap_of, gaps, latency, near_edges, signal, widest
 from servotwin.identification.fitting.point import Frames
-from servotwin.identification.logs.beat import beat, on_beat
+from servotwin.identification.logs.regular import made_regular, regular_times
 
 PERIOD = 0.02
 DEFAULT = ("delay", "frame_phase", "angle_offset", "initial_state")
@@ -76,12 +76,12 @@ def test_later_pulses_move_the_motion_by_as_much():
 def test_a_beat_is_found_behind_stamps_that_scatter():
     rng = np.random.default_rng(1)
     true = 0.02 * np.delete(np.arange(200), [50, 51])
-    found = beat(true + 2e-3 * rng.standard_normal(len(true)).clip(-2.0, 2.0))
+    found = regular_times(true + 2e-3 * rng.standard_normal(len(true)).clip(-2.0, 2.0))
     assert found.step == pytest.approx(0.02, rel=1e-4)
     assert found.scatter == pytest.approx(2e-3, rel=0.2)
     np.testing.assert_allclose(found.times, true, atol=8e-4)
-    assert beat(np.cumsum(rng.exponential(0.02, 300))) is None
-    assert on_beat(uneven()).name == "uneven"
+    assert regular_times(np.cumsum(rng.exponential(0.02, 300))) is None
+    assert made_regular(uneven()).name == "uneven"
 
 
 @pytest.mark.parametrize(("jitter", "clock"), [(1e-9, 0.0), (1e-6, 0.0), (0.0, -1e-6)],

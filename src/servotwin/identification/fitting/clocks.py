@@ -11,7 +11,7 @@ import numpy as np
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.phases import Scan, drifts, likely_periods, settled, with_period
 from servotwin.identification.fitting.point import PERIOD_SCALE, Point
-from servotwin.identification.logs.beat import beat, on_beat
+from servotwin.identification.logs.regular import made_regular, regular_times
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.task import Task
@@ -47,7 +47,7 @@ def with_clocks(task: Task, start: Point, tell: Told, began: float) -> Point:
         if [task.forecast.frames_of(point, k) for k in task.fitted] == before:
             break
     point = _held(task, point, tell, began)
-    return _with_period(task, _with_beat(task, point, tell, began), tell, began)
+    return _with_period(task, _with_regular_times(task, point, tell, began), tell, began)
 
 
 def _held(task: Task, point: Point, tell: Told, began: float) -> Point:
@@ -65,23 +65,24 @@ def _held(task: Task, point: Point, tell: Told, began: float) -> Point:
     return after.point
 
 
-def _with_beat(task: Task, point: Point, tell: Told, began: float) -> Point:
-    """Take the samples of all logs on their beat where stamps scatter about it and the motion does not."""
-    beats = [beat(case.log.time) for case in task.forecast.cases]
-    scatter = max((b.scatter for b in beats if b is not None), default=0.0)
+def _with_regular_times(task: Task, point: Point, tell: Told, began: float) -> Point:
+    """Take samples as regular where stamps scatter about regular times and the motion does not."""
+    several = [regular_times(case.log.time) for case in task.forecast.cases]
+    scatter = max((one.scatter for one in several if one is not None), default=0.0)
     if scatter < _SCATTER:
         return point
     tell(began, "stamps")
     old = task.forecast
-    regular = Forecast([on_beat(case.log) for case in old.cases], old.model, old.space, old.nuisance, old.sensors)
-    other = task.like(regular)
-    found = other.ran(point._replace(frames=regular.frames), tell, began)
+    even = Forecast([made_regular(case.log) for case in old.cases], old.model, old.space, old.nuisance, old.sensors)
+    other = task.like(even)
+    found = other.ran(point._replace(frames=even.frames), tell, began)
     found = other.ran(settled(other.scan(found.point), task.fitted), tell, began)
     if not task.pays(point, other, found.point):
         return point
-    task.become(other, f"stamps scatter by {1e3 * scatter:.2g} ms about their beat, the motion does not: samples count "
-                       "as taken on the beat")
-    task.stamps_off = {k: 2.0 * b.scatter / math.sqrt(len(b.times)) for k, b in enumerate(beats) if b is not None}
+    task.become(other, f"stamps scatter by {1e3 * scatter:.2g} ms about regular times, the motion does not: samples "
+                       "count as taken at those")
+    task.stamps_off = {k: 2.0 * one.scatter / math.sqrt(len(one.times))
+                       for k, one in enumerate(several) if one is not None}
     task.measure(found.point)
     return found.point
 

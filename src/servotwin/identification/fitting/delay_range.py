@@ -19,8 +19,8 @@ from servotwin.identification.fitting.frames import gap_of, near_edges
 from servotwin.identification.fitting.phases import Choice, Scan
 from servotwin.identification.fitting.point import DELAY_SCALE, LogPart
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
-from servotwin.identification.logs.beat import beat
 from servotwin.identification.logs.log import Log
+from servotwin.identification.logs.regular import regular_times
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ def unsure_commands(scan: Scan, credible: Mapping[int, Sequence[Choice]]) -> tup
 
 def _scatter(log: Log) -> float:
     """Return how far off their beat the stamps of commands lie at most [s]; where they have none, they are believed."""
-    found = beat(log.time)
+    found = regular_times(log.time)
     if found is None:
         return 0.0
     off = np.abs(log.time - found.times)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.fit import Fit, Trace
@@ -13,7 +15,9 @@ from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, rows_of
 from servotwin.identification.fitting.verdict import Cause, Verdict, judge, shown
+from servotwin.identification.logs.log import ANGLES
 
+_OUTLIERS = 0.005  # of the samples: then they are told
 _EFFORT = 3.0  # times that of the fit, for all trials: the verdict itself and their start are not counted
 
 
@@ -58,9 +62,6 @@ def with_verdict(task: Task, point: Point, fit: Fit, show: Callable[[float, str]
     return replace(fit, verdict=verdict, warnings=(*said, *fit.warnings))
 
 
-_OUTLIERS = 0.005  # of the samples: then they are told
-
-
 def _with_causes(verdict: Verdict, causes: Sequence[Cause], *, tried: bool) -> str:
     if verdict.holds or not tried:
         return verdict.sentence
@@ -71,8 +72,6 @@ def _with_causes(verdict: Verdict, causes: Sequence[Cause], *, tried: bool) -> s
 
 def _outliers(verdict: Verdict, traces: Sequence[Trace], sensor: str) -> tuple[Cause, ...]:
     """Return samples that lie far off alone as a cause, without any trial."""
-    import numpy as np
-
     if verdict.outliers < _OUTLIERS:
         return ()
     every = np.concatenate([trace.residual for trace in traces])
@@ -93,11 +92,9 @@ def _rows(task: Task, point: Point) -> list[Rows]:
 
 def _others(task: Task) -> dict[str, float]:
     """Return the noise of sensors that are no angles, as far as neighbours show it (SI)."""
-    import numpy as np
-
     found = {}
     for name in task.forecast.sensors:
-        if name in ("output_angle", "feedback_voltage"):
+        if name in ANGLES:
             continue
         cases = [case for case in (task.forecast.cases[k] for k in task.fitted) if name in case.places]
         flat = [Series(case.log, case.times[case.places[name]] + case.log.start, case.values[name],

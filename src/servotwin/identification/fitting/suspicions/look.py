@@ -120,7 +120,7 @@ def look(log: Log, model: Model) -> Look | None:
     values = log.measured[name]
     angle = (values - _offset(here)) / _gain(here) if name == "feedback_voltage" else values
     counts = log.used(name) if log.torque_on is None else log.used(name) & log.torque_on
-    noise = noise_of(angle[counts])
+    noise = rough_noise(angle[counts])
     smooth = counts.copy()
     smooth[counts] = _near_others(time[counts], angle[counts], speed, noise)
     return Look(log, here, time, asked, drive, np.asarray(angle), counts, smooth, noise, speed)
@@ -167,13 +167,13 @@ def said_times(time: Array, most: int = 3) -> str:
     return f"{count}, at {first} s" + (", ..." if len(time) > most else "")
 
 
-def noise_of(values: Array) -> float:
+def rough_noise(values: Array) -> float:
     """Return the noise of an otherwise smooth signal, from the median of its second differences; at least its steps'.
 
     Examples
     --------
     >>> rng = np.random.default_rng(0)
-    >>> 0.009 < noise_of(np.sin(np.linspace(0.0, 6.0, 500)) + 0.01 * rng.standard_normal(500)) < 0.011
+    >>> 0.009 < rough_noise(np.sin(np.linspace(0.0, 6.0, 500)) + 0.01 * rng.standard_normal(500)) < 0.011
     True
     """
     if len(values) < 4:

@@ -1,4 +1,4 @@
-"""The beat of a log: the regular times behind stamps that scatter about them."""
+"""The regular times behind stamps that scatter about them."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 20  # of reweighting
 _MOST = 0.5  # of a step: a stamp further off may belong to the next sample
-_REGULAR = 0.9  # of all stamps are nearer, or there is no beat
+_REGULAR = 0.9  # of all stamps are nearer, or they are not regular
 
 
-class Beat(NamedTuple):
+class Regular(NamedTuple):
     """A straight line through stamps.
 
     Parameters
@@ -35,12 +35,12 @@ class Beat(NamedTuple):
     scatter: float
 
 
-def beat(time: Array) -> Beat | None:
-    """Return the beat of stamps; None where they have none. Samples may be missing.
+def regular_times(time: Array) -> Regular | None:
+    """Return the regular times behind stamps; None where there are none. Samples may be missing.
 
     Examples
     --------
-    >>> found = beat(np.array([0.0, 0.021, 0.04, 0.059, 0.08, 0.12]))
+    >>> found = regular_times(np.array([0.0, 0.021, 0.04, 0.059, 0.08, 0.12]))
     >>> round(found.step, 3), [round(float(t), 2) for t in found.times]
     (0.02, [0.0, 0.02, 0.04, 0.06, 0.08, 0.12])
     """
@@ -52,7 +52,7 @@ def beat(time: Array) -> Beat | None:
         times = first + step * number
         off = np.abs(time - times)
         if step > 0.0 and np.mean(off < _MOST * step) > _REGULAR:
-            return Beat(step, times, 1.4826 * float(np.median(off)))
+            return Regular(step, times, 1.4826 * float(np.median(off)))
     return None
 
 
@@ -66,7 +66,7 @@ def _line(number: Array, time: Array) -> tuple[float, float]:
     return float(step), float(first)
 
 
-def on_beat(log: Log) -> Log:
-    """Return a log whose samples and commands lie on its beat; itself where it has none."""
-    found = beat(log.time)
+def made_regular(log: Log) -> Log:
+    """Return a log whose samples and commands come at regular times; itself where it has none."""
+    found = regular_times(log.time)
     return log if found is None else replace(log, time=found.times)
