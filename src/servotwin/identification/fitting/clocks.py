@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.noise import Series, noise_of
 from servotwin.identification.fitting.phases import Scan, drifts, likely_periods, settled, with_period
 from servotwin.identification.fitting.point import PERIOD_SCALE, Point
+from servotwin.identification.fitting.scatter import by_sensor
+from servotwin.identification.logs.log import ANGLES
 from servotwin.identification.logs.regular import made_regular, regular_times
 
 if TYPE_CHECKING:
@@ -19,8 +22,10 @@ if TYPE_CHECKING:
 Told = Callable[[float, str], None]
 
 _ROUNDS = 2  # of assignment and search
+_MOST_ROUNDS, _FALLS = 6, 0.95  # of pulses of another period, while the cost falls to less than that share
 _HELD_PAYS = 3.0  # of the cost: an odds ratio of 20
 _NEAR_PAYS = 4.0  # of the cost, for each independent residual: what one more number has to gain, a chance of 0.5 %
+_MORE = 1.3  # times the noise: what a period that is off by more than quartz clocks are leaves
 _SCATTER = 2e-5  # s, of stamps: less is a tenth of a milliradian at 5 rad/s
 
 
@@ -95,16 +100,21 @@ def _with_period(task: Task, point: Point, tell: Told, began: float) -> Point:
     old = task.forecast
     if "frame_period" in old.extra:
         return _at_likely_period(task, task, point, tell, began)
-    if len({case.period for case in old.cases}) > 1 or not drifts(old, task.loss, point, task.fitted):
+    if len({case.period for case in old.cases}) > 1:
+        return point
+    far_off = _is_more_than_noise(task, point) and drifts(old, task.loss, point, task.fitted, remember=False)
+    if not far_off and not drifts(old, task.loss, point, task.fitted):
         return point
     tell(began, "period of the pulses")
     wider = task.like(Forecast(
         [case.log for case in old.cases], old.model, old.space, (*old.nuisance, "frame_period"), old.sensors))
     near = wider.ran(_with_its_period(point, task.period), tell, began).point
-    found = near if task.pays(point, wider, near, _NEAR_PAYS) else point
-    if found is point or drifts(wider.forecast, task.loss, near, task.fitted):
+    found = point
+    if task.pays(point, wider, near, _NEAR_PAYS):
+        found = near = _assigned_anew(wider, near, tell, began, rounds=1)
+    if far_off and _is_more_than_noise(wider, near):
         far = _at_likely_period(task, wider, point, tell, began)
-        if far is not point and wider.cost(far) < wider.cost(near) and task.pays(point, wider, far):
+        if wider.cost(far) < wider.cost(near) and task.pays(point, wider, far):
             found = far
     if found is point:
         return point
@@ -116,7 +126,7 @@ def _with_period(task: Task, point: Point, tell: Told, began: float) -> Point:
 
 
 def _at_likely_period(task: Task, wider: Task, point: Point, tell: Told, began: float) -> Point:
-    """Return where a search ends that begins at the periods which explain most; the same point where none does.
+    """Return where a search ends that begins at the periods which explain most.
 
     A period that is wrong by some per cent bends all parameters, so that no other would fit better with these. So they
     are held near where they began until it is found.
@@ -125,18 +135,30 @@ def _at_likely_period(task: Task, wider: Task, point: Point, tell: Told, began: 
     tell(began, "period of the pulses")
     near = task.like(task.forecast, prior=task.near_start())
     scan = near.scan(near.ran(settled(near.scan(_from_start(task, point)), task.fitted), tell, began).point)
-    likely = likely_periods(scan, task.fitted, asked=asked)
-    if not likely:
-        return point
+    likely = likely_periods(scan, task.fitted)
     near = wider.like(wider.forecast, prior=wider.near_start())
     tried = [near.ran(_moved(scan, task.fitted, period, asked=asked), tell, began) for period in likely]
     found = min(tried, key=lambda outcome: outcome.cost).point
-    for _ in range(_ROUNDS):
-        exact = _at_period(wider.forecast, found)
-        found = wider.ran(settled(wider.scan(exact), task.fitted), tell, began).point
+    # A period that is nearly right tells far more of when pulses come: once more from the start with it
+    again = _at_its_period(wider.forecast, _from_start(task, found))
+    again = near.ran(settled(near.scan(again), task.fitted), tell, began).point
+    found = min((_assigned_anew(wider, one, tell, began) for one in (found, again)), key=wider.cost)
     if asked:
         task.measure(found)
     return found
+
+
+def _is_more_than_noise(task: Task, point: Point) -> bool:
+    """Tell whether residuals are so much larger than the sensor's own noise that another period may be the reason."""
+    forecast, series = task.forecast, []
+    for k, part in zip(task.fitted, forecast.at(point, derivatives=False, cases=task.fitted), strict=True):
+        case, residuals = forecast.cases[k], by_sensor(forecast, k, part)
+        name = next(name for name in ANGLES if name in case.places)
+        measured = case.values[name]
+        series.append(Series(case.log, case.log.start + case.times[case.places[name]], measured,
+                             measured + residuals[name]))
+    left = float(np.sqrt(np.mean(np.concatenate([one.residual for one in series]) ** 2)))
+    return left > _MORE * noise_of(series).size
 
 
 def _from_start(task: Task, point: Point) -> Point:
@@ -156,8 +178,20 @@ def _with_its_period(point: Point, period: float) -> Point:
     return point._replace(shared=np.append(point.shared, period / PERIOD_SCALE))
 
 
-def _at_period(forecast: Forecast, point: Point) -> Point:
+def _at_its_period(forecast: Forecast, point: Point) -> Point:
     """Return a point whose commands go to pulses of the period that it found."""
     period = forecast.nuisance_of(point.shared, "frame_period")
     frames = [forecast.frames_of(point, k) for k in range(len(forecast.cases))]
     return point._replace(frames=tuple(f._replace(period=period) for f in frames))
+
+
+def _assigned_anew(wider: Task, point: Point, tell: Told, began: float, rounds: int = _MOST_ROUNDS) -> Point:
+    """Search on from a point with its commands assigned to pulses of the period that it found, while that pays."""
+    cost = math.inf
+    for _ in range(rounds):
+        exact = _at_its_period(wider.forecast, point)
+        found = wider.ran(settled(wider.scan(exact), wider.fitted), tell, began)
+        if found.cost > _FALLS * cost:
+            break
+        point, cost = found.point, found.cost
+    return point

@@ -47,6 +47,7 @@ _PERIOD = "electronics.frame_period"
 _BEFORE = 5  # pulses: by then a servo hunts as it will
 _HOLDS = 0.5  # of the friction that a servo file says: what it surely holds without drives
 _HELD = 1e-6  # of its scale: how far a number moves that stays
+_KEPT = 500  # commands
 _POTENTIOMETER = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")
 
 
@@ -98,6 +99,7 @@ class Forecast:
         delayed = any(name in nuisance for name in ("delay", "log_delay", "frame_phase"))
         self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
         self.strict = True
+        self._commands: dict[tuple[Any, ...], Signal] = {}  # points of a search often differ in other numbers only
         self.work = 0.0  # seconds of one lane that were simulated
         self.phased = "frame_phase" in nuisance and _PERIOD not in space.names and all(c.period for c in self.cases)
         self.extra = tuple(name for name in SHARED if name in nuisance and (name != "frame_period" or self.phased))
@@ -168,7 +170,12 @@ class Forecast:
         first = float(point.own[k][self.names_of_own(case).index("frame_phase")]) * DELAY_SCALE
         frames = self.frames_of(point, k)
         period = self.nuisance_of(point.shared, "frame_period") or frames.period
-        return signal(case.log, frames, first, period, self.lead(case))
+        sent = (k, frames, first, period, self.lead(case))
+        if sent not in self._commands:
+            if len(self._commands) >= _KEPT:
+                self._commands.clear()
+            self._commands[sent] = signal(case.log, *sent[1:])
+        return self._commands[sent]
 
     def lead(self, case: Case) -> float:
         """Return how long before the first sample the simulation of a log begins [s]."""

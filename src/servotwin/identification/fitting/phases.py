@@ -30,7 +30,6 @@ _MOST_PHASES = 16  # for each period
 _REACH = 0.06  # of a period, either way: more than a PCA9685's clock is off by its data sheet
 _FINE = (1e-5, 3e-5, 1e-4, 2e-4, 4e-4, 8e-4)  # of a period: quartz clocks
 _WINDOWS = 6  # of a log, that are compared
-_PAYS = 3.0  # of the cost: what another period has to gain for another look
 _UNLIKELY = 100.0  # times the weight of the best: pulses that count no more
 _DRIFTS = 1e-2  # how often pulses that do not drift would look as if
 
@@ -174,11 +173,12 @@ def credible(scan: Scan, cases: Sequence[int]) -> dict[int, list[Choice]]:
     return found
 
 
-def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int]) -> bool:
+def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int], *, remember: bool = True) -> bool:
     """Tell whether the pulses of some logs come later or earlier and earlier in the course of a log.
 
-    What each window of a log says of its delay scatters as residuals that remember each other make it, or more (chi
-    squared). What a model lacks makes it too, so that this says only whether it is worth to look.
+    What each window of a log says of its delay scatters as residuals make it, or more (chi squared). What a model lacks
+    makes it too, so that this says only whether it is worth to look. `remember=False` takes residuals as independent:
+    pulses that are far off leave residuals which follow each other.
     """
     from scipy.special import chdtrc
 
@@ -187,7 +187,7 @@ def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int]) -
     if not all(np.isfinite(part.residual).all() for part in parts):
         return False
     r = [np.clip(part.residual, -loss.limit, loss.limit) for part in parts]
-    power = widening(parts, loss) * sum(float(x @ x) for x in r) / max(sum(map(len, r)), 1)
+    power = (widening(parts, loss) if remember else 1.0) * sum(float(x @ x) for x in r) / max(sum(map(len, r)), 1)
     for x, part in zip(r, parts, strict=True):
         g = part.later
         share = np.cumsum(g**2)
@@ -204,8 +204,8 @@ def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int]) -
     return freedom > 0 and float(chdtrc(freedom, total)) < _DRIFTS
 
 
-def likely_periods(scan: Scan, cases: Sequence[int], *, asked: bool) -> list[float]:
-    """Return the frame periods that some logs fit best, the best first [s]; none where the present one does as well."""
+def likely_periods(scan: Scan, cases: Sequence[int]) -> list[float]:
+    """Return the frame periods that some logs fit best, the best first [s]."""
     forecast = scan.forecast
     rich = sorted(cases, key=lambda k: -len(gaps(forecast.cases[k].log, scan.now(k).frames.period)))[:_FIRST_LOGS]
     nominal = scan.now(rich[0]).frames.period
@@ -224,8 +224,6 @@ def likely_periods(scan: Scan, cases: Sequence[int], *, asked: bool) -> list[flo
             least[period] = min(trial.cost, least.get(period, math.inf))
         for period, cost in least.items():
             costs[period] = costs.get(period, 0.0) + cost
-    if not asked and min(costs.values()) > costs[nominal] - _PAYS:
-        return []
     found: list[float] = []
     for period in sorted(costs, key=lambda period: costs[period]):
         if all(abs(period - other) > 2.0 * _step(nominal, longest) for other in found):
