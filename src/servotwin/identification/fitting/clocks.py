@@ -25,7 +25,7 @@ _ROUNDS = 2  # of assignment and search
 _MOST_ROUNDS, _FALLS = 6, 0.95  # of pulses of another period, while the cost falls to less than that share
 _HELD_PAYS = 3.0  # of the cost: an odds ratio of 20
 _NEAR_PAYS = 4.0  # of the cost, for each independent residual: what one more number has to gain, a chance of 0.5 %
-_MORE = 1.3  # times the noise: what a period that is off by more than quartz clocks are leaves
+_MORE = 2.0  # times the noise: what a period that is off by more than quartz clocks are leaves
 _SCATTER = 2e-5  # s, of stamps: less is a tenth of a milliradian at 5 rad/s
 
 

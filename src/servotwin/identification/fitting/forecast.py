@@ -10,6 +10,7 @@ import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,7 @@ _BEFORE = 5  # pulses: by then a servo hunts as it will
 _HOLDS = 0.5  # of the friction that a servo file says: what it surely holds without drives
 _HELD = 1e-6  # of its scale: how far a number moves that stays
 _KEPT = 500  # commands
+_WORTH = 4e-3  # s of simulation: three times what a call costs besides
 _POTENTIOMETER = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")
 
 
@@ -100,6 +102,7 @@ class Forecast:
         self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
         self.strict = True
         self._commands: dict[tuple[Any, ...], Signal] = {}  # points of a search often differ in other numbers only
+        self._pace = 0.0  # seconds that a second of one lane takes, as far as is known
         self.work = 0.0  # seconds of one lane that were simulated
         self.phased = "frame_phase" in nuisance and _PERIOD not in space.names and all(c.period for c in self.cases)
         self.extra = tuple(name for name in SHARED if name in nuisance and (name != "frame_period" or self.phased))
@@ -220,7 +223,7 @@ class Forecast:
         groups: dict[tuple[Any, ...], list[LogLanes]] = {}
         for lane in lanes:
             groups.setdefault((lane.case.key, lane.delay), []).append(lane)
-        jobs = [job for group in groups.values() for job in _split(group)]
+        jobs = [job for group in groups.values() for job in _split(group, self._pace)]
         jobs.sort(key=lambda job: -sum(lane.cost for lane in job))
         if len(jobs) == 1 or _workers() == 1:
             for job in jobs:
@@ -267,12 +270,15 @@ class Forecast:
         names = dict.fromkeys((*(name for name in self.sensors if name in case.places), "output_speed",
                                *(["bus_voltage"] if sags else [])))
         lanes = sum(lane.count for lane in job)
+        began = perf_counter()
         batch = simulate_lanes(
             lanes_of(self.model, [signal for lane in job for signal in lane.signals],
                      [load for lane in job for load in [lane.case.log.load] * lane.count], columns, initial or None,
                      np.zeros(lanes, np.int64)),
             duration=max(float(asked.max()), case.log.duration), output_times=asked[order], outputs=tuple(names),
             executor=_HERE)
+        pace = (perf_counter() - began) / sum(lane.cost for lane in job)
+        self._pace = min(pace, self._pace or pace)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
         signals = {name: np.asarray(batch[name][:, back] if later else batch[name], np.float64) for name in names}
@@ -287,9 +293,10 @@ class Forecast:
             first += lane.count
 
 
-def _split(group: list[LogLanes]) -> list[list[LogLanes]]:
-    """Return the lanes of a group as jobs, about two a core."""
-    parts = min(len(group), 2 * _workers())
+def _split(group: list[LogLanes], pace: float) -> list[list[LogLanes]]:
+    """Return the lanes of a group as jobs, at most two a core, and only as many as are worth the call of each."""
+    worth = sum(lane.cost for lane in group) * pace / _WORTH
+    parts = max(1, min(len(group), 2 * _workers(), round(worth)))
     return [group[len(group) * k // parts:len(group) * (k + 1) // parts] for k in range(parts)]
 
 
