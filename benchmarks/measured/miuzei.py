@@ -47,7 +47,7 @@ def main(folder: Path) -> None:
             start = start.replace({"friction.load_friction_motor": 0.01})
         for names in folds(logs, FOLDS):
             fit = st.identify(logs, start, free=[*M1, *terms], priors=None, holdout=names, starts=1, intervals=False,
-                              noise=NOISE, compare_with=() if terms else ("slew",))
+                              noise=NOISE, diagnose=False, compare_with=() if terms else ("slew",))
             errors += fit.holdout.errors["PulseServo"]
             fitted += fit.training.errors["PulseServo"]
             slew += fit.holdout.errors.get("delay + slew + lag", ())

@@ -98,6 +98,17 @@ def test_a_clock_that_is_off_by_nothing_changes_nothing(jitter, clock):
     assert high - low < 0.0115
 
 
+@pytest.mark.parametrize("clock", [-4e-4, 4e-4])
+def test_pulses_that_drift_a_little_get_a_period_of_their_own(clock):
+    """As far as quartz clocks are off: residuals are hardly larger for it, and parameters were biased."""
+    logs = [replace(log, time=log.time * (1.0 + clock)) for log in some(duration=3.0)]
+    fit = fitted(logs, servo=WRONG, free=FREE, nuisance=DEFAULT)
+    assert any("their period was fitted too" in line for line in fit.warnings)
+    assert fit.estimates["frame_period"] == pytest.approx(0.01 * (1.0 + clock), rel=1e-4)
+    low, high, _ = fit.intervals()["delay"]
+    assert low < 0.05 < high
+
+
 def test_a_held_out_log_is_judged_on_its_second_half():
     logs = some(motions=("step", "prbs", "triangle", "step"))
     logs[3] = replace(logs[3], name="other", time=logs[3].time + 3e-3)

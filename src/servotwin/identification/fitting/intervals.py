@@ -1,7 +1,7 @@
 """Intervals: by the normal approximation where the cost is a parabola, by the profile of the cost where it is not.
 
 A profile fixes one number, fits all others again, and asks where the cost has risen as much as chance allows (Venzon &
-Moolgavkar 1988). Whether it is needed is seen from the cost at the two ends of the normal interval.
+Moolgavkar 1988). Whether it is needed is seen from the cost at the two ends of the normal interval, and beyond.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
 Array = NDArray[np.float64]
 
 _FAITHFUL = (0.7, 1.4)  # of the expected rise of the cost: standard errors right within about a sixth
+_FAR = (2.0, 4.0)  # times as far as the ends: between them the cost of a number alone rises too,
+_RISES, _HIGH = 1.5, 50.0  # by more than this factor, or it is flat behind a cliff; unless it is so much above the ends
+_STAYS = 0.01  # of the root of the rise: farther out the cost is the same
 _ROUNDS = 9  # of the search for an end
 
 
@@ -65,7 +68,9 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
     reaches = {k: doubt.quantile(level, k) for k in which}
     both = [(k, side) for k in which for side in (-1.0, 1.0)]
     points = [moved(search, best, doubt, k, side * reaches[k], rows) for k, side in both]
-    rises = dict(zip(both, (cost - best.cost for cost in search.costs(points)), strict=True)) if both else {}
+    beyond = [begins(search, best, doubt, k, far * side * reaches[k], rows)[1] for far in _FAR for k, side in both]
+    costs = iter(search.costs([*points, *beyond]) if both else [])
+    rises, near, far = ({one: next(costs) - best.cost for one in both} for _ in range(3))
     found = {}
     for done, k in enumerate(which, start=1):
         reach = reaches[k]
@@ -73,7 +78,8 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
         inside = all(search.lower[k] <= best.point.shared[k] + side * reach * doubt.std[k] <= search.upper[k]
                      for side in (-1.0, 1.0))
         faithful = all(_FAITHFUL[0] <= rises[k, side] / expected[side] <= _FAITHFUL[1] for side in (-1.0, 1.0))
-        if inside and faithful:
+        flat = any(far[k, side] < _RISES * near[k, side] < _HIGH * expected[side] for side in (-1.0, 1.0))
+        if inside and faithful and not flat:
             found[k] = Ends(-reach, reach, "normal")
         else:
             (low, of_low), (high, of_high) = (_end(search, best, doubt, k, side, reach, rows) for side in (-1.0, 1.0))
@@ -137,6 +143,7 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
         root = math.sqrt(max(rise, 0.0) / wanted)  # grows in proportion where the cost is a parabola
         if abs(root - 1.0) < 0.02:
             break
+        stays = at > low > 0.0 and abs(root - of_low) < _STAYS
         if root < 1.0:
             low, of_low = at, root
             if at >= farthest:
@@ -144,7 +151,7 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
         else:
             high, of_high = at, root
         if math.isinf(high):
-            flat = root < 0.4 and at > reach  # twice nothing: perhaps the logs allow all that there is on this side
+            flat = stays or (root < 0.4 and at > reach)  # perhaps the logs allow all that there is on this side
             at = farthest if flat else min(at * (1.0 / root if root > 0.4 else 2.5), farthest)
         elif high > 10.0 * max(low, 0.1):
             at = math.sqrt(max(low, 0.1) * high)
