@@ -116,8 +116,8 @@ def _with_period(task: Task, point: Point, tell: Told, began: float) -> Point:
         far = _at_likely_period(task, wider, point, tell, began)
         if wider.cost(far) < wider.cost(near) and task.pays(point, wider, far):
             found = far
-    if found is point:
-        return point
+    if found is point or _is_more_than_noise(wider, found):
+        return point  # what lacks something takes any further number: whether this one explains it, trials tell
     there = wider.forecast.nuisance_of(found.shared, "frame_period")
     task.become(wider, f"pulses come every {1e3 * there:.6g} ms by the logs, not every {1e3 * task.period:.6g} ms: "
                        "their period was fitted too")
@@ -131,18 +131,20 @@ def _at_likely_period(task: Task, wider: Task, point: Point, tell: Told, began: 
     A period that is wrong by some per cent bends all parameters, so that no other would fit better with these. So they
     are held near where they began until it is found.
     """
-    asked = wider is task
+    asked, few = wider is task, task.few()
     tell(began, "period of the pulses")
-    near = task.like(task.forecast, prior=task.near_start())
-    scan = near.scan(near.ran(settled(near.scan(_from_start(task, point)), task.fitted), tell, began).point)
-    likely = likely_periods(scan, task.fitted)
-    near = wider.like(wider.forecast, prior=wider.near_start())
-    tried = [near.ran(_moved(scan, task.fitted, period, asked=asked), tell, began) for period in likely]
+    near = task.like(task.forecast, task.near_start(), few)
+    scan = near.scan(near.ran(settled(near.scan(_from_start(task, point)), few), tell, began).point)
+    likely = likely_periods(scan, few)
+    near, free = wider.like(wider.forecast, wider.near_start(), few), wider.like(wider.forecast, wider.prior, few)
+    tried = [near.ran(_moved(scan, few, period, asked=asked), tell, began) for period in likely]
     found = min(tried, key=lambda outcome: outcome.cost).point
     # A period that is nearly right tells far more of when pulses come: once more from the start with it
     again = _at_its_period(wider.forecast, _from_start(task, found))
-    again = near.ran(settled(near.scan(again), task.fitted), tell, began).point
-    found = min((_assigned_anew(wider, one, tell, began) for one in (found, again)), key=wider.cost)
+    again = near.ran(settled(near.scan(again), few), tell, began).point
+    found = min((_assigned_anew(free, one, tell, began) for one in (found, again)), key=free.cost)
+    if few != task.fitted:
+        found = _assigned_anew(wider, found, tell, began, rounds=1)
     if asked:
         task.measure(found)
     return found

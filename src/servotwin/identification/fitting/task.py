@@ -105,7 +105,7 @@ class Task:
             shared = point.shared.copy()
             shared[place] = delay / DELAY_SCALE
             tried.append(point._replace(shared=shared))
-        found = self.forecast.at_all(tried, cases=self._few())
+        found = self.forecast.at_all(tried, cases=self.few())
         sizes = [sum(float(np.abs(part.residual).sum()) for part in parts) for parts in found]
         return tried[int(np.argmin([size if math.isfinite(size) else math.inf for size in sizes]))]
 
@@ -170,10 +170,11 @@ class Task:
         parts = self.forecast.at(point, derivatives=False, cases=self.fitted)
         return Scan(self.forecast, self.loss, point, widening(parts, self.loss))
 
-    def like(self, forecast: Forecast, prior: Prior | None = None) -> Task:
-        """Return the same search over another forecast in the same noise, perhaps with another prior."""
+    def like(self, forecast: Forecast, prior: Prior | None = None, cases: Sequence[int] | None = None) -> Task:
+        """Return the same search over another forecast in the same noise, perhaps with another prior or fewer logs."""
         forecast.goes_on_from(self.forecast)
-        made = Task(forecast, self.loss, self.fitted, self.seed, self.starts, self.noise)
+        fitted = self.fitted if cases is None else list(cases)
+        made = Task(forecast, self.loss, fitted, self.seed, self.starts, self.noise)
         made.prior = self.prior if prior is None and len(self.prior.mean) == forecast.size else prior or made.prior
         return made
 
@@ -200,7 +201,7 @@ class Task:
 
     def _rough(self, nominal: Point, tell: Told) -> list[Outcome]:
         """Search from several starts on some logs; return where that ended, the best first."""
-        few = self._few()
+        few = self.few()
         for k, start in enumerate(self._candidates(nominal, few)):
             text, share = f"start {k + 1} of {self.starts}", _STARTS / self.starts
             tell(k * share, text)
@@ -253,10 +254,10 @@ class Task:
         """Return where an interrupted search stood, or where an earlier start ended, if that is better."""
         known = [*self._ended, *([self._best] if self._best is not None else [])]
         if any(math.isfinite(outcome.cost) for outcome in known[1:]):
-            return self._on_one_scale(known, self._few())[0]
+            return self._on_one_scale(known, self.few())[0]
         return known[0] if known else Outcome(self.nominal(), math.inf, False, 0)
 
-    def _few(self) -> list[int]:
+    def few(self) -> list[int]:
         """Return some logs of every kind of motion, for the rough searches."""
         kinds: dict[str, list[int]] = {}
         for k in self.fitted:
