@@ -157,10 +157,12 @@ class Pieces:
 
     def bounds(self, end: float = math.inf) -> tuple[float, float]:
         """Return the lowest and highest value until `end` [s] (a sinusoid counts with its whole amplitude)."""
-        ends = (*self._starts[1:], math.inf)
-        begun = max(bisect_right(self._starts, end), 1)
-        ranges = [piece_range(p, max(min(e, end), p.start)) for p, e in zip(self.table[:begun], ends, strict=False)]
-        return min(r[0] for r in ranges), max(r[1] for r in ranges)
+        start, value, slope, amplitude = self.rows[:max(bisect_right(self._starts, end), 1), :4].T
+        ends = np.maximum(np.minimum(np.append(start[1:], math.inf), end), start)
+        with np.errstate(invalid="ignore"):
+            last = np.where(slope != 0.0, value + slope * (ends - start), value)
+        size = np.abs(amplitude)
+        return float((np.minimum(value, last) - size).min()), float((np.maximum(value, last) + size).max())
 
 
 def constant_pieces(value: float) -> Pieces:

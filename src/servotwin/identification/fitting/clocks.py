@@ -23,24 +23,37 @@ Told = Callable[[float, str], None]
 
 _ROUNDS = 2  # of assignment and search
 _MOST_ROUNDS, _FALLS = 6, 0.95  # of pulses of another period, while the cost falls to less than that share
+_PERIOD_LOGS = 4  # that a far period is sought on
+_EXPLAINS = 0.75  # of the cost: a period that is nearly right leaves less
 _HELD_PAYS = 3.0  # of the cost: an odds ratio of 20
 _NEAR_PAYS = 4.0  # of the cost, for each independent residual: what one more number has to gain, a chance of 0.5 %
 _MORE = 2.0  # times the noise: what a period that is off by more than quartz clocks are leaves
 _SCATTER = 2e-5  # s, of stamps: less is a tenth of a milliradian at 5 rad/s
 
 
-def with_clocks(task: Task, start: Point, tell: Told, began: float) -> Point:
+def with_clocks(task: Task, starts: Sequence[Point], tell: Told, began: float) -> Point:
     """Search with pulses that come alike for all logs, and then for what the clocks of these logs do.
 
     Parameters
     ----------
     task : Task
         Goes on with another forecast where the logs want another clock, and says so in its remarks.
-    start : Point
+    starts : sequence of Point
+        One for each valley: which is the deepest is seen where pulses come when they do.
     tell : callable
     began : float
         Share of the search that is done.
     """
+    ends = [_with_phases(task, start, tell, began) for start in starts]
+    point = min(ends, key=lambda one: one[1])[0]
+    task.measure(point)
+    point = _held(task, point, tell, began)
+    return _with_period(task, _with_regular_times(task, point, tell, began), tell, began)
+
+
+def _with_phases(task: Task, start: Point, tell: Told, began: float) -> tuple[Point, float]:
+    """Return where a search ends that finds the pulses of each log, and the logarithm of the noise there."""
+    task.forecast.own_phases = False
     point = task.ran(start, tell, began).point
     task.measure(point)
     task.forecast.own_phases = True
@@ -51,8 +64,7 @@ def with_clocks(task: Task, start: Point, tell: Told, began: float) -> Point:
         task.measure(point)
         if [task.forecast.frames_of(point, k) for k in task.fitted] == before:
             break
-    point = _held(task, point, tell, began)
-    return _with_period(task, _with_regular_times(task, point, tell, began), tell, began)
+    return point, math.fsum(math.log(value) for value in task.forecast.noise.values())
 
 
 def _held(task: Task, point: Point, tell: Told, began: float) -> Point:
@@ -131,14 +143,18 @@ def _at_likely_period(task: Task, wider: Task, point: Point, tell: Told, began: 
     A period that is wrong by some per cent bends all parameters, so that no other would fit better with these. So they
     are held near where they began until it is found.
     """
-    asked, few = wider is task, task.few()
+    asked, few = wider is task, task.few(_PERIOD_LOGS)
     tell(began, "period of the pulses")
     near = task.like(task.forecast, task.near_start(), few)
-    scan = near.scan(near.ran(settled(near.scan(_from_start(task, point)), few), tell, began).point)
+    here = near.ran(settled(near.scan(_from_start(task, point)), few), tell, began)
+    scan = near.scan(here.point)
     likely = likely_periods(scan, few)
     near, free = wider.like(wider.forecast, wider.near_start(), few), wider.like(wider.forecast, wider.prior, few)
     tried = [near.ran(_moved(scan, few, period, asked=asked), tell, began) for period in likely]
-    found = min(tried, key=lambda outcome: outcome.cost).point
+    best = min(tried, key=lambda outcome: outcome.cost)
+    if not asked and best.cost > _EXPLAINS * here.cost:
+        return _with_its_period(point, task.period)
+    found = best.point
     # A period that is nearly right tells far more of when pulses come: once more from the start with it
     again = _at_its_period(wider.forecast, _from_start(task, found))
     again = near.ran(settled(near.scan(again), few), tell, began).point

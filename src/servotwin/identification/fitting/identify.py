@@ -148,7 +148,7 @@ def identify(
     trials = checks.checked_flag("diagnose", diagnose)
     task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed,
                 checks.checked_count("starts", starts, least=1), checks.checked_noise(noise, seen))
-    with explained(noticed), checks.shown(progress) as show:
+    with checks.shown(progress) as show, explained(noticed):
         fit = _run(task, held_out, beside, level, show, intervals=intervals, trials=trials)
     fit = replace(fit, warnings=(*noticed, *fit.warnings), seconds=clock.monotonic() - began)
     return with_record(fit, read, fitted, mend)

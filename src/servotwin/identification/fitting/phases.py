@@ -25,8 +25,10 @@ _MOST_GAPS = 24  # of a log, that are tried at first
 _TIMES, _FINE_TIMES = 4, 16  # steps of a frame, either way
 _BEST = 3  # that are tried again where they then are best
 _FIRST_LOGS = 3  # of a scan of periods
+_FIRST_PULSES = 600  # after which no further log is taken
+_LIKELY = 5  # periods, that are searched from
 _MOST_PERIODS = 160
-_MOST_PHASES = 16  # for each period
+_MOST_PHASES = 8  # for each period
 _REACH = 0.06  # of a period, either way: more than a PCA9685's clock is off by its data sheet
 _FINE = (1e-5, 3e-5, 1e-4, 2e-4, 4e-4, 8e-4)  # of a period: quartz clocks
 _WINDOWS = 6  # of a log, that are compared
@@ -207,8 +209,10 @@ def drifts(forecast: Forecast, loss: Loss, point: Point, cases: Sequence[int], *
 def likely_periods(scan: Scan, cases: Sequence[int]) -> list[float]:
     """Return the frame periods that some logs fit best, the best first [s]."""
     forecast = scan.forecast
-    rich = sorted(cases, key=lambda k: -len(gaps(forecast.cases[k].log, scan.now(k).frames.period)))[:_FIRST_LOGS]
-    nominal = scan.now(rich[0]).frames.period
+    nominal = scan.now(cases[0]).frames.period
+    order = sorted(cases, key=lambda k: -len(gaps(forecast.cases[k].log, nominal)))
+    pulses = np.cumsum([forecast.cases[k].log.duration / nominal for k in order])
+    rich = [k for k, before in zip(order, [0.0, *pulses], strict=False) if before < _FIRST_PULSES][:_FIRST_LOGS]
     longest = max(forecast.cases[k].log.duration for k in rich)
     choices: dict[int, list[Choice]] = {k: [] for k in rich}
     of_period: dict[int, list[float]] = {k: [] for k in rich}
@@ -228,7 +232,7 @@ def likely_periods(scan: Scan, cases: Sequence[int]) -> list[float]:
     for period in sorted(costs, key=lambda period: costs[period]):
         if all(abs(period - other) > 2.0 * _step(nominal, longest) for other in found):
             found.append(period)
-    return found[:_BEST]
+    return found[:_LIKELY]
 
 
 def with_period(scan: Scan, cases: Sequence[int], period: float) -> Point:

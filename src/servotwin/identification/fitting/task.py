@@ -34,6 +34,9 @@ Array = NDArray[np.float64]
 HUBER = 1.345  # of the noise: as good as least squares to 5 % where the noise is normal (Huber 1964)
 _TRIED = 8  # random points for each search that is begun
 _FIRST_LOGS = 8  # of the first, rough searches
+_ALIKE, _NEARLY = 1.03, 1.3  # times the least cost of the rough searches, in which pulses do not come when they do
+_APART = 0.3  # the logarithm of a factor, between ends that are in different valleys
+_CLOSELY = 1e-4  # of the cost, for each residual: what a step has to gain between the rough searches and the last one
 _ROUGH = 0.003  # of the cost: what a step of a rough search has to gain
 _BLIND = 1e3  # times the noise: a sensor that does not count yet
 _MOST_OFFSET = 12.0  # rad, nearly two turns: an encoder's zero may be anywhere
@@ -152,14 +155,28 @@ class Task:
                 nominal, most=_MOST["all"], tell=self._kept(tell, began, began, "all", "all logs")).point
             self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
         if self.forecast.phased:
-            nominal = with_clocks(self, nominal, tell, began)
+            nominal = with_clocks(self, [nominal, *self._elsewhere(ended)], tell, began)
         best = self._refined(nominal, self.fitted, rounds=6, tell=tell, began=began)
         return best, ended or [best]
 
+    def _elsewhere(self, ended: Sequence[Outcome]) -> list[Point]:
+        """Return the best end that is nearly as good as the best of all and lies far from it, if there is one.
+
+        One that is just as good lies along what the logs do not determine.
+        """
+        if not ended:
+            return []
+        best, factors = ended[0], np.array([p.logarithmic for p in self.forecast.space.parameters])
+        size = len(factors)
+        far = [one.point for one in ended[1:] if _ALIKE < one.cost / best.cost < _NEARLY
+               and (np.abs(one.point.shared - best.point.shared)[:size][factors] > _APART).any()]
+        return far[:1]
+
     def ran(self, start: Point, tell: Told, began: float) -> Outcome:
-        """Search from a point on all logs that are fitted."""
+        """Search from a point on all logs that are fitted, as closely as is needed to choose between points."""
         keep = self._kept(tell, began, began, "all", "all logs")
-        return self._search(self.fitted).run(start, most=_MOST["all"], tell=keep)
+        least = _CLOSELY * sum(self.forecast.cases[k].count for k in self.fitted)
+        return self._search(self.fitted).run(start, most=_MOST["all"], tell=keep, least_gain=least)
 
     def measure(self, point: Point) -> None:
         """Take the noise of each sensor from its residuals at a point."""
@@ -257,12 +274,12 @@ class Task:
             return self._on_one_scale(known, self.few())[0]
         return known[0] if known else Outcome(self.nominal(), math.inf, False, 0)
 
-    def few(self) -> list[int]:
-        """Return some logs of every kind of motion, for the rough searches."""
+    def few(self, most: int = _FIRST_LOGS) -> list[int]:
+        """Return some logs of every kind of motion, about as many as asked for, for the rough searches."""
         kinds: dict[str, list[int]] = {}
         for k in self.fitted:
             kinds.setdefault(self.forecast.cases[k].log.motion, []).append(k)
-        share = min(1.0, _FIRST_LOGS / len(self.fitted))
+        share = min(1.0, most / len(self.fitted))
         found = []
         for members in kinds.values():
             count = max(1, math.ceil(share * len(members)))
