@@ -179,6 +179,8 @@ class Search:
         damping, small = 1e-3, 0
         scale = np.zeros(self.forecast.size)
         for k in range(1, most + 1):
+            if not all(np.isfinite(part.shared).all() and np.isfinite(part.own).all() for part in parts):
+                return best  # beside it is what no servo is: there is no slope to follow
             normal = self.normal(best.point, parts)
             # A gain is also small where the damping is high: what counts is what a whole step promises
             if self._promise(best.point, normal) < least_gain:
