@@ -33,6 +33,12 @@ def test_intervals_hold_the_truth_under_every_condition():
     assert np.sqrt(np.mean(np.square(off))) > 0.3
 
 
+@pytest.mark.slow
+def test_the_deepest_valley_is_found_where_pulses_come_when_they_do():
+    """With pulses that come alike for all logs another valley looks deeper: a fit ended in it at 1.10 mrad."""
+    assert judged("short logs", 3).rms < 1e-3
+
+
 # The same with many draws of noise on few servos, where chance scatters less. The logs are the package's own, their rig
 # is that of the Miuzei data: 50 Hz, a 12-bit encoder, pulses at 100 Hz, a dead time of 45 to 60 ms, 0.05 degrees rms.
 

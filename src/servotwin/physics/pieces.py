@@ -159,7 +159,7 @@ class Pieces:
         """Return the lowest and highest value until `end` [s] (a sinusoid counts with its whole amplitude)."""
         start, value, slope, amplitude = self.rows[:max(bisect_right(self._starts, end), 1), :4].T
         ends = np.maximum(np.minimum(np.append(start[1:], math.inf), end), start)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             last = np.where(slope != 0.0, value + slope * (ends - start), value)
         size = np.abs(amplitude)
         return float((np.minimum(value, last) - size).min()), float((np.maximum(value, last) + size).max())
