@@ -1,4 +1,4 @@
-"""Legs against a fine numerical solution, and the block of lanes against the general walk, plain and compiled."""
+"""Legs against a fine numerical solution, and the block of lanes against one by one, plain and compiled."""
 
 import math
 from dataclasses import replace
@@ -82,16 +82,16 @@ FEATURES = {
                    "timeout": 0.025, "shortest": 0.9e-3, "lower": 0.1, "upper": 2.0}}
 
 
-def walked(work):
+def one_by_one(work):
     raw = empty_raw(work)
-    lane_runs.run_walks(work, lane_runs.lanes_of(work), np.arange(work.lanes), work.times, raw)
+    lane_runs.run_one_by_one(work, lane_runs.lanes_of(work), np.arange(work.lanes), work.times, raw)
     return raw
 
 
 @pytest.mark.parametrize("name", FEATURES)
 def test_side_by_side_against_one_by_one(name):
     work = case(40, duration=0.7, times=np.linspace(0.0, 0.7, 39), fields=FIELDS, **FEATURES[name])
-    assert_same(run_lanes(work), walked(work), 1e-11)
+    assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
 def assert_same(raw, other, tolerance):
@@ -128,7 +128,7 @@ def test_edges_of_the_command():
     first = np.cumsum([0, *map(len, edges[:-1])])
     own = Tables(first, np.array([len(e) for e in edges]), np.concatenate([np.asarray(e, float) for e in edges]))
     work = replace(case(4, duration=0.3, times=np.linspace(0.0, 0.3, 61), fields=FIELDS), edges=own)
-    assert_same(run_lanes(work), walked(work), 1e-11)
+    assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
 def test_commands_that_are_not_constant():
@@ -136,7 +136,7 @@ def test_commands_that_are_not_constant():
     rows = np.array([[0.0, 1.2e-3, 1e-3, 0, 0, 0, 0], [0.2, 1.4e-3, 0, 3e-4, 9.0, 0.5, 0],
                      [0.0, 1.5e-3, 0, 2e-4, 5.0, 0, 40.0]])
     work = replace(work, command=Tables(np.array([0, 1, 2]), np.array([2, 1, 1]), rows))
-    assert_same(run_lanes(work), walked(work), 1e-11)
+    assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
 def test_lanes_know_nothing_of_each_other():
@@ -158,7 +158,7 @@ def test_float32_follows_float64():
 def test_lanes_that_need_the_general_way_are_mixed_with_others():
     spring = np.where(np.arange(12) % 3 == 0, 0.1, 0.0)
     work = case(12, duration=0.3, times=np.array([0.1, 0.3]), fields=FIELDS, stiffness=spring)
-    assert_same(run_lanes(work), walked(work), 1e-11)
+    assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
 def test_numbers_beyond_all_bounds_end_with_a_status():

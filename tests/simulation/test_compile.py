@@ -40,9 +40,9 @@ def test_compiled_equals_plain():
 
 
 def test_what_is_derived():
-    text = derive(Recipe("walk", ("servotwin.models.kernels.walk:walk",)))
+    text = derive(Recipe("run", ("servotwin.models.kernels.runs:run",)))
     assert "def frame__decide(" in text
-    assert "from servotwin.models.kernels.walk import Point as walk__Point" in text
+    assert "from servotwin.models.kernels.memory import Point as memory__Point" in text
     assert "math.log1p" in text  # the general form leaves it to the system's library
     assert '"""' not in text
     compile(text, "derived", "exec")

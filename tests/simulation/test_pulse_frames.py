@@ -133,14 +133,14 @@ def test_three_decisions_cannot_wait():
 def test_a_decision_that_comes_first_replaces_the_one_that_waits():
     waits = Decision(5.0, 1.0, 1.0, 1e-3)
     chip = servo().chip()
-    now = frame.edge(chip, Frame(3, 0.0, math.inf, math.inf, 0.0, waits, frame.NOTHING), 2.0, 1.2e-3, 0.0, 0.0, 0.0, 0)
+    now = frame.edge(chip, Frame(3, 3, 0.0, math.inf, math.inf, 0.0, waits, frame.NOTHING), 2.0, 1.2e-3, 0.0, 0.0, 0.0, 0)
     assert now.pending.time == pytest.approx(2.0012)
     assert now.later == frame.NOTHING
     assert now.number == 4
 
 
 def test_at_one_instant_a_drive_ends_before_a_decision_starts_one():
-    now = Frame(1, 1.0, 1.0, math.inf, 0.0, Decision(1.0, -1.0, 0.5, -2e-4), frame.NOTHING)
+    now = Frame(1, 1, 1.0, 1.0, math.inf, 0.0, Decision(1.0, -1.0, 0.5, -2e-4), frame.NOTHING)
     after = frame.switched(now, 1.0)
     assert (after.drive, after.drive_end, after.error) == (-1.0, 1.5, -2e-4)
     assert frame.switched(AT_START, 0.0) == AT_START
@@ -181,8 +181,8 @@ def test_states_go_on_in_the_middle_of_a_frame():
         state = pickle.loads(pickle.dumps(sim.advance(state, float(instant), command)))
     state = sim.advance(state, 0.5, command)
     np.testing.assert_allclose(state.values, whole.values, rtol=0.0, atol=1e-12)
-    assert state.frame.drive == whole.frame.drive
-    assert state.frame.number == whole.frame.number
+    assert state.memory.chip.drive == whole.memory.chip.drive
+    assert state.memory.chip.number == whole.memory.chip.number
 
 
 def test_bounces_at_a_stop_die_out():

@@ -15,7 +15,8 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.loads import Load, as_load
-from servotwin.models.kernels import armature, contact, walk
+from servotwin.models.kernels import armature, contact
+from servotwin.models.kernels.memory import started
 from servotwin.models.kernels.plant import FORWARD, FREE, REFERENCE_TEMPERATURE, RIGID, Mode, Plant, Vector
 from servotwin.physics.pieces import constant_pieces
 from servotwin.simulation.engine import Plan, Record, State, run
@@ -182,7 +183,7 @@ class FullDrive:
         hung = as_load(load)
         plant = self.loaded(hung)._replace(upper=end, restitution=0.0)
         record = Record([], [])
-        state = State(time=0.0, places=self.model.states, point=walk.started(_state(start, 0.0), RIGID))
+        state = State(time=0.0, places=self.model.states, memory=started(_state(start, 0.0), RIGID))
         run(Plan(plant, constant_pieces(self.voltage), hung.torque_pieces), state, _LONGEST_SWING, record)
         time = next((event.time for event in record.events if event.kind == "upper stop"), math.nan)
         if math.isnan(time):

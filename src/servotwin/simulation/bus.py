@@ -163,10 +163,8 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
         sim.load.check_span(0.0, duration)
         state = sim.initial(command, (initial or {}).get(name))
         plan = sim.plan(command)
-        if plan.chip is None:
-            raise InputError(f"model of {name}", got=model, allowed="a pulse servo")
         sims[name] = sim
-        units.append(Unit(plan, plan.chip, state.point))
+        units.append(Unit(plan, plan.chip, state.memory.point))
     for name, (_, command, _) in given.items():
         warn_of(sims[name].model.servo, [command], duration)
     source = _source(supply)

@@ -10,14 +10,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from servotwin.models.kernels import armature, coupled, frame, hybrid, motion, walk
+from servotwin.models.kernels import armature, coupled, frame, hybrid, motion, step
 from servotwin.models.kernels.frame import Chip, Frame
+from servotwin.models.kernels.memory import Point
 from servotwin.models.kernels.motion import Motion
 from servotwin.models.kernels.plant import Plant, Vector
-from servotwin.models.kernels.walk import MOST_IDLE, Point
+from servotwin.models.kernels.step import MOST_IDLE
 from servotwin.physics.pieces import Piece, piece_value
 from servotwin.simulation.bus_group import Connected, Group
-from servotwin.simulation.engine import Event, Plan, Record, Segment, event_name, failure, switched
+from servotwin.simulation.engine import Event, Plan, Record, Segment, event_name, failure, keep_switch
 from servotwin.simulation.status import Status
 
 
@@ -47,7 +48,12 @@ class Unit:
     def plan_ahead(self) -> None:
         """Find out when chip and load do something next."""
         self.switch = min(frame.next_switch(self.frame), self.tau_end)
-        self.limit = min(self.switch, frame.edge_time(self.plan.period, self.plan.edges or (), self.frame.number))
+        self.limit = min(self.switch, self.edge)
+
+    @property
+    def edge(self) -> float:
+        """When its next frame begins [s]."""
+        return frame.edge_time(self.plan.inputs.period, self.plan.inputs.edges, self.frame.number)
 
     @property
     def connected(self) -> bool:
@@ -82,16 +88,13 @@ class Unit:
     def alone(self, until: float) -> None:
         """Find out what it does next when no other motor is connected to the bus."""
         plant, time = self.plan.plant, self.point.time
-        if self.motion is None or motion.is_step(self.motion) or self.told() != self.inputs:
-            u = walk.source(plant, self.frame)
-            if self.told() != self.inputs:
-                self.inputs = self.told()
-                self.point = walk.anchored(plant, u, self.tau, time, self.point)
-            self.motion = walk.motion_of(plant, self.point, u, self.tau, self.limit)
-        if self.motion.kind == motion.IMPOSSIBLE:
-            raise failure(Status.STEP_TOO_SMALL, time)
-        point, kind, status = walk.follow(self.motion, self.point, min(self.limit, until))
-        if status != walk.COMPLETED:
+        new, self.inputs = self.told() != self.inputs, self.told()
+        u = step.source(plant, self.frame)
+        m = motion.nothing(plant, u, self.tau) if new or self.motion is None else self.motion
+        if new:
+            self.point = step.anchored(plant, u, self.tau, time, self.point)
+        point, self.motion, kind, status = step.onward(plant, self.point, u, self.tau, m, self.limit, until)
+        if status != step.COMPLETED:
             raise failure(Status.of_code(status), time)
         self.arrival = (point, kind)
 
@@ -129,7 +132,7 @@ class Bus:
                     unit.move(*unit.arrival)
             if self._group.end <= time:
                 for unit, (point, kind) in zip(self._in_group, self._group.arrivals(), strict=True):
-                    if walk.status_of(point.y) != walk.COMPLETED:
+                    if step.status_of(point.y) != step.COMPLETED:
                         raise failure(Status.DIVERGED, time)
                     unit.move(point, kind)
                 self._before = [(id(unit), unit.inputs) for unit in self._in_group]
@@ -150,12 +153,13 @@ class Bus:
         for unit in due:
             if unit.switch <= time:
                 unit.move(unit.at(time))
-                unit.frame = switched(unit.frame, time, unit.point.y[0], unit.record)
+                before, unit.frame = unit.frame, frame.switched(unit.frame, time)
+                keep_switch(unit.record, before, unit.frame, time, unit.point.y[0])
                 if unit.tau_end <= time:
                     unit.tau, unit.tau_end = unit.plan.torque.at(time)
                 unit.plan_ahead()
         for unit in due:
-            if frame.edge_time(unit.plan.period, unit.plan.edges or (), unit.frame.number) <= time:
+            if unit.edge <= time:
                 self._measure(unit, time)
                 unit.plan_ahead()
 
@@ -175,11 +179,11 @@ class Bus:
         plant, drive = unit.plan.plant, unit.frame.drive
         connected = [other for other in self.units if other.connected]
         if not [other for other in connected if other is not unit]:
-            return walk.voltages(plant, unit.chip, drive * plant.V, y)
+            return step.voltages(plant, unit.chip, drive * plant.V, y)
         if len(connected) == 1:
             other = connected[0]
             u = other.frame.drive * other.plan.plant.V
-            V_bus = walk.voltages(other.plan.plant, other.chip, u, other.at(time).y)[1]
+            V_bus = step.voltages(other.plan.plant, other.chip, u, other.at(time).y)[1]
         else:
             V_bus = self._group.voltage_of([_connection(other, time) for other in connected])
         stiff = hybrid.warm(unit.stiff[False], y)

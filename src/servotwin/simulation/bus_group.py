@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from servotwin.models.kernels import coupled, frame, hybrid, motion, together, walk
+from servotwin.models.kernels import coupled, frame, hybrid, motion, together
 from servotwin.models.kernels.coupled import Member, Source
+from servotwin.models.kernels.memory import FIRST_STEP, Point
 from servotwin.models.kernels.motion import Motion
 from servotwin.models.kernels.plant import NO_CURRENT, Mode, Plant, Vector
-from servotwin.models.kernels.walk import Point
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 from servotwin.simulation.engine import failure
 from servotwin.simulation.status import Status
@@ -54,7 +54,7 @@ class Group:
         self._motions: list[Motion] = []
         self._ends: list[Vector] = []
         self._whose = (-1, -1)
-        self._step = walk.FIRST_STEP
+        self._step = FIRST_STEP
         self._jumped = True
 
     def voltage_of(self, connected: Sequence[Connected]) -> float:

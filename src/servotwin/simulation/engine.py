@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
-from servotwin.models.kernels import frame, hybrid, walk
-from servotwin.models.kernels.frame import Chip, Frame
-from servotwin.models.kernels.motion import IMPOSSIBLE, Motion, is_step
+from servotwin.models.kernels import frame, hybrid, motion
+from servotwin.models.kernels.frame import NO_CHIP, Chip, Frame
+from servotwin.models.kernels.memory import Inputs, Memory, counted_anew, due, instant, origin_of, resumed, time_of
+from servotwin.models.kernels.motion import Motion
 from servotwin.models.kernels.plant import (
     CONDUCTING,
     CORE,
@@ -24,8 +26,8 @@ from servotwin.models.kernels.plant import (
     Plant,
     at_rest,
 )
-from servotwin.models.kernels.walk import MOST_IDLE, Point
-from servotwin.physics.pieces import Piece, Pieces, piece_value
+from servotwin.models.kernels.step import COMPLETED, MOST_IDLE, pulse_width, step
+from servotwin.physics.pieces import Pieces
 from servotwin.simulation.status import Status
 
 
@@ -57,20 +59,30 @@ class Plan:
         Of its noise.
     curve : tuple
         Angles [rad] and errors [V] of its potentiometer's linearity table.
+    external_torque : float
+        Constant, beside the load's [N m].
     """
 
     plant: Plant
     command: Pieces
     torque: Pieces
-    chip: Chip | None = None
+    chip: Chip = NO_CHIP
     edges: tuple[float, ...] | None = None
     seed: int = 0
     curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    external_torque: float = 0.0
 
     @property
-    def period(self) -> float:
-        """Of regular frames [s]; 0 where the edges are listed."""
-        return self.chip.frame_period if self.chip is not None and self.edges is None else 0.0
+    def pulsed(self) -> bool:
+        """Whether the command comes in pulses."""
+        return self.chip.frame_period > 0.0
+
+    @cached_property
+    def inputs(self) -> Inputs:
+        """What the servo is told, as a step reads it."""
+        period = self.chip.frame_period if self.edges is None else 0.0
+        return Inputs(self.command.table, self.torque.table, self.external_torque, period, self.edges or (),
+                      self.curve, self.seed)
 
 
 @dataclass(frozen=True)
@@ -83,22 +95,16 @@ class State:
         [s]
     places : tuple of Place
         Which signals are states, and where the engine keeps them.
-    point : Point
-        All numbers of the state; mode of the present motion, where it began, and the step to try next.
-    inputs : tuple of Piece
-        The pieces of voltage and external torque in force since then.
+    memory : Memory
+        All numbers of the state, its clock, and what the chip of a pulse servo has decided.
     plant : Plant
-        The numbers of servo and load by which it moves since then.
-    frame : Frame
-        What the chip of a pulse servo remembers: its drive and when that ends, what it has decided, its clock.
+        The numbers of servo and load by which it moves since its motion began.
     """
 
     time: float
     places: tuple[Place, ...]
-    point: Point
-    inputs: tuple[Piece, Piece] | None = None
+    memory: Memory
     plant: Plant | None = None
-    frame: Frame = frame.AT_START
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -108,13 +114,13 @@ class State:
     @property
     def values(self) -> tuple[float, ...]:
         """Angle [rad], speed [rad/s] and what else the servo remembers (SI)."""
-        return tuple(place.factor * self.point.y[place.at] for place in self.places)
+        return tuple(place.factor * self.memory.point.y[place.at] for place in self.places)
 
     def __getitem__(self, name: str) -> float:
         """Return one value by its signal name."""
         for place in self.places:
             if place.name == name:
-                return place.factor * self.point.y[place.at]
+                return place.factor * self.memory.point.y[place.at]
         raise KeyError(f"{name!r} is no state; there are: {', '.join(self.names)}")
 
 
@@ -123,7 +129,7 @@ class Segment:
     """A stretch of one motion between two times [s], and what holds with it.
 
     `error` is the latest that the chip has decided on [s], `wiper` the angle of the potentiometer at the start [rad],
-    `drive` how a bridge drives: −1, 0 or +1.
+    `drive` how a bridge drives: −1, 0 or +1, `origin` the instant from which the times of the motion count [s].
     """
 
     start: float
@@ -132,11 +138,12 @@ class Segment:
     error: float
     wiper: float
     drive: float
+    origin: float = 0.0
 
     @property
     def anchor(self) -> float:
         """When the motion began [s]; it may be before the segment's start."""
-        return self.motion.t0
+        return self.origin + self.motion.t0
 
 
 @dataclass
@@ -156,51 +163,28 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
     SimulationError
         If the run cannot go on; it carries status, time and cause.
     """
-    plant = plan.plant
-    point = state.point
-    inputs = state.inputs if plant == state.plant else None
-    chip_frame = state.frame
-    motion: Motion | None = None
+    plant, chip, inputs = plan.plant, plan.chip, plan.inputs
+    memory = resumed(plan.pulsed, inputs, state.memory, plant != state.plant)
+    end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
+    m = motion.nothing(plant, memory.u, memory.tau)
     idle = 0
-    while point.time < until:
-        before = point.time
+    while memory.point.time < end:
+        if due(memory):
+            memory = counted_anew(memory)
+            end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
+        before = memory
         try:
-            if plan.chip is None:
-                u, u_end = plan.command.at(before)
-            else:
-                chip_frame = _after_chip(plan, plan.chip, chip_frame, point, record)
-                u = walk.source(plant, chip_frame)
-                u_end = min(frame.next_switch(chip_frame),
-                            frame.edge_time(plan.period, plan.edges or (), chip_frame.number))
-            tau, tau_end = plan.torque.at(before)
-            limit = min(u_end, tau_end)
-            if (u, tau) != inputs:
-                inputs, motion = (u, tau), None
-                point = walk.anchored(plant, u, tau, before, point)
-            if motion is None or is_step(motion):
-                motion = walk.motion_of(plant, point, u, tau, limit)
-            if motion.kind == IMPOSSIBLE:
-                raise failure(Status.STEP_TOO_SMALL, before)
-            wiper = point.wiper
-            point, kind, status = walk.follow(motion, point, min(until, limit))
+            memory, m, event, status = step(plant, chip, inputs, before, m, end)
         except ArithmeticError:  # numbers beyond what a float holds
-            raise failure(Status.DIVERGED, before) from None
-        if status != walk.COMPLETED:
-            raise failure(Status.of_code(status), before)
-        idle = idle + 1 if point.time == before else 0
+            raise failure(Status.DIVERGED, time_of(before)) from None
+        if status != COMPLETED:
+            raise failure(Status.of_code(status), time_of(before))
+        idle = idle + 1 if memory.point.time == before.point.time else 0
         if idle > MOST_IDLE:
-            raise failure(Status.CHATTER, before)
+            raise failure(Status.CHATTER, time_of(before))
         if record is not None:
-            if point.time > before or not record.segments:
-                record.segments.append(Segment(before, point.time, motion, chip_frame.error, wiper,
-                                               chip_frame.drive))
-            if record.tell is not None:
-                record.tell(point.time)
-            if kind >= 0:
-                record.events.append(Event(point.time, event_name(kind, point.mode), point.y[0]))
-        if kind >= 0:
-            motion = None
-    return State(time=point.time, places=state.places, point=point, inputs=inputs, plant=plant, frame=chip_frame)
+            _keep(record, inputs, chip, before, memory, m, event)
+    return State(until, state.places, memory, plant)
 
 
 def failure(status: Status, time: float) -> SimulationError:
@@ -208,28 +192,26 @@ def failure(status: Status, time: float) -> SimulationError:
     return SimulationError(status.name, time, status.message)
 
 
-def _after_chip(plan: Plan, chip: Chip, now: Frame, point: Point, record: Record | None) -> Frame:
-    """Return the frame state after all that the chip does at the time of a point."""
-    time = point.time
-    now = switched(now, time, point.y[0], record)
-    if frame.edge_time(plan.period, plan.edges or (), now.number) <= time:
-        t_in = piece_value(plan.command.at(time)[0], time)
-        if record is not None and not frame.accepted(chip, t_in):
-            record.events.append(Event(time, "pulse refused", point.y[0]))
-        now = walk.measured(plan.plant, chip, plan.curve, now, point, t_in, plan.seed)
-        if now.number == frame.CROWDED:
-            raise failure(Status.CROWDED, time)
-    return now
+def _keep(record: Record, inputs: Inputs, chip: Chip, before: Memory, memory: Memory, m: Motion, event: int) -> None:
+    """Add a step to a record: its chip's doings, its motion, its event."""
+    start, now = time_of(before), time_of(memory)
+    point, angle = memory.point, before.point.y[0]
+    keep_switch(record, before.chip, memory.chip, start, angle)
+    if memory.chip.number > before.chip.number and not frame.accepted(chip, pulse_width(inputs, before)):
+        record.events.append(Event(start, "pulse refused", angle))
+    if now > start or not record.segments:
+        record.segments.append(Segment(start, now, m, memory.chip.error, before.point.wiper, memory.chip.drive,
+                                       origin_of(memory)))
+    if record.tell is not None:
+        record.tell(now)
+    if event >= 0:
+        record.events.append(Event(now, event_name(event, point.mode), point.y[0]))
 
 
-def switched(now: Frame, time: float, angle: float, record: Record | None) -> Frame:
-    """Return the frame state after all that switches at `time` [s], where the shaft is at `angle` [rad]."""
-    if frame.next_switch(now) > time:
-        return now
-    after = frame.switched(now, time)
-    if record is not None and after.drive != now.drive:
+def keep_switch(record: Record, before: Frame, after: Frame, time: float, angle: float) -> None:
+    """Add to a record that a drive has begun or ended at `time` [s], where the shaft is at `angle` [rad]."""
+    if after.drive != before.drive:
         record.events.append(Event(time, _DRIVES[int(after.drive)], angle))
-    return after
 
 
 _DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}

@@ -18,18 +18,18 @@ _BLOCKS = {
     dtype: Recipe(f"blocks_{dtype}", ("servotwin.models.kernels.blocks:run",), vector=True, single=dtype == "float32")
     for dtype in ("float64", "float32")
 }
-_ENTRY = ("servotwin.models.kernels.walks:walk_lanes",)
-_WALKS = Recipe("walks", _ENTRY)  # everything
+_ENTRY = ("servotwin.models.kernels.runs:run_lanes",)
+_RUNS = Recipe("runs", _ENTRY)  # everything
 _RARE = {"varies": 0.0, "half_play": 0.0, "C_w": 0.0, "half_slack": 0.0, "L": 0.0, "gravity": 0.0, "kappa": 0.0,
          "I_max": np.inf}
-_PLAIN_WALKS = Recipe(
-    "plain_walks", _ENTRY, absent=(*_RARE.items(), ("sweep", 0.0)),
+_PLAIN_RUNS = Recipe(
+    "plain_runs", _ENTRY, absent=(*_RARE.items(), ("sweep", 0.0)),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 _SWINGING = Recipe(
-    "pendulum_walks", _ENTRY, absent=(*((name, x) for name, x in _RARE.items() if name != "gravity"), ("sweep", 0.0)),
+    "pendulum_runs", _ENTRY, absent=(*((name, x) for name, x in _RARE.items() if name != "gravity"), ("sweep", 0.0)),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 _ENDING = Recipe("ending", ("servotwin.models.kernels.ending:look_at_lanes",), vector=True)
-_ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a walk leaves behind
+_ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
 
@@ -48,10 +48,10 @@ def run(work: Work) -> Raw:
             _run_blocks(work, lanes, kind, times, outputs_of(work, raw, given_up))
         elif which.any():
             _run_some(work, lanes, kind, np.flatnonzero(which), times, raw, given_up)
-    for recipe, some in ((_PLAIN_WALKS, ~(rare | swinging)), (_SWINGING, swinging & ~rare), (_WALKS, rare)):
+    for recipe, some in ((_PLAIN_RUNS, ~(rare | swinging)), (_SWINGING, swinging & ~rare), (_RUNS, rare)):
         rest = np.flatnonzero(some & (given_up != 0))
         if len(rest):
-            run_walks(work, lanes, rest, times, raw, recipe)
+            run_one_by_one(work, lanes, rest, times, raw, recipe)
     kernels(_ENDING).look_at_lanes(
         work.law == "pulse", lanes, _rows(work.torque.rows), _indices(work.torque.first), _indices(work.torque.count),
         float(work.duration), raw.final, raw.refused, raw.marks)
@@ -82,8 +82,8 @@ def _run_some(work: Work, lanes: Lanes, braked: bool, which: NDArray[np.int64], 
     given_up[which] = marks
 
 
-def run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw,
-              recipe: Recipe = _WALKS) -> None:
+def run_one_by_one(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw,
+              recipe: Recipe = _RUNS) -> None:
     """Run some lanes one after the other, in float64."""
     at_once = max(1, _ROOM // (len(_ALL) * max(len(times), 1)))
     for start in range(0, len(which), at_once):
@@ -91,8 +91,8 @@ def run_walks(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats,
         room = np.zeros((len(part), len(_ALL), len(times)))
         status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
         final = np.zeros((len(part), raw.final.shape[1]))
-        kernels(recipe).walk_lanes(
-            work.law == "pulse", lanes, np.array(work.curve, np.float64), _rows(work.torque.rows),
+        kernels(recipe).run_lanes(
+            lanes, np.array(work.curve, np.float64), _rows(work.torque.rows),
             _indices(work.torque.first), _indices(work.torque.count), part, float(work.duration), times, room,
             final, status, ended)
         raw.status[part], raw.ended[part], raw.final[part] = status, ended, final
@@ -119,7 +119,7 @@ def side_by_side(work: Work, lanes: Lanes, rare: NDArray[np.bool_]) -> tuple[NDA
 
 
 def has_rare_terms(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Tell which lanes have a term that the plain walk leaves out, and which have a pendulum."""
+    """Tell which lanes have a term that the plain run leaves out, and which have a pendulum."""
     plant = Plant(*lanes.plants)
     terms = [getattr(plant, name) != value for name, value in _RARE.items() if name != "gravity"]
     if lanes.pieces[:, 6].any():

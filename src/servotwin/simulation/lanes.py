@@ -17,7 +17,7 @@ Numbers = TypeVar("Numbers", bound=tuple[object, ...])
 
 FIELDS = ("angle", "speed", "contact", "drive", "error")
 MORE_FIELDS = ("current", "winding", "housing", "motor_angle", "motor_speed", "wiper", "mesh",
-               "motor")  # of the general walk alone
+               "motor")  # of servos that run one by one
 SMALL_FIELDS = ("contact", "drive", "mesh", "motor")  # fields that are kept as int8
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
 from servotwin.loads import as_load
 from servotwin.models import Model
-from servotwin.models.kernels import walk
+from servotwin.models.kernels.frame import NO_CHIP
+from servotwin.models.kernels.memory import started
 from servotwin.models.kernels.plant import INSIDE, RIGID
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
@@ -63,15 +64,15 @@ class Simulator:
         self.seed = _seed(seed)
         self._plant = model.pack(self.load)
         self._torque = self.load.torque_pieces
-        self._last: tuple[Signal, Pieces] | None = None
+        self._last: tuple[Signal, Plan] | None = None
 
     def drive(self, command: Signal) -> Pieces:
         """Return the command as what the model follows [V]."""
         if not isinstance(command, Signal):
             raise CommandError("command", got=type(command).__name__, allowed="a signal of servotwin.signals")
-        if self._last is None or self._last[0] is not command:
-            self._last = (command, self.model.command(command))
-        return self._last[1]
+        if self._last is not None and self._last[0] is command:
+            return self._last[1].command
+        return self.model.command(command)
 
     def initial(self, command: Signal, initial: Mapping[str, float] | None = None) -> State:
         """Return the state at t = 0: at rest where the command of just before asks for.
@@ -102,7 +103,7 @@ class Simulator:
         y = start_vector(self.model.states, self._plant, angle, initial or {})
         check_start(self.model.states, self._plant, y)
         mesh = INSIDE if self._plant.half_play > 0.0 else RIGID
-        return State(time=0.0, places=self.model.states, point=walk.started(y, mesh))
+        return State(time=0.0, places=self.model.states, memory=started(y, mesh))
 
     def advance(self, state: State, until: float, command: Signal, *, external_torque: float = 0.0) -> State:
         """Return the state at `until` [s] under a command.
@@ -144,9 +145,12 @@ class Simulator:
 
     def plan(self, command: Signal, external_torque: float = 0.0) -> Plan:
         """Return what the engine needs for a run under a command, and a constant torque beside the load [N m]."""
-        torque = self._torque.scaled(1.0, external_torque) if external_torque else self._torque
-        return Plan(self._plant, self.drive(command), torque, self.model.chip(command), self.model.edges(command),
-                    self.seed, self.model.curve())
+        if self._last is not None and self._last[0] is command and self._last[1].external_torque == external_torque:
+            return self._last[1]
+        plan = Plan(self._plant, self.drive(command), self._torque, self.model.chip(command) or NO_CHIP,
+                    self.model.edges(command), self.seed, self.model.curve(), float(external_torque))
+        self._last = (command, plan)
+        return plan
 
 
 def simulate(model: Model, command: Signal, *, duration: float, load: Load | Part | None = None,

@@ -82,7 +82,8 @@ class Trajectory:
         """
         segment = self.segments[index]
         age, end = segment.start - segment.anchor, segment.end - segment.anchor
-        width = motion.period(segment.motion.u, segment.motion.tau, segment.start, segment.end) / 4.0
+        width = motion.period(segment.motion.u, segment.motion.tau, segment.start - segment.origin,
+                              segment.end - segment.origin) / 4.0
         fine, settled = motion.scales(segment.motion)
         fine = max(fine, _SHORTEST)
         edges = [age]

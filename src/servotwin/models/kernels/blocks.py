@@ -1,7 +1,7 @@
 """Pulse servos side by side: a block of lanes goes from frame to frame, each through up to four phases.
 
 In a frame window the bridge finishes the drive left over from the frame before, rests until the decision, drives, and
-rests. A lane that hits a stop, decides after the next edge or needs too many legs is marked and left to `walk`. What
+rests. A lane that hits a stop, decides after the next edge or needs too many legs is marked and left to `runs`. What
 a lane does never depends on its neighbours.
 """
 

@@ -12,7 +12,7 @@ from servotwin.models.kernels import contact, frame
 from servotwin.models.kernels.block_rows import plant_at
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.plant import Plant, at_temperature
-from servotwin.models.kernels.walks import chip_at
+from servotwin.models.kernels.runs import chip_at
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:

@@ -57,6 +57,7 @@ class Frame(NamedTuple):
     """Everything that the chip remembers."""
 
     number: int  # of the next frame, lost pulses counted
+    draws: int  # of noise so far, one a frame
     drive: float  # −1, 0, +1: how the bridge drives now
     drive_end: float
     clock: float  # the drive ends here at the latest
@@ -67,7 +68,8 @@ class Frame(NamedTuple):
 
 NOTHING = Decision(math.inf, 0.0, 0.0, 0.0)
 CROWDED = -1  # as the number of a frame: more than two decisions would have to wait
-AT_START = Frame(0, 0.0, math.inf, math.inf, 0.0, NOTHING, NOTHING)
+NO_CHIP = Chip(*[0.0] * 21)  # of a plant that follows its command at all times
+AT_START = Frame(0, 0, 0.0, math.inf, math.inf, 0.0, NOTHING, NOTHING)
 
 
 def one_shot(T_0: float, slope: float, v_eff: float) -> float:
@@ -127,9 +129,9 @@ def accepted(chip: Chip, t_in: float) -> bool:
 def edge(chip: Chip, frame: Frame, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, seed: int) -> Frame:
     """Return the frame state after the rising edge of a pulse of the width t_in."""
     if not accepted(chip, t_in):
-        return Frame(frame.number + 1, frame.drive, frame.drive_end, frame.clock, frame.error, frame.pending,
-                     frame.later)
-    draw = gaussian(seed, frame.number) if chip.noise > 0.0 else 0.0
+        return Frame(frame.number + 1, frame.draws + 1, frame.drive, frame.drive_end, frame.clock, frame.error,
+                     frame.pending, frame.later)
+    draw = gaussian(seed, frame.draws) if chip.noise > 0.0 else 0.0
     new = decide(chip, time, t_in, v_o, v_m, V_bus, draw)
     number, pending, later = frame.number + 1, frame.pending, frame.later
     if new.time <= pending.time:  # where another waits, it would be replaced as soon as it comes
@@ -138,7 +140,8 @@ def edge(chip: Chip, frame: Frame, time: float, t_in: float, v_o: float, v_m: fl
         later = new
     else:
         number = CROWDED
-    return Frame(number, frame.drive, frame.drive_end, time + chip.timeout, frame.error, pending, later)
+    return Frame(number, frame.draws + 1, frame.drive, frame.drive_end, time + chip.timeout, frame.error, pending,
+                 later)
 
 
 def edge_time(period: float, edges: Sequence[float] | NDArray[np.float64], k: int) -> float:
@@ -146,6 +149,12 @@ def edge_time(period: float, edges: Sequence[float] | NDArray[np.float64], k: in
     if period > 0.0:
         return k * period
     return edges[k] if k < len(edges) else math.inf
+
+
+def numbered(frame: Frame, number: int) -> Frame:
+    """Return the frame state before the frame of this number."""
+    return Frame(number, frame.draws, frame.drive, frame.drive_end, frame.clock, frame.error, frame.pending,
+                 frame.later)
 
 
 def next_switch(frame: Frame) -> float:
@@ -166,4 +175,4 @@ def switched(frame: Frame, time: float) -> Frame:
         if drive == 0.0 or end <= time or frame.clock <= time:
             drive, end = 0.0, math.inf
         pending, later = later, NOTHING
-    return Frame(frame.number, drive, end, frame.clock, error, pending, later)
+    return Frame(frame.number, frame.draws, drive, end, frame.clock, error, pending, later)

@@ -50,7 +50,7 @@ class Motion(NamedTuple):
 
 def nothing(plant: Plant, u: Piece, tau: Piece) -> Motion:
     """Return a motion that is none yet."""
-    return _closed(IMPOSSIBLE, plant, Mode(0, 0, 0, 0), u, tau, -1.0, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+    return _closed(IMPOSSIBLE, plant, Mode(0, 0, 0, 0), u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
 
 
 def is_step(motion: Motion) -> bool:
