@@ -9,8 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from lane_cases import case
-from servotwin.models.kernels import block_rows, blocks, contact, legs
+from servotwin.models.kernels import contact, legs, side_by_side, tiles
 from servotwin.models.kernels.plant import Plant
+from servotwin.models.kernels.records import room
 from servotwin.simulation import lane_runs
 from servotwin.simulation.lanes import FIELDS, Tables, empty_raw, run_lanes
 
@@ -84,7 +85,7 @@ FEATURES = {
 
 def one_by_one(work):
     raw = empty_raw(work)
-    lane_runs.run_one_by_one(work, lane_runs.lanes_of(work), np.arange(work.lanes), work.times, raw)
+    lane_runs.run_one_by_one(work, lane_runs.lanes_of(work), np.arange(work.lanes), raw)
     return raw
 
 
@@ -105,14 +106,16 @@ def assert_same(raw, other, tolerance):
 
 def plain(work):
     raw = empty_raw(work)
-    given_up = np.zeros(work.lanes, np.int8)
     lanes = lane_runs.lanes_of(work)
     _, braked = lane_runs.side_by_side(work, lanes, lane_runs.has_rare_terms(work, lanes)[0])
     assert braked.all() or not braked.any()
     with np.errstate(all="ignore"):
-        blocks.run(lanes, bool(braked.all()), work.duration, work.times, lane_runs.outputs_of(work, raw, given_up),
-                   np.zeros(block_rows.NUMBERS), np.zeros(block_rows.TIMES), np.zeros(block_rows.INTEGERS, np.int64))
-    assert not given_up.any()
+        rows = room(1, tiles.tile_type("float64"))
+        side_by_side.start(lanes, work.times[0], rows)
+        lost = side_by_side.go_on(
+            lanes.pieces, lanes.edges, bool(braked.all()), np.arange(work.lanes), work.duration, work.times,
+            lane_runs.outputs_of(work, raw), rows, room(1, tiles.plan_type("float64")))
+    assert lost == 0
     return raw
 
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from servotwin.models.kernels import legs
+from servotwin.models.kernels import legs, tiles
 from servotwin.models.kernels.legs import Shaft
 from servotwin.models.kernels.noise import gaussian
 from servotwin.simulation.compile import Recipe, kernels
@@ -15,7 +15,7 @@ from servotwin.simulation.compile.derive import derive
 
 SLIDE = Recipe("slide", ("servotwin.models.kernels.legs:slide",), vector=True)
 SHAFT = Shaft(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0, -1.0,
-              0.0, -math.inf, math.inf)
+              0.0, -math.inf, math.inf, 6e-3, 2.0, 0.2, 0.2)
 SCRIPT = """
 from servotwin.simulation.compile import Recipe, kernels
 print(kernels(Recipe("noise", ("servotwin.models.kernels.noise:gaussian",))).gaussian(3, 7))
@@ -49,22 +49,22 @@ def test_what_is_derived():
 
 
 def test_the_vector_form_has_polynomials():
-    text = derive(Recipe("blocks", ("servotwin.models.kernels.blocks:run",), vector=True))
+    text = derive(Recipe("tiles", ("servotwin.models.kernels.side_by_side:go_on",), vector=True))
     assert "elementary__log1p(" in text
     assert "math.log1p" not in text
 
 
 @pytest.mark.slow
 def test_float32_stays_float32(folder):
-    recipe = Recipe("single", ("servotwin.models.kernels.block_phases:phases",
-                               "servotwin.models.kernels.block_plan:plan_all"), vector=True, single=True)
+    recipe = Recipe("single", ("servotwin.models.kernels.phases:phases",
+                               "servotwin.models.kernels.windows:divide"), vector=True, single=True)
     module = kernels(recipe)
-    from numba import types
+    from numba import from_dtype, types
 
-    block, integers = types.Array(types.float32, 1, "C"), types.Array(types.int64, 1, "C")
-    module.phases.compile((types.int64, types.boolean, types.boolean, block, integers))
-    module.plan_all.compile((types.int64, block))
-    for entry in (module.phases, module.plan_all):
+    tile, plan = from_dtype(tiles.tile_type("float32")), from_dtype(tiles.plan_type("float32")["of"])
+    module.phases.compile((types.int64, types.boolean, types.boolean, tile, plan))
+    module.divide.compile((types.int64, types.boolean, tile, plan))
+    for entry in (module.phases, module.divide):
         (code,) = entry.inspect_llvm().values()
         assert "float" in code
         assert "double" not in code

@@ -7,26 +7,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels import block_rows
-from servotwin.models.kernels.block_rows import Lanes, Outputs
+from servotwin.models.kernels import tiles
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.plant import Plant
+from servotwin.models.kernels.records import room
+from servotwin.models.kernels.tiles import Lanes, Outputs
 from servotwin.simulation.compile import Recipe, kernels
+from servotwin.simulation.lane_memory import RECORD, flat, records_of
 from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
 
-_BLOCKS = {
-    dtype: Recipe(f"blocks_{dtype}", ("servotwin.models.kernels.blocks:run",), vector=True, single=dtype == "float32")
+Indices = NDArray[np.int64]
+
+_SIDE_BY_SIDE = {
+    dtype: Recipe(f"side_by_side_{dtype}", tuple(
+        f"servotwin.models.kernels.side_by_side:{name}" for name in ("start", "go_on")),
+        vector=True, single=dtype == "float32")
     for dtype in ("float64", "float32")
 }
-_ENTRY = ("servotwin.models.kernels.runs:run_lanes",)
-_RUNS = Recipe("runs", _ENTRY)  # everything
+_ENTRIES = tuple(f"servotwin.models.kernels.runs:{name}" for name in ("start", "go_on"))
+_RUNS = Recipe("runs", _ENTRIES)  # everything
 _RARE = {"varies": 0.0, "half_play": 0.0, "C_w": 0.0, "half_slack": 0.0, "L": 0.0, "gravity": 0.0, "kappa": 0.0,
          "I_max": np.inf}
 _PLAIN_RUNS = Recipe(
-    "plain_runs", _ENTRY, absent=(*_RARE.items(), ("sweep", 0.0)),
+    "plain_runs", _ENTRIES, absent=(*_RARE.items(), ("sweep", 0.0)),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 _SWINGING = Recipe(
-    "pendulum_runs", _ENTRY, absent=(*((name, x) for name, x in _RARE.items() if name != "gravity"), ("sweep", 0.0)),
+    "pendulum_runs", _ENTRIES,
+    absent=(*((name, x) for name, x in _RARE.items() if name != "gravity"), ("sweep", 0.0)),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 _ENDING = Recipe("ending", ("servotwin.models.kernels.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
@@ -38,20 +45,16 @@ def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw = empty_raw(work)
     lanes = lanes_of(work)
-    times = _own(work.times, np.float64)
     rare, swinging = has_rare_terms(work, lanes)
     side, braked = side_by_side(work, lanes, rare | swinging)
-    given_up = np.ones(work.lanes, np.int8)
     for kind in (True, False):
-        which = side & (braked == kind)
-        if which.all():
-            _run_blocks(work, lanes, kind, times, outputs_of(work, raw, given_up))
-        elif which.any():
-            _run_some(work, lanes, kind, np.flatnonzero(which), times, raw, given_up)
+        which = np.flatnonzero(side & (braked == kind))
+        if len(which):
+            run_side_by_side(work, lanes, which, kind, raw)
     for recipe, some in ((_PLAIN_RUNS, ~(rare | swinging)), (_SWINGING, swinging & ~rare), (_RUNS, rare)):
-        rest = np.flatnonzero(some & (given_up != 0))
-        if len(rest):
-            run_one_by_one(work, lanes, rest, times, raw, recipe)
+        which = np.flatnonzero(some & ~side)
+        if len(which):
+            run_one_by_one(work, lanes, which, raw, recipe)
     kernels(_ENDING).look_at_lanes(
         work.law == "pulse", lanes, _rows(work.torque.rows), _indices(work.torque.first), _indices(work.torque.count),
         float(work.duration), raw.final, raw.refused, raw.marks)
@@ -60,47 +63,60 @@ def run(work: Work) -> Raw:
     return raw
 
 
-def _run_blocks(work: Work, lanes: Lanes, braked: bool, times: Floats, outputs: Outputs) -> None:
-    if len(lanes.torque):
-        room = np.zeros(block_rows.NUMBERS, work.dtype)
-        kernels(_BLOCKS[work.dtype]).run(lanes, braked, float(work.duration), times, outputs, room,
-                                         np.zeros(block_rows.TIMES), np.zeros(block_rows.INTEGERS, np.int64))
+def run_side_by_side(work: Work, lanes: Lanes, which: Indices, braked: bool, raw: Raw) -> None:
+    """Run some lanes side by side, all of them `braked` or none; finish those that are given up one by one."""
+    rows = room(-(-len(which) // tiles.TILE), tiles.tile_type(work.dtype))
+    plans = room(1, tiles.plan_type(work.dtype))
+    times = _own(work.times, np.float64)
+    module = kernels(_SIDE_BY_SIDE[work.dtype])
+    some = lanes if len(which) == work.lanes else Lanes(*(
+        x if name in _SHARED else np.ascontiguousarray(x[..., which])
+        for name, x in zip(Lanes._fields, lanes, strict=True)))
+    module.start(some, times[0] if len(times) else np.inf, rows)
+    lost = module.go_on(lanes.pieces, lanes.edges, braked, which, float(work.duration), times, outputs_of(work, raw),
+                        rows, plans)
+    raw.final[which, 0], raw.final[which, 1] = (flat(rows, "servo", name)[:len(which)] for name in ("q", "w"))
+    if lost:
+        owed = flat(rows, "clock", "owed")[:len(which)]
+        places = np.flatnonzero(owed > 0.0)
+        gone = which[places]
+        _finish(work, lanes, gone, owed[places], flat(rows, "count", "output")[places],
+                records_of(rows, places, lanes.start[3:5, gone]), raw, _PLAIN_RUNS)
 
 
-def _run_some(work: Work, lanes: Lanes, braked: bool, which: NDArray[np.int64], times: Floats, raw: Raw,
-              given_up: NDArray[np.int8]) -> None:
-    """Run only some lanes side by side."""
-    part = Raw({name: np.zeros((len(which), len(times)), values.dtype) for name, values in raw.fields.items()},
-               raw.status, raw.ended, np.zeros((len(which), raw.final.shape[1])), raw.refused, raw.marks)
-    marks = np.zeros(len(which), np.int8)
-    columns: Any = (x if name in _SHARED else np.ascontiguousarray(x[..., which])
-                    for name, x in zip(Lanes._fields, lanes, strict=True))
-    _run_blocks(work, Lanes(*columns), braked, times, outputs_of(work, part, marks))
-    for name, values in part.fields.items():
-        raw.fields[name][which] = values
-    raw.final[which, :2] = part.final[:, :2]
-    given_up[which] = marks
-
-
-def run_one_by_one(work: Work, lanes: Lanes, which: NDArray[np.int64], times: Floats, raw: Raw,
-              recipe: Recipe = _RUNS) -> None:
+def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = _RUNS) -> None:
     """Run some lanes one after the other, in float64."""
+    records = np.zeros(len(which), RECORD)
+    kernels(recipe).start(lanes, which, records)
+    _finish(work, lanes, which, np.full(len(which), float(work.duration)), np.zeros(len(which), np.int64), records,
+            raw, recipe)
+
+
+def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: Indices, records: NDArray[Any],
+            raw: Raw, recipe: Recipe) -> None:
+    """Let lanes go on one after the other, for durations of their own [s], from outputs of their own on."""
+    times = _own(work.times, np.float64)
     at_once = max(1, _ROOM // (len(_ALL) * max(len(times), 1)))
     for start in range(0, len(which), at_once):
-        part = which[start:start + at_once]
-        room = np.zeros((len(part), len(_ALL), len(times)))
+        some = slice(start, start + at_once)
+        part, own = which[some], _indices(first[some])
+        found = np.zeros((len(part), len(_ALL), len(times)))
         status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
-        final = np.zeros((len(part), raw.final.shape[1]))
-        kernels(recipe).run_lanes(
-            lanes, np.array(work.curve, np.float64), _rows(work.torque.rows),
-            _indices(work.torque.first), _indices(work.torque.count), part, float(work.duration), times, room,
-            final, status, ended)
-        raw.status[part], raw.ended[part], raw.final[part] = status, ended, final
-        failed = (status != 0)[:, None] & (times >= ended[:, None])
+        kernels(recipe).go_on(
+            lanes, np.array(work.curve, np.float64), _rows(work.torque.rows), _indices(work.torque.first),
+            _indices(work.torque.count), part, _own(durations[some], np.float64), times, own, found, records[some],
+            status, ended)
+        bad = status != 0
+        raw.status[part], raw.ended[part] = status, np.where(bad, ended, work.duration)
+        y = records[some]["point"]["y"]
+        raw.final[part] = y[:, [0, 1, 3, 4]]
+        failed = bad[:, None] & (times >= ended[:, None])
+        ahead = np.arange(len(times)) >= own[:, None]
         for k, name in enumerate(_ALL):
             if name in raw.fields:
                 with np.errstate(over="ignore"):
-                    raw.fields[name][part] = np.where(failed, 0 if name in SMALL_FIELDS else np.nan, room[:, k])
+                    own_part = np.where(failed, 0 if name in SMALL_FIELDS else np.nan, found[:, k])
+                    raw.fields[name][part] = np.where(ahead, own_part, raw.fields[name][part])
 
 
 def side_by_side(work: Work, lanes: Lanes, rare: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -164,8 +180,8 @@ def _own(values: Any, kind: Any) -> NDArray[Any]:
     return np.require(values, kind, ("C_CONTIGUOUS", "WRITEABLE"))
 
 
-def outputs_of(work: Work, raw: Raw, given_up: NDArray[np.int8]) -> Outputs:
+def outputs_of(work: Work, raw: Raw) -> Outputs:
     """Return the arrays into which the kernels write."""
     none = {name: np.zeros((0, 0), np.int8 if name in SMALL_FIELDS else work.dtype) for name in FIELDS}
     angle, speed, contact, drive, error = ({**none, **raw.fields}[name] for name in FIELDS)
-    return Outputs(angle, speed, contact, drive, error, given_up, raw.final)
+    return Outputs(angle, speed, contact, drive, error)

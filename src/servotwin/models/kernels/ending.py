@@ -9,10 +9,9 @@ import math
 from typing import TYPE_CHECKING
 
 from servotwin.models.kernels import contact, frame
-from servotwin.models.kernels.block_rows import plant_at
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.plant import Plant, at_temperature
-from servotwin.models.kernels.runs import chip_at
+from servotwin.models.kernels.tiles import chip_in, plant_at
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from servotwin.models.kernels.block_rows import Indices, Lanes, Numbers, Smalls
+    from servotwin.models.kernels.tiles import Indices, Lanes, Numbers, Smalls
 
 ON_STOP, CANNOT_HOLD = 1, 2  # added up
 
@@ -136,7 +135,7 @@ def look_at_lanes(pulsed: bool, lanes: Lanes, torques: Numbers, torque_first: In
         command = lanes.pieces[lanes.piece_first[lane]:lanes.piece_first[lane] + lanes.piece_count[lane]]
         own = lanes.edge_count[lane]
         edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
-        plant, chip = plant_at(lanes.plants, lane), chip_at(lanes.chips, lane)
+        plant, chip = plant_at(lanes.plants, lane), chip_in(lanes.chips, lane)
         period = 0.0 if own >= 0 else chip.frame_period
         tau = lanes.torque[lane]
         if torque_count[lane] > 0:

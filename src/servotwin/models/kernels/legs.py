@@ -40,6 +40,19 @@ class Shaft(NamedTuple):
     start_off: float
     lower: float
     upper: float
+    inertia: float
+    pull: float  # of full drive on a shaft at rest [N m]
+    hold_forward: float  # most that friction holds against a start [N m]
+    hold_backward: float
+
+
+class Loading(NamedTuple):
+    """What a constant external torque is to the legs of a servo."""
+
+    against: float  # τ_ext/J [rad/s²]
+    start_forward: float  # which way a shaft at rest starts while driven forward: −1, 0, +1
+    start_backward: float
+    start_off: float
 
 
 class Leg(NamedTuple):
@@ -63,25 +76,28 @@ def shaft_of(plant: Plant, torque: float) -> Shaft:
     forward = (plant.F_forward + plant.coulomb) / J
     backward = (plant.F_backward + plant.coulomb) / J
     pull = max(plant.K * (plant.V - plant.D_drive) / plant.R_drive, 0.0)
+    hold_backward, hold_forward = holding_bounds(plant, 0.0, 0.0)
+    load = loading(J, pull, hold_forward, hold_backward, torque)
     return Shaft(
         rate_drive, rate_off, rate_free, _inverse(rate_drive), _inverse(rate_off), _inverse(rate_free), push,
         drag_drive, K * plant.D_off / (plant.R_off * J), plant.V / K_b, plant.D_drive / K_b, plant.D_off / K_b,
-        forward, backward, torque / J, _start(plant, pull - torque), _start(plant, -pull - torque),
-        _start(plant, -torque), plant.lower, plant.upper)
+        forward, backward, load.against, load.start_forward, load.start_backward, load.start_off,
+        plant.lower, plant.upper, J, pull, hold_forward, hold_backward)
+
+
+def loading(inertia: float, pull: float, hold_forward: float, hold_backward: float, torque: float) -> Loading:
+    """Return what a constant external torque [N m] does to a shaft."""
+    return Loading(torque / inertia, _start(hold_forward, hold_backward, pull - torque),
+                   _start(hold_forward, hold_backward, -pull - torque), _start(hold_forward, hold_backward, -torque))
 
 
 def _inverse(x: float) -> float:
     return 1.0 / x if x > 0.0 else 0.0
 
 
-def _start(plant: Plant, torque: float) -> float:
+def _start(forward: float, backward: float, torque: float) -> float:
     """Return which way a shaft at rest starts under a torque [N m]: −1, 0, +1."""
-    backward, forward = holding_bounds(plant, 0.0, 0.0)
-    if torque > forward:
-        return 1.0
-    if torque < -backward:
-        return -1.0
-    return 0.0
+    return 1.0 if torque > forward else (-1.0 if torque < -backward else 0.0)
 
 
 def start_of(shaft: Shaft, drive: float) -> float:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from servotwin.models.kernels import frame
 from servotwin.models.kernels.frame import Decision, Frame
 from servotwin.models.kernels.plant import Mode, Vector
+from servotwin.models.kernels.records import record_reader, record_writer
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
@@ -66,6 +67,8 @@ class Inputs(NamedTuple):
 
 
 NOTHING = Piece()
+memory_of = record_reader("memory_of", Memory)
+put_memory = record_writer("put_memory", Memory)
 
 
 def started(y: Vector, mesh: int) -> Memory:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from servotwin.models.kernels import frame, motion
-from servotwin.models.kernels.block_rows import plant_at
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.memory import (
     Inputs,
@@ -13,24 +12,38 @@ from servotwin.models.kernels.memory import (
     counted_anew,
     due,
     instant,
+    memory_of,
     origin_of,
+    put_memory,
     resumed,
     started,
     time_of,
 )
 from servotwin.models.kernels.plant import INSIDE, RIGID, Plant
 from servotwin.models.kernels.step import CHATTER, COMPLETED, MOST_IDLE, step
+from servotwin.models.kernels.tiles import chip_in, plant_at
 
 if TYPE_CHECKING:
-    from servotwin.models.kernels.block_rows import Indices, Lanes, Numbers
+    from servotwin.models.kernels.tiles import Indices, Lanes, Numbers
 
 
-def run_lanes(lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indices, torque_count: Indices,
-              which: Indices, duration: float, times: Numbers, outputs: Numbers, final: Numbers, status: Indices,
-              ended: Numbers) -> None:
-    """Run the lanes named in `which` from t = 0; `outputs` has the shape (n, 13, T), as in `run`, and is zero.
+def start(lanes: Lanes, which: Indices, records: Any) -> None:
+    """Put the lanes named in `which` into records, as they start."""
+    for k in range(which.size):
+        lane, y = which[k], lanes.start
+        plant = plant_at(lanes.plants, lane)
+        put_memory(records[k], started(
+            (y[0, lane], y[1, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane]),
+            INSIDE if plant.half_play > 0.0 else RIGID))
 
-    `final`, shape (n, 4), is where they end: angle, speed, temperatures of winding and housing.
+
+def go_on(lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indices, torque_count: Indices,
+          which: Indices, durations: Numbers, times: Numbers, first_output: Indices, outputs: Numbers, records: Any,
+          status: Indices, ended: Numbers) -> None:
+    """Let the lanes named in `which`, whose memories the records hold, go on for durations of their own [s].
+
+    `outputs` has the shape (n, 13, T), as in `run`, and gets what stands at `times` from the one numbered
+    `first_output` on.
     """
     for k in range(which.size):
         lane = which[k]
@@ -39,24 +52,21 @@ def run_lanes(lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indi
         own = lanes.edge_count[lane]
         edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
         period = 0.0 if own >= 0 else lanes.chips[14, lane]
-        plant, y = plant_at(lanes.plants, lane), lanes.start
-        memory = started((y[0, lane], y[1, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane]),
-                         INSIDE if plant.half_play > 0.0 else RIGID)
         inputs = Inputs(lanes.pieces[first:last], torques[begin:end], lanes.torque[lane], period, edges, curve,
                         lanes.seeds[lane])
-        memory, how = run(plant, chip_at(lanes.chips, lane), inputs, memory, duration, times, outputs[k])
+        memory, how = run(plant_at(lanes.plants, lane), chip_in(lanes.chips, lane), inputs, memory_of(records[k]),
+                          durations[k], times, first_output[k], outputs[k])
         status[k] = how
         ended[k] = time_of(memory)
         if how == COMPLETED:
-            y_end = memory.point.y
-            final[k, 0], final[k, 1], final[k, 2], final[k, 3] = y_end[0], y_end[1], y_end[3], y_end[4]
+            put_memory(records[k], memory)
 
 
 def run(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, duration: float, times: Numbers,
-        outputs: Numbers) -> tuple[Memory, int]:
+        done: int, outputs: Numbers) -> tuple[Memory, int]:
     """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
 
-    What stands at `times` [s], of those that lie ahead, goes into `outputs`, shape (13, n): angle, speed, contact,
+    What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (13, n): angle, speed, contact,
     drive, error, and what only few servos have: current, temperatures of winding and housing, angle and speed of the
     motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there.
     """
@@ -65,7 +75,7 @@ def run(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, duration: floa
     until = instant(pulsed, inputs, memory, memory.point.time + duration)
     origin = origin_of(memory)
     m = motion.nothing(plant, memory.u, memory.tau)
-    done = idle = 0
+    idle = 0
     while memory.point.time < until:
         if due(memory):
             memory = counted_anew(memory)
@@ -90,9 +100,3 @@ def run(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, duration: floa
             outputs[11, done], outputs[12, done] = m.mode.mesh, m.mode.motor
             done += 1
     return memory, COMPLETED
-
-
-def chip_at(c: Numbers, j: int) -> Chip:
-    """Return the chip in column j."""
-    return Chip(c[0, j], c[1, j], c[2, j], c[3, j], c[4, j], c[5, j], c[6, j], c[7, j], c[8, j], c[9, j], c[10, j],
-                c[11, j], c[12, j], c[13, j], c[14, j], c[15, j], c[16, j], c[17, j], c[18, j], c[19, j], c[20, j])

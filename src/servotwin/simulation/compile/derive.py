@@ -21,7 +21,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import cast
+from typing import Any, cast
 
 _ELEMENTARY = "servotwin.models.kernels.elementary"
 _INTRINSICS = "servotwin.simulation.compile.intrinsics"
@@ -123,11 +123,27 @@ class _Derivation:
 
     def _callable(self, function: FunctionType) -> str:
         module, name = function.__module__, function.__name__
+        if hasattr(function, "text"):
+            return self._generated(function)
         if self.recipe.vector and module == _ELEMENTARY and name.lstrip("_") in _PRIMITIVES:
             flat = _flat(_INTRINSICS, name.lstrip("_"))
             self.imports[flat] = (_INTRINSICS, name.lstrip("_"))
             return flat
         return self.function(module, name)
+
+    def _generated(self, function: Any) -> str:
+        """Collect a function of `kernels.records`, which comes as text."""
+        flat = _flat(function.__module__, function.__name__)
+        if flat not in self.functions:
+            aliases = {name: self.value(kind.__module__, name, kind) for name, kind in function.kinds.items()}
+            node = ast.parse(function.text).body[0]
+            for part in ast.walk(node):
+                if isinstance(part, ast.Name) and part.id in aliases:
+                    part.id = aliases[part.id]
+            cast("ast.FunctionDef", node).name = flat
+            self.functions[flat] = ast.unparse(node)
+            self.order.append(flat)
+        return flat
 
     def typed(self, module: str) -> bool:
         """Tell whether float literals of this module get the type of the recipe."""

@@ -1,0 +1,100 @@
+"""Named tuples as columns: a tile holds many of them, each field a row of lanes, in plain code and compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar, get_args, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+TILE = 128  # lanes that go together; what they work with fits into the nearest caches
+
+_LINE = 64  # bytes
+
+Kind = TypeVar("Kind", bound=tuple[Any, ...])
+
+
+def tile_of(fields: dict[str, Any]) -> np.dtype[Any]:
+    """Return the type of a tile: a row of `TILE` numbers for each name, or a tile in it."""
+    return np.dtype((np.record, [(name, kind) if isinstance(kind, np.dtype) and kind.names else (name, kind, (TILE,))
+                                 for name, kind in fields.items()]))
+
+
+def room(count: int, kind: np.dtype[Any]) -> NDArray[Any]:
+    """Return so many tiles, not filled, each row at the beginning of a cache line."""
+    bytes_ = np.empty(count * kind.itemsize + _LINE, np.uint8)
+    start = -bytes_.ctypes.data % _LINE
+    return bytes_[start:start + count * kind.itemsize].view(kind)
+
+
+def rows_of(kind: type[Any], number: Any) -> np.dtype[Any]:
+    """Return the type of a tile that holds named tuples of numbers."""
+    return tile_of(dict.fromkeys(kind._fields, number))
+
+
+def reader(name: str, kind: type[Kind]) -> Callable[[Any, int], Kind]:
+    """Return the function `name(tile, j)` that reads a named tuple; a compiler gets it as text."""
+    values = ", ".join(f"tile.{field}[j]" for field in kind._fields)  # type: ignore[attr-defined]
+    return _made(name, f"def {name}(tile, j):\n    return {kind.__name__}({values})\n", {kind.__name__: kind})
+
+
+def writer(name: str, kind: type[Kind]) -> Callable[[Any, int, Kind], None]:
+    """Return the function `name(tile, j, values)` that puts a named tuple into a tile."""
+    lines = "".join(f"    tile.{field}[j] = values.{field}\n" for field in kind._fields)  # type: ignore[attr-defined]
+    return _made(name, f"def {name}(tile, j, values):\n{lines}", {})
+
+
+def record_of(kind: type[Any]) -> np.dtype[Any]:
+    """Return the type of a record that holds a named tuple, with those in it."""
+    return np.dtype((np.record, [(name, *_field(hint)) for name, hint in get_type_hints(kind).items()]))
+
+
+def _field(hint: Any) -> tuple[Any, ...]:
+    if hasattr(hint, "_fields"):
+        return (record_of(hint),)
+    if hint is int:
+        return (np.int64,)
+    return (np.float64,) if hint is float else (np.float64, (len(get_args(hint)),))
+
+
+def record_reader(name: str, kind: type[Kind]) -> Callable[[Any], Kind]:
+    """Return the function `name(record)` that reads a named tuple with those in it; a compiler gets it as text."""
+    kinds: dict[str, type[Any]] = {}
+    return _made(name, f"def {name}(record):\n    return {_reading(kind, 'record', kinds)}\n", kinds)
+
+
+def _reading(kind: Any, place: str, kinds: dict[str, type[Any]]) -> str:
+    kinds[kind.__name__] = kind
+    parts = []
+    for field, hint in get_type_hints(kind).items():
+        at = f"{place}.{field}"
+        if hasattr(hint, "_fields"):
+            at = _reading(hint, at, kinds)
+        elif hint not in (int, float):
+            at = "(" + ", ".join(f"{at}[{k}]" for k in range(len(get_args(hint)))) + ")"
+        parts.append(at)
+    return f"{kind.__name__}({', '.join(parts)})"
+
+
+def record_writer(name: str, kind: type[Kind]) -> Callable[[Any, Kind], None]:
+    """Return the function `name(record, values)` that puts a named tuple into a record."""
+    return _made(name, f"def {name}(record, values):\n{''.join(_writing(kind, 'record', 'values'))}", {})
+
+
+def _writing(kind: Any, to: str, of: str) -> Iterator[str]:
+    for field, hint in get_type_hints(kind).items():
+        if hasattr(hint, "_fields"):
+            yield from _writing(hint, f"{to}.{field}", f"{of}.{field}")
+        elif hint in (int, float):
+            yield f"    {to}.{field} = {of}.{field}\n"
+        else:
+            yield from (f"    {to}.{field}[{k}] = {of}.{field}[{k}]\n" for k in range(len(get_args(hint))))
+
+
+def _made(name: str, text: str, kinds: Mapping[str, type[Any]]) -> Any:
+    space: dict[str, Any] = dict(kinds)
+    exec(text, space)
+    function = space[name]
+    function.__module__, function.text, function.kinds = __name__, text, kinds
+    return function
