@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from operator import lt
+from operator import itemgetter, lt
 from typing import NamedTuple
 
 import numpy as np
@@ -121,12 +121,14 @@ class Pieces:
         """Lowest and highest value until the last piece starts (a sinusoid counts with its whole amplitude)."""
         if len(self.table) > _FEW:
             return self.bounds(self._starts[-1])
-        lows, highs = zip(*self._ranges(), strict=True)
-        return float(min(lows)), float(max(highs))
+        ranges = self._ranges()
+        if len(ranges) == 1:
+            return float(ranges[0][0]), float(ranges[0][1])
+        return float(min(ranges)[0]), float(max(ranges, key=itemgetter(1))[1])
 
     def _ranges(self) -> list[tuple[float, float]]:
         """Return bounds of each piece until the next one, or the last one, starts."""
-        return list(map(piece_range, self.table, (*self._starts[1:], self._starts[-1])))
+        return list(map(piece_range, self.table, self._starts[1:] + self._starts[-1:]))
 
     def extreme(self, lowest: bool) -> tuple[int, float]:
         """Return number and start [s] of the piece with the lowest, or highest, of the `extremes`.
