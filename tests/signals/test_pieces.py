@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from servotwin.errors import InputError
-from servotwin.physics.pieces import Piece, Pieces, constant_pieces, piece_range, piece_rate, piece_value
+from servotwin.physics.pieces import Piece, Pieces, constant_pieces, piece_range, piece_rate, piece_value, table_rows
 
 numbers = st.floats(-5.0, 5.0)
 
@@ -90,6 +90,26 @@ def test_bounds_end_where_they_are_told_to():
     assert Pieces((Piece(0.0, 1.0, 1.0),)).bounds() == (1.0, math.inf)
     assert Pieces((Piece(0.0, 1.0, 0.0, -2.0, 1.0),)).bounds() == (-1.0, 3.0)
     assert piece_range(Piece(0.0, 3.0, -1.0), 2.0) == (1.0, 3.0)
+
+
+@given(tables(), st.sampled_from([1, 5]))
+def test_extremes_are_the_bounds_until_the_last_piece_starts(pieces, times):
+    shift = 20.0 * (1.0 + np.arange(times))  # a long table goes another way
+    table = tuple(piece._replace(start=piece.start + more) for more in shift for piece in pieces.table)
+    longer = Pieces(table)
+    assert longer.extremes == longer.bounds(table[-1].start)
+    assert all(type(value) is float for value in longer.extremes)
+
+
+@given(st.lists(tables(), min_size=1, max_size=4))
+def test_rows_of_many_tables(functions):
+    rows = table_rows(functions)
+    np.testing.assert_array_equal(rows, [piece for pieces in functions for piece in pieces.table])
+    np.testing.assert_array_equal(rows, np.concatenate([pieces.rows for pieces in functions]))
+
+
+def test_huge_numbers_are_finite():
+    assert Pieces((Piece(value=1e308), Piece(1.0, value=1.7e308))).extremes == (1e308, 1.7e308)
 
 
 def test_a_constant():

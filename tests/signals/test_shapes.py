@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from servotwin import signals, units
 from servotwin.errors import CommandError
 from servotwin.physics.pieces import Piece, Pieces
-from servotwin.signals.signal import KINDS
+from servotwin.signals.signal import KIND_NAMES, KINDS, headers
 
 FACTOR = {"deg": math.pi / 180.0, "rad": 1.0, "us": 1e-6, "ms": 1e-3, "s": 1.0, "V": 1.0, "mV": 1e-3}
 KIND = {"deg": "angle", "rad": "angle", "us": "pulse_width", "ms": "pulse_width", "s": "pulse_width",
@@ -82,6 +82,22 @@ def test_signals_compare_and_travel(shape):
     assert hash(again) == hash(signal)
     assert signal != SHAPES[shape]("ms")
     np.testing.assert_array_equal(again(TIMES), signal(TIMES))
+    assert pickle.dumps(again) == pickle.dumps(SHAPES[shape]("us"))
+
+
+def test_headers_say_what_signals_say():
+    given = [SHAPES[shape](unit) for shape in SHAPES for unit in KINDS]
+    given += [signals.constant(3.0, unit="ms", frame_period=0.02), signals.pulse_train([-0.5, 0.5], [1500.0, 1600.0])]
+    for signal, head in zip(given, headers(given), strict=True):
+        low, high = signal.pieces.extremes
+        assert KIND_NAMES[head["kind"]] == signal.kind
+        assert head["initial"] == signal.initial
+        assert (head["lowest"], head["highest"]) == (min(low, signal.initial), max(high, signal.initial))
+        assert head["pieces"] == len(signal.pieces.table)
+        assert head["edges"] == (-1 if signal.edges is None else len(signal.edges))
+        for name in ("frame_period", "first_change"):
+            value = getattr(signal, name)
+            np.testing.assert_equal(head[name], math.nan if value is None else value)
 
 
 @each_shape

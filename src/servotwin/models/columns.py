@@ -120,15 +120,19 @@ class LanePieces:
 
     def tables(self) -> tuple[Indices, Indices, Array]:
         """Return first and count of each lane, and the rows with gain and offset applied; only rows that are used."""
-        if isinstance(self.gain, np.ndarray) or isinstance(self.offset, np.ndarray):
-            first, count, lane = self.first, self.count, np.arange(len(self.first))
-        else:
+        first, count, lane = self.first, self.count, np.arange(len(self.first))
+        own = isinstance(self.gain, np.ndarray) or isinstance(self.offset, np.ndarray)
+        if not own and (np.diff(first) <= 0).any():  # lanes may share tables
             first, lane = np.unique(self.first, return_inverse=True)
             count = np.zeros_like(first)
             count[lane] = self.count
         place = np.cumsum(count) - count
-        rows = self.rows[np.repeat(first - place, count) + np.arange(count.sum())]
-        gain, offset = (np.repeat(np.broadcast_to(x, (len(first), 1)), count, axis=0) for x in (self.gain, self.offset))
+        if np.array_equal(first, place):
+            rows = self.rows[:count.sum()].copy()
+        else:
+            rows = self.rows[np.repeat(first - place, count) + np.arange(count.sum())]
+        gain, offset = (np.repeat(np.broadcast_to(x, (len(first), 1)), count, axis=0)
+                        if isinstance(x, np.ndarray) else x for x in (self.gain, self.offset))
         rows[:, 1:2] = gain * rows[:, 1:2] + offset
         rows[:, 2:4] *= gain  # slope and amplitude
         return place[lane], count[lane], rows

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from bisect import bisect_left
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -199,7 +200,7 @@ class _Pulsed(Model):
 
     def edges(self, signal: Signal) -> tuple[float, ...] | None:
         """Return when the frames of a command start [s]; None where they come regularly."""
-        return None if signal.edges is None else tuple(t for t in signal.edges if t >= 0.0)
+        return None if signal.edges is None else signal.edges[bisect_left(signal.edges, 0.0):]
 
     def command(self, signal: Signal) -> Pieces:
         """Return the pulse width t_a [s]: k_p1 v_i + t_0 of a voltage, T_0 + (p q* + b_o)/s_r of an angle.

@@ -10,15 +10,21 @@ so it is constant, linear, a sinusoid or a linear chirp. The first piece also ho
 from __future__ import annotations
 
 import math
+from array import array
 from bisect import bisect_right
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
+from operator import itemgetter, lt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from servotwin.errors import InputError
+
+_FEW = 16  # pieces, for which plain Python is faster than arrays
 
 
 class Piece(NamedTuple):
@@ -31,6 +37,9 @@ class Piece(NamedTuple):
     frequency: float = 0.0
     phase: float = 0.0
     sweep: float = 0.0
+
+
+_WIDTH = len(Piece._fields)
 
 
 def piece_value(piece: Piece, time: float) -> float:
@@ -73,9 +82,11 @@ def piece_range(piece: Piece, end: float) -> tuple[float, float]:
     >>> piece_range(Piece(value=1.0, slope=2.0), 3.0)
     (1.0, 7.0)
     """
-    first = piece.value
-    last = first + piece.slope * (end - piece.start) if piece.slope != 0.0 else first
-    return min(first, last) - abs(piece.amplitude), max(first, last) + abs(piece.amplitude)
+    start, first, slope, amplitude, *_ = piece
+    if slope == 0.0:
+        return first - abs(amplitude), first + abs(amplitude)
+    last = first + slope * (end - start)
+    return min(first, last) - abs(amplitude), max(first, last) + abs(amplitude)
 
 
 @dataclass(frozen=True)
@@ -83,29 +94,41 @@ class Pieces:
     """A right-continuous function of time; `table` is sorted by start and not empty."""
 
     table: tuple[Piece, ...]
+    numbers: array[float] = field(init=False, repr=False, compare=False)
+    """All numbers of the table, piece after piece; not to be written to."""
+    _starts: tuple[float, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not self.table:
             raise InputError("pieces", got="an empty table", allowed="at least one piece")
-        for piece in self.table:
-            if not all(map(math.isfinite, piece)):
-                raise InputError("piece", got=tuple(piece), allowed="finite numbers")
-        if any(b <= a for a, b in zip(self._starts, self._starts[1:], strict=False)):
+        numbers = tuple(chain.from_iterable(self.table))
+        if not (math.isfinite(sum(numbers)) or all(map(math.isfinite, numbers))):  # huge ones have no finite sum
+            bad = next(piece for piece in self.table if not all(map(math.isfinite, piece)))
+            raise InputError("piece", got=tuple(bad), allowed="finite numbers")
+        starts = numbers[::_WIDTH]
+        if not all(map(lt, starts, starts[1:])):
             raise InputError("pieces", got="starts that do not increase", allowed="increasing times")
-
-    @cached_property
-    def _starts(self) -> tuple[float, ...]:
-        return tuple(piece.start for piece in self.table)
+        object.__setattr__(self, "numbers", array("d", numbers))
+        object.__setattr__(self, "_starts", starts)
 
     @cached_property
     def rows(self) -> NDArray[np.float64]:
         """The table as an array, a row for each piece; not to be written to."""
-        return np.array(self.table, dtype=np.float64)
+        return np.frombuffer(self.numbers).reshape(-1, _WIDTH)
 
     @cached_property
     def extremes(self) -> tuple[float, float]:
         """Lowest and highest value until the last piece starts (a sinusoid counts with its whole amplitude)."""
-        return self.bounds(self.table[-1].start)
+        if len(self.table) > _FEW:
+            return self.bounds(self._starts[-1])
+        ranges = self._ranges()
+        if len(ranges) == 1:
+            return float(ranges[0][0]), float(ranges[0][1])
+        return float(min(ranges)[0]), float(max(ranges, key=itemgetter(1))[1])
+
+    def _ranges(self) -> list[tuple[float, float]]:
+        """Return bounds of each piece until the next one, or the last one, starts."""
+        return list(map(piece_range, self.table, self._starts[1:] + self._starts[-1:]))
 
     def extreme(self, lowest: bool) -> tuple[int, float]:
         """Return number and start [s] of the piece with the lowest, or highest, of the `extremes`.
@@ -115,18 +138,13 @@ class Pieces:
         >>> Pieces((Piece(value=1.0), Piece(start=2.0, value=3.0))).extreme(False)
         (1, 2.0)
         """
-        ends = (*self._starts[1:], self._starts[-1])
-        ranges = [piece_range(piece, end)[not lowest] for piece, end in zip(self.table, ends, strict=True)]
+        ranges = [both[not lowest] for both in self._ranges()]
         k = ranges.index(min(ranges) if lowest else max(ranges))
         return k, self._starts[k]
 
-    def __getstate__(self) -> dict[str, object]:
-        """Leave caches out, so that equal tables pickle to equal bytes."""
-        return {"table": self.table}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        """Restore the table alone."""
-        self.__dict__.update(state)
+    def __reduce__(self) -> tuple[type[Pieces], tuple[tuple[Piece, ...]]]:
+        """Pickle the table alone, so that equal tables pickle to equal bytes."""
+        return Pieces, (self.table,)
 
     def at(self, time: float) -> tuple[Piece, float]:
         """Return the piece in force at `time` [s] and the time at which the next one takes over (inf: never)."""
@@ -168,3 +186,14 @@ class Pieces:
 def constant_pieces(value: float) -> Pieces:
     """Return the function that is `value` at all times."""
     return Pieces((Piece(value=value),))
+
+
+def table_rows(functions: Iterable[Pieces]) -> NDArray[np.float64]:
+    """Return the tables of many functions as one array, table behind table.
+
+    Examples
+    --------
+    >>> table_rows([constant_pieces(1.0), constant_pieces(2.0)])[:, 1].tolist()
+    [1.0, 2.0]
+    """
+    return np.frombuffer(b"".join([pieces.numbers for pieces in functions])).reshape(-1, _WIDTH)

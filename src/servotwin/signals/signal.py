@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from struct import Struct
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from servotwin import units
 from servotwin.errors import CommandError
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from servotwin.physics.pieces import Pieces
@@ -21,6 +24,14 @@ KINDS: dict[str, tuple[str, str]] = {
     "us": ("pulse_width", "time"), "ms": ("pulse_width", "time"), "s": ("pulse_width", "time"),
     "V": ("voltage", "voltage"), "mV": ("voltage", "voltage"),
 }
+KIND_NAMES = ("angle", "pulse_width", "voltage")
+"""Kinds of commands, by the number that a header has for them."""
+
+_HEADER = np.dtype([("kind", np.int64), ("initial", np.float64), ("lowest", np.float64), ("highest", np.float64),
+                    ("frame_period", np.float64), ("first_change", np.float64), ("pieces", np.int64),
+                    ("edges", np.int64)])
+_CODES = {unit: KIND_NAMES.index(kind) for unit, (kind, _) in KINDS.items()}
+_pack = Struct("=qdddddqq").pack
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,20 +64,49 @@ class Signal:
     initial: float
     frame_period: float | None = None
     edges: tuple[float, ...] | None = None
+    header: bytes = field(init=False, repr=False, compare=False)
+    """What `headers` reads of it."""
 
     def __post_init__(self) -> None:
-        kind_of(self.unit)
+        kind = kind_of(self.unit)
         if not math.isfinite(self.initial):
             raise CommandError("value just before t = 0", got=self.initial, allowed="a finite number")
         if self.frame_period is not None:
-            if self.kind != "pulse_width":
+            if kind != "pulse_width":
                 raise CommandError("frame_period", got=self.frame_period,
                                    allowed="none: only a pulse signal (unit us, ms or s) has frames")
             if not (units.is_finite(self.frame_period) and self.frame_period > 0.0):
                 raise CommandError("frame_period", got=self.frame_period, allowed="a positive number [s]")
-        if self.kind == "pulse_width" and self.pieces.extremes[0] <= 0.0:
-            raise CommandError("pulse width", got=self.pieces.extremes[0],
-                               allowed="a positive width [s]")
+        low, high = self.pieces.extremes
+        if kind == "pulse_width" and low <= 0.0:
+            raise CommandError("pulse width", got=low, allowed="a positive width [s]")
+        change = self.first_change
+        object.__setattr__(self, "header", _pack(
+            _CODES[self.unit], self.initial, min(low, self.initial), max(high, self.initial),
+            self.frame_period or math.nan, math.nan if change is None else change, len(self.pieces.table),
+            -1 if self.edges is None else len(self.edges)))
+
+    @property
+    def first_change(self) -> float | None:
+        """When it changes first, or its first pulse comes [s]; None where it never changes.
+
+        A single pulse that comes late is how a servo is left without pulses.
+
+        Examples
+        --------
+        >>> from servotwin.signals import constant, pulse_train, step
+        >>> step(0.0, 90.0, at=2.0, unit="deg").first_change, constant(1500.0, unit="us").first_change
+        (2.0, None)
+        >>> pulse_train([0.5, 0.52], [1500.0, 1500.0]).first_change
+        0.5
+        """
+        if self.edges is not None:
+            return self.edges[0] if len(self.edges) > 1 else None
+        table = self.pieces.table
+        first = table[0]
+        if first.slope or first.amplitude:
+            return first.start
+        return table[1].start if len(table) > 1 else None
 
     @property
     def kind(self) -> str:
@@ -76,6 +116,21 @@ class Signal:
     def __call__(self, time: ArrayLike) -> NDArray[np.float64]:
         """Return the values (SI) at `time` [s], any shape."""
         return self.pieces(time)
+
+
+def headers(signals: Iterable[Signal]) -> NDArray[Any]:
+    """Return what there is to know of many signals but their pieces, as an array of records.
+
+    `kind` is the place in `KIND_NAMES`; `lowest` and `highest` (SI) include `initial`; `frame_period` and
+    `first_change` [s] are nan where there is none; `pieces` and `edges` count, and `edges` is -1 where there are none.
+
+    Examples
+    --------
+    >>> from servotwin.signals import constant, step
+    >>> headers([constant(1.5, unit="ms"), step(0.0, 2.0, at=0.1, unit="V")])[["kind", "highest", "pieces"]].tolist()
+    [(1, 0.0015, 1), (2, 2.0, 2)]
+    """
+    return np.frombuffer(b"".join([signal.header for signal in signals]), _HEADER)
 
 
 def kind_of(unit: str) -> str:

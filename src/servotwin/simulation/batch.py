@@ -5,13 +5,13 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, SupportsIndex, overload
 
 import numpy as np
 
-from servotwin.errors import MissingExtraError, SimulationError, UnknownNameError
+from servotwin.errors import SimulationError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
-from servotwin.simulation import files
+from servotwin.simulation import files, frames
 from servotwin.simulation.remarks import LaneRemark
 from servotwin.simulation.simulator import Simulator, simulated
 from servotwin.simulation.status import Status
@@ -156,14 +156,7 @@ class Batch:
         >>> batch.to_dataframe().index.names, batch.to_dataframe().loc[1].shape
         (FrozenList(['lane', 'time']), (3, 1))
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise MissingExtraError("pandas", "data") from None
-        frame = pd.DataFrame({name: values.ravel() for name, values in self.signals.items()},
-                             index=pd.MultiIndex.from_product([range(len(self)), self.time], names=["lane", "time"]))
-        frame.attrs["units"] = dict(self.units)
-        return frame
+        return frames.dataframe("lane", range(len(self)), self.time, self.signals, self.units)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write all signals to a CSV or Parquet file, a row for each lane and time.
@@ -183,19 +176,17 @@ class Batch:
         OutputExistsError, OutputError
             If the file exists and `overwrite` is false, or it cannot be written.
         """
-        files.save_lanes(path, self.time, self.signals, self.units, {**self.lanes.numbers, **self.lanes.words},
-                         overwrite=overwrite)
+        files.save_lanes(path, self.time, self.signals, self.units, {"lane": np.arange(len(self)), **self._varied},
+                         what="a batch", overwrite=overwrite)
 
     def to_xarray(self) -> xr.Dataset:
         """Return all signals (SI) as an xarray Dataset over `lane` and `time`, with what differs between lanes."""
-        try:
-            import xarray as xr
-        except ImportError:
-            raise MissingExtraError("xarray", "data") from None
-        data = {name: (("lane", "time"), values, {"units": self.units[name], "long_name": SIGNALS[name].meaning})
-                for name, values in self.signals.items()}
-        varied = {name: ("lane", column) for name, column in {**self.lanes.numbers, **self.lanes.words}.items()}
-        return xr.Dataset(
-            data | {"status": ("lane", self.status)},
-            coords={"lane": np.arange(len(self)), "time": ("time", self.time, {"units": "s"}), **varied},
+        return frames.dataset(
+            "lane", range(len(self)), self.time, self.signals, more={"status": ("lane", self.status)},
+            coords={name: ("lane", column) for name, column in self._varied.items()},
             attrs={"model": type(self.lanes.model).__name__, "servo": self.lanes.model.servo.name})
+
+    @property
+    def _varied(self) -> dict[str, NDArray[Any]]:
+        """What differs between lanes, by its dotted name."""
+        return {**self.lanes.numbers, **self.lanes.words}

@@ -16,10 +16,12 @@ from servotwin.models.kernels import coupled
 from servotwin.models.kernels.coupled import Source
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.plant import Mode
+from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
 from servotwin.parameters.groups import Supply
 from servotwin.physics.pieces import Piece
 from servotwin.signals import Signal
+from servotwin.simulation import files, frames
 from servotwin.simulation.bus_engine import Bus, Unit
 from servotwin.simulation.bus_group import Group
 from servotwin.simulation.energy import Energy
@@ -33,10 +35,15 @@ from servotwin.simulation.trajectory import Trajectory
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+    import xarray as xr
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
+_BUS_UNITS = {"bus_voltage": "V", "bus_current": "A"}
 _OF_SERVO = ("bridge_drop_voltage", "bridge_drop_resistance")
 
 
@@ -106,6 +113,80 @@ class Fleet(Mapping[str, Result]):
         """Energy balance of all servos together [J]; its `supply` is what the bus has delivered."""
         parts = [result.energy for result in self.results.values()]
         return Energy(*(sum(getattr(part, one.name) for part in parts) for one in fields(Energy)))
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """SI unit of each signal of tables and files."""
+        return {"time": "s", **{name: SIGNALS[name].unit for name in self._signals}, **_BUS_UNITS}
+
+    @cached_property
+    def _signals(self) -> dict[str, Array]:
+        """All signals of the servos, shape (servos, n); nan where a servo lacks one."""
+        names = dict.fromkeys(name for result in self.results.values() for name in result.model.available)
+        none = np.full(len(self.time), np.nan)
+        return {name: np.array([result[name] if name in result else none for result in self.results.values()])
+                for name in names if name not in _BUS_UNITS}
+
+    def _table(self) -> dict[str, Array]:
+        """Return all signals, and voltage and current of the bus as each servo's."""
+        shape = (len(self), len(self.time))
+        return self._signals | {"bus_voltage": np.broadcast_to(self.bus_voltage, shape),
+                                "bus_current": np.broadcast_to(self.supply_current, shape)}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return all signals (SI) as a pandas DataFrame, a row for each servo and time.
+
+        `supply_current` is what a servo draws; `bus_voltage`, and `bus_current` of all servos, stand with each. A
+        signal that a servo lacks is nan.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
+        >>> command = st.signals.step(0.0, 60.0, unit="deg")
+        >>> fleet = st.simulate_bus({"left": (model, command), "right": (model, command)}, duration=0.1,
+        ...                         supply=st.Supply(open_circuit_voltage=6.0, internal_resistance=0.5))
+        >>> frame = fleet.to_dataframe()
+        >>> frame.index.names, len(frame.loc["left"]) == len(fleet.time), "bus_voltage" in frame
+        (FrozenList(['servo', 'time']), True, True)
+        """
+        return frames.dataframe("servo", list(self.results), self.time, self._table(), self.units)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return all signals (SI) as an xarray Dataset over `servo` and `time`; those of the bus over `time` alone.
+
+        `supply_current` is what a servo draws, `bus_current` that of all. A signal that a servo lacks is nan.
+        """
+        bus = {"bus_voltage": (self.bus_voltage, SIGNALS["bus_voltage"].meaning),
+               "bus_current": (self.supply_current, "current that the supply gives to all servos")}
+        models = [result.model for result in self.results.values()]
+        return frames.dataset(
+            "servo", list(self.results), self.time, self._signals,
+            more={name: ("time", values, {"units": _BUS_UNITS[name], "long_name": meaning})
+                  for name, (values, meaning) in bus.items()},
+            coords={"model": ("servo", [type(model).__name__ for model in models]),
+                    "servo_name": ("servo", [model.servo.name for model in models])}, attrs={})
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write all signals to a CSV or Parquet file, a row for each servo and time.
+
+        Columns are `servo`, `time_s`, the signals, and voltage and current of the bus, the unit of each in its name. A
+        signal that a servo lacks, and what a failed run has not reached, is nan.
+
+        Parameters
+        ----------
+        path : str or Path
+            Ends in .csv or .parquet; the latter needs pyarrow.
+        overwrite : bool
+            Whether a file that is there may be replaced.
+
+        Raises
+        ------
+        OutputExistsError, OutputError
+            If the file exists and `overwrite` is false, or it cannot be written.
+        """
+        files.save_lanes(path, self.time, self._table(), self.units, {"servo": np.array(list(self.results))},
+                         what="a fleet", overwrite=overwrite)
 
     def raise_if_failed(self) -> Fleet:
         """Return the fleet itself, or raise SimulationError if the run ended before its time."""

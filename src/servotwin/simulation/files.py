@@ -57,7 +57,8 @@ def shown_columns(signals: Mapping[str, NDArray[Any]], si_units: Mapping[str, st
 
 
 def save_lanes(path: str | Path, time: NDArray[np.float64], signals: Mapping[str, NDArray[Any]],
-               si_units: Mapping[str, str], varied: Mapping[str, NDArray[Any]], *, overwrite: bool = False) -> None:
+               si_units: Mapping[str, str], of_lanes: Mapping[str, NDArray[Any]], *, what: str,
+               overwrite: bool = False) -> None:
     """Write signals of many lanes, one row for each lane and time, as CSV or Parquet.
 
     Parameters
@@ -68,8 +69,10 @@ def save_lanes(path: str | Path, time: NDArray[np.float64], signals: Mapping[str
     signals : mapping of str to ndarray, shape (B, T)
     si_units : mapping
         Of `time` and the signals.
-    varied : mapping of str to ndarray, shape (B,)
-        What differs from lane to lane.
+    of_lanes : mapping of str to ndarray, shape (B,)
+        Number or name of each lane, and what else differs from lane to lane.
+    what : str
+        Whose file it is, for errors.
     overwrite : bool
 
     Raises
@@ -85,14 +88,13 @@ def save_lanes(path: str | Path, time: NDArray[np.float64], signals: Mapping[str
 
     ending = Path(path).suffix.lower().removeprefix(".")
     if ending not in FORMATS:
-        raise OutputError("file of a batch", got=str(path), allowed="a name that ends in .csv or .parquet")
+        raise OutputError(f"file of {what}", got=str(path), allowed="a name that ends in .csv or .parquet")
     check_format(ending)
     lanes, times = next(iter(signals.values())).shape
 
     def rows(first: int, last: int) -> dict[str, NDArray[Any]]:
-        of_lanes = {"lane": np.arange(first, last), **{name: column[first:last] for name, column in varied.items()}}
         flat = {"time": np.tile(time, last - first), **{name: x[first:last].ravel() for name, x in signals.items()}}
-        return {**{name: np.repeat(column, times) for name, column in of_lanes.items()},
+        return {**{name: np.repeat(column[first:last], times) for name, column in of_lanes.items()},
                 **shown_columns(flat, si_units)}
 
     def write(file: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductiv
 from servotwin.parameters import GROUPS, Servo
 from servotwin.parameters.groups import check_columns
 from servotwin.signals import Signal
+from servotwin.signals.signal import headers
 from servotwin.simulation.lane_loads import LOAD_NAMES, check_number, with_numbers
 from servotwin.units import is_finite
 
@@ -53,6 +55,11 @@ class Lanes:
     load_of: Indices
     initial: Mapping[str, Array]
     seeds: Indices
+
+    @cached_property
+    def headers(self) -> NDArray[Any]:
+        """Those of `commands`."""
+        return headers(self.commands)
 
     def load(self, lane: int) -> Load:
         """Return the load of a lane."""
@@ -190,6 +197,8 @@ def _seeds(seeds: Any) -> Indices:
 
 
 def _check_commands(signals: Sequence[object], of: Indices) -> None:
+    if set(map(type, signals)) == {Signal}:
+        return
     for k, signal in enumerate(signals):
         if not isinstance(signal, Signal):
             raise CommandError("command" if len(of) == 1 else f"command of lane {np.argmax(of == k)}",
@@ -214,6 +223,8 @@ def _once(given: Any) -> tuple[tuple[Any, ...], Indices]:
     items = list(given) if isinstance(given, Sequence) else [given]
     if items and all(item is items[0] for item in items):
         return (items[0],), np.zeros(len(items), dtype=np.int64)
+    if len(set(map(id, items))) == len(items):  # each is another
+        return tuple(items), np.arange(len(items))
     ids = np.fromiter(map(id, items), dtype=np.uint64, count=len(items))
     _, where, index = np.unique(ids, return_index=True, return_inverse=True)
     place = np.empty_like(where)

@@ -115,7 +115,7 @@ def simulate_many(
     lanes = lanes_of(model, command, load, parameters, initial, seeds)
     if is_finite(duration) and duration > 0.0:
         warn_of(lanes.model.servo, lanes.commands, duration,
-                voltages=lanes.numbers.get("supply.open_circuit_voltage"))
+                voltages=lanes.numbers.get("supply.open_circuit_voltage"), known=lanes.headers)
     return simulate_lanes(lanes, duration=duration, output_step=output_step, output_times=output_times,
                           outputs=outputs, dtype=dtype, executor=executor, chunk=chunk, progress=progress)
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -16,6 +17,8 @@ from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.models.kernels.plant import Plant
 from servotwin.models.outputs import FIELDS as FIELDS_OF
+from servotwin.physics.pieces import table_rows
+from servotwin.signals.signal import KIND_NAMES
 from servotwin.simulation.lane_inputs import LAWS, Lanes
 from servotwin.simulation.lane_loads import LOAD_NAMES, column_load, recorded_torque, structure
 from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Raw, Tables, Work, no_tables, regular_edges
@@ -48,20 +51,23 @@ class Commands:
 
     def __init__(self, lanes: Lanes) -> None:
         signals, self.of = lanes.commands, lanes.command_of
-        self.kinds = np.array([signal.kind for signal in signals])
-        self.initial = np.array([signal.initial for signal in signals])
-        bounds = np.array([signal.pieces.extremes for signal in signals])
-        self.low = np.minimum(bounds[:, 0], self.initial)
-        self.high = np.maximum(bounds[:, 1], self.initial)
-        self.periods = np.array([signal.frame_period or math.nan for signal in signals])
-        self.rows = np.concatenate([signal.pieces.rows for signal in signals])
-        self.count = np.array([len(signal.pieces.table) for signal in signals])
+        heads = lanes.headers
+        self.kinds, self.initial, self.periods = heads["kind"], heads["initial"], heads["frame_period"]
+        self.low, self.high, self.count = heads["lowest"], heads["highest"], heads["pieces"]
+        self.rows = table_rows([signal.pieces for signal in signals])
         self.first = np.cumsum(self.count) - self.count
-        edges = [lanes.model.edges(signal) for signal in signals]
-        self.edge_count = np.array([-1 if some is None else len(some) for some in edges])
-        own = np.maximum(self.edge_count, 0)
-        self.edge_first = np.cumsum(own) - own
-        self.edges = np.array([t for some in edges for t in some or ()], dtype=np.float64)
+        self.edge_count = np.full(len(signals), -1)
+        edges: list[tuple[float, ...]] = []
+        for k in np.flatnonzero(heads["edges"] >= 0).tolist():
+            own = lanes.model.edges(signals[k])
+            if own is not None:
+                self.edge_count[k] = len(own)
+                edges.append(own)
+        used = np.maximum(self.edge_count, 0)
+        self.edge_first = np.cumsum(used) - used
+        self.edges = np.fromiter(chain.from_iterable(edges), np.float64)
+        # One number for what can share columns: kind, whether it has a frame period, whether it has edges
+        self.shape = 4 * self.kinds + 2 * np.isnan(self.periods) + (heads["edges"] < 0)
 
     def signal(self, lanes: Indices) -> LaneSignal:
         """Return the commands of some lanes, all of one kind."""
@@ -83,7 +89,8 @@ class Commands:
     def _signal(self, lanes: Indices, pieces: LanePieces) -> LaneSignal:
         of = self.of[lanes]
         period = None if math.isnan(self.periods[of[0]]) else self._shared(self.periods, of)
-        return LaneSignal(str(self.kinds[of[0]]), pieces, period, None if self.edge_count[of[0]] < 0 else (), lanes)
+        edges = None if self.edge_count[of[0]] < 0 else ()
+        return LaneSignal(KIND_NAMES[self.kinds[of[0]]], pieces, period, edges, lanes)
 
     def frame_edges(self, lanes: Indices) -> Tables:
         """Return the edges of each lane's frames."""
@@ -95,7 +102,7 @@ class Commands:
 
 def groups(lanes: Lanes, commands: Commands) -> Iterator[Indices]:
     """Return the lanes in groups of one structure: one kind of command and frame, same words, loads of same parts."""
-    of_command = [(signal.kind, signal.frame_period is None, signal.edges is None) for signal in lanes.commands]
+    of_command = commands.shape.tolist() if np.ptp(commands.shape) else [0]
     of_load = [structure(load) for load in lanes.loads]
     code = np.zeros(lanes.count, dtype=np.int64)
     for shapes, index in ((of_command, lanes.command_of), (of_load, lanes.load_of)):

@@ -88,6 +88,8 @@ def factor(unit: str, dimension: str) -> float:
     (1e-06, 1e-06)
     """
     units = _units_of(dimension)
+    if unit in units:
+        return units[unit]
     plain = unit.translate(_SPELLINGS).replace(" / ", "/") if isinstance(unit, str) else unit
     if plain not in units:
         raise UnitError(f"unit of a {dimension}", got=unit, allowed=", ".join(units))
@@ -133,7 +135,7 @@ def is_finite(value: object) -> TypeGuard[float]:
     [True, True, False, False, False, False]
     """
     try:
-        return not isinstance(value, bool) and isinstance(value, Real) and math.isfinite(value)
+        return not isinstance(value, bool) and isinstance(value, (float, Real)) and math.isfinite(value)
     except OverflowError:  # an integer beyond the range of a float
         return False
 
