@@ -107,13 +107,12 @@ def assert_same(raw, other, tolerance):
 def plain(work):
     raw = empty_raw(work)
     lanes = lane_runs.lanes_of(work)
-    _, braked = lane_runs.side_by_side(work, lanes, lane_runs.has_rare_terms(work, lanes)[0])
-    assert braked.all() or not braked.any()
+    (kind,) = lane_runs.kinds_of(lanes, True, "float64", work.torque.count > 0, False)
     with np.errstate(all="ignore"):
         rows = room(1, tiles.tile_type("float64"))
         side_by_side.start(lanes, work.times[0], rows)
         lost = side_by_side.go_on(
-            lanes.pieces, lanes.edges, bool(braked.all()), np.arange(work.lanes), work.duration, work.times,
+            lanes.pieces, lanes.edges, kind.braked, kind.which, work.duration, work.times,
             lane_runs.outputs_of(work, raw), rows, room(1, tiles.plan_type("float64")))
     assert lost == 0
     return raw

@@ -118,6 +118,29 @@ def lanes_of(model: Model, command: object, load: object, parameters: object, in
         seeds=np.arange(count) if seed is None else _spread(np.atleast_1d(seed), count))
 
 
+def pick(lanes: Any, count: int) -> Indices:
+    """Return the numbers of the lanes that a mask, or a list of numbers, means; all for None.
+
+    Raises
+    ------
+    InputError
+        If the mask has another length, or a lane is out of range.
+    """
+    if lanes is None:
+        return np.arange(count)
+    array = np.atleast_1d(_array(lanes))
+    if array.dtype == np.bool_ and array.shape == (count,):
+        return np.flatnonzero(array)
+    if array.ndim != 1 or array.dtype.kind not in "iu" or np.ma.is_masked(lanes):
+        raise InputError("lanes", got=lanes if array.size < 20 else f"an array of shape {array.shape}",
+                         allowed=f"a mask of {count} lanes, or numbers of lanes from 0 to {count - 1}")
+    bad = (array < 0) | (array >= count)
+    if bad.any() or len(np.unique(array)) < len(array):
+        raise InputError("lanes", got=array[bad].tolist() if bad.any() else "a lane twice",
+                         allowed=f"numbers of lanes from 0 to {count - 1}, each once")
+    return array.astype(np.int64)
+
+
 def _named(what: str, mapping: object) -> Mapping[str, Any]:
     if mapping is None:
         return {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,17 +18,17 @@ from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Floats
 
 Indices = NDArray[np.int64]
 
-_SIDE_BY_SIDE = {
+SIDE_BY_SIDE = {
     dtype: Recipe(f"side_by_side_{dtype}", tuple(
-        f"servotwin.models.kernels.side_by_side:{name}" for name in ("start", "go_on")),
+        f"servotwin.models.kernels.side_by_side:{name}" for name in ("start", "go_on", "advance", "renew")),
         vector=True, single=dtype == "float32")
     for dtype in ("float64", "float32")
 }
-_ENTRIES = tuple(f"servotwin.models.kernels.runs:{name}" for name in ("start", "go_on"))
+_ENTRIES = tuple(f"servotwin.models.kernels.runs:{name}" for name in ("start", "go_on", "settle"))
 _RUNS = Recipe("runs", _ENTRIES)  # everything
 _RARE = {"varies": 0.0, "half_play": 0.0, "C_w": 0.0, "half_slack": 0.0, "L": 0.0, "gravity": 0.0, "kappa": 0.0,
          "I_max": np.inf}
-_PLAIN_RUNS = Recipe(
+PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE.items(), ("sweep", 0.0)),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 _SWINGING = Recipe(
@@ -45,16 +45,11 @@ def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw = empty_raw(work)
     lanes = lanes_of(work)
-    rare, swinging = has_rare_terms(work, lanes)
-    side, braked = side_by_side(work, lanes, rare | swinging)
-    for kind in (True, False):
-        which = np.flatnonzero(side & (braked == kind))
-        if len(which):
-            run_side_by_side(work, lanes, which, kind, raw)
-    for recipe, some in ((_PLAIN_RUNS, ~(rare | swinging)), (_SWINGING, swinging & ~rare), (_RUNS, rare)):
-        which = np.flatnonzero(some & ~side)
-        if len(which):
-            run_one_by_one(work, lanes, which, raw, recipe)
+    for kind in kinds_of(lanes, work.law == "pulse", work.dtype, work.torque.count > 0, bool(work.curve[0])):
+        if isinstance(kind, OneByOne):
+            run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
+        else:
+            run_side_by_side(work, lanes, kind.which, kind.braked, raw)
     kernels(_ENDING).look_at_lanes(
         work.law == "pulse", lanes, _rows(work.torque.rows), _indices(work.torque.first), _indices(work.torque.count),
         float(work.duration), raw.final, raw.refused, raw.marks)
@@ -68,11 +63,8 @@ def run_side_by_side(work: Work, lanes: Lanes, which: Indices, braked: bool, raw
     rows = room(-(-len(which) // tiles.TILE), tiles.tile_type(work.dtype))
     plans = room(1, tiles.plan_type(work.dtype))
     times = _own(work.times, np.float64)
-    module = kernels(_SIDE_BY_SIDE[work.dtype])
-    some = lanes if len(which) == work.lanes else Lanes(*(
-        x if name in _SHARED else np.ascontiguousarray(x[..., which])
-        for name, x in zip(Lanes._fields, lanes, strict=True)))
-    module.start(some, times[0] if len(times) else np.inf, rows)
+    module = kernels(SIDE_BY_SIDE[work.dtype])
+    module.start(some_of(lanes, which), times[0] if len(times) else np.inf, rows)
     lost = module.go_on(lanes.pieces, lanes.edges, braked, which, float(work.duration), times, outputs_of(work, raw),
                         rows, plans)
     raw.final[which, 0], raw.final[which, 1] = (flat(rows, "servo", name)[:len(which)] for name in ("q", "w"))
@@ -81,7 +73,7 @@ def run_side_by_side(work: Work, lanes: Lanes, which: Indices, braked: bool, raw
         places = np.flatnonzero(owed > 0.0)
         gone = which[places]
         _finish(work, lanes, gone, owed[places], flat(rows, "count", "output")[places],
-                records_of(rows, places, lanes.start[3:5, gone]), raw, _PLAIN_RUNS)
+                records_of(rows, places, lanes.start[3:5, gone]), raw, PLAIN_RUNS)
 
 
 def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = _RUNS) -> None:
@@ -119,22 +111,45 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
                     raw.fields[name][part] = np.where(ahead, own_part, raw.fields[name][part])
 
 
-def side_by_side(work: Work, lanes: Lanes, rare: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Tell which lanes have nothing that takes the general way, and which of these brake without a dead zone."""
-    if work.law != "pulse":
-        return np.zeros(work.lanes, np.bool_), np.zeros(work.lanes, np.bool_)
+class SideBySide(NamedTuple):
+    """Lanes that run side by side, all of them `braked` or none."""
+
+    which: Indices
+    braked: bool
+
+
+class OneByOne(NamedTuple):
+    """Lanes that run one by one, by a form that leaves out what they lack."""
+
+    which: Indices
+    recipe: Recipe
+
+
+def kinds_of(lanes: Lanes, pulsed: bool, dtype: str, recorded: NDArray[np.bool_],
+             curved: bool) -> list[SideBySide | OneByOne]:
+    """Return how lanes run.
+
+    `recorded` is whose load is recorded over time, `curved` whether the potentiometers have a table.
+    """
+    rare, swinging = has_rare_terms(lanes)
     plant, chip = Plant(*lanes.plants), Chip(*lanes.chips)
-    if work.dtype == "float32":  # what is not zero has to stay so
-        kept = [((x == 0.0) | (abs(x.astype(np.float32)) > 0.0)).all(axis=0) for x in (lanes.plants, lanes.chips)]
+    if not pulsed or curved:
+        side = np.zeros(len(lanes.torque), np.bool_)
     else:
-        kept = [np.ones(work.lanes, np.bool_)]
-    side = np.logical_and.reduce([~rare, plant.stiffness == 0.0, chip.step == 0.0,
-                                  plant.K_b > 0.0, work.torque.count == 0, *kept])
-    side &= not work.curve[0]
-    return np.asarray(side), np.asarray((plant.D_off == 0.0) & (plant.D_drive < plant.V))
+        side = np.asarray(~(rare | swinging | recorded) & (plant.stiffness == 0.0) & (chip.step == 0.0)
+                          & (plant.K_b > 0.0))
+    if dtype == "float32":  # what is not zero has to stay so
+        for x in (lanes.plants, lanes.chips):
+            side &= ((x == 0.0) | (abs(x.astype(np.float32)) > 0.0)).all(axis=0)
+    braked = (plant.D_off == 0.0) & (plant.D_drive < plant.V)
+    found: list[SideBySide | OneByOne] = [SideBySide(np.flatnonzero(side & (braked == kind)), kind)
+                                          for kind in (True, False)]
+    found += [OneByOne(np.flatnonzero(some & ~side), recipe) for recipe, some in (
+        (PLAIN_RUNS, ~(rare | swinging)), (_SWINGING, swinging & ~rare), (_RUNS, rare))]
+    return [kind for kind in found if len(kind.which)]
 
 
-def has_rare_terms(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def has_rare_terms(lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Tell which lanes have a term that the plain run leaves out, and which have a pendulum."""
     plant = Plant(*lanes.plants)
     terms = [getattr(plant, name) != value for name, value in _RARE.items() if name != "gravity"]
@@ -142,6 +157,14 @@ def has_rare_terms(work: Work, lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray
         swept = np.concatenate([[0], np.cumsum(lanes.pieces[:, 6] != 0.0)])
         terms.append(swept[lanes.piece_first + lanes.piece_count] > swept[lanes.piece_first])
     return np.asarray(np.logical_or.reduce(terms)), np.asarray(plant.gravity != 0.0)
+
+
+def some_of(lanes: Lanes, which: Indices) -> Lanes:
+    """Return the numbers of some lanes."""
+    if len(which) == len(lanes.torque):
+        return lanes
+    return Lanes(*(x if name in _SHARED else np.ascontiguousarray(x[..., which])
+                   for name, x in zip(Lanes._fields, lanes, strict=True)))
 
 
 def lanes_of(work: Work) -> Lanes:

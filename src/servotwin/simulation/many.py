@@ -133,14 +133,14 @@ def simulate_lanes(
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     times = np.array(_times(duration, output_step, output_times))  # a copy: it becomes read-only
-    asked = Asked(float(duration), times, _outputs(lanes.model, outputs), _dtype(dtype))
+    asked = Asked(float(duration), times, _outputs(lanes.model, outputs), real_type(dtype))
     commands = Commands(lanes)
     packs = _packs(lanes, commands, asked, chunk, _workers(executor))
     signals = _space(lanes, asked)
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
     refused, marks = np.empty(lanes.count), np.empty(lanes.count, dtype=np.int8)
-    own = _threads(os.getpid()) if executor is None else executor
+    own = own_threads(os.getpid()) if executor is None else executor
     with shown(progress, lanes.count, "simulate_many") as show, closing(_run(packs, asked, own)) as running:
         for which, raw, values in running:
             place: Any = which
@@ -218,7 +218,7 @@ def _outputs(model: Model, outputs: Sequence[str]) -> tuple[str, ...]:
     return tuple(asked)
 
 
-def _dtype(dtype: DTypeLike) -> str:
+def real_type(dtype: DTypeLike) -> str:
     try:
         name = "" if dtype is None else np.dtype(dtype).name
     except TypeError:
@@ -330,6 +330,6 @@ def _chunks(packs: list[_Pack], asked: Asked) -> Iterator[tuple[Chunk, Work]]:
 
 
 @cache
-def _threads(process: int) -> ThreadPoolExecutor:
+def own_threads(process: int) -> ThreadPoolExecutor:
     """Return the threads of this process, kept from call to call; a forked child has none of its parent's."""
     return ThreadPoolExecutor(_workers(None), thread_name_prefix="servotwin")

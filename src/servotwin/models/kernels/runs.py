@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.kernels import frame, motion
@@ -16,11 +17,12 @@ from servotwin.models.kernels.memory import (
     origin_of,
     put_memory,
     resumed,
+    since,
     started,
     time_of,
 )
-from servotwin.models.kernels.plant import INSIDE, RIGID, Plant
-from servotwin.models.kernels.step import CHATTER, COMPLETED, MOST_IDLE, step
+from servotwin.models.kernels.plant import INSIDE, RIGID, Mode, Plant
+from servotwin.models.kernels.step import CHATTER, COMPLETED, MOST_IDLE, anchored, source, step
 from servotwin.models.kernels.tiles import chip_in, plant_at
 
 if TYPE_CHECKING:
@@ -47,19 +49,41 @@ def go_on(lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indices,
     """
     for k in range(which.size):
         lane = which[k]
-        first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
-        begin, end = torque_first[lane], torque_first[lane] + torque_count[lane]
-        own = lanes.edge_count[lane]
-        edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
-        period = 0.0 if own >= 0 else lanes.chips[14, lane]
-        inputs = Inputs(lanes.pieces[first:last], torques[begin:end], lanes.torque[lane], period, edges, curve,
-                        lanes.seeds[lane])
+        inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
         memory, how = run(plant_at(lanes.plants, lane), chip_in(lanes.chips, lane), inputs, memory_of(records[k]),
                           durations[k], times, first_output[k], outputs[k])
         status[k] = how
         ended[k] = time_of(memory)
         if how == COMPLETED:
             put_memory(records[k], memory)
+
+
+def _inputs(lanes: Lanes, curve: Numbers, torque: Numbers, lane: int) -> Inputs:
+    first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
+    own = lanes.edge_count[lane]
+    edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
+    period = 0.0 if own >= 0 else lanes.chips[14, lane]
+    return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane])
+
+
+def settle(lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indices, torque_count: Indices,
+           which: Indices, records: Any, modes: Indices) -> None:
+    """Fill `modes`, shape (4, n), with the modes of lanes as they stand, under their present inputs."""
+    for k in range(which.size):
+        lane = which[k]
+        inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
+        mode = mode_of(plant_at(lanes.plants, lane), chip_in(lanes.chips, lane), inputs, memory_of(records[k]))
+        modes[0, k], modes[1, k], modes[2, k], modes[3, k] = mode.zone, mode.contact, mode.mesh, mode.motor
+
+
+def mode_of(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory) -> Mode:
+    """Return the mode of a servo as it stands, under its present inputs."""
+    memory = resumed(chip.frame_period > 0.0, inputs, memory, False)
+    origin, point = origin_of(memory), memory.point
+    u = source(plant, memory.chip) if chip.frame_period > 0.0 else since(memory.u, origin)
+    if point.anchor_time < math.inf and (chip.frame_period == 0.0 or u.value == memory.u.value):
+        return point.mode
+    return anchored(plant, u, since(memory.tau, origin), point.time, point).mode
 
 
 def run(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, duration: float, times: Numbers,

@@ -40,48 +40,93 @@ def start(lanes: Lanes, first_output: float, tile_rows: Any) -> None:
         tiles.start(lanes, first, min(tiles.TILE, total - first), first_output, tile_rows[k])
 
 
+def advance(which: Indices, braked: bool, first: int, last: int, duration: float, widths: Numbers, torques: Numbers,
+            loads_change: bool, tile_rows: Any, plans: Any) -> int:
+    """Let the lanes `which` of the tiles from `first` to before `last` go on under constant pulses [s] and torques.
+
+    The torques [N m] are read where `loads_change`. Return how many lanes were given up.
+    """
+    lost = 0
+    for k in range(first, last):
+        lost += _advance(which[k * tiles.TILE:(k + 1) * tiles.TILE], braked, duration, widths, torques, loads_change,
+                         tile_rows[k], plans[0].of, plans[0].clock)
+    return lost
+
+
+def _advance(which: Indices, braked: bool, duration: float, widths: Numbers, torques: Numbers, loads_change: bool,
+             tile: Any, plan: Any, before: Any) -> int:
+    size = which.size
+    for j in range(size):
+        tile.servo.width[j] = widths[which[j]]
+        tile.clock.remaining[j] = duration
+    if loads_change:
+        _hang(which, torques, tile)
+    full, noisy = _needs_all(size, tile)
+    lost = 0
+    while windows.begin(widths, size, False, tile, plan, before) > 0:
+        _through(size, full, noisy, braked, False, tile, plan)
+        lost += windows.give_up(size, tile, plan, before)
+    return lost
+
+
 def _go_on(pieces: Numbers, listed: Numbers, braked: bool, which: Indices, duration: float, times: Numbers,
            outputs: Outputs, tile: Any, plan: Any, before: Any) -> int:
     size = which.size
-    own = full = noisy = False
+    own = False
     for j in range(size):
         own = own or tile.count.edges[j] >= 0
-        noisy = noisy or tile.chip.noise[j] != 0.0
-        full = full or _needs_all(tile, j)
         tile.clock.remaining[j] = duration
+    full, noisy = _needs_all(size, tile)
     lost = 0
     while windows.begin(listed, size, own, tile, plan, before) > 0:
         windows.commands(pieces, size, tile, plan)
-        if noisy:
-            for j in range(size):
-                plan.draw[j] = gaussian(tile.count.seed[j], tile.count.first_draw[j] + tile.count.number[j] - 1)
-        if full:
-            windows.measure(size, tile, plan)
-        windows.divide(size, full, tile, plan)
         wanted = _wanted(size, tile, plan, before)
-        phases.phases(size, wanted > 0, braked, tile, plan)
+        _through(size, full, noisy, braked, wanted > 0, tile, plan)
         if wanted > 0:
             _write(which, times, outputs, tile, plan, before)
         lost += windows.give_up(size, tile, plan, before)
     return lost
 
 
-def _needs_all(tile: Any, j: int) -> bool:
-    """Tell whether a chip has noise, a coupling or an RC stretcher."""
+def _through(size: int, full: bool, noisy: bool, braked: bool, keep: bool, tile: Any, plan: Any) -> None:
+    """Go through a window that has begun."""
+    if noisy:
+        for j in range(size):
+            plan.draw[j] = gaussian(tile.count.seed[j], tile.count.first_draw[j] + tile.count.number[j] - 1)
+    if full:
+        windows.measure(size, tile, plan)
+    windows.divide(size, full, tile, plan)
+    phases.phases(size, keep, braked, tile, plan)
+
+
+def _needs_all(size: int, tile: Any) -> tuple[bool, bool]:
+    """Tell whether a chip has noise, a coupling or an RC stretcher, and whether one has noise."""
     chip = tile.chip
-    return bool(chip.beta[j] != 0.0 or chip.c_s[j] != 0.0 or chip.noise[j] != 0.0 or chip.tau_s[j] != 0.0)
+    full = noisy = False
+    for j in range(size):
+        noisy = noisy or chip.noise[j] != 0.0
+        full = full or chip.beta[j] != 0.0 or chip.c_s[j] != 0.0 or chip.tau_s[j] != 0.0
+    return full or noisy, noisy
 
 
-def reload(size: int, torque: Numbers, start: int, tile: Any) -> None:
+def _hang(which: Indices, torques: Numbers, tile: Any) -> None:
     """Hang constant external torques [N m] on the shafts of a tile."""
     shaft = tile.shaft
-    for j in range(size):
+    for j in range(which.size):
         load = legs.loading(shaft.inertia[j], shaft.pull[j], shaft.hold_forward[j], shaft.hold_backward[j],
-                            torque[start + j])
+                            torques[which[j]])
         shaft.against[j] = load.against
         shaft.start_forward[j] = load.start_forward
         shaft.start_backward[j] = load.start_backward
         shaft.start_off[j] = load.start_off
+
+
+def renew(lanes: Lanes, tile_rows: Any) -> None:
+    """Put what all lanes are into their tiles; what they remember stays."""
+    total = lanes.torque.size
+    for k in range(len(tile_rows)):
+        first = k * tiles.TILE
+        tiles.set_numbers(lanes.plants, lanes.chips, lanes.torque, first, min(tiles.TILE, total - first), tile_rows[k])
 
 
 def _wanted(size: int, tile: Any, plan: Any, before: Any) -> int:

@@ -29,6 +29,8 @@ FEW = 2  # lanes that are not worth going together
 class Meter(NamedTuple):
     """What the chip meets when it measures while a current flows."""
 
+    V: float
+    R_b: float
     K_b: float
     D_drive: float
     R_drive: float
@@ -213,7 +215,7 @@ def set_numbers(plants: Numbers, chips: Numbers, torque: Numbers, first: int, si
         tile.clock.period[j] = chips[14, first + j]
     for j in range(size):
         plant = plant_at(plants, first + j)
-        put_meter(tile.meter, j, Meter(plant.K_b, plant.D_drive, plant.R_drive, plant.D_off, plant.R_off))
+        put_meter(tile.meter, j, Meter(plant.V, plant.R_b, plant.K_b, plant.D_drive, plant.R_drive, plant.D_off, plant.R_off))
 
 
 def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -> None:

@@ -15,7 +15,7 @@ from servotwin.models.kernels.memory import SAME
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
-    from servotwin.models.kernels.tiles import Numbers
+    from servotwin.models.kernels.tiles import Meter, Numbers
 
 
 def begin(listed: Numbers, size: int, own: bool, tile: Any, plan: Any, before: Any) -> int:
@@ -96,9 +96,9 @@ def measure(size: int, tile: Any, plan: Any) -> None:
         back_emf = meter.K_b * tile.servo.w[j]
         D = meter.D_off if off else meter.D_drive
         R = meter.R_off if off else meter.R_drive
-        x = drive * chip.V_oc - back_emf
+        x = drive * meter.V - back_emf
         i = (x - math.copysign(D, x)) / R if abs(x) > D else 0.0
-        v_m, V_bus = _terminal_voltage(chip, drive, back_emf, i)
+        v_m, V_bus = _terminal_voltage(chip, meter, drive, back_emf, i)
         plan.v_m[j] = v_m
         plan.V_bus[j] = V_bus
 
@@ -197,11 +197,11 @@ def give_up(size: int, tile: Any, plan: Any, before: Any) -> int:
     return lost
 
 
-def _terminal_voltage(chip: Chip, drive: float, back_emf: float, i: float) -> tuple[float, float]:
+def _terminal_voltage(chip: Chip, meter: Meter, drive: float, back_emf: float, i: float) -> tuple[float, float]:
     """Return v_m at the motor's terminals and V_bus of the supply, for the current i."""
     if i != 0.0:
         v_m = back_emf + chip.R_a * i + math.copysign(chip.V_br, i)
         if drive != 0.0:
-            return v_m, chip.V_oc - chip.R_b * drive * i
-        return v_m, chip.V_oc + (chip.R_b * abs(i) if chip.coast > 0.0 else 0.0)
-    return (back_emf if drive != 0.0 or chip.coast > 0.0 else 0.0), chip.V_oc
+            return v_m, meter.V - meter.R_b * drive * i
+        return v_m, meter.V + (meter.R_b * abs(i) if chip.coast > 0.0 else 0.0)
+    return (back_emf if drive != 0.0 or chip.coast > 0.0 else 0.0), meter.V

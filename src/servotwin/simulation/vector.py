@@ -1,0 +1,305 @@
+"""`VectorSimulator`: many servos that stop and go on, tick by tick, under commands and loads given at each."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.simulation.batch import Failure
+from servotwin.simulation.lane_inputs import lanes_of, pick
+from servotwin.simulation.many import own_threads, real_type
+from servotwin.simulation.status import Status
+from servotwin.simulation.vector_commands import Translator
+from servotwin.simulation.vector_memory import VectorMemory
+from servotwin.simulation.vector_numbers import LaneNumbers
+from servotwin.simulation.vector_store import Store
+from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, DTypeLike
+
+    from servotwin import loads
+    from servotwin.models import Model
+
+Array = NDArray[np.float64]
+_KINDS = ("pulse_width", "command_angle", "command_voltage")
+
+
+class VectorSimulator:
+    """Many servos (lanes) side by side that remember where they are between calls.
+
+    Every lane has a clock of its own: its frames begin when it is reset. Between calls commands and torques stay as
+    they were given last. `simulate_many` runs lanes from start to end with outputs in between; here one call is one
+    tick of a robot, an environment or a page.
+
+    Parameters
+    ----------
+    model : PulseServo, PulseServoInductive or BoundedServo
+    lanes : int
+        Number of servos.
+    load : Load or sequence of Load, optional
+        As in `simulate_many`.
+    parameters : mapping, optional
+        Number or array (lanes,) (SI) by dotted name, of the servo or of the load.
+    dtype : str
+        "float64" or "float32"; the latter for lanes that run side by side.
+    threads : int, optional
+        How many share the lanes; all cores unless given. Results do not depend on it.
+    seed : int
+        Of all noise; the k-th lane has the seed `seed` + k.
+
+    Raises
+    ------
+    InputError
+        On bad input; names lane and parameter.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> sims = st.VectorSimulator(st.PulseServo(st.load_servo("hitec-hs-755hb")), lanes=3)
+    >>> sims.reset(command_angle=0.5)
+    >>> for _ in range(400):
+    ...     sims.advance(1e-3, command_angle=[0.5, 0.6, 0.7], external_torque=0.1)
+    >>> sims["output_angle"].round(2).tolist(), sims.time.round(9).tolist()
+    ([0.48, 0.57, 0.67], [0.4, 0.4, 0.4])
+    """
+
+    def __init__(
+        self, model: Model, lanes: int, *, load: loads.Load | loads.Part | None | list[Any] = None,
+        parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
+        threads: int | None = None, seed: int = 0,
+    ) -> None:
+        count = _whole("lanes", lanes, 1)
+        if bus is not None:
+            raise InputError("bus of VectorSimulator", got=bus, allowed="None: several servos on one supply are run by "
+                             "simulate_bus")
+        base = _whole("seed", seed, None)
+        from servotwin import signals
+
+        start = signals.constant(1500.0, unit="us")  # until the first command
+        inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count))
+        if inputs.count != count:
+            raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
+                             allowed="arrays of one number for each lane")
+        self._numbers = LaneNumbers(inputs)
+        self._threads = _whole("threads", threads, 1) if threads is not None else os.cpu_count() or 1
+        self._pool = own_threads(os.getpid())
+        self._store = Store(self._numbers, real_type(dtype), self._threads, self._pool)
+        self._translate = Translator(self._numbers)
+        self._command = np.full(count, math.nan)  # as the engine follows it: pulse width [s] or control voltage [V]
+        self._torque = np.zeros(count)
+        self.reset()
+
+    def __len__(self) -> int:
+        """Return the number of lanes."""
+        return self._numbers.count
+
+    # --- time ---------------------------------------------------------------------------------------------------------
+
+    @property
+    def time(self) -> Array:
+        """Time of each lane since it was reset [s], shape (lanes,)."""
+        return self._store.time
+
+    @property
+    def status(self) -> NDArray[np.int8]:
+        """Code of each lane's `Status`, shape (lanes,); a lane that has failed is nan until it is reset."""
+        return self._store.status.copy()
+
+    @property
+    def failures(self) -> tuple[Failure, ...]:
+        """(lane, time [s], cause) of all lanes that have failed."""
+        return tuple(Failure(lane, float(self._store.ended[lane]), Status.of_code(int(self._store.status[lane])).message)
+                     for lane in np.flatnonzero(self._store.status).tolist())
+
+    def advance(self, duration: float, *, pulse_width: ArrayLike | None = None, command_angle: ArrayLike | None = None,
+                command_voltage: ArrayLike | None = None, external_torque: ArrayLike | None = None) -> None:
+        """Go on for a time, all lanes at once.
+
+        Parameters
+        ----------
+        duration : float
+            At least 0 [s].
+        pulse_width, command_angle, command_voltage : float or array, shape (lanes,), optional
+            The command from now on, one of them [s], [rad] or [V]; the one before unless given.
+        external_torque : float or array, shape (lanes,), optional
+            Constant torque beside the load from now on; positive pushes towards −q [N m].
+
+        Raises
+        ------
+        InputError
+            On bad input, before any lane moves; names lane and argument. A lane that fails later says so in `status`.
+        """
+        if not (duration >= 0.0 and duration < math.inf):
+            raise InputError("advance(duration)", got=duration, allowed="a number of seconds, at least 0")
+        torque = self._torque_of(external_torque) if external_torque is not None else None
+        self._take_command(pulse_width, command_angle, command_voltage)
+        if torque is not None and not np.array_equal(torque, self._torque):
+            self._torque[:] = torque
+            self._store.hang(self._torque)
+        if not (self._command == self._command).all():
+            raise InputError("command", got="none", allowed="pulse_width, command_angle or command_voltage, at the first "
+                             "call or in reset()")
+        if duration > 0.0:
+            self._store.advance(float(duration), self._command)
+
+    def reset(self, *, pulse_width: ArrayLike | None = None, command_angle: ArrayLike | None = None,
+              command_voltage: ArrayLike | None = None, output_angle: ArrayLike | None = None,
+              lanes: ArrayLike | None = None) -> None:
+        """Put lanes at rest and their clocks to 0; noise goes on where it was.
+
+        Parameters
+        ----------
+        pulse_width, command_angle, command_voltage : float or array, optional
+            The command from now on, as in `advance`; one for each of `lanes`.
+        output_angle : float or array, optional
+            Where they rest [rad]; at the zero-error angle of their command unless given.
+        lanes : array of bool, shape (lanes,), or of int, optional
+            Which; all unless given.
+        """
+        which = pick(lanes, len(self))
+        angle = None if output_angle is None else self._own("output_angle", output_angle, which)
+        command = self._command.copy()
+        found = self._translate.command(pulse_width, command_angle, command_voltage, which)
+        if found is not None:
+            command[which] = found
+        self._store.start(which, self._numbers.start(which, command, angle))
+        self._command = command
+
+    # --- what can be seen and set -------------------------------------------------------------------------------------
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a signal (SI) of all lanes at their present time, shape (lanes,)."""
+        if name == "time":
+            return self.time
+        if name not in self._numbers.model.available:
+            raise UnknownNameError(f"signal of {type(self._numbers.model).__name__}", name,
+                                   ("time", *self._numbers.model.available))
+        return self._numbers.observe(name, self._store.samples(), self._command, self._torque)
+
+    @property
+    def impulse_work(self) -> Array:
+        """Kinetic energy that speeds which were set have given to each lane since its reset [J], shape (lanes,)."""
+        return self._store.work.copy()
+
+    def set(self, *, output_angle: ArrayLike | None = None, output_speed: ArrayLike | None = None,
+            load_inertia: ArrayLike | None = None, bus_voltage: ArrayLike | None = None,
+            parameters: Mapping[str, Any] | None = None, torque_enable: ArrayLike | None = None,
+            lanes: ArrayLike | None = None) -> None:
+        """Impose what another simulator decides, or change numbers; all else that lanes remember goes on.
+
+        Parameters
+        ----------
+        output_angle, output_speed : float or array, optional
+            Of the shaft [rad], [rad/s]. A speed is an impulse, whose work `impulse_work` adds up; with play in the gear
+            the motor keeps its own, and its angle as far as the play allows.
+        load_inertia : float or array, optional
+            J_L instead of the load's [kg m²]; the gear's own stays.
+        bus_voltage : float or array, optional
+            Voltage at the bridge instead of what the supply would leave, positive [V].
+        parameters : mapping, optional
+            Number or array by dotted name, as at the beginning.
+        lanes : array of bool, shape (lanes,), or of int, optional
+            For which lanes; arrays have one number for each of them.
+
+        Raises
+        ------
+        InputError
+            On bad input, before anything changes; names lane and argument.
+        """
+        which = pick(lanes, len(self))
+        if torque_enable is not None:
+            raise InputError(f"torque_enable of {type(self._numbers.model).__name__}", got=torque_enable,
+                             allowed="nothing: an analog servo has no such switch")
+        angle, speed, inertia, bus = (
+            None if value is None else self._own(name, value, which) for name, value in (
+                ("output_angle", output_angle), ("output_speed", output_speed), ("load_inertia", load_inertia),
+                ("bus_voltage", bus_voltage)))
+        if inertia is not None:
+            _check_lanes("load_inertia", inertia, which, inertia >= 0.0, "at least 0 kg m²")
+        if bus is not None:
+            _check_lanes("bus_voltage", bus, which, bus > 0.0, "a positive voltage")
+        if angle is not None:
+            self._numbers.check_angles(angle, which)
+        if parameters or inertia is not None or bus is not None:
+            numbers = self._numbers.changed(which, parameters or {}, inertia, bus)
+            memory = self._store.records()
+            self._numbers = numbers
+            self._store.renew(numbers, memory, self._torque)
+            self._translate = Translator(numbers)
+        if angle is not None or speed is not None:
+            self._store.impose(which, angle, speed)
+
+    # --- memory -------------------------------------------------------------------------------------------------------
+
+    def save(self) -> VectorMemory:
+        """Return all that the lanes remember, as it is now; picklable."""
+        store = self._store
+        return VectorMemory(type(self._numbers.model).__name__, store.records(), self._command.copy(),
+                            self._torque.copy(), store.status.copy(), store.ended.copy(), store.work.copy())
+
+    def restore(self, memory: VectorMemory) -> None:
+        """Go back to what was saved, here or in another simulator of this model with as many lanes.
+
+        Raises
+        ------
+        InputError
+            If it is the memory of another model or of another number of lanes.
+        """
+        kind = type(self._numbers.model).__name__
+        if not isinstance(memory, VectorMemory):
+            raise InputError("restore(memory)", got=memory, allowed="what save() has returned")
+        if memory.model != kind or len(memory.records) != len(self):
+            raise InputError("restore(memory)", got=f"{len(memory.records)} lanes of {memory.model}",
+                             allowed=f"{len(self)} lanes of {kind}")
+        self._command, self._torque = memory.command.copy(), memory.torque.copy()
+        self._store.restore(memory, self._torque)
+
+    # --- arguments ----------------------------------------------------------------------------------------------------
+
+    def _take_command(self, pulse_width: Any, command_angle: Any, command_voltage: Any) -> None:
+        found = self._translate.command(pulse_width, command_angle, command_voltage, None)
+        if found is not None:
+            self._command[:] = found
+
+    def _torque_of(self, torque: ArrayLike) -> Any:
+        if type(torque) is float and math.isfinite(torque):
+            return torque
+        return self._own("external_torque", torque, np.arange(len(self)))
+
+    def _own(self, name: str, values: ArrayLike, which: NDArray[np.int64]) -> Array:
+        return numbers_of(name, values, which)
+
+
+def numbers_of(name: str, values: Any, which: NDArray[np.int64]) -> Array:
+    """Return one finite number for each of some lanes, or raise InputError that names lane and argument."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(name, got=values, allowed="a number, or one number per lane") from None
+    if np.ma.is_masked(values) or array.shape not in ((), (len(which),)):
+        raise InputError(name, got=f"an array of shape {array.shape}", allowed=f"a number, or an array ({len(which)},)")
+    array = np.broadcast_to(array, which.shape)
+    _check_lanes(name, array, which, np.isfinite(array), "a finite number")
+    return array
+
+
+def _check_lanes(name: str, values: Array, which: NDArray[np.int64], good: Any, allowed: str) -> None:
+    if not good.all():
+        k = int(np.argmin(good))
+        raise InputError(f"{name} of lane {which[k]}", got=float(values[k]), allowed=allowed)
+
+
+def _whole(name: str, value: Any, least: int | None) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or (least is not None and value < least):
+        raise InputError(name, got=value, allowed="a whole number" + ("" if least is None else f", at least {least}"))
+    return int(value)
+
+
+__all__ = ["VectorSimulator", "is_finite"]
