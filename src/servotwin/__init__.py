@@ -19,7 +19,7 @@ _LAZY = {
         ("AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "PulseServo",
          "PulseServoInductive"), "models"),
     **dict.fromkeys(("Batch", "Fleet", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_bus",
-                     "simulate_many"), "simulation"),
+                     "simulate_many", "VectorSimulator"), "simulation"),
     **dict.fromkeys(("DataSheet", "curves", "servos_that_lift"), "datasheet"),
     **dict.fromkeys(("Study", "distributions", "sweep"), "simulation.sweep"),
     **dict.fromkeys(("Fit", "Log", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "read_logs",

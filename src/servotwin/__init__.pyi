@@ -42,6 +42,7 @@ from servotwin.simulation import Result as Result
 from servotwin.simulation import Simulator as Simulator
 from servotwin.simulation import State as State
 from servotwin.simulation import Status as Status
+from servotwin.simulation import VectorSimulator as VectorSimulator
 from servotwin.simulation import grid as grid
 from servotwin.simulation import simulate as simulate
 from servotwin.simulation import simulate_bus as simulate_bus

@@ -14,12 +14,14 @@ if TYPE_CHECKING:
     from servotwin.simulation.batch import Batch, Failure
     from servotwin.simulation.bus import Fleet, simulate_bus
     from servotwin.simulation.many import grid, simulate_many
+    from servotwin.simulation.vector import VectorSimulator
+    from servotwin.simulation.vector_memory import VectorMemory
 
 _LAZY = {"Batch": "batch", "Failure": "batch", "Fleet": "bus", "grid": "many", "simulate_bus": "bus",
-         "simulate_many": "many"}
+         "simulate_many": "many", "VectorMemory": "vector_memory", "VectorSimulator": "vector"}
 
 __all__ = ["Batch", "Energy", "Event", "Failure", "Fleet", "Result", "Simulator", "State", "Stats", "Status",
-           "StepMetrics", "grid", "simulate", "simulate_bus", "simulate_many"]
+           "StepMetrics", "VectorMemory", "VectorSimulator", "grid", "simulate", "simulate_bus", "simulate_many"]
 
 
 def __getattr__(name: str) -> Any:

@@ -99,12 +99,15 @@ class State:
         All numbers of the state, its clock, and what the chip of a pulse servo has decided.
     plant : Plant
         The numbers of servo and load by which it moves since its motion began.
+    changes : tuple
+        (name, value) of the numbers that are others than the simulator's.
     """
 
     time: float
     places: tuple[Place, ...]
     memory: Memory
     plant: Plant | None = None
+    changes: tuple[tuple[str, object], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -184,7 +187,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
             raise failure(Status.CHATTER, time_of(before))
         if record is not None:
             _keep(record, inputs, chip, before, memory, m, event)
-    return State(until, state.places, memory, plant)
+    return State(until, state.places, memory, plant, state.changes)
 
 
 def failure(status: Status, time: float) -> SimulationError:

@@ -91,7 +91,7 @@ def lanes_of(model: Model, command: object, load: object, parameters: object, in
         raise InputError("model of simulate_many", got=model, allowed=" or ".join(kind.__name__ for kind in LAWS))
     given = _named("parameters", parameters)
     for name in given:
-        _check_name(model, name)
+        check_name(model, name)
     values = {name: _value(name, value) for name, value in given.items()}
     start = {name: _numbers(f"initial {name}", value) for name, value in _named("initial", initial).items()}
     _check_states(model, start)
@@ -149,7 +149,7 @@ def _named(what: str, mapping: object) -> Mapping[str, Any]:
     return mapping
 
 
-def _check_name(model: Model, name: str) -> None:
+def check_name(model: Model, name: str) -> None:
     """Raise unless the model, or a load, has this number."""
     read = (*model.requires, *model.optional)
     if name in LOAD_NAMES or name in read:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.kernels.memory import BEAT, FIRST_STEP, Memory
-from servotwin.models.kernels.records import record_of
+from servotwin.models.kernels.records import TILE, record_of
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -18,8 +18,13 @@ RECORD = record_of(Memory)
 
 
 def flat(tiles: NDArray[Any], group: str, name: str) -> Any:
-    """Return a number of all lanes in tiles, one after the other."""
-    return tiles[group][name].reshape(-1)
+    """Return a copy of a number of all lanes in tiles, one after the other."""
+    return tiles[group][name].ravel()
+
+
+def put(tiles: NDArray[Any], group: str, name: str, places: Indices, values: Any) -> None:
+    """Set a number of the lanes at these places of tiles."""
+    tiles[group][name][places // TILE, places % TILE] = values
 
 
 def records_of(tiles: NDArray[Any], places: Indices, temperatures: Floats) -> NDArray[Any]:
@@ -64,7 +69,7 @@ def put_records(tiles: NDArray[Any], places: Indices, records: NDArray[Any]) -> 
                             f"{before}duration": waits["duration"], f"{before}decided": waits["error"]}
     for group, columns in values.items():
         for name, column in columns.items():
-            flat(tiles, group, name)[places] = column
+            put(tiles, group, name, places, column)
 
 
 _READ = {

@@ -5,20 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
-from servotwin.loads import as_load
+from servotwin.loads import Constant, as_load
 from servotwin.models import Model
 from servotwin.models.kernels.frame import NO_CHIP
-from servotwin.models.kernels.memory import started
+from servotwin.models.kernels.memory import started, with_play
 from servotwin.models.kernels.plant import INSIDE, RIGID
+from servotwin.models.kernels.runs import mode_of
+from servotwin.models.samples import Samples
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
 from servotwin.simulation.engine import Plan, Record, State
+from servotwin.simulation.lane_inputs import check_name
+from servotwin.simulation.lane_loads import LOAD_NAMES, check_number, with_numbers
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.result import Result
@@ -33,6 +37,7 @@ if TYPE_CHECKING:
     from servotwin.loads import Load, Part
 
 _MOST_SAMPLES = 20_000_000
+_MOST_OTHERS = 64  # servos with other numbers that a simulator keeps
 _THOUSAND = 1000  # parts of a run, of which progress tells
 
 
@@ -65,6 +70,7 @@ class Simulator:
         self._plant = model.pack(self.load)
         self._torque = self.load.torque_pieces
         self._last: tuple[Signal, Plan] | None = None
+        self._others: dict[tuple[tuple[str, Any], ...], Simulator] = {}
 
     def drive(self, command: Signal) -> Pieces:
         """Return the command as what the model follows [V]."""
@@ -128,20 +134,117 @@ class Simulator:
         """
         return self._run(state, until, command, external_torque, None)
 
+    def observe(self, state: State, name: str, command: Signal, *, external_torque: float = 0.0) -> float:
+        """Return a signal (SI) of a state, as it is before anything happens at its time.
+
+        Parameters
+        ----------
+        state : State
+        name : str
+            Of any signal that a result of the model has.
+        command : Signal
+        external_torque : float
+            As in `advance` [N m].
+
+        Raises
+        ------
+        UnknownNameError
+            If the model does not have it; the message lists those that it has.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> sim = st.Simulator(st.PulseServo(st.load_servo("hitec-hs-755hb")), load=st.loads.Constant(0.1))
+        >>> command = st.signals.step(0.0, 90.0, unit="deg")
+        >>> state = sim.advance(sim.initial(command), 0.1, command)
+        >>> round(sim.observe(state, "load_torque", command), 3)
+        0.1
+        """
+        self._check(state, "observe(state)")
+        own = self._with(state.changes)
+        plan, load = own.plan(command, external_torque), own.load
+        if external_torque:
+            load = load + Constant(external_torque)
+        y, chip = np.array(state.memory.point.y)[:, None], state.memory.chip
+        mode = np.array(mode_of(plan.plant, plan.chip, plan.inputs, state.memory))[:, None]
+        samples = Samples.make(np.array([state.time]), y, np.array([state.memory.point.wiper]), mode,
+                               np.array([chip.drive]), np.array([chip.error]))
+        return float(own.model.output(name, samples, plan.command, load)[0])
+
+    def changed(self, state: State, *, parameters: Mapping[str, Any] | None = None,
+                torque_enable: bool | None = None) -> State:
+        """Return a state from which the servo goes on with other numbers; all that it remembers stays.
+
+        Parameters
+        ----------
+        state : State
+        parameters : mapping
+            New values (SI) by dotted name, of the servo ("electronics.deadband") or of the load ("load.inertia"). They
+            stay with the state and those that follow it.
+
+        Raises
+        ------
+        InputError
+            Or one of its kinds, if a name is unknown or a value is not possible.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> sim = st.Simulator(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+        >>> command = st.signals.constant(90.0, unit="deg")
+        >>> state = sim.advance(sim.initial(command), 0.1, command)
+        >>> heavy = sim.changed(state, parameters={"load.torque": 0.6})
+        >>> bool(sim.advance(heavy, 1.0, command)["output_angle"] < state["output_angle"] - 0.05)
+        True
+        """
+        self._check(state, "changed(state)")
+        if torque_enable is not None:
+            raise InputError(f"torque_enable of {type(self.model).__name__}", got=torque_enable,
+                             allowed="nothing: an analog servo has no such switch")
+        if not isinstance(parameters, Mapping) or not parameters:
+            raise InputError("changed(parameters)", got=parameters, allowed="a mapping of names to numbers (SI)")
+        changes = tuple(sorted({**dict(state.changes), **parameters}.items()))
+        own = self._with(changes)
+        self._check(state, "changed(parameters)", own.model)
+        return replace(state, changes=changes, places=own.model.states, memory=with_play(state.memory, own._plant.half_play > 0.0))
+
+    def _with(self, changes: tuple[tuple[str, Any], ...]) -> Simulator:
+        """Return the simulator of the servo and load with these numbers."""
+        if not changes:
+            return self
+        if changes not in self._others:
+            of_load: dict[str, Any] = {name: value for name, value in changes if name in LOAD_NAMES}
+            servo = {name: value for name, value in changes if name not in LOAD_NAMES}
+            for name, value in changes:
+                if name in LOAD_NAMES:
+                    check_number(name, value)
+                else:
+                    check_name(self.model, name)
+            model = type(self.model)(self.model.servo.replace(servo)) if servo else self.model
+            if len(self._others) >= _MOST_OTHERS:
+                self._others.clear()
+            self._others[changes] = Simulator(model, with_numbers(self.load, of_load), self.seed)
+        return self._others[changes]
+
+    def _check(self, state: State, what: str, model: Model | None = None) -> None:
+        model = model or self.model
+        if not isinstance(state, State):
+            raise InputError(what, got=state, allowed="a state of this simulator")
+        own = tuple(place.name for place in model.states)
+        if state.names != own:
+            raise InputError(what, got=f"a state of {', '.join(state.names)}",
+                             allowed=f"one of {', '.join(own)}, as {type(model).__name__} has")
+
     def _run(self, state: State, until: float, command: Signal, external_torque: float,
              record: Record | None) -> State:
-        if not isinstance(state, State):
-            raise InputError("advance(state)", got=state, allowed="a state of this simulator")
-        if state.places != self.model.states:
-            own = ", ".join(place.name for place in self.model.states)
-            raise InputError("advance(state)", got=f"a state of {', '.join(state.names)}",
-                             allowed=f"one of {own}, as {type(self.model).__name__} has")
+        self._check(state, "advance(state)")
         if not (is_finite(until) and until >= state.time):
             raise InputError("advance(until)", got=until, allowed=f"a finite time from {state.time:g} s on")
         if not is_finite(external_torque):
             raise InputError("external_torque", got=external_torque, allowed="a finite number [N m]")
-        self.load.check_span(state.time, until)
-        return engine.run(self.plan(command, external_torque), state, float(until), record)
+        own = self._with(state.changes)
+        own.load.check_span(state.time, until)
+        return engine.run(own.plan(command, external_torque), state, float(until), record)
 
     def plan(self, command: Signal, external_torque: float = 0.0) -> Plan:
         """Return what the engine needs for a run under a command, and a constant torque beside the load [N m]."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.models.base import PULSE_RANGE
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.lane_inputs import lanes_of, pick
 from servotwin.simulation.many import own_threads, real_type
@@ -19,7 +20,6 @@ from servotwin.simulation.vector_commands import Translator
 from servotwin.simulation.vector_memory import VectorMemory
 from servotwin.simulation.vector_numbers import LaneNumbers
 from servotwin.simulation.vector_store import Store
-from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
@@ -28,14 +28,13 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 Array = NDArray[np.float64]
-_KINDS = ("pulse_width", "command_angle", "command_voltage")
 
 
 class VectorSimulator:
     """Many servos (lanes) side by side that remember where they are between calls.
 
-    Every lane has a clock of its own: its frames begin when it is reset. Between calls commands and torques stay as
-    they were given last. `simulate_many` runs lanes from start to end with outputs in between; here one call is one
+    Every lane has a clock of its own: its frames begin when it is reset. Commands and torques stay as they were given
+    last; before the first command it is a pulse in the middle of those that the servo takes. `simulate_many` runs lanes from start to end with outputs in between; here one call is one
     tick of a robot, an environment or a page.
 
     Parameters
@@ -67,7 +66,7 @@ class VectorSimulator:
     >>> for _ in range(400):
     ...     sims.advance(1e-3, command_angle=[0.5, 0.6, 0.7], external_torque=0.1)
     >>> sims["output_angle"].round(2).tolist(), sims.time.round(9).tolist()
-    ([0.48, 0.57, 0.67], [0.4, 0.4, 0.4])
+    ([0.5, 0.58, 0.67], [0.4, 0.4, 0.4])
     """
 
     def __init__(
@@ -82,7 +81,7 @@ class VectorSimulator:
         base = _whole("seed", seed, None)
         from servotwin import signals
 
-        start = signals.constant(1500.0, unit="us")  # until the first command
+        start = signals.constant(1e6 * _neutral(model), unit="us")  # until the first command
         inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count))
         if inputs.count != count:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
@@ -92,7 +91,7 @@ class VectorSimulator:
         self._pool = own_threads(os.getpid())
         self._store = Store(self._numbers, real_type(dtype), self._threads, self._pool)
         self._translate = Translator(self._numbers)
-        self._command = np.full(count, math.nan)  # as the engine follows it: pulse width [s] or control voltage [V]
+        self._command = self._numbers.neutral.copy()  # as the engine follows it: pulse width [s], control voltage [V]
         self._torque = np.zeros(count)
         self.reset()
 
@@ -143,9 +142,6 @@ class VectorSimulator:
         if torque is not None and not np.array_equal(torque, self._torque):
             self._torque[:] = torque
             self._store.hang(self._torque)
-        if not (self._command == self._command).all():
-            raise InputError("command", got="none", allowed="pulse_width, command_angle or command_voltage, at the first "
-                             "call or in reset()")
         if duration > 0.0:
             self._store.advance(float(duration), self._command)
 
@@ -277,6 +273,13 @@ class VectorSimulator:
         return numbers_of(name, values, which)
 
 
+def _neutral(model: Model) -> float:
+    """Return a pulse width that the servo takes [s]."""
+    value = getattr(model, "value_or", lambda _, default: default)
+    return 0.5 * sum(value(f"electronics.pulse_width_{end}", usual)
+                     for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
+
+
 def numbers_of(name: str, values: Any, which: NDArray[np.int64]) -> Array:
     """Return one finite number for each of some lanes, or raise InputError that names lane and argument."""
     try:
@@ -300,6 +303,3 @@ def _whole(name: str, value: Any, least: int | None) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or (least is not None and value < least):
         raise InputError(name, got=value, allowed="a whole number" + ("" if least is None else f", at least {least}"))
     return int(value)
-
-
-__all__ = ["VectorSimulator", "is_finite"]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.models.kernels import frame
 from servotwin.models.kernels.frame import Decision, Frame
-from servotwin.models.kernels.plant import Mode, Vector
+from servotwin.models.kernels.plant import INSIDE, RIGID, Mode, Vector
 from servotwin.models.kernels.records import record_reader, record_writer
 from servotwin.physics.pieces import Piece
 
@@ -134,6 +134,16 @@ def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memo
     if changed or u != memory.u or tau != memory.tau:
         memory = forgotten(memory)
     return Memory(memory.frames, beat, memory.point, frame.numbered(memory.chip, number), u, u_end, tau, tau_end)
+
+
+def with_play(memory: Memory, play: bool) -> Memory:
+    """Return a memory in which no motion has begun, of a servo whose gear has play, or none."""
+    p = memory.point
+    q, w, i, T_w, T_h, _, _ = p.y
+    mesh = (p.mode.mesh if p.mode.mesh != RIGID else INSIDE) if play else RIGID
+    y = p.y if play else (q, w, i, T_w, T_h, q, w)
+    mode = Mode(p.mode.zone, p.mode.contact, mesh, p.mode.motor)
+    return forgotten(memory._replace(point=p._replace(y=y, mode=mode)))
 
 
 def due(memory: Memory) -> bool:

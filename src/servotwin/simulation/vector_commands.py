@@ -1,0 +1,138 @@
+"""What lanes are told at a tick, as the engine follows it: pulse width [s] or control voltage [V]."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import CommandError, InputError
+from servotwin.models import BoundedServo
+from servotwin.models.base import PULSE_RANGE
+from servotwin.models.columns import LanePieces, LaneSignal
+from servotwin.simulation.packing import Chunk
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.simulation.vector_numbers import LaneNumbers
+
+Array = NDArray[np.float64]
+_KINDS = {"pulse_width": "pulse_width", "command_angle": "angle", "command_voltage": "voltage"}
+
+
+class _Scale(NamedTuple):
+    """engine = gain · given + offset, and within which bounds given is surely good; each a number or (lanes,)."""
+
+    gain: Any
+    offset: Any
+    low: float
+    high: float
+
+
+class Translator:
+    """Commands of lanes as the engine follows them; what it has found out once it keeps."""
+
+    def __init__(self, numbers: LaneNumbers) -> None:
+        self._numbers = numbers
+        self._scales: dict[str, _Scale] = {}
+
+    def command(self, pulse_width: Any, command_angle: Any, command_voltage: Any, which: Any) -> Any:
+        """Return the command of all lanes, or of some, as the engine follows it; None where none is given.
+
+        Raises
+        ------
+        InputError
+            If two are given, or one is not possible; names lane and argument.
+        """
+        if pulse_width is not None:
+            name, given = "pulse_width", pulse_width
+            several = command_angle is not None or command_voltage is not None
+        elif command_angle is not None:
+            name, given, several = "command_angle", command_angle, command_voltage is not None
+        elif command_voltage is not None:
+            name, given, several = "command_voltage", command_voltage, False
+        else:
+            return None
+        if several:
+            raise InputError("command", got="more than one", allowed="one of " + ", ".join(_KINDS))
+        scale = self._scales.get(name) or self._scale(name)
+        if type(given) is float:
+            good = scale.low < given < scale.high
+        else:
+            try:
+                given = np.asarray(given, dtype=np.float64)
+            except (TypeError, ValueError, OverflowError):
+                raise InputError(name, got=given, allowed="a number, or one number per lane") from None
+            count = self._numbers.count if which is None else len(which)
+            if given.shape not in ((), (count,)):
+                raise InputError(name, got=f"an array of shape {given.shape}",
+                                 allowed=f"a number, or an array ({count},)")
+            good = given.size == 0 or bool(scale.low < given.min() and given.max() < scale.high)  # nan is neither
+        if not good:
+            self._look(name, given, which)
+        gain, offset = scale.gain, scale.offset
+        if which is not None:
+            gain, offset = (x[which] if isinstance(x, np.ndarray) else x for x in (gain, offset))
+        return gain * given + offset
+
+    def _scale(self, name: str) -> _Scale:
+        """Find out how the models take this kind of command."""
+        numbers = self._numbers
+        gain, offset = np.empty(numbers.count), np.empty(numbers.count)
+        low, high = -math.inf, math.inf
+        for chunk in numbers.chunks:
+            rows = np.zeros((1, 7))
+            pieces = chunk.model.command(cast("Any", _signal(name, rows, chunk.which, math.nan, math.nan)))
+            gain[chunk.which], offset[chunk.which] = _flat(pieces.gain), _flat(pieces.offset)
+            own_low, own_high = _sure(name, chunk.model, gain[chunk.which], offset[chunk.which])
+            low, high = max(low, own_low), min(high, own_high)
+        if np.ptp(gain) == 0.0 and np.ptp(offset) == 0.0:
+            found = _Scale(float(gain[0]), float(offset[0]), low, high)
+        else:
+            found = _Scale(gain, offset, low, high)
+        self._scales[name] = found
+        return found
+
+    def _look(self, name: str, given: Any, which: Any) -> None:
+        """Raise CommandError if a command is not possible, lane by lane."""
+        lanes = np.arange(self._numbers.count) if which is None else which
+        values = np.broadcast_to(np.asarray(given, dtype=np.float64), lanes.shape)
+        if not np.isfinite(values).all():
+            k = int(np.argmin(np.isfinite(values)))
+            raise CommandError(f"{name} of lane {lanes[k]}", got=float(values[k]), allowed="a finite number")
+        for chunk in self._numbers.chunks:
+            own = np.flatnonzero(np.isin(lanes, chunk.which))
+            if not len(own):
+                continue
+            rows = np.zeros((len(own), 7))
+            rows[:, 1] = values[own]
+            Chunk(chunk.lanes, chunk.commands, lanes[own]).model.command(
+                cast("Any", _signal(name, rows, lanes[own], values[own, None], values[own, None])))
+
+
+def _sure(name: str, model: Model, gain: Array, offset: Array) -> tuple[float, float]:
+    """Return bounds between which every lane takes a command, to be sure; beyond, one has to look."""
+    if name == "command_angle":
+        lower, upper = (model.value_or(f"stops.{end}_angle", limit) for end, limit in (
+            ("lower", -math.inf), ("upper", math.inf)))
+        return float(np.max(lower)), float(np.min(upper))
+    if isinstance(model, BoundedServo):
+        if name == "command_voltage":
+            return -math.inf, math.inf
+        shortest, longest = (model.value_or(f"electronics.pulse_width_{end}", usual)
+                             for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
+        return float(np.max(shortest)), float(np.min(longest))
+    longest = np.ravel(model.frame_period)  # type: ignore[attr-defined]  # the others have pulses
+    ends = np.array([(0.0 - offset) / gain, (longest - offset) / gain])
+    return float(ends.min(axis=0).max()), float(ends.max(axis=0).min())
+
+
+def _signal(name: str, rows: Array, lanes: Any, low: Any, high: Any) -> LaneSignal:
+    first = np.arange(len(lanes)) if len(rows) > 1 or len(lanes) == 1 else np.zeros(len(lanes), np.int64)
+    return LaneSignal(_KINDS[name], LanePieces(rows, first, np.ones_like(first), low=low, high=high), None, None, lanes)
+
+
+def _flat(x: Any) -> Any:
+    return x[:, 0] if isinstance(x, np.ndarray) and x.ndim else x

@@ -1,0 +1,38 @@
+"""What the lanes of a `VectorSimulator` remember, as something to keep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class VectorMemory:
+    """Everything that the lanes of a `VectorSimulator` remember; picklable.
+
+    Parameters
+    ----------
+    model : str
+        Name of the model's class.
+    records : ndarray, shape (lanes,)
+        A record of `models.kernels.memory.Memory` for each lane.
+    command, torque : ndarray, shape (lanes,)
+        What each is told: width of the pulse [s] or control voltage [V]; external torque [N m].
+    status, ended : ndarray, shape (lanes,)
+        Code of its `Status`, and when it failed [s].
+    work : ndarray, shape (lanes,)
+        Of the speeds that were set [J].
+    """
+
+    model: str
+    records: NDArray[Any]
+    command: Array
+    torque: Array
+    status: NDArray[np.int8]
+    ended: Array
+    work: Array

@@ -1,0 +1,266 @@
+"""What the lanes of a `VectorSimulator` are: checked inputs as the numbers that the engine reads, and what of them shows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import fields
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.loads import Load
+from servotwin.models.columns import LanePieces
+from servotwin.models.kernels.frame import Chip
+from servotwin.models.kernels.memory import Memory, started
+from servotwin.models.kernels.plant import INSIDE, RIGID, Plant
+from servotwin.models.kernels.tiles import Lanes as Columns
+from servotwin.simulation import lane_runs
+from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
+from servotwin.simulation.lanes import Tables
+from servotwin.simulation.packing import Asked, Chunk, Commands, groups
+from servotwin.simulation.start import start_vector
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+_SLACK = 1e-9  # rad: another simulator's stop may give way so much
+
+
+class Imposed(NamedTuple):
+    """What another simulator decides; nan where it does not, shape (lanes,)."""
+
+    load_inertia: Array
+    bus_voltage: Array
+
+
+class LaneNumbers:
+    """The lanes of a `VectorSimulator` as columns of numbers.
+
+    Attributes
+    ----------
+    columns : models.kernels.tiles.Lanes
+    torque : Tables
+        Recorded torque over time; a lane without one has no row.
+    curve : ndarray, shape (2, n)
+        Angles [rad] and errors [V] of the potentiometers.
+    """
+
+    def __init__(self, inputs: Lanes, imposed: Imposed | None = None) -> None:
+        self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
+        nothing = np.full(self.count, math.nan)
+        self.imposed = imposed or Imposed(nothing, nothing.copy())
+        commands = Commands(inputs)
+        self.chunks = [Chunk(inputs, commands, which) for which in groups(inputs, commands)]
+        self.pulsed = LAWS[type(inputs.model)] == "pulse"
+        self.curve = np.array(inputs.model.curve(), np.float64).reshape(2, -1)
+        self.neutral = np.empty(self.count)
+        self.columns, self.torque = self._packed()
+        self.load_total = np.empty(self.count)
+        for chunk in self.chunks:
+            self.load_total[chunk.which] = _flat(chunk.load.total_inertia)
+        self._impose()
+
+    def _packed(self) -> tuple[Columns, Tables]:
+        B = self.count
+        plants, chips, start = np.empty((len(Plant._fields), B)), np.empty((len(Chip._fields), B)), np.empty((7, B))
+        torque, first, count = np.empty(B), np.zeros(B, np.int64), np.zeros(B, np.int64)
+        rows: list[Array] = []
+        for chunk in self.chunks:
+            asked = Asked(1.0, np.zeros(1), (), "float64")
+            work = chunk.work(asked, ())
+            packed, which = lane_runs.lanes_of(work), chunk.which
+            plants[:, which], chips[:, which], start[:, which] = packed.plants, packed.chips, packed.start
+            torque[which] = packed.torque
+            first[which], count[which] = work.torque.first + sum(map(len, rows)), work.torque.count
+            rows.append(work.torque.rows)
+            self.neutral[which] = work.command.rows[work.command.first, 1]
+        pieces = np.zeros((B, 7))
+        index, none = np.arange(B), np.zeros(B, np.int64)
+        columns = Columns(plants, chips, start, torque, self.inputs.seeds.astype(np.int64), pieces, index, none + 1,
+                          np.zeros(0), none, none - 1)
+        return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
+
+    def _impose(self) -> None:
+        """Put what another simulator decides in the place of what load and supply would."""
+        plants, (J_L, V) = self.columns.plants, self.imposed
+        plant = Plant(*plants)  # rows that can be written to
+        own = plant.J_out - self.load_total
+        hung = ~np.isnan(J_L)
+        plant.J[hung] += (J_L + own - plant.J_out)[hung]
+        plant.J_out[hung] = (J_L + own)[hung]
+        fed = ~np.isnan(V)
+        coasts = fed & (plant.D_off >= plant.V)
+        plant.D_off[coasts] += (V - plant.V)[coasts]
+        plant.R_off[coasts & np.isinf(plant.I_max)] -= plant.R_b[coasts & np.isinf(plant.I_max)]
+        plant.R_drive[fed] -= plant.R_b[fed]
+        plant.V[fed], plant.R_b[fed], plant.I_max[fed] = V[fed], 0.0, math.inf
+
+    def changed(self, which: Indices, parameters: Mapping[str, Any], inertia: Array | None,
+                bus: Array | None) -> LaneNumbers:
+        """Return these lanes with other numbers in some of them.
+
+        Raises
+        ------
+        InputError
+            Or one of its kinds, as `simulate_many` has them; names the lane.
+        """
+        inputs = self.inputs
+        if parameters:
+            if not isinstance(parameters, Mapping):
+                raise InputError("parameters", got=parameters, allowed="a mapping of names to numbers or arrays (SI)")
+            merged = {name: self._merged(name, value, which) for name, value in parameters.items()}
+            known = {**inputs.numbers, **inputs.words}
+            loads = [inputs.loads[k] for k in inputs.load_of.tolist()]
+            inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
+        J_L, V = self.imposed.load_inertia.copy(), self.imposed.bus_voltage.copy()
+        if inertia is not None:
+            J_L[which] = inertia
+        if bus is not None:
+            V[which] = bus
+        return LaneNumbers(inputs, Imposed(J_L, V))
+
+    def _merged(self, name: str, value: Any, which: Indices) -> Any:
+        """Return a parameter of all lanes, of which some have new values."""
+        if len(which) == self.count:
+            return value
+        now = {**self.inputs.numbers, **self.inputs.words}.get(name)
+        if now is None:
+            now = self._shared(name)
+        if isinstance(now, np.ndarray):
+            column = now.astype(object) if now.dtype.kind == "U" else now.copy()
+        else:
+            column = np.full(self.count, now, dtype=object if isinstance(now, str) else np.float64)
+        given = np.asarray(value)
+        if given.shape not in ((), (len(which),)):
+            raise InputError(name, got=f"an array of shape {given.shape}",
+                             allowed=f"a number, or an array ({len(which)},)")
+        column[which] = given
+        return column.tolist() if column.dtype == object else column
+
+    def _shared(self, name: str) -> Any:
+        group, _, key = name.partition(".")
+        if group == "load":
+            load: Any = self.inputs.loads[0]
+            for part in key.split("."):
+                load = getattr(load, part)
+            return load
+        value = self.inputs.model.servo.get(name)
+        if value is None:
+            raise InputError(f"parameters: {name}", got="a value for some lanes only",
+                             allowed="one for all, for the servo does not give it")
+        return value
+
+    # --- where lanes are ----------------------------------------------------------------------------------------------
+
+    def start(self, which: Indices, command: Array, angle: Array | None) -> NDArray[Any]:
+        """Return the memories of lanes at rest, under commands of all lanes as the engine follows them.
+
+        Raises
+        ------
+        InputError
+            If an angle is beyond a stop; names the lane.
+        """
+        from servotwin.simulation.lane_memory import RECORD
+
+        records = np.zeros(len(which), RECORD)
+        place = np.full(self.count, -1)
+        place[which] = np.arange(len(which))
+        for chunk in self.chunks:
+            own = chunk.which[place[chunk.which] >= 0]
+            if not len(own):
+                continue
+            part = Chunk(chunk.lanes, chunk.commands, own)
+            q = part.model.start_angle(cast("Any", command[own, None])) if angle is None else angle[place[own], None]
+            y = np.empty((7, len(own), 1))
+            for k, values in enumerate(start_vector(part.model.states, part.plant, q, {})):
+                y[k] = values
+            if angle is not None:
+                self.check_angles(angle[place[own]], own)
+            play = self.columns.plants[Plant._fields.index("half_play"), own] > 0.0
+            _fill(records, place[own], started((0.0,) * 7, RIGID))
+            point = records["point"]
+            for name in ("y", "anchor"):
+                point[name][place[own]] = y[:, :, 0].T
+            point["wiper"][place[own]] = y[0, :, 0]
+            point["mode"]["mesh"][place[own]] = np.where(play, INSIDE, RIGID)
+        return records
+
+    def check_angles(self, angle: Array, which: Indices) -> None:
+        """Raise InputError if an angle [rad] is beyond a stop; names the lane."""
+        lower, upper = (self.columns.plants[Plant._fields.index(name), which] for name in ("lower", "upper"))
+        good = (angle >= lower - _SLACK) & (angle <= upper + _SLACK)
+        if not good.all():
+            k = int(np.argmin(good))
+            raise InputError(f"output_angle of lane {which[k]}", got=float(angle[k]),
+                             allowed=f"{lower[k]:.6g} to {upper[k]:.6g} rad, between the stops")
+
+    # --- what shows ---------------------------------------------------------------------------------------------------
+
+    def observe(self, name: str, samples: SimpleNamespace, command: Array, torque: Array) -> Array:
+        """Return a signal of all lanes that are in the states of `samples`, with fields of shape (lanes,)."""
+        found = np.empty(self.count)
+        for chunk in self.chunks:
+            which = chunk.which
+            own = SimpleNamespace(**{field: values[which, None] for field, values in vars(samples).items()
+                                     if values is not None})
+            own.time = np.zeros(1)
+            if np.isnan(self.imposed.bus_voltage[which]).all():
+                own.bus = None
+            else:
+                V = self.imposed.bus_voltage[which, None]
+                own.bus = np.where(np.isnan(V), self.columns.plants[Plant._fields.index("V"), which, None], V)
+            found[which] = np.broadcast_to(chunk.model.output(
+                name, own, cast("Any", _constant(command[which])), self._load(chunk, samples.time[which], torque)),
+                (len(which), 1))[:, 0]
+        return found
+
+    def _load(self, chunk: Chunk, time: Array, torque: Array) -> Load:
+        """Return the loads of lanes with all that acts on them now."""
+        which, load = chunk.which, chunk.load
+        changed = object.__new__(Load)
+        for field in fields(load):
+            object.__setattr__(changed, field.name, getattr(load, field.name))
+        J_L = self.imposed.load_inertia[which]
+        if not np.isnan(J_L).all():
+            more = np.where(np.isnan(J_L), 0.0, J_L - self.load_total[which])
+            object.__setattr__(changed, "inertia", load.inertia + more[:, None])
+        own = self.columns.torque[which] + torque[which] + self._recorded(which, time)
+        changed.__dict__["torque_pieces"] = _constant(own)
+        return changed
+
+    def _recorded(self, which: Indices, time: Array) -> Array:
+        first, count, rows = self.torque.first[which], self.torque.count[which], self.torque.rows
+        found = np.zeros(len(which))
+        for k in np.flatnonzero(count).tolist():
+            table = rows[first[k]:first[k] + count[k]]
+            row = table[max(int(np.searchsorted(table[:, 0], time[k], side="right")) - 1, 0)]
+            found[k] = row[1] + row[2] * (time[k] - row[0])
+        return found
+
+
+def _constant(values: Array) -> LanePieces:
+    rows = np.zeros((len(values), 7))
+    rows[:, 1] = values
+    index = np.arange(len(values))
+    return LanePieces(rows, index, np.ones_like(index))
+
+
+def _fill(records: NDArray[Any], places: Indices, memory: Memory) -> None:
+    """Put the same memory into some records."""
+    def put(into: Any, values: Any) -> None:
+        for name, value in values._asdict().items():
+            if hasattr(value, "_fields"):
+                put(into[name], value)
+            else:
+                into[name][places] = value
+    put(records, memory)
+
+
+def _flat(x: Any) -> Any:
+    return x[:, 0] if isinstance(x, np.ndarray) and x.ndim else x

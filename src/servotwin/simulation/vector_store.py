@@ -1,0 +1,282 @@
+"""Where the lanes of a `VectorSimulator` are kept and moved: in tiles side by side, or in records one by one."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Executor
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.models.kernels import tiles
+from servotwin.models.kernels.plant import BACKWARD, FORWARD, FREE, INSIDE, RIGID, STUCK, Plant
+from servotwin.models.kernels.records import TILE, room
+from servotwin.simulation import lane_runs
+from servotwin.simulation.compile import kernels
+from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
+from servotwin.simulation.lane_runs import PLAIN_RUNS, SIDE_BY_SIDE, OneByOne, SideBySide, some_of
+
+if TYPE_CHECKING:
+    from servotwin.simulation.vector_memory import VectorMemory
+    from servotwin.simulation.vector_numbers import LaneNumbers
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+_WORTH = 8  # tiles for a thread: fewer cost more in waking it
+
+
+class Store:
+    """The memories of lanes, and how they go on.
+
+    Parameters
+    ----------
+    numbers : LaneNumbers
+    dtype : str
+        Of lanes that run side by side.
+    threads : int
+    pool : Executor
+    """
+
+    def __init__(self, numbers: LaneNumbers, dtype: str, threads: int, pool: Executor) -> None:
+        self._dtype, self._threads, self._pool = dtype, threads, pool
+        count = numbers.count
+        self.status, self.ended = np.zeros(count, np.int8), np.zeros(count)
+        self.work = np.zeros(count)
+        self._total = np.zeros(count)  # of torque
+        self._build(numbers)
+
+    def _build(self, numbers: LaneNumbers) -> None:
+        self._numbers = numbers
+        columns = numbers.columns
+        self._base = columns.torque.copy()
+        self._total[:] = self._base
+        self._columns = columns._replace(torque=self._total)
+        kinds = lane_runs.kinds_of(columns, numbers.pulsed, self._dtype, numbers.torque.count > 0,
+                                   bool(numbers.curve.size))
+        self._sets: list[_Tiles | _Records] = [
+            _Tiles(kind, self._dtype, some_of(self._columns, kind.which), self._threads)
+            if isinstance(kind, SideBySide) else _Records(kind) for kind in kinds]
+        self._inputs = (numbers.curve, numbers.torque.rows, numbers.torque.first, numbers.torque.count)
+        self._loads_change = True
+
+    def hang(self, torque: Array) -> None:
+        """Hang external torques beside the loads [N m]."""
+        np.add(self._base, torque, out=self._total)
+        self._loads_change = True
+
+    def renew(self, numbers: LaneNumbers, memory: NDArray[Any], torque: Array) -> None:
+        """Take other numbers; memories go on."""
+        self._build(numbers)
+        self.hang(torque)
+        play = numbers.columns.plants[Plant._fields.index("half_play")] > 0.0
+        point = memory["point"]
+        point["anchor_time"] = math.inf
+        mesh = point["mode"]["mesh"]
+        point["mode"]["mesh"] = np.where(play, np.where(mesh == RIGID, INSIDE, mesh), RIGID)
+        point["y"][~play, 5:7] = point["y"][~play, 0:2]
+        self._put(np.arange(numbers.count), memory)
+
+    def restore(self, memory: VectorMemory, torque: Array) -> None:
+        """Go back to what was saved."""
+        self.status, self.ended, self.work = memory.status.copy(), memory.ended.copy(), memory.work.copy()
+        self.hang(torque)
+        self._put(np.arange(len(self.status)), memory.records)
+
+    def start(self, which: Indices, records: NDArray[Any]) -> None:
+        """Put lanes where they start; their noise goes on."""
+        records["chip"]["draws"] = self.records()["chip"]["draws"][which]
+        self.status[which], self.ended[which], self.work[which] = 0, 0.0, 0.0
+        self._put(which, records)
+
+    def _put(self, which: Indices, records: NDArray[Any]) -> None:
+        place = np.full(len(self.status), -1)
+        place[which] = np.arange(len(which))
+        for some in self._sets:
+            own = np.flatnonzero(place[some.which] >= 0)
+            if len(own):
+                some.put(own, records[place[some.which[own]]], self._numbers)
+
+    def records(self) -> NDArray[Any]:
+        """Return the memories of all lanes."""
+        found = np.zeros(len(self.status), RECORD)
+        for some in self._sets:
+            found[some.which] = some.records(self._columns)
+        return found
+
+    @property
+    def time(self) -> Array:
+        """Time of each lane since its start [s]."""
+        found = np.empty(len(self.status))
+        for some in self._sets:
+            found[some.which] = some.time
+        failed = self.status != 0
+        found[failed] = self.ended[failed]
+        return found
+
+    # --- going on -----------------------------------------------------------------------------------------------------
+
+    def advance(self, duration: float, command: Array) -> None:
+        """Let all lanes go on [s]."""
+        for some in self._sets:
+            if isinstance(some, _Tiles):
+                self._advance_tiles(some, duration, command)
+            else:
+                self._columns.pieces[:, 1] = command
+                own = np.flatnonzero(self.status[some.which] == 0)
+                if len(own) == len(some.which):
+                    self._one_by_one(some.recipe, some.which, duration, some.rows)
+                elif len(own):
+                    part = some.rows[own]
+                    self._one_by_one(some.recipe, some.which[own], duration, part)
+                    some.rows[own] = part
+        self._loads_change = False
+
+    def _advance_tiles(self, some: _Tiles, duration: float, command: Array) -> None:
+        count, workers = len(some.rows), some.workers
+        arguments = (duration, command, self._total, self._loads_change, some.rows)
+        if workers == 1:
+            lost = some.advance(some.which, some.braked, 0, count, *arguments, some.plans[0])
+        else:
+            cuts = [count * k // workers for k in range(workers + 1)]
+            runs = [self._pool.submit(some.advance, some.which, some.braked, cuts[k], cuts[k + 1], *arguments,
+                                      some.plans[k]) for k in range(workers)]
+            lost = sum(run.result() for run in runs)
+        if lost:
+            owed = flat(some.rows, "clock", "owed")[:len(some.which)]
+            places = np.flatnonzero(owed > 0.0)
+            durations = owed[places].copy()
+            some.forget(places)
+            alive = self.status[some.which[places]] == 0
+            places, durations = places[alive], durations[alive]
+            if len(places):
+                self._columns.pieces[:, 1] = command
+                part = records_of(some.rows, places, self._columns.start[3:5, some.which[places]])
+                self._one_by_one(PLAIN_RUNS, some.which[places], durations, part)
+                put_records(some.rows, places, part)
+
+    def _one_by_one(self, recipe: Any, which: Indices, duration: float | Array, records: NDArray[Any]) -> None:
+        """Let some lanes go on one by one; their memories are changed in place."""
+        status, ended = np.zeros(len(which), np.int64), np.zeros(len(which))
+        durations = np.full(len(which), duration) if isinstance(duration, float) else duration
+        go_on = kernels(recipe).go_on
+
+        def go(part: slice) -> None:
+            go_on(self._columns, *self._inputs, which[part], durations[part], _NONE, np.zeros(len(which[part]), np.int64),
+                  np.zeros((len(which[part]), 13, 0)), records[part], status[part], ended[part])
+
+        workers = min(self._threads, len(which))
+        if workers == 1:
+            go(slice(0, len(which)))
+        else:
+            cuts = [len(which) * k // workers for k in range(workers + 1)]
+            for run in [self._pool.submit(go, slice(a, b)) for a, b in zip(cuts, cuts[1:], strict=False)]:
+                run.result()
+        for k in np.flatnonzero(status).tolist():
+            self.status[which[k]], self.ended[which[k]] = status[k], ended[k]
+            records["point"]["y"][k] = math.nan
+
+    # --- what shows, and what is imposed ------------------------------------------------------------------------------
+
+    def samples(self) -> SimpleNamespace:
+        """Return the states of all lanes as outputs read them, fields of shape (lanes,)."""
+        records = self.records()
+        modes = np.zeros((4, len(records)), np.int64)
+        for some in self._sets:
+            if isinstance(some, _Tiles):
+                modes[1, some.which] = some.contacts()
+            else:
+                kernels(some.recipe).settle(self._columns, *self._inputs, some.which, records[some.which],
+                                            found := np.zeros((4, len(some.which)), np.int64))
+                modes[:, some.which] = found
+        point, chip = records["point"], records["chip"]
+        q, w, i, T_w, T_h, q_m, w_m = point["y"].T
+        return SimpleNamespace(
+            time=self.time, angle=q, speed=w, current=i, winding=T_w, housing=T_h, motor_angle=q_m, motor_speed=w_m,
+            wiper=point["wiper"], zone=modes[0], contact=modes[1], mesh=modes[2], motor=modes[3], drive=chip["drive"],
+            error=chip["error"])
+
+    def impose(self, which: Indices, angle: Array | None, speed: Array | None) -> None:
+        """Set angles [rad] and speeds [rad/s] of the output; book the work of the impulses."""
+        records = self.records()[which]
+        plant = Plant(*self._columns.plants[:, which])
+        point, y = records["point"], records["point"]["y"]
+        play = plant.half_play > 0.0
+        if angle is not None:
+            y[:, 0] = np.clip(angle, plant.lower, plant.upper)
+            y[:, 5] = np.where(play, np.clip(y[:, 5], y[:, 0] - plant.half_play, y[:, 0] + plant.half_play), y[:, 0])
+            point["wiper"] = np.clip(point["wiper"], y[:, 0] - plant.half_slack, y[:, 0] + plant.half_slack)
+        if speed is not None:
+            J = np.where(play, plant.J_out, plant.J)
+            with np.errstate(over="ignore", invalid="ignore"):
+                self.work[which] += 0.5 * J * (speed**2 - y[:, 1]**2)
+            y[:, 1] = speed
+            y[:, 6] = np.where(play, y[:, 6], speed)
+        point["anchor_time"], point["anchor"] = math.inf, y
+        point["mode"]["mesh"] = np.where(play, INSIDE, RIGID)
+        self._put(which, records)
+
+
+_NONE = np.zeros(0)
+
+
+class _Tiles:
+    """Lanes that run side by side."""
+
+    def __init__(self, kind: SideBySide, dtype: str, lanes: tiles.Lanes, threads: int) -> None:
+        self.which, self.braked = kind.which, kind.braked
+        self.rows = room(-(-len(self.which) // TILE), tiles.tile_type(dtype))
+        self.workers = max(1, min(threads, len(self.rows) // _WORTH))
+        self.plans = [room(1, tiles.plan_type(dtype)) for _ in range(self.workers)]
+        module = kernels(SIDE_BY_SIDE[dtype])
+        self.advance = module.advance
+        module.start(lanes, math.inf, self.rows)
+        self.rows["clock"]["piece_end"] = math.inf
+
+    def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
+        records["beat"] = np.where(records["chip"]["number"] > 0, records["beat"],
+                                   numbers.columns.chips[14, self.which[places]])
+        put_records(self.rows, places, records)
+
+    def forget(self, places: Indices) -> None:
+        """Let the general way finish the calls of these lanes."""
+        put(self.rows, "clock", "owed", places, 0.0)
+
+    def records(self, columns: tiles.Lanes) -> NDArray[Any]:
+        return records_of(self.rows, np.arange(len(self.which)), columns.start[3:5, self.which])
+
+    @property
+    def time(self) -> Array:
+        edge, since = (flat(self.rows, "clock", name)[:len(self.which)] for name in ("edge", "since"))
+        return np.asarray(edge + since)
+
+    def contacts(self) -> Indices:
+        """Return in which contact each shaft is."""
+        n = len(self.which)
+        shaft, servo = ({name: flat(self.rows, group, name)[:n] for name in names} for group, names in (
+            ("shaft", ("friction_forward", "friction_backward", "start_forward", "start_backward", "start_off")),
+            ("servo", ("w", "drive"))))
+        start = np.select([servo["drive"] > 0.0, servo["drive"] < 0.0],
+                          [shaft["start_forward"], shaft["start_backward"]], shaft["start_off"])
+        way = np.where(servo["w"] != 0.0, servo["w"], start)
+        smooth = (shaft["friction_forward"] == 0.0) & (shaft["friction_backward"] == 0.0)
+        return np.asarray(np.select([smooth, way == 0.0, way > 0.0], [FREE, STUCK, FORWARD], BACKWARD))
+
+
+class _Records:
+    """Lanes that run one by one."""
+
+    def __init__(self, kind: OneByOne) -> None:
+        self.which, self.recipe = kind.which, kind.recipe
+        self.rows = np.zeros(len(self.which), RECORD)
+
+    def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
+        self.rows[places] = records
+
+    def records(self, columns: tiles.Lanes) -> NDArray[Any]:
+        return self.rows.copy()
+
+    @property
+    def time(self) -> Array:
+        return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])

@@ -1,0 +1,344 @@
+"""Many servos that stop and go on: the same as one that does, however time is cut, and whatever is changed between."""
+
+import pickle
+
+import numpy as np
+import pytest
+from conftest import EVERYTHING
+
+import servotwin as st
+from servotwin.errors import CommandError, InputError, ServotwinError, UnknownNameError
+
+WIDTHS = (1100e-6, 1900e-6, 1500e-6)  # s, one after the other
+CASES = {  # what leads to each way in which lanes run
+    "plain": ({}, None),
+    "coasting, with noise": ({"electronics.off_state": "coast", "potentiometer.noise": 1e-3}, st.loads.Inertia(1e-3)),
+    "couplings": ({"electronics.back_emf_injection": 0.02, "electronics.supply_coupling": 0.02,
+                   "supply.internal_resistance": 0.3, "electronics.stretcher_time_constant": 0.02}, None),
+    "limp after a while": ({"electronics.pulse_timeout": 0.013}, st.loads.Constant(0.1)),
+    "frames as short as pulses": ({"electronics.frame_period": 3e-3}, None),
+    "stops": ({"stops.lower_angle": 1.2, "stops.upper_angle": 1.9, "stops.restitution": 0.5}, None),
+    "spring": ({}, st.loads.Spring(0.1, 0.5)),
+    "pendulum": ({}, st.loads.Pendulum(mass=0.1, length=0.1)),
+    "recorded": ({}, st.loads.Recorded([0.0, 0.2, 10.0], [0.0, 0.1, -0.1])),
+    "play": ({"gear.backlash": 0.02, "gear.output_inertia": 1e-3}, None),
+}
+
+
+def model_of(servo, changes, kind=st.PulseServo):
+    if kind is st.PulseServoInductive:
+        changes = {"motor.armature_inductance": 5e-4, **changes}
+    return kind(servo.replace(changes))
+
+
+def one(model, load, seed, cuts, widths, torques=None):
+    """Return states of one servo at `cuts` [s], where width and torque change."""
+    sim = st.Simulator(model, load, seed)
+    state = sim.initial(st.signals.constant(1500.0, unit="us"))
+    states = []
+    for k, until in enumerate(cuts):
+        command = st.signals.constant(1e6 * widths[k % len(widths)], unit="us")
+        state = sim.advance(state, until, command, external_torque=0.0 if torques is None else torques[k])
+        states.append(state)
+    return sim, states
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_it_is_many_simulators(servo, name):
+    changes, load = CASES[name]
+    model = model_of(servo, changes)
+    rng = np.random.default_rng(3)
+    cuts = np.sort(rng.uniform(0.0, 0.4, 60))
+    torques = np.repeat(rng.uniform(-0.05, 0.05, 12), 5)
+    sims = st.VectorSimulator(model, 3, load=load, seed=11)
+    sims.reset(pulse_width=1500e-6)
+    every = [np.roll(WIDTHS, -lane) for lane in range(3)]
+    alone = [one(model, load, 11 + lane, cuts, np.repeat(every[lane], 20), torques) for lane in range(3)]
+    before = 0.0
+    for k, until in enumerate(cuts):
+        sims.advance(until - before, pulse_width=[every[lane][k // 20 % 3] for lane in range(3)],
+                     external_torque=torques[k])
+        before = until
+        for signal in (place.name for place in model.states):
+            np.testing.assert_allclose(sims[signal], [states[k][signal] for _, states in alone], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(sims.time, cuts[-1], rtol=1e-12)
+    last = [st.signals.constant(1e6 * every[lane][59 // 20 % 3], unit="us") for lane in range(3)]
+    for signal in set(model.available) - {"command_voltage"}:
+        expected = [sim.observe(states[-1], signal, last[lane], external_torque=torques[-1])
+                    for lane, (sim, states) in enumerate(alone)]
+        np.testing.assert_allclose(sims[signal], expected, rtol=1e-9, atol=1e-10, err_msg=signal)
+
+
+@pytest.mark.parametrize("kind", [st.PulseServoInductive, st.BoundedServo])
+def test_the_other_models(servo, kind):
+    model = model_of(servo, {}, kind)
+    cuts = np.arange(1, 101) * 2e-3
+    sims = st.VectorSimulator(model, 2)
+    sims.reset(pulse_width=1500e-6)
+    for k in range(100):
+        sims.advance(2e-3, pulse_width=WIDTHS[k // 40])
+    _, states = one(model, None, 0, cuts, np.repeat(WIDTHS, 40))
+    for place in model.states:
+        np.testing.assert_allclose(sims[place.name], states[-1][place.name], rtol=1e-12, atol=1e-12)
+
+
+def test_twenty_ticks_are_a_frame(servo):
+    """A tick that ends on an edge, to rounding, ends before the pulse is measured, however many came before."""
+    model = st.PulseServo(servo)
+    sims = st.VectorSimulator(model, 1)
+    sims.reset(pulse_width=1500e-6)
+    errors = []
+    for k in range(400):
+        sims.advance(1e-3, pulse_width=1500e-6 + 1e-6 * (k // 20))
+        errors.append(sims["error_time"][0])
+    decided = np.flatnonzero(np.diff(errors))
+    assert len(decided) >= 18
+    assert set(decided % 20) <= {0, 1}  # a decision falls within the first two milliseconds of a frame
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["plain", "pendulum"])
+def test_a_million_ticks(servo, kind):
+    changes, load = CASES[kind]
+    model = model_of(servo, changes)
+    sims = st.VectorSimulator(model, 2, load=load)
+    sims.reset(pulse_width=1500e-6)
+    command = st.signals.samples(np.arange(100) * 10.0, 1e6 * np.resize(WIDTHS, 100), unit="us")
+    sim = st.Simulator(model, load)
+    state = sim.initial(st.signals.constant(1500.0, unit="us"))
+    for k in range(100):
+        for _ in range(10_000):
+            sims.advance(1e-3, pulse_width=WIDTHS[k % 3])
+        state = sim.advance(state, 10.0 * (k + 1), command)
+        np.testing.assert_allclose(sims["output_angle"], state["output_angle"], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(sims.time, 1000.0, rtol=1e-13)
+
+
+@pytest.mark.parametrize("changes", [{}, EVERYTHING], ids=["plain", "with everything"])
+def test_it_goes_on_from_what_was_saved(servo, changes):
+    model = model_of(servo, changes)
+    sims = st.VectorSimulator(model, 4)
+    for k in range(30):
+        sims.advance(0.003, pulse_width=WIDTHS[k // 10])
+    memory = pickle.loads(pickle.dumps(sims.save()))
+    ends = []
+    for one_of in (sims, st.VectorSimulator(model, 4)):
+        one_of.restore(memory)
+        for _ in range(30):
+            one_of.advance(0.003, external_torque=0.02)
+        ends.append(one_of["output_angle"])
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0.0, atol=1e-12)
+    assert np.ptp(WIDTHS) > 0.0
+    assert pickle.dumps(memory) == pickle.dumps(memory)
+
+
+def test_lanes_are_reset_on_their_own(servo):
+    model = model_of(servo, {"potentiometer.noise": 1e-3})
+    sims = st.VectorSimulator(model, 3, seed=2)
+    sims.reset(pulse_width=1500e-6)
+    for _ in range(37):
+        sims.advance(1e-3, pulse_width=1800e-6)
+    others = sims["output_angle"][[0, 2]]
+    sims.reset(pulse_width=[1300e-6], lanes=[False, True, False])
+    assert sims.time.tolist() == pytest.approx([0.037, 0.0, 0.037], abs=1e-12)
+    np.testing.assert_array_equal(sims["output_angle"][[0, 2]], others)
+    rest = st.Simulator(model).initial(st.signals.constant(1300.0, unit="us"))["output_angle"]
+    assert sims["output_angle"][1] == pytest.approx(rest, abs=1e-12)
+    sims.reset(output_angle=[1.0, 1.1], lanes=[0, 2])
+    np.testing.assert_allclose(sims["output_angle"][[0, 2]], [1.0, 1.1])
+    noise = []
+    for _ in range(2):  # another stretch of the same noise
+        sims.reset(pulse_width=1500e-6)
+        sims.advance(0.015)
+        noise.append(sims["error_time"])
+    assert not np.array_equal(*noise)
+
+
+def test_threads_and_neighbours_change_nothing(servo):
+    model = st.PulseServo(servo)
+    rng = np.random.default_rng(1)
+    widths = rng.uniform(1.1e-3, 1.9e-3, (5, 3000))
+    ends = []
+    for threads in (1, 3):
+        sims = st.VectorSimulator(model, 3000, threads=threads)
+        for row in widths:
+            sims.advance(0.013, pulse_width=row)
+        ends.append(sims["output_angle"])
+    few = st.VectorSimulator(model, 3)
+    for row in widths:
+        few.advance(0.013, pulse_width=row[1000:1003])
+    np.testing.assert_array_equal(ends[0], ends[1])
+    np.testing.assert_array_equal(ends[0][1000:1003], few["output_angle"])
+
+
+def test_float32_follows(servo):
+    model = st.PulseServo(servo)
+    ends = []
+    for dtype in ("float64", "float32"):
+        sims = st.VectorSimulator(model, 200, dtype=dtype)
+        sims.reset(pulse_width=1500e-6)
+        for _ in range(100):
+            sims.advance(0.004, pulse_width=np.linspace(1.2e-3, 1.8e-3, 200))
+        ends.append(sims["output_angle"])
+    assert np.abs(ends[0] - ends[1]).max() < 1e-4
+
+
+# --- what is imposed --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("changes", [{}, {"gear.backlash": 0.02, "gear.output_inertia": 1e-3}], ids=["rigid", "play"])
+def test_a_speed_that_is_set_is_an_impulse(servo, changes):
+    model = model_of(servo, changes)
+    sims = st.VectorSimulator(model, 2, load=st.loads.Inertia(2e-3))
+    sims.reset(pulse_width=1500e-6)
+    before = sims["motor_speed"].copy()
+    sims.set(output_speed=[3.0], lanes=[1])
+    plant = model.pack(st.loads.as_load(st.loads.Inertia(2e-3)))
+    J = plant.J_out if changes else plant.J
+    np.testing.assert_allclose(sims.impulse_work, [0.0, 0.5 * J * 9.0])
+    assert sims["output_speed"].tolist() == [0.0, 3.0]
+    if changes:
+        np.testing.assert_array_equal(sims["motor_speed"], before)
+    sims.advance(0.005)
+    assert sims["output_angle"][1] > sims["output_angle"][0]
+
+
+def test_an_inertia_that_is_set_is_that_of_the_load(servo):
+    model = st.PulseServo(servo)
+    imposed = st.VectorSimulator(model, 2)
+    imposed.set(load_inertia=[1e-3, 5e-3])
+    given = st.VectorSimulator(model, 2, parameters={"load.inertia": [1e-3, 5e-3]})
+    for sims in (imposed, given):
+        sims.reset(pulse_width=1500e-6)
+        sims.advance(0.1, pulse_width=1800e-6)
+    np.testing.assert_allclose(imposed["output_angle"], given["output_angle"], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(imposed["load_torque"], given["load_torque"], rtol=1e-9, atol=1e-12)
+
+
+def test_a_bus_voltage_that_is_set_is_the_supply(servo):
+    weak = servo.replace({"supply.internal_resistance": 0.5})
+    imposed = st.VectorSimulator(st.PulseServo(weak), 2)
+    imposed.set(bus_voltage=[4.8, 6.0])
+    stiff = st.VectorSimulator(st.PulseServo(servo), 2, parameters={"supply.open_circuit_voltage": [4.8, 6.0],
+                                                                   "supply.internal_resistance": 0.0})
+    for sims in (imposed, stiff):
+        sims.reset(pulse_width=1500e-6)
+        sims.advance(0.05, pulse_width=1800e-6)
+    np.testing.assert_allclose(imposed["output_angle"], stiff["output_angle"], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(imposed["armature_current"], stiff["armature_current"], rtol=1e-9, atol=1e-12)
+    assert imposed["bus_voltage"].tolist() == [4.8, 6.0]
+
+
+@pytest.mark.parametrize("more", [{}, {"gear.backlash": 0.01, "gear.output_inertia": 1e-3}], ids=["plain", "play"])
+def test_numbers_change_while_memory_goes_on(servo, more):
+    changes = {"electronics.deadband": 20e-6, "load.torque": 0.2, "electronics.stretcher_gain": 90.0}
+    model = model_of(servo, more)
+    sim, command = st.Simulator(model), st.signals.constant(1800.0, unit="us")
+    state = sim.advance(sim.initial(st.signals.constant(1500.0, unit="us")), 0.113, command)
+    other = sim.changed(state, parameters=changes)
+    sims = st.VectorSimulator(model, 2)
+    sims.reset(pulse_width=1500e-6)
+    sims.advance(0.113, pulse_width=1800e-6)
+    sims.set(parameters=changes, lanes=[1])
+    sims.advance(0.3)
+    ends = [sim.advance(one_of, 0.413, command)["output_angle"] for one_of in (state, other)]
+    np.testing.assert_allclose(sims["output_angle"], ends, rtol=0.0, atol=1e-12)
+    assert ends[0] != ends[1]
+    assert pickle.loads(pickle.dumps(other)) == other
+
+
+def test_a_changed_state_has_the_signals_of_its_numbers(servo):
+    sim, command = st.Simulator(st.PulseServo(servo)), st.signals.constant(1800.0, unit="us")
+    state = sim.advance(sim.initial(command), 0.5, command)
+    hung = sim.changed(state, parameters={"load.torque": 0.3})
+    assert sim.observe(state, "load_torque", command) == pytest.approx(0.0, abs=1e-12)
+    assert sim.observe(hung, "load_torque", command) == pytest.approx(0.3)
+    assert sim.observe(state, "load_torque", command, external_torque=0.1) == pytest.approx(0.1)
+    with pytest.raises(UnknownNameError):
+        sim.observe(state, "oil_pressure", command)
+    with pytest.raises(UnknownNameError):
+        sim.changed(state, parameters={"electronics.colour": 1.0})
+
+
+# --- bad input --------------------------------------------------------------------------------------------------------
+
+BAD = {
+    "negative step": (lambda s: s.advance(-1e-3), "advance"),
+    "no number": (lambda s: s.advance(float("nan")), "advance"),
+    "shape": (lambda s: s.advance(1e-3, pulse_width=[1.5e-3] * 4), "pulse_width"),
+    "nan in a lane": (lambda s: s.advance(1e-3, pulse_width=[1.5e-3, np.nan, 1.5e-3]), "lane 1"),
+    "a pulse of 0": (lambda s: s.advance(1e-3, pulse_width=[1.5e-3, 1.5e-3, 0.0]), "lane 2"),
+    "longer than a frame": (lambda s: s.advance(1e-3, pulse_width=0.021), "pulse width"),
+    "angle beyond": (lambda s: s.advance(1e-3, command_angle=[0.1, 0.2, 99.0]), "lane 2"),
+    "two commands": (lambda s: s.advance(1e-3, pulse_width=1.5e-3, command_angle=0.1), "command"),
+    "torque of nan": (lambda s: s.advance(1e-3, external_torque=[0.0, 0.0, np.nan]), "external_torque of lane 2"),
+    "a word": (lambda s: s.advance(1e-3, pulse_width="long"), "pulse_width"),
+    "unknown signal": (lambda s: s["oil_pressure"], "oil_pressure"),
+    "lane out of range": (lambda s: s.reset(lanes=[3]), "lanes"),
+    "mask too short": (lambda s: s.reset(lanes=[True]), "lanes"),
+    "angle beyond a stop": (lambda s: s.set(output_angle=[99.0], lanes=[1]), "lane 1"),
+    "negative inertia": (lambda s: s.set(load_inertia=[0.0, -1.0, 0.0]), "load_inertia of lane 1"),
+    "no voltage": (lambda s: s.set(bus_voltage=0.0), "bus_voltage of lane 0"),
+    "unknown parameter": (lambda s: s.set(parameters={"motor.colour": 1.0}), "colour"),
+    "impossible parameter": (lambda s: s.set(parameters={"motor.armature_resistance": [3.0, -3.0, 3.0]}), "lane 1"),
+    "torque_enable": (lambda s: s.set(torque_enable=True), "torque_enable"),
+    "memory of nothing": (lambda s: s.restore(None), "restore"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_is_said_before_any_lane_moves(servo, name):
+    call, word = BAD[name]
+    sims = st.VectorSimulator(st.PulseServo(servo), 3)
+    sims.advance(0.01, pulse_width=1.6e-3)
+    before = pickle.dumps(sims.save())
+    with pytest.raises(ServotwinError) as caught:
+        call(sims)
+    assert word in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert pickle.dumps(sims.save()) == before
+
+
+def test_a_memory_belongs_to_its_model(servo):
+    memory = st.VectorSimulator(st.BoundedServo(servo), 3).save()
+    with pytest.raises(InputError, match="3 lanes of BoundedServo"):
+        st.VectorSimulator(st.PulseServo(servo), 3).restore(memory)
+    with pytest.raises(InputError, match="2 lanes of BoundedServo"):
+        st.VectorSimulator(st.BoundedServo(servo), 2).restore(memory)
+
+
+@pytest.mark.parametrize(("lanes", "more"), [(0, {}), (2.5, {}), (2, {"bus": 6.0}), (2, {"threads": 0}),
+                                             (2, {"parameters": {"load.inertia": [1e-3] * 3}}), (2, {"dtype": "int8"})])
+def test_what_cannot_be_built(servo, lanes, more):
+    with pytest.raises(InputError):
+        st.VectorSimulator(st.PulseServo(servo), lanes, **more)
+
+
+def test_models_without_lanes_are_refused(servo):
+    with pytest.raises(InputError, match="PulseServo"):
+        st.VectorSimulator(st.AveragedServo(servo), 2)
+
+
+def test_bounded_servos_refuse_pulses_that_the_chip_does(servo):
+    sims = st.VectorSimulator(st.BoundedServo(servo), 2)
+    with pytest.raises(CommandError, match="lane 1"):
+        sims.advance(1e-3, pulse_width=[1.5e-3, 4e-3])
+
+
+def test_a_lane_that_fails_harms_no_other(servo):
+    model = model_of(servo, {"supply.current_limit": 1.0})
+    sims = st.VectorSimulator(model, 3)
+    sound = st.VectorSimulator(model, 3)
+    for s in (sims, sound):
+        s.reset(pulse_width=1500e-6)
+    sims.set(output_speed=[1e200], lanes=[1])
+    for s in (sims, sound):
+        s.advance(0.05, pulse_width=1.7e-3)
+    assert sims.status.tolist()[::2] == [0, 0]
+    assert sims.status[1] != 0
+    assert [failure.lane for failure in sims.failures] == [1]
+    assert np.isnan(sims["output_angle"][1])
+    np.testing.assert_array_equal(sims["output_angle"][[0, 2]], sound["output_angle"][[0, 2]])
+    sims.reset(lanes=[1])
+    sims.advance(0.05)
+    assert sims.status.tolist() == [0, 0, 0]
