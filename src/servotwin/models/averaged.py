@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from servotwin import physics
 from servotwin.models.base import Model, check_accepted, check_travel
 from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
-from servotwin.physics import electronics, potentiometer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -77,8 +77,8 @@ class _Averaged(Model):
         if name == "command_voltage":
             return v_i
         if name == "pulse_width":
-            return np.asarray(electronics.pulse_width_from_voltage(v_i, k_p1, t_0))
-        return np.asarray(potentiometer.angle_from_voltage(
+            return np.asarray(physics.pulse_width_from_voltage(v_i, k_p1, t_0))
+        return np.asarray(physics.angle_from_voltage(
             drive, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)))
 
     def start_angle(self, drive: float) -> float:

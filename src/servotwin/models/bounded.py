@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from servotwin import physics
 from servotwin.errors import MissingParameterError
 from servotwin.models.base import Model, check_accepted, check_travel, clipped
 from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
-from servotwin.physics import potentiometer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -138,7 +138,7 @@ class BoundedServo(Model):
             return self._T_0 + self._slope * drive
         if name == "command_voltage":
             return (drive - self._b_i) / (self.value("electronics.voltage_to_pulse_gain") * self._k_p2)
-        return np.asarray(potentiometer.angle_from_voltage(
+        return np.asarray(physics.angle_from_voltage(
             drive, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)))
 
     def start_angle(self, drive: float) -> float:

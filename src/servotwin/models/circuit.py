@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.physics import bridge, electronics, motor, potentiometer
+from servotwin import physics
 
 if TYPE_CHECKING:
     from servotwin.models.base import Model
@@ -38,12 +38,12 @@ def circuit_of(model: Model, plant: Plant, samples: Samples, drive: Pieces) -> C
     """
     if np.any(plant.V > 0.0):
         return _behind_bridge(model, plant, samples)
-    error = electronics.feedback_error(drive(samples.time), potentiometer.feedback_voltage(
+    error = physics.feedback_error(drive(samples.time), physics.feedback_voltage(
         samples.angle, plant.p, plant.b_o))
-    v = np.asarray(electronics.bounded_armature_voltage(
+    v = np.asarray(physics.bounded_armature_voltage(
         error, 2.0 * plant.half_deadband, plant.gain, 1.0, plant.V_max))
     if plant.L == 0.0:
-        i = np.asarray(motor.steady_armature_current(v, samples.speed, plant.R, plant.K_b))
+        i = np.asarray(physics.steady_armature_current(v, samples.speed, plant.R, plant.K_b))
     else:
         i = samples.current
     return Circuit(v, i, np.full_like(v, np.nan), np.full_like(v, np.nan), v * i, np.zeros_like(v), np.zeros_like(v))
@@ -58,7 +58,7 @@ def _behind_bridge(model: Model, plant: Plant, samples: Samples) -> Circuit:
     V_br, V_ce0 = (model.value_or(name, 0.0) for name in ("motor.brush_drop_voltage", "supply.bridge_drop_voltage"))
     v_b = plant.K_b * (samples.motor_speed if np.any(plant.half_play) else samples.speed)
     inductive = np.any(plant.L > 0.0)
-    i = samples.current if inductive else np.asarray(bridge.bridge_current(
+    i = samples.current if inductive else np.asarray(physics.bridge_current(
         s * plant.V, v_b, np.where(driven, plant.D_drive, plant.D_off), np.where(driven, plant.R_drive, plant.R_off)))
     if not inductive and np.any(np.isfinite(plant.I_max)):
         i = np.where(driven, _from_regulator(plant, s, v_b, i), i)
@@ -72,7 +72,7 @@ def _behind_bridge(model: Model, plant: Plant, samples: Samples) -> Circuit:
                      np.where(coasts, -np.copysign(bus + V_ce0, i), 0.0))
         v = np.where(i == 0.0, np.where(driven | coasts, v_b, 0.0), v)
     else:
-        v = np.asarray(bridge.motor_voltage(i, v_b, plant.R, V_br, np.where(driven | coasts, v_b, 0.0)))
+        v = np.asarray(physics.motor_voltage(i, v_b, plant.R, V_br, np.where(driven | coasts, v_b, 0.0)))
     lost = np.where(driven | coasts, (V_ce0 + r_c * np.abs(i)) * np.abs(i), 0.0)
     return Circuit(v, i, bus, of_supply, bus * of_supply, lost, V_br * np.abs(i))
 
@@ -90,7 +90,7 @@ def _from_regulator(plant: Plant, s: Array, v_b: Array, i: Array) -> Array:
     """Return the current of a drive from a source that gives so much and no more, and takes none back."""
     x, R = s * plant.V - v_b, plant.R_drive - plant.R_b
     along = s * x
-    back = bridge.bridge_current(s * plant.V, v_b, plant.D_drive, R)
+    back = physics.bridge_current(s * plant.V, v_b, plant.D_drive, R)
     short = s * (along - plant.V - plant.D_drive) / R
     most = np.where(along > plant.D_drive + R * plant.I_max + plant.V, short, s * plant.I_max)
     return np.where(along < 0.0, back, np.where(along > plant.D_drive + plant.R_drive * plant.I_max, most, i))

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin import physics
 from servotwin.models.circuit import circuit_of
 from servotwin.models.kernels.plant import BACKWARD, FORWARD, INSIDE, STUCK, at_temperature
-from servotwin.physics import friction, gear, load_friction, motor, potentiometer
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
@@ -80,7 +80,7 @@ def gear_budgets(plant: Plant, speed: Array, motor_torque: Array, external: Arra
         r = np.where(at_rest, plant.breakaway, 1.0)
         return plant.F_backward * r, plant.F_forward * r
     w_s = np.where(np.asarray(plant.w_s) > 0.0, plant.w_s, 1e-300)  # static friction ends at once
-    backward, forward = (np.asarray(load_friction.gear_friction_budget(
+    backward, forward = (np.asarray(physics.gear_friction_budget(
         speed, motor_torque, external, coulomb_torque=F, breakaway_ratio=plant.breakaway, stribeck_speed=w_s,
         stribeck_exponent=plant.alpha, load_friction_motor=plant.K_m, load_friction_external=plant.K_e,
         load_friction_motor_stribeck=plant.K_ms, load_friction_external_stribeck=plant.K_es,
@@ -104,7 +104,7 @@ def friction_of(plant: Plant, samples: Samples, drive: Array, external: Array) -
     """
     w = samples.speed
     if np.any(plant.kappa > 0.0):
-        own = friction.smoothed_coulomb_torque(w, plant.F_forward, plant.F_backward, plant.kappa)
+        own = physics.smoothed_coulomb_torque(w, plant.F_forward, plant.F_backward, plant.kappa)
         return np.asarray(own), plant.coulomb * np.tanh(plant.kappa * w)
     low, high = gear_budgets(plant, w, drive, -external - plant.b_out * w)
     both = _sliding_or_held(samples.contact, (low + plant.coulomb, high + plant.coulomb), drive - external)
@@ -138,7 +138,7 @@ def _current(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array
 def _motor_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
     plant = warm_plant(model, samples, load)
     k_a = plant.K / _reduction(model)
-    return np.asarray(motor.electromagnetic_torque(
+    return np.asarray(physics.electromagnetic_torque(
         circuit_of(model, plant, samples, drive).armature_current, k_a))
 
 
@@ -146,8 +146,8 @@ def _feedback(model: Model, samples: Samples, drive: Pieces, load: Load) -> Arra
     plant, (angles, errors) = model.plant(load), model.curve()
     count: Any = model.value_or("potentiometer.quantisation", 0.0) if np.any(plant.V > 0.0) else 0.0
     if not angles and not np.any(count) and not np.any(plant.half_slack):
-        return np.asarray(potentiometer.feedback_voltage(samples.angle, plant.p, plant.b_o))
-    return np.asarray(potentiometer.sensed_voltage(
+        return np.asarray(physics.feedback_voltage(samples.angle, plant.p, plant.b_o))
+    return np.asarray(physics.sensed_voltage(
         samples.wiper, plant.p, plant.b_o, angles or (0.0,), errors or (0.0,), count if np.any(count) else None))
 
 
@@ -156,7 +156,7 @@ def _of_motor(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
     def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
         play = np.any(model.plant(load).half_play)
         values: Array = getattr(samples, f"motor_{name}" if play else name)
-        return np.asarray(gear.motor_from_output(values, _reduction(model)))
+        return np.asarray(physics.motor_from_output(values, _reduction(model)))
     return compute
 
 
