@@ -16,8 +16,9 @@ import numpy as np
 from servotwin.errors import InputError
 from servotwin.loads import Load, as_load
 from servotwin.models.kernels import armature, contact, walk
-from servotwin.models.kernels.plant import FORWARD, FREE, REFERENCE_TEMPERATURE, RIGID, Mode, Plant, Vector
+from servotwin.models.kernels.plant import FORWARD, FREE, RIGID, Mode, Plant, Vector
 from servotwin.physics.pieces import constant_pieces
+from servotwin.physics.thermal import REFERENCE_TEMPERATURE
 from servotwin.simulation.engine import Plan, Record, State, run
 from servotwin.simulation.trajectory import Trajectory
 
