@@ -91,6 +91,8 @@ forward_efficiency = array_form(load_friction.forward_efficiency)
 gear_friction_budget = array_form(load_friction.gear_friction_budget)
 gear_sticks = array_form(load_friction.gear_sticks)
 quadratic_gear_friction = array_form(load_friction.quadratic_gear_friction)
+sliding_gear_friction = array_form(load_friction.sliding_gear_friction)
+static_gear_friction = array_form(load_friction.static_gear_friction)
 stribeck_factor = array_form(load_friction.stribeck_factor)
 torque_share = array_form(load_friction.torque_share)
 
@@ -218,6 +220,7 @@ __all__ = [
     "sheet_resistance",
     "sheet_stall_torque",
     "sheet_torque_constant",
+    "sliding_gear_friction",
     "smoothed_coulomb_slope",
     "smoothed_coulomb_torque",
     "source_voltage",
@@ -225,6 +228,7 @@ __all__ = [
     "spring_torque",
     "stall_current_for",
     "stall_torque",
+    "static_gear_friction",
     "steady_armature_current",
     "steady_temperatures",
     "sticks",

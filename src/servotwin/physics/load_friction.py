@@ -114,6 +114,77 @@ def quadratic_gear_friction(motor_torque: float, external_torque_on_gear: float,
     return load_friction_motor_quad * tau_m**2
 
 
+def sliding_gear_friction(motor_torque: float, external_torque_on_gear: float, coulomb_torque: float,
+                          load_friction_motor: float = 0.0, load_friction_external: float = 0.0) -> float:
+    """Return the dry friction of a gear that slides fast.
+
+    Parameters
+    ----------
+    motor_torque, external_torque_on_gear : float or array
+        τ_m and τ_e, at the output shaft, towards +q [N m].
+    coulomb_torque : float or array
+        N F_c of the direction in question [N m].
+    load_friction_motor, load_friction_external : float or array
+        K_m and K_e, both K_l for one share [1].
+
+    Returns
+    -------
+    float or array
+        N F_c + abs(K_m τ_m − K_e τ_e), a magnitude [N m].
+
+    Notes
+    -----
+    Models M3 and M5 of Duclusaud et al., 2025, without viscous friction.
+
+    Examples
+    --------
+    >>> sliding_gear_friction(1.0, -0.5, 0.25, 0.5, 0.25)
+    0.875
+    """
+    return coulomb_torque + torque_share(motor_torque, external_torque_on_gear, load_friction_motor,
+                                         load_friction_external)
+
+
+def static_gear_friction(motor_torque: float, external_torque_on_gear: float, coulomb_torque: float,
+                         breakaway_ratio: float = 1.0, load_friction_motor_stribeck: float = 0.0,
+                         load_friction_external_stribeck: float = 0.0, load_friction_motor_quad: float = 0.0,
+                         load_friction_external_quad: float = 0.0) -> float:
+    """Return what a gear at rest holds beyond its sliding friction.
+
+    Parameters
+    ----------
+    motor_torque, external_torque_on_gear : float or array
+        τ_m and τ_e, at the output shaft, towards +q [N m].
+    coulomb_torque : float or array
+        N F_c of the direction in question [N m].
+    breakaway_ratio : float or array
+        r, at least 1 [1].
+    load_friction_motor_stribeck, load_friction_external_stribeck : float or array
+        K_ms and K_es, both K_ls for one share [1].
+    load_friction_motor_quad, load_friction_external_quad : float or array
+        K_mq and K_eq [1/(N m)].
+
+    Returns
+    -------
+    float or array
+        N (r − 1) F_c + abs(K_ms τ_m − K_es τ_e) + Q, a magnitude [N m].
+
+    Notes
+    -----
+    Models M2, M4 and M6 of Duclusaud et al., 2025; `stribeck_factor` says how it fades with speed.
+
+    Examples
+    --------
+    >>> static_gear_friction(1.0, -0.5, 0.25, 2.0, 0.5, 0.25)
+    0.875
+    """
+    Q = quadratic_gear_friction(motor_torque, external_torque_on_gear, load_friction_motor_quad,
+                                load_friction_external_quad)
+    return (breakaway_torque(coulomb_torque, breakaway_ratio) - coulomb_torque
+            + torque_share(motor_torque, external_torque_on_gear, load_friction_motor_stribeck,
+                           load_friction_external_stribeck) + Q)
+
+
 def gear_friction_budget(
     output_speed: float, motor_torque: float, external_torque_on_gear: float, *, coulomb_torque: float,
     breakaway_ratio: float = 1.0, stribeck_speed: float = 0.0, stribeck_exponent: float = 1.0,
@@ -166,10 +237,10 @@ def gear_friction_budget(
     """
     tau_m, tau_e, N_F_c = motor_torque, external_torque_on_gear, coulomb_torque
     S = stribeck_factor(output_speed, stribeck_speed, stribeck_exponent)
-    Q = quadratic_gear_friction(tau_m, tau_e, load_friction_motor_quad, load_friction_external_quad)
-    static = (breakaway_torque(N_F_c, breakaway_ratio) - N_F_c
-              + torque_share(tau_m, tau_e, load_friction_motor_stribeck, load_friction_external_stribeck) + Q)
-    return N_F_c + torque_share(tau_m, tau_e, load_friction_motor, load_friction_external) + S * static
+    static = static_gear_friction(
+        tau_m, tau_e, N_F_c, breakaway_ratio, load_friction_motor_stribeck, load_friction_external_stribeck,
+        load_friction_motor_quad, load_friction_external_quad)
+    return sliding_gear_friction(tau_m, tau_e, N_F_c, load_friction_motor, load_friction_external) + S * static
 
 
 def gear_sticks(
@@ -212,12 +283,11 @@ def gear_sticks(
     (False, True)
     """
     tau = motor_torque + external_torque_on_gear
-    more = gear_friction_budget(
-        0.0, motor_torque, external_torque_on_gear, coulomb_torque=0.0, load_friction_motor=load_friction_motor,
-        load_friction_external=load_friction_external, load_friction_motor_stribeck=load_friction_motor_stribeck,
-        load_friction_external_stribeck=load_friction_external_stribeck,
-        load_friction_motor_quad=load_friction_motor_quad, load_friction_external_quad=load_friction_external_quad)
-    more += load_coulomb_torque
+    more = load_coulomb_torque + sliding_gear_friction(
+        motor_torque, external_torque_on_gear, 0.0, load_friction_motor, load_friction_external)
+    more += static_gear_friction(
+        motor_torque, external_torque_on_gear, 0.0, 1.0, load_friction_motor_stribeck, load_friction_external_stribeck,
+        load_friction_motor_quad, load_friction_external_quad)
     return sticks(tau, breakaway_torque(coulomb_torque_forward, breakaway_ratio) + more,
                   breakaway_torque(coulomb_torque_backward, breakaway_ratio) + more)
 

@@ -18,7 +18,11 @@ def sliding_friction(plant: Plant, forward: bool, w: float, tau_m: float, tau_e:
     if plant.varies == 0.0:
         return F
     speed = w if plant.w_s > 0.0 else math.inf  # else static friction ends as soon as the shaft moves
-    return _budget(plant, F, speed, tau_m, tau_e)
+    return load_friction.gear_friction_budget(
+        speed, tau_m, tau_e, coulomb_torque=F, breakaway_ratio=plant.breakaway, stribeck_speed=plant.w_s,
+        stribeck_exponent=plant.alpha, load_friction_motor=plant.K_m, load_friction_external=plant.K_e,
+        load_friction_motor_stribeck=plant.K_ms, load_friction_external_stribeck=plant.K_es,
+        load_friction_motor_quad=plant.K_mq, load_friction_external_quad=plant.K_eq)
 
 
 def coulomb(plant: Plant, forward: bool) -> float:
@@ -31,15 +35,9 @@ def holding_friction(plant: Plant, forward: bool, tau_m: float, tau_e: float) ->
     F = coulomb(plant, forward)
     if plant.varies == 0.0:
         return friction.breakaway_torque(F, plant.breakaway)
-    return _budget(plant, F, 0.0, tau_m, tau_e)
-
-
-def _budget(plant: Plant, F: float, w: float, tau_m: float, tau_e: float) -> float:
-    return load_friction.gear_friction_budget(
-        w, tau_m, tau_e, coulomb_torque=F, breakaway_ratio=plant.breakaway, stribeck_speed=plant.w_s,
-        stribeck_exponent=plant.alpha, load_friction_motor=plant.K_m, load_friction_external=plant.K_e,
-        load_friction_motor_stribeck=plant.K_ms, load_friction_external_stribeck=plant.K_es,
-        load_friction_motor_quad=plant.K_mq, load_friction_external_quad=plant.K_eq)
+    static = load_friction.static_gear_friction(
+        tau_m, tau_e, F, plant.breakaway, plant.K_ms, plant.K_es, plant.K_mq, plant.K_eq)
+    return load_friction.sliding_gear_friction(tau_m, tau_e, F, plant.K_m, plant.K_e) + static
 
 
 def has_gear_friction(plant: Plant) -> bool:
