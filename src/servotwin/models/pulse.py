@@ -10,7 +10,7 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.errors import InputError
-from servotwin.models.base import Model, Place, check_travel, check_widths, clipped
+from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.plant import Plant
@@ -210,15 +210,13 @@ class _Pulsed(Model):
             If a width is not positive or not shorter than a frame, or an angle outside the travel.
         """
         if signal.kind == "voltage":
-            pieces = signal.pieces.scaled(self.value("electronics.voltage_to_pulse_gain"),
-                                          self.value_or("electronics.command_pulse_offset", 0.0))
+            pieces = signal.pieces.scaled(*self._voltage_line())
         elif signal.kind == "angle":
             check_travel(signal, self.servo)
-            slope = self.value("electronics.one_shot_slope")
-            pieces = signal.pieces.scaled(
-                slope * self.value("potentiometer.feedback_gain"),
-                self.value_or("electronics.one_shot_offset", 0.0)
-                + slope * self.value_or("potentiometer.feedback_offset", 0.0))
+            slope, T_0 = self.value("electronics.one_shot_slope"), self.value_or("electronics.one_shot_offset", 0.0)
+            p, b_o = feedback_line(self)
+            pieces = signal.pieces.scaled(physics.pulse_width_from_feedback(p, slope),
+                                          physics.pulse_width_from_feedback(b_o, slope, T_0))
         else:
             pieces = signal.pieces
         check_widths(signal, pieces, self._period(signal) if signal.edges is None else math.inf)
@@ -229,9 +227,14 @@ class _Pulsed(Model):
         if name == "pulse_width":
             return drive
         if name == "command_voltage":
-            return (drive - self.value_or("electronics.command_pulse_offset", 0.0)) / self.value(
-                "electronics.voltage_to_pulse_gain")
+            return np.asarray(solved(self._voltage_line(), drive))
         return np.asarray(self._angle_of(drive))
+
+    def _voltage_line(self) -> Line:
+        """Return how the pulse width [s] follows a voltage command [V]."""
+        k_p1, t_0 = (self.value("electronics.voltage_to_pulse_gain"),
+                     self.value_or("electronics.command_pulse_offset", 0.0))
+        return physics.pulse_width_from_voltage(1.0, k_p1), physics.pulse_width_from_voltage(0.0, k_p1, t_0)
 
     def _angle_of(self, pulse_width: Any) -> Any:
         """Return the angle [rad] at which the one-shot is as long as this pulse."""
