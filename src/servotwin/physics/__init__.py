@@ -136,7 +136,17 @@ two_mass_temperatures = array_form(thermal.two_mass_temperatures)
 warming_rate = array_form(thermal.warming_rate)
 winding_resistance = array_form(thermal.winding_resistance)
 
-ANALYSIS = ()
+ANALYSIS = (
+    "averaged_bridge_gain", "back_drive_torque", "bounded_armature_voltage", "bridge_current",
+    "bridge_supply_current", "bus_voltage", "comparator_voltage", "conduction", "creep_speed",
+    "driven_spindle_torque", "forward_acceleration", "forward_efficiency", "full_drive_error", "gear_sticks",
+    "impact_energy", "load_share", "loop_voltage", "motor_from_sheet", "no_load_current_of", "pulse_stiffness",
+    "reflected_inertia", "reflected_viscous_friction", "required_motor_torque", "sheet_efficiency", "sheet_growth",
+    "sheet_resistance", "sheet_stall_torque", "sheet_torque_constant", "spindle_torque", "stall_current_for",
+    "stall_torque", "steady_temperatures", "thermal_time_constants", "two_mass_temperatures",
+    "unbounded_armature_voltage", "undamped_creep_speed",
+)
+"""Laws that no run calls: they tell of a servo as a whole, or join laws of which the engine runs each alone."""
 
 __all__ = [
     "ANALYSIS",
