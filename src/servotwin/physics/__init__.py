@@ -100,6 +100,7 @@ armature_current_rate = array_form(motor.armature_current_rate)
 back_emf = array_form(motor.back_emf)
 circuit_current = array_form(motor.circuit_current)
 electromagnetic_torque = array_form(motor.electromagnetic_torque)
+magnetic_energy = array_form(motor.magnetic_energy)
 required_motor_torque = array_form(motor.required_motor_torque)
 steady_armature_current = array_form(motor.steady_armature_current)
 
@@ -117,6 +118,7 @@ one_shot_width = array_form(pulse.one_shot_width)
 pulse_stiffness = array_form(pulse.pulse_stiffness)
 
 kinetic_energy = array_form(shaft.kinetic_energy)
+load_torque = array_form(shaft.load_torque)
 pendulum_stiffness = array_form(shaft.pendulum_stiffness)
 pendulum_torque = array_form(shaft.pendulum_torque)
 shaft_acceleration = array_form(shaft.shaft_acceleration)
@@ -199,8 +201,10 @@ __all__ = [
     "kinetic_energy",
     "linearity_error",
     "load_share",
+    "load_torque",
     "loop_voltage",
     "magnet_factor",
+    "magnetic_energy",
     "motor_from_output",
     "motor_from_sheet",
     "motor_voltage",

@@ -169,6 +169,29 @@ def circuit_current(voltage: float, back_emf: float, resistance: float) -> float
     return (voltage - back_emf) / resistance
 
 
+def magnetic_energy(armature_current: float, armature_inductance: float) -> float:
+    """Return the energy in the magnetic field of the armature.
+
+    Parameters
+    ----------
+    armature_current : float or array
+        i_a [A].
+    armature_inductance : float or array
+        L_a [H].
+
+    Returns
+    -------
+    float or array
+        L_a i_a²/2 [J].
+
+    Examples
+    --------
+    >>> magnetic_energy(2.0, 0.5)
+    1.0
+    """
+    return 0.5 * armature_inductance * armature_current * armature_current
+
+
 def required_motor_torque(
     motor_acceleration: float, motor_speed: float, rotor_inertia: float, motor_viscous_friction: float
 ) -> float:

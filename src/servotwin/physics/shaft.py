@@ -41,6 +41,42 @@ def shaft_acceleration(driving_torque: float, speed: float, dry_friction: float,
     return (driving_torque - viscous_friction * speed - dry_friction - external_torque) / inertia
 
 
+def load_torque(acceleration: float, speed: float, dry_friction: float, external_torque: float,
+                load_viscous_friction: float, load_inertia: float) -> float:
+    """Return the torque that a shaft delivers to its load.
+
+    Parameters
+    ----------
+    acceleration : float or array
+        q̈ [rad/s²].
+    speed : float or array
+        q̇ [rad/s].
+    dry_friction : float or array
+        Of the load, against +q [N m].
+    external_torque : float or array
+        τ_ext, positive where it pushes towards −q [N m].
+    load_viscous_friction : float or array
+        B_L [N m s/rad].
+    load_inertia : float or array
+        J_L [kg m²].
+
+    Returns
+    -------
+    float or array
+        τ_L = J_L q̈ + B_L q̇ + its dry friction + τ_ext [N m].
+
+    Notes
+    -----
+    Eq. 16 and 23.
+
+    Examples
+    --------
+    >>> load_torque(2.0, 1.0, 0.25, 0.5, 0.25, 2.0)
+    5.0
+    """
+    return load_inertia * acceleration + load_viscous_friction * speed + dry_friction + external_torque
+
+
 def kinetic_energy(speed: float, inertia: float) -> float:
     """Return the kinetic energy of a shaft.
 
