@@ -8,6 +8,7 @@ import json
 import sys
 import types
 import warnings
+from dataclasses import astuple
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def signals_of(st, compiled=False):
         plain = st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005, seed=0)
         for signal in model.available:
             found[f"plain/{name}/{signal}"] = plain[signal]
-        found[f"plain/{name}/energy"] = np.array([plain.energy.supply, plain.energy.friction, plain.energy.stored])
+        found[f"plain/{name}/energy"] = np.array(astuple(plain.energy))
         if batched:
             R = model.value("motor.armature_resistance")
             batch = st.simulate_many(model, command, duration=SECONDS, load=load, output_step=0.005,
@@ -104,9 +105,10 @@ def called_laws(run):
 
     def look(frame, event, _):
         code = frame.f_code
-        if event == "call" and ("/physics/" in code.co_filename.replace("\\", "/")
-                                or code.co_filename.startswith("<array form of")):
-            names.add(code.co_filename[len("<array form of "):-1] if code.co_name == "derived" else code.co_name)
+        if event == "call" and code.co_filename.startswith("<array form of servotwin.physics."):
+            names.add(code.co_filename[:-1].rpartition(".")[2])
+        elif event == "call" and "/physics/" in code.co_filename.replace("\\", "/"):
+            names.add(code.co_name)
 
     sys.setprofile(look)
     try:

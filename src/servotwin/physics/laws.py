@@ -110,7 +110,7 @@ class _Derivation(ast.NodeTransformer):
             raise self._refused(node)
         text = "\n    ".join([f"def derived({ast.unparse(arguments)}):", *self._lines,
                               f"return {ast.unparse(result)}"])
-        exec(compile(text, f"<array form of {self._law.__name__}>", "exec"), self._space)
+        exec(compile(text, f"<array form of {self._law.__module__}.{self._law.__name__}>", "exec"), self._space)
         function: Callable[..., Any] = self._space["derived"]
         return function
 

@@ -232,18 +232,18 @@ def voltage(plant: Plant, zone: int, error: float) -> float:
 def conductance(plant: Plant, zone: int, u: float) -> float:
     """Return by how much the current changes per volt in this zone [S]."""
     if zone < CONDUCTING:
-        return motor.circuit_current(1.0, 0.0, plant.R)
+        return motor.steady_armature_current(1.0, 0.0, plant.R, plant.K_b)
     if constant_current(zone):
         return 0.0
     _, R = loop(plant, zone, u)
-    return motor.circuit_current(1.0, 0.0, R)
+    return motor.steady_armature_current(1.0, 0.0, R, plant.K_b)
 
 
 def current_slope(plant: Plant, zone: int, du: float) -> float:
     """Return di/dt [A/s] at a standstill of a current without inertia, where the command changes by du [V/s]."""
     if not in_linear_zone(zone):
         return 0.0
-    return motor.circuit_current(electronics.proportional_voltage(du, plant.gain), 0.0, plant.R)
+    return conductance(plant, zone, 0.0) * electronics.proportional_voltage(du, plant.gain)
 
 
 def bus_voltage(plant: Plant, zone: int, u: float, w: float, i: float, coasts: bool) -> float:

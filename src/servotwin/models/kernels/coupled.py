@@ -64,7 +64,7 @@ def _demand(members: Sequence[Member], states: Sequence[Vector]) -> tuple[float,
         if plant.L > 0.0:
             given += sign * y[2]
         elif mode.zone != NO_CURRENT:
-            g += motor.circuit_current(1.0, 0.0, warm.R_drive)
+            g += motor.steady_armature_current(1.0, 0.0, warm.R_drive, warm.K_b)
             v = bridge.driving_voltage(0.0, armature.sign_of(mode.zone), warm.D_drive)
             h -= sign * motor.steady_armature_current(v, y[6], warm.R_drive, warm.K_b)
     return g, h, given

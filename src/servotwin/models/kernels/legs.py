@@ -74,7 +74,7 @@ def shaft_of(plant: Plant, torque: float) -> Shaft:
 
 def _torque(plant: Plant, voltage: float, R: float) -> float:
     """Return the motor's torque [N m] by a voltage [V] at a standstill, in a circuit of R [Ω]."""
-    return motor.electromagnetic_torque(motor.circuit_current(voltage, 0.0, R), plant.K)
+    return motor.electromagnetic_torque(motor.steady_armature_current(voltage, 0.0, R, plant.K_b), plant.K)
 
 
 def _inverse(x: float) -> float:
