@@ -1,7 +1,7 @@
 """From a law over numbers to the same law over arrays, derived in memory when it is first called with one.
 
 A law is a pure function: straight lines, conditional expressions and early returns, made of `math`, other laws, named
-tuples and constants of its module. Its array form computes every branch and takes from each what its condition says.
+tuples and constants of its module. Its array form computes both branches and takes from each what the condition says.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import textwrap
 from collections.abc import Callable, Iterator
 from copy import deepcopy
 from functools import cache, wraps
+from itertools import count
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 _RENAMED = {"atanh": "arctanh", "asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2",
             "pow": "power", "fabs": "abs"}
 _BUILTINS = {"abs": "np.abs", "min": "np.minimum", "max": "np.maximum"}
+_NO_ARGUMENTS = ast.arguments([], [], None, [], [], None, [])
 _COMPARED = (ast.Eq, ast.NotEq, ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 
 
@@ -88,12 +90,13 @@ def derived(law: FunctionType) -> Callable[..., Any]:
 
 
 class _Derivation(ast.NodeTransformer):
-    """Writes one function in static single assignment: every branch is computed, and merged where it ends."""
+    """Writes one function in static single assignment: branches become functions, and are merged where they end."""
 
     def __init__(self, law: FunctionType) -> None:
         self._law = law
         self._space: dict[str, Any] = {**vars(sys.modules[law.__module__]), "np": np, "where_": _where}
         self._lines: list[str] = []
+        self._numbers = count()
         self._names: dict[str, str] = {}  # of the law's variables, as they stand now
 
     def function(self) -> Callable[..., Any]:
@@ -139,34 +142,39 @@ class _Derivation(ast.NodeTransformer):
 
     def _choice(self, node: ast.If, rest: list[ast.stmt]) -> ast.expr | None:
         """Write both branches, each with the rest of the function where one of them returns."""
-        condition = self._kept(self._expression(node.test))
-        before = self._names
-        self._names = dict(before)
-        yes, names_yes = self._block([*node.body, *rest]), self._names
-        self._names = dict(before)
-        no, names_no = self._block([*node.orelse, *rest]), self._names
-        if yes is not None and no is not None:
-            return _call("where_", condition, yes, no)
-        for name, of_yes in names_yes.items():
-            of_no = names_no.get(name, of_yes)
-            if of_yes != of_no:
-                self._assign(ast.Name(name, ast.Store()), _call("where_", condition, _name(of_yes), _name(of_no)))
-            else:
-                self._names[name] = of_yes
+        before, lines = self._names, self._lines
+        branches = []
+        for body in (node.body, node.orelse):
+            self._names, self._lines = dict(before), []
+            branches.append((self._block([*body, *rest]), self._names, self._lines))
+        self._names, self._lines = before, lines
+        (yes, names_yes, _), (no, names_no, _) = branches
+        if (yes is None) != (no is None):
+            raise self._refused(node)
+        changed = [name for name in names_yes if name in names_no and names_yes[name] != names_no[name]]
+        calls = []
+        for result, names, inside in branches:
+            result = result or ast.Tuple([_name(names[name]) for name in changed], ast.Load())
+            function = self._new("branch")
+            inside = [*inside, f"return {ast.unparse(result)}"]
+            self._lines += [f"def {function}():", *(f"    {line}" for line in inside)]
+            calls.append(_name(function))
+        chosen = _call("where_", self._expression(node.test), *calls)
+        if yes is not None:
+            return chosen
+        if changed:
+            self._assign(ast.Tuple([ast.Name(name, ast.Store()) for name in changed], ast.Store()), chosen)
         return None
+
+    def _new(self, name: str) -> str:
+        return f"{name}_{next(self._numbers)}"
 
     def _assign(self, target: ast.expr, value: ast.expr) -> None:
         """Write an assignment, each variable under a name of its own."""
         target = deepcopy(target)
         for node in [node for node in ast.walk(target) if isinstance(node, ast.Name)]:
-            self._names[node.id] = f"{node.id}_{len(self._lines)}"
-            node.id = self._names[node.id]
+            self._names[node.id] = node.id = self._new(node.id)
         self._lines.append(f"{ast.unparse(target)} = {ast.unparse(value)}")
-
-    def _kept(self, value: ast.expr) -> ast.expr:
-        name = f"condition_{len(self._lines)}"
-        self._lines.append(f"{name} = {ast.unparse(value)}")
-        return _name(name)
 
     def _expression(self, node: ast.expr) -> ast.expr:
         found: ast.expr = self.visit(deepcopy(node))  # the end of a function may be written twice
@@ -178,7 +186,8 @@ class _Derivation(ast.NodeTransformer):
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         """Choose element by element."""
-        return _call("where_", self.visit(node.test), self.visit(node.body), self.visit(node.orelse))
+        branches = (ast.Lambda(_NO_ARGUMENTS, self.visit(branch)) for branch in (node.body, node.orelse))
+        return _call("where_", self.visit(node.test), *branches)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         """Combine element by element."""
@@ -250,12 +259,16 @@ def _folded(function: str, values: list[ast.expr]) -> ast.expr:
     return found
 
 
-def _where(condition: Any, yes: Any, no: Any) -> Any:
-    """Return what a condition takes of two numbers, arrays or tuples of them."""
-    if np.ndim(condition) == 0:
-        return yes if condition else no
+def _where(condition: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+    """Return what a condition takes of two branches; one that nothing takes is not computed."""
+    if np.all(condition):
+        return yes()
+    return _merged(condition, yes(), no()) if np.any(condition) else no()
+
+
+def _merged(condition: Any, yes: Any, no: Any) -> Any:
     if isinstance(yes, tuple):
-        return _made(yes, [_where(condition, a, b) for a, b in zip(yes, no, strict=True)])
+        return _made(yes, [_merged(condition, a, b) for a, b in zip(yes, no, strict=True)])
     return np.where(condition, yes, no)
 
 
