@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-
 _friction_torque, _holding_bounds, _at_temperature = (
     array_form(law, __name__) for law in (contact.friction_torque, contact.holding_bounds, at_temperature))
 
@@ -63,7 +62,8 @@ def torques_of(model: Model, samples: Samples, drive: Pieces, load: Load) -> Tor
     tau = np.asarray(physics.electromagnetic_torque(circuit_of(model, plant, samples, drive).armature_current, plant.K))
     external = load.external_torque(samples.time, samples.angle)
     w, contact_of = samples.speed, samples.contact
-    own, of_load = _friction_of(plant, contact_of, w, tau, -external - plant.b_out * w, tau - external)
+    on_gear = np.asarray(physics.torque_on_gear(external, w, plant.b_out))
+    own, of_load = _friction_of(plant, contact_of, w, tau, on_gear, tau - external)
     acceleration = physics.shaft_acceleration(tau, w, own + of_load, external, plant.b, plant.J)
     if np.any(plant.half_play):
         inside = samples.mesh == INSIDE

@@ -94,6 +94,7 @@ quadratic_gear_friction = array_form(load_friction.quadratic_gear_friction)
 sliding_gear_friction = array_form(load_friction.sliding_gear_friction)
 static_gear_friction = array_form(load_friction.static_gear_friction)
 stribeck_factor = array_form(load_friction.stribeck_factor)
+torque_on_gear = array_form(load_friction.torque_on_gear)
 torque_share = array_form(load_friction.torque_share)
 
 armature_current_rate = array_form(motor.armature_current_rate)
@@ -249,6 +250,7 @@ __all__ = [
     "stribeck_factor",
     "supply_current",
     "thermal_time_constants",
+    "torque_on_gear",
     "torque_share",
     "two_mass_temperatures",
     "unbounded_armature_voltage",

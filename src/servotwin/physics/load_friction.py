@@ -48,6 +48,31 @@ def stribeck_factor(speed: float, stribeck_speed: float = 0.0, stribeck_exponent
     return math.exp(-math.exp(log_power)) if log_power < _NOTHING_LEFT else 0.0
 
 
+def torque_on_gear(external_torque: float, output_speed: float, load_viscous_friction: float) -> float:
+    """Return the torque with which a load acts on the gear.
+
+    Parameters
+    ----------
+    external_torque : float or array
+        τ_ext, positive where it pushes towards −q [N m].
+    output_speed : float or array
+        q̇ [rad/s].
+    load_viscous_friction : float or array
+        B_L [N m s/rad].
+
+    Returns
+    -------
+    float or array
+        τ_e = −τ_ext − B_L q̇, towards +q [N m].
+
+    Examples
+    --------
+    >>> torque_on_gear(0.5, 2.0, 0.25)
+    -1.0
+    """
+    return -external_torque - load_viscous_friction * output_speed
+
+
 def torque_share(motor_torque: float, external_torque_on_gear: float, motor_share: float,
                  external_share: float) -> float:
     """Return the friction that the torques through a gear make.

@@ -25,7 +25,7 @@ from servotwin.models.kernels.plant import (
     Vector,
     at_rest,
 )
-from servotwin.physics import backlash, friction, motor, shaft
+from servotwin.physics import backlash, friction, load_friction, motor, shaft
 
 _SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
 _REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
@@ -218,7 +218,7 @@ def acceleration(plant: Plant, mode: Mode, u: float, tau: float, y: Vector) -> f
         return 0.0
     q, w = y[0], y[1]
     torque, against = drive_torque(plant, mode.zone, u, y), external_torque(plant, tau, q)
-    dry = friction_torque(plant, mode.contact, w, torque, -against - plant.b_out * w)
+    dry = friction_torque(plant, mode.contact, w, torque, load_friction.torque_on_gear(against, w, plant.b_out))
     return shaft.shaft_acceleration(torque, w, dry, against, plant.b, plant.J)
 
 
