@@ -57,17 +57,19 @@ class Leg(NamedTuple):
 def shaft_of(plant: Plant, torque: float) -> Shaft:
     """Return what the legs read of a plant with a bridge under a constant external torque [N m]."""
     emf = motor.back_emf(1.0, plant.K_b)
-    driven, off = _torque(plant, 1.0, plant.R_drive), _torque(plant, 1.0, plant.R_off)  # per volt
-    rate_drive = accelerated(plant, plant.b + driven * emf)
-    rate_off = accelerated(plant, plant.b + off * emf)
+    rate_drive = accelerated(plant, plant.b + _torque(plant, emf, plant.R_drive))
+    rate_off = accelerated(plant, plant.b + _torque(plant, emf, plant.R_off))
     rate_free = accelerated(plant, plant.b)
     forward = accelerated(plant, coulomb(plant, True) + plant.coulomb)
     backward = accelerated(plant, coulomb(plant, False) + plant.coulomb)
+    push = _torque(plant, bridge.driving_voltage(plant.V, 0.0, 0.0), plant.R_drive)
+    drag = _torque(plant, bridge.driving_voltage(0.0, -1.0, plant.D_drive), plant.R_drive)
+    drag_off = _torque(plant, bridge.driving_voltage(0.0, -1.0, plant.D_off), plant.R_off)
     pull = max(_torque(plant, bridge.driving_voltage(plant.V, 1.0, plant.D_drive), plant.R_drive), 0.0)
     return Shaft(
         rate_drive, rate_off, rate_free, _inverse(rate_drive), _inverse(rate_off), _inverse(rate_free),
-        accelerated(plant, driven * plant.V), accelerated(plant, driven * plant.D_drive),
-        accelerated(plant, off * plant.D_off), plant.V / emf, plant.D_drive / emf, plant.D_off / emf,
+        accelerated(plant, push), accelerated(plant, drag), accelerated(plant, drag_off),
+        plant.V / emf, plant.D_drive / emf, plant.D_off / emf,
         forward, backward, accelerated(plant, torque), _start(plant, pull - torque), _start(plant, -pull - torque),
         _start(plant, -torque), plant.lower, plant.upper)
 
