@@ -135,8 +135,8 @@ def quadratic_gear_friction(motor_torque: float, external_torque_on_gear: float,
     if tau_m * tau_e >= 0.0 or abs(tau_m) == abs(tau_e):
         return 0.0
     if abs(tau_m) > abs(tau_e):
-        return load_friction_external_quad * tau_e**2
-    return load_friction_motor_quad * tau_m**2
+        return load_friction_external_quad * (tau_e * tau_e)  # as a power it would be an error to overflow
+    return load_friction_motor_quad * (tau_m * tau_m)
 
 
 def sliding_gear_friction(motor_torque: float, external_torque_on_gear: float, coulomb_torque: float,
