@@ -19,7 +19,7 @@ from servotwin.identification import (
     write_bam_log,
     write_bam_parameters,
 )
-from servotwin.physics.load_friction import gear_friction_budget
+from servotwin.physics import gear_friction_budget
 
 MOTOR = {"kt": 0.3, "R": 2.5, "armature": 0.002, "friction_viscous": 0.015, "friction_base": 0.01}
 STRIBECK = {"friction_stribeck": 0.004, "dtheta_stribeck": 0.2, "alpha": 1.3}

@@ -12,7 +12,7 @@ from servotwin.bench.converter import FEEDBACK_CONVERTER, INPUT_CONVERTER, Conve
 from servotwin.bench.generator import PulseGenerator
 from servotwin.bench.reading import Reading, TableRow
 from servotwin.errors import CommandError, InputError, MissingParameterError
-from servotwin.physics.potentiometer import feedback_voltage
+from servotwin.physics import feedback_voltage
 from servotwin.signals import constant, pulse_train
 from servotwin.simulation import Simulator, simulate
 

@@ -17,8 +17,10 @@ from servotwin.errors import InputError
 from servotwin.loads import Load, as_load
 from servotwin.models.kernels import armature, contact
 from servotwin.models.kernels.memory import started
-from servotwin.models.kernels.plant import FORWARD, FREE, REFERENCE_TEMPERATURE, RIGID, Mode, Plant, Vector
+from servotwin.models.kernels.plant import FORWARD, FREE, RIGID, Mode, Plant, Vector
+from servotwin.physics import motor
 from servotwin.physics.pieces import constant_pieces
+from servotwin.physics.thermal import REFERENCE_TEMPERATURE
 from servotwin.simulation.engine import Plan, Record, State, run
 from servotwin.simulation.trajectory import Trajectory
 
@@ -122,7 +124,7 @@ class FullDrive:
 
     def torque(self, speed: float) -> float:
         """Return the torque [N m] against which the shaft turns steadily at a speed [rad/s]; 0 beyond no load."""
-        most = self._plant.K * self.current(speed)
+        most = motor.electromagnetic_torque(self.current(speed), self._plant.K)
         if not self.acceleration(speed, 0.0) > 0.0:
             return 0.0
         return _root(lambda tau: self.acceleration(speed, tau), 0.0, most)
@@ -131,7 +133,7 @@ class FullDrive:
     def no_load_speed(self) -> float:
         """Steady speed of the free shaft [rad/s]."""
         plant = self._plant
-        limit = (plant.V if plant.V > 0.0 else plant.V_max) / plant.K_b
+        limit = (plant.V if plant.V > 0.0 else plant.V_max) / motor.back_emf(1.0, plant.K_b)
         return _root(lambda w: self.acceleration(w, 0.0), 0.0, limit)
 
     @cached_property
@@ -162,7 +164,7 @@ class FullDrive:
     @cached_property
     def starting_torque(self) -> float:
         """The most torque against which the shaft starts from rest [N m]: static friction counts in full."""
-        tau_m = self._plant.K * self.stall_current
+        tau_m = motor.electromagnetic_torque(self.stall_current, self._plant.K)
 
         def beyond(tau: float) -> float:
             return tau_m - tau - contact.holding_bounds(self._plant, tau_m, -tau)[1]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from servotwin import loads, signals
+from servotwin import loads, physics, signals
 from servotwin.datasheet.conditions import changed
 from servotwin.models import mid_travel
 from servotwin.models.outputs import warm_plant
@@ -108,7 +108,7 @@ def _means(result: Result, start: float) -> tuple[float, float, float]:
     def looked_at(samples: Samples) -> NDArray[np.float64]:
         i = model.output("armature_current", samples, drive, load)
         return np.array([samples.angle, model.output(drawn, samples, drive, load),
-                         warm_plant(model, samples, load).R * i * i])
+                         physics.copper_loss(i, warm_plant(model, samples, load).R)])
 
     angle, current, heat = (result.trajectory.since(start).integral(looked_at) / (result.ended - start)).tolist()
     return angle, current, heat

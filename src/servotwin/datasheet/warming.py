@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from servotwin.datasheet.conditions import at_temperatures
 from servotwin.datasheet.holding import Held, hold
 from servotwin.parameters import printed_fact
-from servotwin.physics.thermal import REFERENCE_TEMPERATURE, Temperatures, steady_temperatures, two_mass_temperatures
+from servotwin.physics import Temperatures, steady_temperatures, two_mass_temperatures
+from servotwin.physics.thermal import REFERENCE_TEMPERATURE
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -53,16 +54,19 @@ class Masses:
 
     def after(self, time: float, heat: float, now: Temperatures) -> Temperatures:
         """Return the temperatures [K] after a time [s] of constant heat [W]."""
-        return two_mass_temperatures(
+        then: Temperatures = two_mass_temperatures(
             time, heat, now.winding, now.housing, winding_capacity=self.winding_capacity,
             housing_capacity=self.housing_capacity, winding_to_housing=self.winding_to_housing,
             housing_to_ambient=self.housing_to_ambient, ambient=self.ambient)
+        return then
 
     def with_winding(self, winding: float) -> Temperatures:
         """Return the temperatures [K] of a servo whose winding has come to rest at this one [K]."""
         per_watt = self.winding_to_housing + self.housing_to_ambient
-        return steady_temperatures((winding - self.ambient) / per_watt, winding_to_housing=self.winding_to_housing,
-                                   housing_to_ambient=self.housing_to_ambient, ambient=self.ambient)
+        then: Temperatures = steady_temperatures(
+            (winding - self.ambient) / per_watt, winding_to_housing=self.winding_to_housing,
+            housing_to_ambient=self.housing_to_ambient, ambient=self.ambient)
+        return then
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from servotwin import physics
 from servotwin.errors import LoadError
 from servotwin.physics.pieces import Piece, Pieces, constant_pieces
 from servotwin.units import is_finite
@@ -171,7 +172,8 @@ class Load:
         self.check_span(float(np.min(t, initial=math.inf)), float(np.max(t, initial=-math.inf)))
         amplitude, hanging = self.gravity
         stiffness, rest = self.elasticity
-        return np.asarray(self.torque_pieces(t) + stiffness * (q - rest) + amplitude * np.sin(q - hanging))
+        return np.asarray(self.torque_pieces(t) + physics.spring_torque(q, stiffness, rest)
+                          + physics.pendulum_torque(q, amplitude, hanging))
 
     def check_span(self, start: float, end: float) -> None:
         """Raise LoadError unless the load is known from `start` to `end` [s]."""

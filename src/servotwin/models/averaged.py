@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from servotwin.models.base import Model, check_accepted, check_travel
+from servotwin import physics
+from servotwin.models.base import KINDS, Line, Model, check_accepted, check_travel, feedback_line, solved
 from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
-from servotwin.physics import electronics, potentiometer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -46,11 +46,18 @@ class _Averaged(Model):
             gain=self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain"),
             p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0))
 
-    def _gains(self) -> tuple[float, float, float, float]:
-        """k_p1, k_p2, b_i, t_0."""
-        return (self.value("electronics.voltage_to_pulse_gain"), self.value("electronics.pulse_to_voltage_gain"),
-                self.value_or("electronics.command_offset", 0.0),
-                self.value_or("electronics.command_pulse_offset", 0.0))
+    def _line(self, kind: str) -> Line:
+        """Return how the control voltage [V] follows a command of this kind."""
+        if kind == "angle":
+            return feedback_line(self)
+        k_p1, k_p2 = self.value("electronics.voltage_to_pulse_gain"), self.value("electronics.pulse_to_voltage_gain")
+        b_i = self.value_or("electronics.command_offset", 0.0)
+        if kind == "voltage":
+            return (physics.control_voltage_from_voltage(1.0, k_p1, k_p2),
+                    physics.control_voltage_from_voltage(0.0, k_p1, k_p2, b_i))
+        t_0 = self.value_or("electronics.command_pulse_offset", 0.0)
+        return (physics.control_voltage_from_paper_pulse(1.0, k_p2),
+                physics.control_voltage_from_paper_pulse(0.0, k_p2, t_0, b_i))
 
     def command(self, signal: Signal) -> Pieces:
         """Return v_c [V]: k_p v_i + b_i of a voltage, k_p2 (t_a − t_0) + b_i of a pulse, p q* + b_o of an angle.
@@ -60,30 +67,20 @@ class _Averaged(Model):
         CommandError
             If a pulse is one that the chip refuses, or an angle is outside the travel.
         """
-        k_p1, k_p2, b_i, t_0 = self._gains()
-        if signal.kind == "voltage":
-            return signal.pieces.scaled(k_p1 * k_p2, b_i)
         if signal.kind == "pulse_width":
             check_accepted(signal, self)
-            return signal.pieces.scaled(k_p2, b_i - k_p2 * t_0)
-        check_travel(signal, self.servo)
-        return signal.pieces.scaled(self.value("potentiometer.feedback_gain"),
-                                    self.value_or("potentiometer.feedback_offset", 0.0))
+        elif signal.kind == "angle":
+            check_travel(signal, self.servo)
+        return signal.pieces.scaled(*self._line(signal.kind))
 
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
-        k_p1, k_p2, b_i, t_0 = self._gains()
-        v_i = (drive - b_i) / (k_p1 * k_p2)
-        if name == "command_voltage":
-            return v_i
-        if name == "pulse_width":
-            return np.asarray(electronics.pulse_width_from_voltage(v_i, k_p1, t_0))
-        return np.asarray(potentiometer.angle_from_voltage(
-            drive, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)))
+        return np.asarray(solved(self._line(KINDS[name]), drive))
 
     def start_angle(self, drive: float) -> float:
         """Return the angle without error, (v_c − b_o)/p [rad]."""
-        return (drive - self.value_or("potentiometer.feedback_offset", 0.0)) / self.value("potentiometer.feedback_gain")
+        angle: float = solved(feedback_line(self), drive)
+        return angle
 
 
 @final

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, final
 
 import numpy as np
 
+from servotwin import physics
 from servotwin.errors import CommandError, InputError, MissingParameterError, UnknownNameError
 from servotwin.models import outputs
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
+
+KINDS = {"command_voltage": "voltage", "command_angle": "angle", "pulse_width": "pulse_width"}
+"""The kind of command that a signal stands for."""
 
 PULSE_RANGE = (3e-4, 2.7e-3)  # s, of what chips accept where the servo does not say; no source
 
@@ -200,6 +204,22 @@ class Model(ABC):
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
         raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.available))
+
+
+Line = tuple[float, float]
+"""Gain and offset of a law that is a straight line."""
+
+
+def feedback_line(model: Model) -> Line:
+    """Return how the feedback voltage [V] follows the angle [rad]."""
+    p, b_o = model.value("potentiometer.feedback_gain"), model.value_or("potentiometer.feedback_offset", 0.0)
+    return physics.feedback_voltage(1.0, p), physics.feedback_voltage(0.0, p, b_o)
+
+
+def solved(line: Line, y: Any) -> Any:
+    """Return where a straight line has the value y."""
+    gain, offset = line
+    return (y - offset) / gain
 
 
 def clipped(x: float, low: float, high: float) -> float:

@@ -8,11 +8,20 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
+from servotwin import physics
 from servotwin.errors import MissingParameterError
-from servotwin.models.base import Model, check_accepted, check_travel, clipped
+from servotwin.models.base import (
+    KINDS,
+    Line,
+    Model,
+    check_accepted,
+    check_travel,
+    clipped,
+    feedback_line,
+    solved,
+)
 from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
-from servotwin.physics import potentiometer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,8 +97,8 @@ class BoundedServo(Model):
         if given("electronics.one_shot_offset") is None and given("electronics.command_offset") is None:
             return
         for width in (0.5e-3, 2.5e-3):  # s, the range of Table I; between them both are straight
-            of_pulse = (width - self._T_0) / self._slope
-            of_voltage = self._k_p2 * (width - self._t_0) + self._b_i
+            of_pulse = physics.control_voltage_from_pulse(width, self._slope, self._T_0)
+            of_voltage = physics.control_voltage_from_paper_pulse(width, self._k_p2, self._t_0, self._b_i)
             if abs(of_pulse - of_voltage) <= 0.01 * self.value("supply.open_circuit_voltage"):
                 continue
             warnings.warn(
@@ -101,7 +110,9 @@ class BoundedServo(Model):
     @property
     def voltage_limit(self) -> float:
         """V_max = V_oc − V_ce0 [V]."""
-        return self.value("supply.open_circuit_voltage") - self.value_or("supply.bridge_drop_voltage", 0.0)
+        limit: float = physics.driving_voltage(
+            self.value("supply.open_circuit_voltage"), 1.0, self.value_or("supply.bridge_drop_voltage", 0.0))
+        return limit
 
     def pack(self, load: Load) -> Plant:
         """Return the plant at the output shaft."""
@@ -115,6 +126,17 @@ class BoundedServo(Model):
             stops=(self.value_or("stops.lower_angle", -math.inf), self.value_or("stops.upper_angle", math.inf)),
             restitution=self.value_or("stops.restitution", 0.0))
 
+    def _line(self, kind: str) -> Line:
+        """Return how the control voltage [V] follows a command of this kind."""
+        if kind == "angle":
+            return feedback_line(self)
+        if kind == "pulse_width":
+            return (physics.control_voltage_from_pulse(1.0, self._slope),
+                    physics.control_voltage_from_pulse(0.0, self._slope, self._T_0))
+        k_p1 = self.value("electronics.voltage_to_pulse_gain")
+        return (physics.control_voltage_from_voltage(1.0, k_p1, self._k_p2),
+                physics.control_voltage_from_voltage(0.0, k_p1, self._k_p2, self._b_i))
+
     def command(self, signal: Signal) -> Pieces:
         """Return v_c [V]: k_p v_i + b_i of a voltage, (t_a − T_0)/one_shot_slope of a pulse, p q* + b_o of an angle.
 
@@ -123,27 +145,19 @@ class BoundedServo(Model):
         CommandError
             If a pulse is one that the chip refuses, or an angle is outside the travel.
         """
-        if signal.kind == "voltage":
-            return signal.pieces.scaled(self.value("electronics.voltage_to_pulse_gain") * self._k_p2, self._b_i)
         if signal.kind == "pulse_width":
             check_accepted(signal, self)
-            return signal.pieces.scaled(1.0 / self._slope, -self._T_0 / self._slope)
-        check_travel(signal, self.servo)
-        return signal.pieces.scaled(self.value("potentiometer.feedback_gain"),
-                                    self.value_or("potentiometer.feedback_offset", 0.0))
+        elif signal.kind == "angle":
+            check_travel(signal, self.servo)
+        return signal.pieces.scaled(*self._line(signal.kind))
 
     def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a control voltage [V]."""
-        if name == "pulse_width":
-            return self._T_0 + self._slope * drive
-        if name == "command_voltage":
-            return (drive - self._b_i) / (self.value("electronics.voltage_to_pulse_gain") * self._k_p2)
-        return np.asarray(potentiometer.angle_from_voltage(
-            drive, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)))
+        return np.asarray(solved(self._line(KINDS[name]), drive))
 
     def start_angle(self, drive: float) -> float:
         """Return the angle without error, (v_c − b_o)/p, within the stops [rad]."""
-        q = (drive - self.value_or("potentiometer.feedback_offset", 0.0)) / self.value("potentiometer.feedback_gain")
+        q = solved(feedback_line(self), drive)
         return clipped(q, self.value_or("stops.lower_angle", -math.inf), self.value_or("stops.upper_angle", math.inf))
 
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.physics import bridge, electronics, motor, potentiometer
+from servotwin import physics
+from servotwin.models.kernels import armature
+from servotwin.physics.laws import array_form
 
 if TYPE_CHECKING:
     from servotwin.models.base import Model
@@ -17,6 +19,15 @@ if TYPE_CHECKING:
     from servotwin.physics.pieces import Pieces
 
 Array = NDArray[np.float64]
+
+
+_NO_VOLTAGE = 5e-324  # V: a bus without any is still connected
+_EDGE = 1e-6  # of a limit: what float32 rounds
+
+_zone_of, _error_of, _voltage, _current, _bus_voltage, _terminal_voltage, _bridge_drops = (
+    array_form(law, __name__) for law in (
+        armature.zone_of, armature.error_of, armature.voltage, armature.current, armature.bus_voltage,
+        armature.terminal_voltage, armature.bridge_drops))
 
 
 class Circuit(NamedTuple):
@@ -38,43 +49,40 @@ def circuit_of(model: Model, plant: Plant, samples: Samples, drive: Pieces) -> C
     """
     if np.any(plant.V > 0.0):
         return _behind_bridge(model, plant, samples)
-    error = electronics.feedback_error(drive(samples.time), potentiometer.feedback_voltage(
-        samples.angle, plant.p, plant.b_o))
-    v = np.asarray(electronics.bounded_armature_voltage(
-        error, 2.0 * plant.half_deadband, plant.gain, 1.0, plant.V_max))
-    if plant.L == 0.0:
-        i = np.asarray(motor.steady_armature_current(v, samples.speed, plant.R, plant.K_b))
-    else:
-        i = samples.current
+    u, q, w = drive(samples.time), samples.angle, samples.speed
+    zone = _zone_of(plant, u, 0.0, q, w, 0.0)
+    v = np.asarray(_voltage(plant, zone, _error_of(plant, u, q)))
+    i = np.asarray(_current(plant, zone, u, q, w)) if plant.L == 0.0 else samples.current
     return Circuit(v, i, np.full_like(v, np.nan), np.full_like(v, np.nan), v * i, np.zeros_like(v), np.zeros_like(v))
 
 
 def _behind_bridge(model: Model, plant: Plant, samples: Samples) -> Circuit:
-    s, driven = samples.drive, samples.drive != 0.0
+    s = samples.drive
     coasts = plant.D_off >= plant.V  # nothing flows before the back-EMF opens the diodes
     shared = getattr(samples, "bus", None)
     if shared is not None:
         plant = on_bus(plant, shared)
-    V_br, V_ce0 = (model.value_or(name, 0.0) for name in ("motor.brush_drop_voltage", "supply.bridge_drop_voltage"))
-    v_b = plant.K_b * (samples.motor_speed if np.any(plant.half_play) else samples.speed)
+    V_br = model.value_or("motor.brush_drop_voltage", 0.0)
+    w = samples.motor_speed if np.any(plant.half_play) else samples.speed
+    u = s * np.maximum(plant.V, _NO_VOLTAGE)
     inductive = np.any(plant.L > 0.0)
-    i = samples.current if inductive else np.asarray(bridge.bridge_current(
-        s * plant.V, v_b, np.where(driven, plant.D_drive, plant.D_off), np.where(driven, plant.R_drive, plant.R_off)))
-    if not inductive and np.any(np.isfinite(plant.I_max)):
-        i = np.where(driven, _from_regulator(plant, s, v_b, i), i)
-    of_supply = np.where(driven, s * i, np.where(coasts, -np.abs(i), 0.0))
-    bus = plant.V - plant.R_b * of_supply
-    if np.any(np.isfinite(plant.I_max)):
-        bus = _regulated(plant, s, v_b, i, of_supply, bus)
-    r_c = np.where(driven, model.value_or("supply.bridge_drop_resistance", 0.0), 0.0)
-    if inductive:
-        v = np.where(driven, s * bus - np.copysign(V_ce0, i) - r_c * i,
-                     np.where(coasts, -np.copysign(bus + V_ce0, i), 0.0))
-        v = np.where(i == 0.0, np.where(driven | coasts, v_b, 0.0), v)
-    else:
-        v = np.asarray(bridge.motor_voltage(i, v_b, plant.R, V_br, np.where(driven | coasts, v_b, 0.0)))
-    lost = np.where(driven | coasts, (V_ce0 + r_c * np.abs(i)) * np.abs(i), 0.0)
-    return Circuit(v, i, bus, of_supply, bus * of_supply, lost, V_br * np.abs(i))
+    i = _at_limit(plant, samples.current) if inductive else np.zeros_like(w)
+    zone = _zone_of(plant, u, 0.0, 0.0, w, i)
+    if not inductive:
+        i = _current(plant, zone, u, 0.0, w)
+    bus = np.asarray(_bus_voltage(plant, zone, u, w, i, coasts))
+    v = np.asarray(_terminal_voltage(plant, V_br, u, w, i, bus, coasts))
+    connected = (s != 0.0) | coasts
+    of_supply = np.where(connected, physics.supply_current(i, s), 0.0)
+    lost = np.where(connected, physics.bridge_loss(i, *_bridge_drops(plant, V_br, u)), 0.0)
+    return Circuit(v, i, bus, of_supply, bus * of_supply, lost, np.asarray(physics.brush_loss(i, V_br)))
+
+
+def _at_limit(plant: Plant, i: Array) -> Array:
+    """Return a current, at the limit of a regulator but for rounding just there."""
+    with np.errstate(invalid="ignore"):
+        near = np.abs(np.abs(i) - plant.I_max) <= _EDGE * plant.I_max
+    return np.where(near & np.isfinite(plant.I_max), np.copysign(plant.I_max, i), i)
 
 
 def on_bus(plant: Plant, bus: Array) -> Plant:
@@ -84,21 +92,3 @@ def on_bus(plant: Plant, bus: Array) -> Plant:
     changed: dict[str, Any] = {"V": bus, "D_off": np.where(coasts, plant.D_off - plant.V + bus, plant.D_off),
                                "R_off": R_off, "R_drive": plant.R_drive - plant.R_b, "R_b": 0.0, "I_max": math.inf}
     return plant._replace(**changed)
-
-
-def _from_regulator(plant: Plant, s: Array, v_b: Array, i: Array) -> Array:
-    """Return the current of a drive from a source that gives so much and no more, and takes none back."""
-    x, R = s * plant.V - v_b, plant.R_drive - plant.R_b
-    along = s * x
-    back = bridge.bridge_current(s * plant.V, v_b, plant.D_drive, R)
-    short = s * (along - plant.V - plant.D_drive) / R
-    most = np.where(along > plant.D_drive + R * plant.I_max + plant.V, short, s * plant.I_max)
-    return np.where(along < 0.0, back, np.where(along > plant.D_drive + plant.R_drive * plant.I_max, most, i))
-
-
-def _regulated(plant: Plant, s: Array, v_b: Array, i: Array, of_supply: Array, bus: Array) -> Array:
-    """Return the bus voltage behind a regulator, where `bus` is that of a battery."""
-    edge = 1e-9
-    needed = s * ((plant.R_drive - plant.R_b) * i + v_b) + plant.D_drive
-    limited = np.where(of_supply > plant.I_max * (1.0 + edge), 0.0, np.clip(needed, 0.0, bus))
-    return np.where(of_supply < 0.0, plant.V, np.where(of_supply >= plant.I_max * (1.0 - edge), limited, bus))

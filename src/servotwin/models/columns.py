@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from servotwin.physics.pieces import Piece, Pieces
+from servotwin.physics.laws import array_form
+from servotwin.physics.pieces import Piece, Pieces, piece_value
 
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
@@ -113,9 +114,7 @@ class LanePieces:
             middle = (low + high) // 2
             begun = (middle > low) & (self.rows[middle, 0] <= t)
             low, high = np.where(begun, middle, low), np.where(begun, high, np.maximum(middle, low + 1))
-        start, value, slope, amplitude, frequency, phase, sweep = np.moveaxis(self.rows[low], -1, 0)
-        s = t - start
-        y = value + slope * s + amplitude * np.sin(phase + (frequency + 0.5 * sweep * s) * s)
+        y = array_form(piece_value)(Piece(*np.moveaxis(self.rows[low], -1, 0)), t)
         return np.asarray(self.gain * (y if len(first) == 1 else y[lane]) + self.offset)
 
     def tables(self) -> tuple[Indices, Indices, Array]:

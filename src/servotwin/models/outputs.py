@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin import physics
 from servotwin.models.circuit import circuit_of
-from servotwin.models.kernels.plant import BACKWARD, FORWARD, INSIDE, STUCK, at_temperature
-from servotwin.physics import friction, gear, load_friction, motor, potentiometer
+from servotwin.models.kernels import contact
+from servotwin.models.kernels.plant import INSIDE, STUCK, at_temperature
+from servotwin.physics.laws import array_form
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
     from servotwin.physics.pieces import Pieces
 
 Array = NDArray[np.float64]
+
+_friction_torque, _holding_bounds, _at_temperature = (
+    array_form(law, __name__) for law in (contact.friction_torque, contact.holding_bounds, at_temperature))
 
 
 class Output(NamedTuple):
@@ -38,8 +43,7 @@ def warm_plant(model: Model, samples: Samples, load: Load) -> Plant:
     plant = model.plant(load)
     if not np.any(plant.C_w > 0.0):
         return plant
-    T_w, T_h = cast("Any", samples.winding), cast("Any", samples.housing)
-    return at_temperature(plant, T_w, T_h)
+    return cast("Plant", _at_temperature(plant, samples.winding, samples.housing))
 
 
 class Torques(NamedTuple):
@@ -55,69 +59,45 @@ class Torques(NamedTuple):
 def torques_of(model: Model, samples: Samples, drive: Pieces, load: Load) -> Torques:
     """Return all torques that act at the output shaft."""
     plant = warm_plant(model, samples, load)
-    drive_torque = plant.K * circuit_of(model, plant, samples, drive).armature_current
+    tau = np.asarray(physics.electromagnetic_torque(circuit_of(model, plant, samples, drive).armature_current, plant.K))
     external = load.external_torque(samples.time, samples.angle)
-    still = samples.contact >= STUCK
-    if not np.any(plant.half_play):
-        own, of_load = friction_of(plant, samples, drive_torque, external)
-        acceleration = (drive_torque - plant.b * samples.speed - own - of_load - external) / plant.J
-        return Torques(drive_torque, own, of_load, external, np.where(still, 0.0, acceleration))
-    inside = samples.mesh == INSIDE
-    own, of_load = friction_of(plant, samples, drive_torque, external)
-    own_inside = _sliding_or_held(samples.motor, gear_budgets(plant, samples.motor_speed, drive_torque, 0.0),
-                                  drive_torque)
-    load_inside = _sliding_or_held(samples.contact, (plant.coulomb, plant.coulomb), -external)
-    own, of_load = np.where(inside, own_inside, own), np.where(inside, load_inside, of_load)
-    together = (drive_torque - plant.b * samples.speed - own - of_load - external) / plant.J
-    alone = (-external - plant.b_out * samples.speed - of_load) / np.where(plant.J_out > 0.0, plant.J_out, 1.0)
-    return Torques(drive_torque, own, of_load, external, np.where(still, 0.0, np.where(inside, alone, together)))
+    w, contact_of = samples.speed, samples.contact
+    on_gear = np.asarray(physics.torque_on_gear(external, w, plant.b_out))
+    own, of_load = _friction_of(plant, contact_of, w, tau, on_gear, tau - external)
+    acceleration = physics.shaft_acceleration(tau, w, own + of_load, external, plant.b, plant.J)
+    if np.any(plant.half_play):
+        inside = samples.mesh == INSIDE
+        gear, dry = plant._replace(coulomb=0.0), plant._replace(F_forward=0.0, F_backward=0.0, varies=0.0)
+        own_inside, _ = _friction_of(gear, samples.motor, samples.motor_speed, tau, np.zeros_like(tau), tau)
+        _, load_inside = _friction_of(dry, contact_of, w, np.zeros_like(tau), -external, -external)
+        own, of_load = np.where(inside, own_inside, own), np.where(inside, load_inside, of_load)
+        alone = physics.shaft_acceleration(0.0, w, of_load, external, plant.b_out, plant.J_out)
+        acceleration = np.where(inside, alone, acceleration)
+    return Torques(tau, own, of_load, external, np.where(contact_of >= STUCK, 0.0, acceleration))
 
 
-def gear_budgets(plant: Plant, speed: Array, motor_torque: Array, external: Array | float) -> tuple[Array, Array]:
-    """Return the gear's friction backward and forward [N m]; `external` is what acts on the gear towards +q [N m]."""
-    at_rest = np.asarray(speed) == 0.0
-    if not np.any(plant.varies):
-        r = np.where(at_rest, plant.breakaway, 1.0)
-        return plant.F_backward * r, plant.F_forward * r
-    w_s = np.where(np.asarray(plant.w_s) > 0.0, plant.w_s, 1e-300)  # static friction ends at once
-    backward, forward = (np.asarray(load_friction.gear_friction_budget(
-        speed, motor_torque, external, coulomb_torque=F, breakaway_ratio=plant.breakaway, stribeck_speed=w_s,
-        stribeck_exponent=plant.alpha, load_friction_motor=plant.K_m, load_friction_external=plant.K_e,
-        load_friction_motor_stribeck=plant.K_ms, load_friction_external_stribeck=plant.K_es,
-        load_friction_motor_quad=plant.K_mq, load_friction_external_quad=plant.K_eq))
-        for F in (plant.F_backward, plant.F_forward))
-    return backward, forward
-
-
-def _sliding_or_held(contact: Any, budgets: tuple[Any, Any], net: Array) -> Array:
-    """Return the friction against +q of a body with these budgets, on which `net` acts [N m]."""
-    backward, forward = budgets
-    sliding = np.where(contact == FORWARD, forward, np.where(contact == BACKWARD, -backward, 0.0))
-    return np.where(contact >= STUCK, np.clip(net, -backward, forward), sliding)
-
-
-def friction_of(plant: Plant, samples: Samples, drive: Array, external: Array) -> tuple[Array, Array]:
-    """Return the friction torques of servo and load [N m], against +q, of motor and output as one body.
+def _friction_of(plant: Plant, contact_of: Any, w: Array, tau_m: Array, tau_e: Array,
+                 net: Array) -> tuple[Array, Array]:
+    """Return the friction torques of servo and load [N m], against +q, where `net` is what they have to hold at rest.
 
     At rest friction takes what it has to hold, shared by servo and load in proportion to what each can hold (the
     sharing is assumed: statics does not tell); what remains then is carried by a stop.
     """
-    w = samples.speed
-    if np.any(plant.kappa > 0.0):
-        own = friction.smoothed_coulomb_torque(w, plant.F_forward, plant.F_backward, plant.kappa)
-        return np.asarray(own), plant.coulomb * np.tanh(plant.kappa * w)
-    low, high = gear_budgets(plant, w, drive, -external - plant.b_out * w)
-    both = _sliding_or_held(samples.contact, (low + plant.coulomb, high + plant.coulomb), drive - external)
-    limit = np.where(both > 0.0, high, low) + plant.coulomb
-    share = np.divide(plant.coulomb, limit, out=np.zeros_like(both), where=limit > 0.0)
-    return both * (1.0 - share), both * share
+    sliding = _friction_torque(plant, contact_of, w, tau_m, tau_e)
+    own = _friction_torque(plant._replace(coulomb=0.0), contact_of, w, tau_m, tau_e)
+    low, high = _holding_bounds(plant, tau_m, tau_e)
+    held = np.clip(net, -low, high)
+    limit = np.where(held > 0.0, high, low)
+    share = np.divide(plant.coulomb, limit, out=np.zeros_like(held), where=limit > 0.0)
+    still = contact_of >= STUCK
+    return np.where(still, held * (1.0 - share), own), np.where(still, held * share, sliding - own)
 
 
 def load_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
-    """Return τ_L [N m], delivered to the load: J_L q̈ + B_L q̇ + its friction + τ_ext (physics, eq. 16 and 23)."""
+    """Return τ_L [N m], delivered to the load."""
     torques = torques_of(model, samples, drive, load)
-    return (model.load_inertia(load) * torques.acceleration + load.viscous_friction * samples.speed
-            + torques.load_friction + torques.external)
+    return np.asarray(physics.load_torque(torques.acceleration, samples.speed, torques.load_friction, torques.external,
+                                          load.viscous_friction, model.load_inertia(load)))
 
 
 def _reduction(model: Model) -> float:
@@ -138,7 +118,7 @@ def _current(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array
 def _motor_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
     plant = warm_plant(model, samples, load)
     k_a = plant.K / _reduction(model)
-    return np.asarray(motor.electromagnetic_torque(
+    return np.asarray(physics.electromagnetic_torque(
         circuit_of(model, plant, samples, drive).armature_current, k_a))
 
 
@@ -146,8 +126,8 @@ def _feedback(model: Model, samples: Samples, drive: Pieces, load: Load) -> Arra
     plant, (angles, errors) = model.plant(load), model.curve()
     count: Any = model.value_or("potentiometer.quantisation", 0.0) if np.any(plant.V > 0.0) else 0.0
     if not angles and not np.any(count) and not np.any(plant.half_slack):
-        return np.asarray(potentiometer.feedback_voltage(samples.angle, plant.p, plant.b_o))
-    return np.asarray(potentiometer.sensed_voltage(
+        return np.asarray(physics.feedback_voltage(samples.angle, plant.p, plant.b_o))
+    return np.asarray(physics.sensed_voltage(
         samples.wiper, plant.p, plant.b_o, angles or (0.0,), errors or (0.0,), count if np.any(count) else None))
 
 
@@ -156,7 +136,7 @@ def _of_motor(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
     def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
         play = np.any(model.plant(load).half_play)
         values: Array = getattr(samples, f"motor_{name}" if play else name)
-        return np.asarray(gear.motor_from_output(values, _reduction(model)))
+        return np.asarray(physics.motor_from_output(values, _reduction(model)))
     return compute
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from servotwin import physics
 from servotwin.models.kernels.plant import Plant
 
 if TYPE_CHECKING:
@@ -25,11 +26,13 @@ def make_plant(model: Model, load: Load, *, reduction: float, inductance: float 
     stiffness, rest_angle = load.elasticity
     gravity, hanging = load.gravity
     numbers: dict[str, Any] = dict.fromkeys(Plant._fields, 0.0) | {
-        "J": N * N * model.value("motor.rotor_inertia") + model.load_inertia(load),
-        "b": N * N * model.value("motor.motor_viscous_friction") + load.viscous_friction,
-        "K": N * model.value("motor.torque_constant"), "K_b": N * model.value("motor.back_emf_constant"),
+        "J": physics.output_inertia(model.value("motor.rotor_inertia"), model.load_inertia(load), N),
+        "b": physics.output_viscous_friction(model.value("motor.motor_viscous_friction"), load.viscous_friction, N),
+        "K": physics.output_torque(model.value("motor.torque_constant"), N),
+        "K_b": physics.motor_from_output(model.value("motor.back_emf_constant"), N),  # per speed of the output
         "R": model.value("motor.armature_resistance"), "L": inductance,
-        "F_forward": N * friction[0], "F_backward": N * friction[1], "breakaway": breakaway, "kappa": N * slope,
+        "F_forward": physics.output_torque(friction[0], N), "F_backward": physics.output_torque(friction[1], N),
+        "breakaway": breakaway, "kappa": physics.motor_from_output(slope, N),
         "coulomb": load.coulomb_torque, "stiffness": stiffness, "rest_angle": rest_angle,
         "gravity": gravity, "hanging_angle": hanging,
         "gain": gain, "p": p, "b_o": b_o, "half_deadband": 0.5 * deadband, "V_max": voltage_limit,

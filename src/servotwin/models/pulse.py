@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
+from servotwin import physics
 from servotwin.errors import InputError
-from servotwin.models.base import Model, Place, check_travel, check_widths, clipped
+from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
 from servotwin.models.pulse_plant import gear_numbers, sensor_numbers, source_numbers, thermal_numbers
-from servotwin.physics import bridge, electronics, potentiometer
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -187,8 +187,8 @@ class _Pulsed(Model):
         if not (is_finite(T_f) and T_f > 0.0):
             raise InputError("frame_period", got=T_f, allowed="a positive number [s]")
         source = source_numbers(self, self._coasts())
-        stalled = bridge.bridge_current(source["V"], 0.0, source["D_drive"], source["R_drive"])
-        gain = electronics.averaged_bridge_gain(
+        stalled = physics.bridge_current(source["V"], 0.0, source["D_drive"], source["R_drive"])
+        gain = physics.averaged_bridge_gain(
             self.value("motor.armature_resistance") * min(float(stalled), source["I_max"]), 0.0,
             self.value("electronics.stretcher_gain"), T_f, self.value("electronics.one_shot_slope"))
         return float(gain)
@@ -211,15 +211,13 @@ class _Pulsed(Model):
             If a width is not positive or not shorter than a frame, or an angle outside the travel.
         """
         if signal.kind == "voltage":
-            pieces = signal.pieces.scaled(self.value("electronics.voltage_to_pulse_gain"),
-                                          self.value_or("electronics.command_pulse_offset", 0.0))
+            pieces = signal.pieces.scaled(*self._voltage_line())
         elif signal.kind == "angle":
             check_travel(signal, self.servo)
-            slope = self.value("electronics.one_shot_slope")
-            pieces = signal.pieces.scaled(
-                slope * self.value("potentiometer.feedback_gain"),
-                self.value_or("electronics.one_shot_offset", 0.0)
-                + slope * self.value_or("potentiometer.feedback_offset", 0.0))
+            slope, T_0 = self.value("electronics.one_shot_slope"), self.value_or("electronics.one_shot_offset", 0.0)
+            p, b_o = feedback_line(self)
+            pieces = signal.pieces.scaled(physics.pulse_width_from_feedback(p, slope),
+                                          physics.pulse_width_from_feedback(b_o, slope, T_0))
         else:
             pieces = signal.pieces
         check_widths(signal, pieces, self._period(signal) if signal.edges is None else math.inf)
@@ -230,15 +228,20 @@ class _Pulsed(Model):
         if name == "pulse_width":
             return drive
         if name == "command_voltage":
-            return (drive - self.value_or("electronics.command_pulse_offset", 0.0)) / self.value(
-                "electronics.voltage_to_pulse_gain")
+            return np.asarray(solved(self._voltage_line(), drive))
         return np.asarray(self._angle_of(drive))
+
+    def _voltage_line(self) -> Line:
+        """Return how the pulse width [s] follows a voltage command [V]."""
+        k_p1, t_0 = (self.value("electronics.voltage_to_pulse_gain"),
+                     self.value_or("electronics.command_pulse_offset", 0.0))
+        return physics.pulse_width_from_voltage(1.0, k_p1), physics.pulse_width_from_voltage(0.0, k_p1, t_0)
 
     def _angle_of(self, pulse_width: Any) -> Any:
         """Return the angle [rad] at which the one-shot is as long as this pulse."""
-        v_o = electronics.control_voltage_from_pulse(
+        v_o = physics.control_voltage_from_pulse(
             pulse_width, self.value("electronics.one_shot_slope"), self.value_or("electronics.one_shot_offset", 0.0))
-        return potentiometer.angle_from_voltage(
+        return physics.angle_from_voltage(
             v_o, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0))
 
     def start_angle(self, drive: float) -> float:
@@ -247,8 +250,8 @@ class _Pulsed(Model):
         angle = self._angle_of(drive)
         if angles:
             p, b_o = self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)
-            angle = potentiometer.angle_from_sensed_voltage(
-                potentiometer.feedback_voltage(angle, p, b_o), p, b_o, angles, errors)
+            angle = physics.angle_from_sensed_voltage(
+                physics.feedback_voltage(angle, p, b_o), p, b_o, angles, errors)
         return clipped(angle, self.value_or("stops.lower_angle", -math.inf),
                        self.value_or("stops.upper_angle", math.inf))
 
@@ -310,7 +313,7 @@ class PulseServo(_Pulsed):
         T_f = self.frame_period if frame_period is None else frame_period
         slope = self.value("electronics.one_shot_slope")
         s_r, T_0 = 1.0 / slope, self.value_or("electronics.one_shot_offset", 0.0)
-        gain = electronics.averaged_bridge_gain(
+        gain = physics.averaged_bridge_gain(
             self.value("supply.open_circuit_voltage"), self.value_or("supply.bridge_drop_voltage", 0.0),
             self.value("electronics.stretcher_gain"), T_f, slope)
         t_0 = self.value_or("electronics.command_pulse_offset", 0.0)

@@ -6,26 +6,25 @@ Eq. 40 is an inverse statement: given a motion and a command it yields the torqu
 
 from __future__ import annotations
 
-from servotwin.physics._typing import Real
 from servotwin.physics.electronics import control_voltage_from_voltage, unbounded_armature_voltage
 from servotwin.physics.friction import smoothed_coulomb_torque
-from servotwin.physics.gear import motor_from_output, output_inertia
+from servotwin.physics.gear import motor_from_output, output_inertia, output_torque
 from servotwin.physics.motor import electromagnetic_torque, required_motor_torque, steady_armature_current
 from servotwin.physics.potentiometer import feedback_voltage
 
 
 def loop_voltage(
-    output_angle: Real,
-    command_voltage: Real,
+    output_angle: float,
+    command_voltage: float,
     *,
-    bridge_gain: Real,
-    comparator_gain: Real,
-    voltage_to_pulse_gain: Real,
-    pulse_to_voltage_gain: Real,
-    feedback_gain: Real,
-    command_offset: Real = 0.0,
-    feedback_offset: Real = 0.0,
-) -> Real:
+    bridge_gain: float,
+    comparator_gain: float,
+    voltage_to_pulse_gain: float,
+    pulse_to_voltage_gain: float,
+    feedback_gain: float,
+    command_offset: float = 0.0,
+    feedback_offset: float = 0.0,
+) -> float:
     """Return the armature voltage that the paper's control loop gives at this angle and command.
 
     Parameters
@@ -66,20 +65,20 @@ def loop_voltage(
 
 
 def driven_spindle_torque(
-    output_speed: Real,
-    output_acceleration: Real,
-    armature_voltage: Real,
+    output_speed: float,
+    output_acceleration: float,
+    armature_voltage: float,
     *,
-    armature_resistance: Real,
-    torque_constant: Real,
-    back_emf_constant: Real,
-    rotor_inertia: Real,
-    motor_viscous_friction: Real,
-    gear_reduction: Real,
-    coulomb_torque_forward: Real,
-    coulomb_torque_backward: Real,
-    zero_crossing_slope: Real,
-) -> Real:
+    armature_resistance: float,
+    torque_constant: float,
+    back_emf_constant: float,
+    rotor_inertia: float,
+    motor_viscous_friction: float,
+    gear_reduction: float,
+    coulomb_torque_forward: float,
+    coulomb_torque_backward: float,
+    zero_crossing_slope: float,
+) -> float:
     """Return the torque that a geared motor leaves for its load, for a stated motion and armature voltage.
 
     Parameters
@@ -131,34 +130,32 @@ def driven_spindle_torque(
     tau_o = electromagnetic_torque(i_a, torque_constant)
     tau_m = required_motor_torque(qdd_m, qd_m, rotor_inertia, motor_viscous_friction)
     f_ec = smoothed_coulomb_torque(qd_m, coulomb_torque_forward, coulomb_torque_backward, zero_crossing_slope)
-    return N * (tau_o - tau_m - f_ec)
-
-
+    return output_torque(tau_o - tau_m - f_ec, N)
 
 
 def spindle_torque(
-    output_angle: Real,
-    output_speed: Real,
-    output_acceleration: Real,
-    command_voltage: Real,
+    output_angle: float,
+    output_speed: float,
+    output_acceleration: float,
+    command_voltage: float,
     *,
-    armature_resistance: Real,
-    torque_constant: Real,
-    back_emf_constant: Real,
-    rotor_inertia: Real,
-    motor_viscous_friction: Real,
-    gear_reduction: Real,
-    coulomb_torque_forward: Real,
-    coulomb_torque_backward: Real,
-    zero_crossing_slope: Real,
-    bridge_gain: Real,
-    comparator_gain: Real,
-    voltage_to_pulse_gain: Real,
-    pulse_to_voltage_gain: Real,
-    feedback_gain: Real,
-    command_offset: Real = 0.0,
-    feedback_offset: Real = 0.0,
-) -> Real:
+    armature_resistance: float,
+    torque_constant: float,
+    back_emf_constant: float,
+    rotor_inertia: float,
+    motor_viscous_friction: float,
+    gear_reduction: float,
+    coulomb_torque_forward: float,
+    coulomb_torque_backward: float,
+    zero_crossing_slope: float,
+    bridge_gain: float,
+    comparator_gain: float,
+    voltage_to_pulse_gain: float,
+    pulse_to_voltage_gain: float,
+    feedback_gain: float,
+    command_offset: float = 0.0,
+    feedback_offset: float = 0.0,
+) -> float:
     """Return the torque at the spindle of the paper's servo, for a stated motion and command.
 
     Parameters
@@ -245,30 +242,30 @@ def spindle_torque(
 
 
 def forward_acceleration(
-    output_angle: Real,
-    output_speed: Real,
-    command_voltage: Real,
+    output_angle: float,
+    output_speed: float,
+    command_voltage: float,
     *,
-    load_inertia: Real = 0.0,
-    load_viscous_friction: Real = 0.0,
-    external_torque: Real = 0.0,
-    armature_resistance: Real,
-    torque_constant: Real,
-    back_emf_constant: Real,
-    rotor_inertia: Real,
-    motor_viscous_friction: Real,
-    gear_reduction: Real,
-    coulomb_torque_forward: Real,
-    coulomb_torque_backward: Real,
-    zero_crossing_slope: Real,
-    bridge_gain: Real,
-    comparator_gain: Real,
-    voltage_to_pulse_gain: Real,
-    pulse_to_voltage_gain: Real,
-    feedback_gain: Real,
-    command_offset: Real = 0.0,
-    feedback_offset: Real = 0.0,
-) -> Real:
+    load_inertia: float = 0.0,
+    load_viscous_friction: float = 0.0,
+    external_torque: float = 0.0,
+    armature_resistance: float,
+    torque_constant: float,
+    back_emf_constant: float,
+    rotor_inertia: float,
+    motor_viscous_friction: float,
+    gear_reduction: float,
+    coulomb_torque_forward: float,
+    coulomb_torque_backward: float,
+    zero_crossing_slope: float,
+    bridge_gain: float,
+    comparator_gain: float,
+    voltage_to_pulse_gain: float,
+    pulse_to_voltage_gain: float,
+    feedback_gain: float,
+    command_offset: float = 0.0,
+    feedback_offset: float = 0.0,
+) -> float:
     """Return the acceleration of the output shaft of the paper's servo under a load.
 
     Parameters

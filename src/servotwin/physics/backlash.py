@@ -6,12 +6,8 @@ move on their own inside it. That between output and potentiometer has nothing b
 
 from __future__ import annotations
 
-import numpy as np
 
-from servotwin.physics._typing import Real
-
-
-def play(follower: Real, leader: Real, width: Real) -> Real:
+def play(follower: float, leader: float, width: float) -> float:
     """Return where a body without inertia is after its leader has moved, in one direction, to a new place.
 
     Parameters
@@ -35,15 +31,14 @@ def play(follower: Real, leader: Real, width: Real) -> Real:
 
     Examples
     --------
-    >>> out = float(play(0.0, 1.0, 0.5))
-    >>> out, float(play(out, 0.75, 0.5)), float(play(out, 0.25, 0.5))
+    >>> out = play(0.0, 1.0, 0.5)
+    >>> out, play(out, 0.75, 0.5), play(out, 0.25, 0.5)
     (0.75, 0.75, 0.5)
     """
-    y: Real = np.minimum(np.maximum(follower, leader - 0.5 * width), leader + 0.5 * width)[()]
-    return y
+    return min(max(follower, leader - 0.5 * width), leader + 0.5 * width)
 
 
-def impact_speed(inertia: Real, speed: Real, other_inertia: Real, other_speed: Real) -> Real:
+def impact_speed(inertia: float, speed: float, other_inertia: float, other_speed: float) -> float:
     """Return the common speed of two bodies that meet and stay together.
 
     Parameters
@@ -70,7 +65,30 @@ def impact_speed(inertia: Real, speed: Real, other_inertia: Real, other_speed: R
     return (inertia * speed + other_inertia * other_speed) / (inertia + other_inertia)
 
 
-def impact_energy(inertia: Real, speed: Real, other_inertia: Real, other_speed: Real) -> Real:
+def rebound_speed(speed: float, restitution: float) -> float:
+    """Return the speed with which a shaft leaves an end stop.
+
+    Parameters
+    ----------
+    speed : float or array
+        With which it meets the stop [rad/s].
+    restitution : float or array
+        From 0, where it stays there, to 1 [1].
+
+    Returns
+    -------
+    float or array
+        −restitution times the speed [rad/s].
+
+    Examples
+    --------
+    >>> rebound_speed(2.0, 0.25)
+    -0.5
+    """
+    return -restitution * speed
+
+
+def impact_energy(inertia: float, speed: float, other_inertia: float, other_speed: float) -> float:
     """Return the kinetic energy that is lost when two bodies meet and stay together.
 
     Parameters

@@ -6,12 +6,10 @@ the supply's limit (`docs/theory/bounded.md`).
 
 from __future__ import annotations
 
-import numpy as np
-
-from servotwin.physics._typing import Real
+import math
 
 
-def feedback_error(command: Real, feedback_voltage: Real) -> Real:
+def feedback_error(command: float, feedback_voltage: float) -> float:
     """Return what the comparator sees: command less feedback.
 
     Parameters
@@ -39,7 +37,7 @@ def feedback_error(command: Real, feedback_voltage: Real) -> Real:
     return v_c - v_o
 
 
-def comparator_voltage(error: Real, voltage_deadband: Real) -> Real:
+def comparator_voltage(error: float, voltage_deadband: float) -> float:
     """Return the part of the error that lies outside the deadband.
 
     Parameters
@@ -60,16 +58,71 @@ def comparator_voltage(error: Real, voltage_deadband: Real) -> Real:
 
     Examples
     --------
-    >>> comparator_voltage(np.array([0.5, 2.0, -2.0]), 1.0)
-    array([ 0. ,  1.5, -1.5])
+    >>> [comparator_voltage(v_e, 1.0) for v_e in (0.5, 2.0, -2.0)]
+    [0.0, 1.5, -1.5]
     """
     v_e, w_v = error, voltage_deadband
-    return np.sign(v_e) * np.maximum(np.abs(v_e) - w_v / 2, 0.0)
+    if abs(v_e) <= 0.5 * w_v:
+        return 0.0
+    return error_beyond_deadband(v_e, math.copysign(1.0, v_e), w_v)
+
+
+def error_beyond_deadband(error: float, side: float, voltage_deadband: float) -> float:
+    """Return the error less half of the deadband, on one side of it.
+
+    Parameters
+    ----------
+    error : float or array
+        v_e [V].
+    side : float or array
+        +1 or −1: the sign of an error outside the deadband [1].
+    voltage_deadband : float or array
+        w_v, full width, at least 0 [V].
+
+    Returns
+    -------
+    float or array
+        v_e − side w_v/2 [V].
+
+    Examples
+    --------
+    >>> error_beyond_deadband(-2.0, -1.0, 1.0)
+    -1.5
+    """
+    return error - side * (0.5 * voltage_deadband)
+
+
+def proportional_voltage(error: float, bridge_gain: float, comparator_gain: float = 1.0) -> float:
+    """Return the mean armature voltage that the bridge makes of an error, unbounded.
+
+    Parameters
+    ----------
+    error : float or array
+        v_d, what counts of the error [V].
+    bridge_gain, comparator_gain : float or array
+        A and k_s [V/V].
+
+    Returns
+    -------
+    float or array
+        A k_s v_d [V].
+
+    Notes
+    -----
+    The gains of eq. 38.
+
+    Examples
+    --------
+    >>> proportional_voltage(0.25, 10.0, 2.0)
+    5.0
+    """
+    A, k_s = bridge_gain, comparator_gain
+    return A * k_s * error
 
 
 def unbounded_armature_voltage(
-    control_voltage: Real, feedback_voltage: Real, bridge_gain: Real, comparator_gain: Real
-) -> Real:
+    control_voltage: float, feedback_voltage: float, bridge_gain: float, comparator_gain: float
+) -> float:
     """Return the armature voltage of the paper's control loop, which no supply limits.
 
     Parameters
@@ -97,13 +150,12 @@ def unbounded_armature_voltage(
     >>> unbounded_armature_voltage(1.5, 1.25, 10.0, 2.0)
     5.0
     """
-    A, k_s = bridge_gain, comparator_gain
-    return A * k_s * feedback_error(control_voltage, feedback_voltage)
+    return proportional_voltage(feedback_error(control_voltage, feedback_voltage), bridge_gain, comparator_gain)
 
 
 def bounded_armature_voltage(
-    error: Real, voltage_deadband: Real, bridge_gain: Real, comparator_gain: Real, voltage_limit: Real
-) -> Real:
+    error: float, voltage_deadband: float, bridge_gain: float, comparator_gain: float, voltage_limit: float
+) -> float:
     """Return the mean armature voltage with a deadband and a supply that ends.
 
     Parameters
@@ -130,16 +182,16 @@ def bounded_armature_voltage(
 
     Examples
     --------
-    >>> bounded_armature_voltage(np.array([0.05, 0.3, 5.0, -5.0]), 0.2, 10.0, 1.0, 6.0)
-    array([ 0.,  2.,  6., -6.])
+    >>> [bounded_armature_voltage(v_e, 0.2, 10.0, 1.0, 6.0) for v_e in (0.05, 0.3, 5.0, -5.0)]
+    [0.0, 2.0, 6.0, -6.0]
     """
-    A, k_s, V_max = bridge_gain, comparator_gain, voltage_limit
-    return np.maximum(-V_max, np.minimum(A * k_s * comparator_voltage(error, voltage_deadband), V_max))
+    v_d, V_max = comparator_voltage(error, voltage_deadband), voltage_limit
+    return max(-V_max, min(proportional_voltage(v_d, bridge_gain, comparator_gain), V_max))
 
 
 def control_voltage_from_voltage(
-    command_voltage: Real, voltage_to_pulse_gain: Real, pulse_to_voltage_gain: Real, command_offset: Real = 0.0
-) -> Real:
+    command_voltage: float, voltage_to_pulse_gain: float, pulse_to_voltage_gain: float, command_offset: float = 0.0
+) -> float:
     """Return the control voltage of a voltage command.
 
     Parameters
@@ -171,7 +223,7 @@ def control_voltage_from_voltage(
     return k_p1 * k_p2 * v_i + b_i
 
 
-def control_voltage_from_pulse(pulse_width: Real, one_shot_slope: Real, one_shot_offset: Real = 0.0) -> Real:
+def control_voltage_from_pulse(pulse_width: float, one_shot_slope: float, one_shot_offset: float = 0.0) -> float:
     """Return the feedback voltage at which the chip's own pulse is as long as this one.
 
     Parameters
@@ -201,9 +253,66 @@ def control_voltage_from_pulse(pulse_width: Real, one_shot_slope: Real, one_shot
     return (t_a - T_0) / one_shot_slope
 
 
+def pulse_width_from_feedback(feedback_voltage: float, one_shot_slope: float, one_shot_offset: float = 0.0) -> float:
+    """Return the pulse that is as long as the chip's own at a feedback voltage.
+
+    Parameters
+    ----------
+    feedback_voltage : float or array
+        v_o [V].
+    one_shot_slope : float or array
+        1/s_r [s/V].
+    one_shot_offset : float or array
+        T_0; it may be negative [s].
+
+    Returns
+    -------
+    float or array
+        T_0 + v_o/s_r, without the bound of `servotwin.physics.pulse.one_shot_width` [s].
+
+    Notes
+    -----
+    Inverse of `control_voltage_from_pulse`.
+
+    Examples
+    --------
+    >>> round(pulse_width_from_feedback(1.0, 0.001, 0.0005), 9)
+    0.0015
+    """
+    return one_shot_offset + one_shot_slope * feedback_voltage
+
+
+def control_voltage_from_paper_pulse(pulse_width: float, pulse_to_voltage_gain: float,
+                                     command_pulse_offset: float = 0.0, command_offset: float = 0.0) -> float:
+    """Return the control voltage that the paper's board makes of a pulse.
+
+    Parameters
+    ----------
+    pulse_width : float or array
+        t_a [s].
+    pulse_to_voltage_gain : float or array
+        k_p2 [V/s].
+    command_pulse_offset : float or array
+        t_0, the pulse width at v_i = 0 [s].
+    command_offset : float or array
+        b_i, the control voltage at v_i = 0 [V].
+
+    Returns
+    -------
+    float or array
+        v_c = k_p2 (t_a − t_0) + b_i [V].
+
+    Examples
+    --------
+    >>> control_voltage_from_paper_pulse(0.0015, 1000.0, 0.0005, 0.25)
+    1.25
+    """
+    return pulse_to_voltage_gain * (pulse_width - command_pulse_offset) + command_offset
+
+
 def pulse_width_from_voltage(
-    command_voltage: Real, voltage_to_pulse_gain: Real, command_pulse_offset: Real = 0.0
-) -> Real:
+    command_voltage: float, voltage_to_pulse_gain: float, command_pulse_offset: float = 0.0
+) -> float:
     """Return the pulse width that the transmitter makes of a voltage command.
 
     Parameters
@@ -234,8 +343,8 @@ def pulse_width_from_voltage(
 
 
 def averaged_bridge_gain(
-    supply_voltage: Real, bridge_drop_voltage: Real, stretcher_gain: Real, frame_period: Real, one_shot_slope: Real
-) -> Real:
+    supply_voltage: float, bridge_drop_voltage: float, stretcher_gain: float, frame_period: float, one_shot_slope: float
+) -> float:
     """Return the product A k_s that the pulse-level board has in the mean over a frame.
 
     Parameters

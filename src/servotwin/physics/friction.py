@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,8 +16,8 @@ _MAX_STEPS = 200  # Newton's method ends after about ten; this is a stop for NaN
 
 
 def smoothed_coulomb_torque(
-    motor_speed: Real, coulomb_torque_forward: Real, coulomb_torque_backward: Real, zero_crossing_slope: Real
-) -> Real:
+    motor_speed: float, coulomb_torque_forward: float, coulomb_torque_backward: float, zero_crossing_slope: float
+) -> float:
     """Return the paper's Coulomb friction, smooth through zero speed.
 
     Parameters
@@ -44,12 +46,43 @@ def smoothed_coulomb_torque(
     >>> [round(float(smoothed_coulomb_torque(w, 2.0, 3.0, 100.0)), 6) for w in (-1.0, 0.0, 1.0)]
     [-3.0, 0.0, 2.0]
     """
-    w, F_ec1, F_ec2, k = motor_speed, coulomb_torque_forward, coulomb_torque_backward, zero_crossing_slope
-    s: Real = np.sign(w)
-    return F_ec1 * np.tanh(k * w) * (1 + s) / 2 + F_ec2 * np.tanh(k * w) * (1 - s) / 2
+    w, k = motor_speed, zero_crossing_slope
+    return (coulomb_torque_forward if w >= 0.0 else coulomb_torque_backward) * math.tanh(k * w)
 
 
-def coulomb_torque(motor_speed: Real, coulomb_torque_forward: Real, coulomb_torque_backward: Real) -> Real:
+def smoothed_coulomb_slope(motor_speed: float, coulomb_torque_forward: float, coulomb_torque_backward: float,
+                           zero_crossing_slope: float) -> float:
+    """Return by how much the paper's friction grows with the speed.
+
+    Parameters
+    ----------
+    motor_speed : float or array
+        w [rad/s].
+    coulomb_torque_forward, coulomb_torque_backward : float or array
+        F_ec1 and F_ec2, at least 0 [N m].
+    zero_crossing_slope : float or array
+        k, positive [s/rad].
+
+    Returns
+    -------
+    float or array
+        df_ec/dw = F_ec k (1 − tanh²(k w)) [N m s/rad].
+
+    Notes
+    -----
+    The derivative of eq. 41.
+
+    Examples
+    --------
+    >>> smoothed_coulomb_slope(0.0, 2.0, 3.0, 100.0)
+    200.0
+    """
+    w, k = motor_speed, zero_crossing_slope
+    x = math.tanh(k * w)
+    return (coulomb_torque_forward if w >= 0.0 else coulomb_torque_backward) * k * (1.0 - x * x)
+
+
+def coulomb_torque(motor_speed: float, coulomb_torque_forward: float, coulomb_torque_backward: float) -> float:
     """Return the Coulomb friction of a sliding shaft by the true law of signs.
 
     Parameters
@@ -75,13 +108,37 @@ def coulomb_torque(motor_speed: Real, coulomb_torque_forward: Real, coulomb_torq
     >>> [float(coulomb_torque(w, 2.0, 3.0)) for w in (-1.0, 0.0, 1.0)]
     [-3.0, 0.0, 2.0]
     """
-    s: Real = np.sign(motor_speed)
-    return coulomb_torque_forward * np.maximum(s, 0.0) + coulomb_torque_backward * np.minimum(s, 0.0)
+    if motor_speed == 0.0:
+        return 0.0
+    return coulomb_torque_forward if motor_speed > 0.0 else -coulomb_torque_backward
+
+
+def breakaway_torque(coulomb_torque: float, breakaway_ratio: float) -> float:
+    """Return the torque up to which dry friction holds.
+
+    Parameters
+    ----------
+    coulomb_torque : float or array
+        F_c of one direction [N m].
+    breakaway_ratio : float or array
+        r = F_s/F_c, static over sliding friction, at least 1 [1].
+
+    Returns
+    -------
+    float or array
+        F_s = r F_c [N m].
+
+    Examples
+    --------
+    >>> breakaway_torque(2.0, 1.25)
+    2.5
+    """
+    return breakaway_ratio * coulomb_torque
 
 
 def sticks(
-    torque: Real, coulomb_torque_forward: Real, coulomb_torque_backward: Real, breakaway_ratio: Real = 1.0
-) -> bool | NDArray[np.bool_]:
+    torque: float, coulomb_torque_forward: float, coulomb_torque_backward: float, breakaway_ratio: float = 1.0
+) -> bool:
     """Return whether a shaft at rest stays at rest.
 
     Parameters
@@ -109,8 +166,8 @@ def sticks(
     >>> sticks(2.4, 2.0, 3.0, 1.25), sticks(2.6, 2.0, 3.0, 1.25), sticks(-2.6, 2.0, 3.0, 1.25)
     (True, False, True)
     """
-    tau_a, r = torque, breakaway_ratio
-    return (-r * coulomb_torque_backward <= tau_a) & (tau_a <= r * coulomb_torque_forward)
+    r = breakaway_ratio
+    return -breakaway_torque(coulomb_torque_backward, r) <= torque <= breakaway_torque(coulomb_torque_forward, r)
 
 
 def undamped_creep_speed(

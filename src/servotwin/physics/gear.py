@@ -6,10 +6,8 @@ inverse, n = 1/N. The train is rigid and has no losses here; friction is in `ser
 
 from __future__ import annotations
 
-from servotwin.physics._typing import Real
 
-
-def motor_from_output(output_motion: Real, gear_reduction: Real) -> Real:
+def motor_from_output(output_motion: float, gear_reduction: float) -> float:
     """Return the angle, speed or acceleration of the motor shaft that goes with one of the output shaft.
 
     Parameters
@@ -37,7 +35,34 @@ def motor_from_output(output_motion: Real, gear_reduction: Real) -> Real:
     return N * q
 
 
-def reflected_inertia(rotor_inertia: Real, load_inertia: Real, gear_reduction: Real) -> Real:
+def output_torque(motor_torque: float, gear_reduction: float) -> float:
+    """Return the torque at the output shaft that goes with one at the motor shaft.
+
+    Parameters
+    ----------
+    motor_torque : float or array
+        At the motor shaft [N m].
+    gear_reduction : float or array
+        N = 1/n, positive [1].
+
+    Returns
+    -------
+    float or array
+        The same torque at the output shaft, N times as large [N m].
+
+    Notes
+    -----
+    Eq. 23 without inertia and friction.
+
+    Examples
+    --------
+    >>> output_torque(0.01, 250.0)
+    2.5
+    """
+    return gear_reduction * motor_torque
+
+
+def reflected_inertia(rotor_inertia: float, load_inertia: float, gear_reduction: float) -> float:
     """Return the total inertia as the motor shaft feels it.
 
     Parameters
@@ -68,8 +93,8 @@ def reflected_inertia(rotor_inertia: Real, load_inertia: Real, gear_reduction: R
 
 
 def reflected_viscous_friction(
-    motor_viscous_friction: Real, load_viscous_friction: Real, gear_reduction: Real
-) -> Real:
+    motor_viscous_friction: float, load_viscous_friction: float, gear_reduction: float
+) -> float:
     """Return the total viscous friction as the motor shaft feels it.
 
     Parameters
@@ -99,7 +124,7 @@ def reflected_viscous_friction(
     return B_m + B_L / N**2
 
 
-def output_inertia(rotor_inertia: Real, load_inertia: Real, gear_reduction: Real) -> Real:
+def output_inertia(rotor_inertia: float, load_inertia: float, gear_reduction: float) -> float:
     """Return the total inertia as the output shaft feels it.
 
     Parameters
@@ -129,7 +154,9 @@ def output_inertia(rotor_inertia: Real, load_inertia: Real, gear_reduction: Real
     return N**2 * J_m + J_L
 
 
-def output_viscous_friction(motor_viscous_friction: Real, load_viscous_friction: Real, gear_reduction: Real) -> Real:
+def output_viscous_friction(
+    motor_viscous_friction: float, load_viscous_friction: float, gear_reduction: float
+) -> float:
     """Return the total viscous friction as the output shaft feels it.
 
     Parameters

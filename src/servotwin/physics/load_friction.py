@@ -7,15 +7,14 @@ their difference is the sum of their magnitudes where the motor holds a load.
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
-import numpy as np
-from numpy.typing import NDArray
+from servotwin.physics.friction import breakaway_torque, sticks
 
-from servotwin.physics._typing import Real
+_NOTHING_LEFT = 7.0  # exp(−exp(7)) is 0, and a trial step may be far too fast for a power
 
 
-def stribeck_factor(speed: Real, stribeck_speed: Real | None = None, stribeck_exponent: Real = 1.0) -> Real:
+def stribeck_factor(speed: float, stribeck_speed: float = 0.0, stribeck_exponent: float = 1.0) -> float:
     """Return how much of the static friction is left at a speed.
 
     Parameters
@@ -23,7 +22,7 @@ def stribeck_factor(speed: Real, stribeck_speed: Real | None = None, stribeck_ex
     speed : float or array
         w, of the shaft at which `stribeck_speed` is given [rad/s].
     stribeck_speed : float or array, optional
-        w_s, positive; at the output shaft it is v_s/N. Without it static friction ends where motion begins [rad/s].
+        w_s; at the output shaft it is v_s/N. Without it, or with 0, static friction ends where motion begins [rad/s].
     stribeck_exponent : float or array
         α, positive [1].
 
@@ -38,20 +37,74 @@ def stribeck_factor(speed: Real, stribeck_speed: Real | None = None, stribeck_ex
 
     Examples
     --------
-    >>> [round(float(stribeck_factor(w, 2.0)), 4) for w in (0.0, 2.0, -4.0)], float(stribeck_factor(1e-9))
+    >>> [round(stribeck_factor(w, 2.0), 4) for w in (0.0, 2.0, -4.0)], stribeck_factor(1e-9)
     ([1.0, 0.3679, 0.1353], 0.0)
     """
-    S: Real
-    if stribeck_speed is None:
-        S = np.where(np.asarray(speed) == 0.0, 1.0, 0.0)[()]
-        return S
-    with np.errstate(over="ignore"):  # a power beyond all numbers leaves nothing of it, as it should
-        S = np.exp(-np.power(np.abs(np.asarray(speed / stribeck_speed)), stribeck_exponent))[()]
-    return S
+    if speed == 0.0:
+        return 1.0
+    if stribeck_speed == 0.0:
+        return 0.0
+    log_power = stribeck_exponent * math.log(abs(speed) / stribeck_speed)
+    return math.exp(-math.exp(log_power)) if log_power < _NOTHING_LEFT else 0.0
 
 
-def quadratic_gear_friction(motor_torque: Real, external_torque_on_gear: Real, load_friction_motor_quad: Real = 0.0,
-                            load_friction_external_quad: Real = 0.0) -> Real:
+def torque_on_gear(external_torque: float, output_speed: float, load_viscous_friction: float) -> float:
+    """Return the torque with which a load acts on the gear.
+
+    Parameters
+    ----------
+    external_torque : float or array
+        τ_ext, positive where it pushes towards −q [N m].
+    output_speed : float or array
+        q̇ [rad/s].
+    load_viscous_friction : float or array
+        B_L [N m s/rad].
+
+    Returns
+    -------
+    float or array
+        τ_e = −τ_ext − B_L q̇, towards +q [N m].
+
+    Examples
+    --------
+    >>> torque_on_gear(0.5, 2.0, 0.25)
+    -1.0
+    """
+    return -external_torque - load_viscous_friction * output_speed
+
+
+def torque_share(motor_torque: float, external_torque_on_gear: float, motor_share: float,
+                 external_share: float) -> float:
+    """Return the friction that the torques through a gear make.
+
+    Parameters
+    ----------
+    motor_torque : float or array
+        τ_m, at the output shaft [N m].
+    external_torque_on_gear : float or array
+        τ_e, what acts on the gear from outside, towards +q [N m].
+    motor_share, external_share : float or array
+        K_m and K_e of sliding, or K_ms and K_es of static friction [1].
+
+    Returns
+    -------
+    float or array
+        abs(K_m τ_m − K_e τ_e) [N m].
+
+    Notes
+    -----
+    Models M3 to M6 of Duclusaud et al., 2025.
+
+    Examples
+    --------
+    >>> torque_share(1.0, -0.5, 0.5, 0.25)
+    0.625
+    """
+    return abs(motor_share * motor_torque - external_share * external_torque_on_gear)
+
+
+def quadratic_gear_friction(motor_torque: float, external_torque_on_gear: float, load_friction_motor_quad: float = 0.0,
+                            load_friction_external_quad: float = 0.0) -> float:
     """Return the part of the static gear friction that is quadratic in a torque.
 
     Parameters
@@ -79,19 +132,91 @@ def quadratic_gear_friction(motor_torque: Real, external_torque_on_gear: Real, l
     [0.0, 0.5, 0.1]
     """
     tau_m, tau_e = motor_torque, external_torque_on_gear
-    m, e = np.abs(tau_m), np.abs(tau_e)
-    larger = np.where(m > e, load_friction_external_quad * e**2, load_friction_motor_quad * m**2)
-    Q: Real = np.where((np.sign(tau_m) == np.sign(tau_e)) | (m == e), 0.0, larger)[()]
-    return Q
+    if tau_m * tau_e >= 0.0 or abs(tau_m) == abs(tau_e):
+        return 0.0
+    if abs(tau_m) > abs(tau_e):
+        return load_friction_external_quad * (tau_e * tau_e)  # as a power it would be an error to overflow
+    return load_friction_motor_quad * (tau_m * tau_m)
+
+
+def sliding_gear_friction(motor_torque: float, external_torque_on_gear: float, coulomb_torque: float,
+                          load_friction_motor: float = 0.0, load_friction_external: float = 0.0) -> float:
+    """Return the dry friction of a gear that slides fast.
+
+    Parameters
+    ----------
+    motor_torque, external_torque_on_gear : float or array
+        τ_m and τ_e, at the output shaft, towards +q [N m].
+    coulomb_torque : float or array
+        N F_c of the direction in question [N m].
+    load_friction_motor, load_friction_external : float or array
+        K_m and K_e, both K_l for one share [1].
+
+    Returns
+    -------
+    float or array
+        N F_c + abs(K_m τ_m − K_e τ_e), a magnitude [N m].
+
+    Notes
+    -----
+    Models M3 and M5 of Duclusaud et al., 2025, without viscous friction.
+
+    Examples
+    --------
+    >>> sliding_gear_friction(1.0, -0.5, 0.25, 0.5, 0.25)
+    0.875
+    """
+    return coulomb_torque + torque_share(motor_torque, external_torque_on_gear, load_friction_motor,
+                                         load_friction_external)
+
+
+def static_gear_friction(motor_torque: float, external_torque_on_gear: float, coulomb_torque: float,
+                         breakaway_ratio: float = 1.0, load_friction_motor_stribeck: float = 0.0,
+                         load_friction_external_stribeck: float = 0.0, load_friction_motor_quad: float = 0.0,
+                         load_friction_external_quad: float = 0.0) -> float:
+    """Return what a gear at rest holds beyond its sliding friction.
+
+    Parameters
+    ----------
+    motor_torque, external_torque_on_gear : float or array
+        τ_m and τ_e, at the output shaft, towards +q [N m].
+    coulomb_torque : float or array
+        N F_c of the direction in question [N m].
+    breakaway_ratio : float or array
+        r, at least 1 [1].
+    load_friction_motor_stribeck, load_friction_external_stribeck : float or array
+        K_ms and K_es, both K_ls for one share [1].
+    load_friction_motor_quad, load_friction_external_quad : float or array
+        K_mq and K_eq [1/(N m)].
+
+    Returns
+    -------
+    float or array
+        N (r − 1) F_c + abs(K_ms τ_m − K_es τ_e) + Q, a magnitude [N m].
+
+    Notes
+    -----
+    Models M2, M4 and M6 of Duclusaud et al., 2025; `stribeck_factor` says how it fades with speed.
+
+    Examples
+    --------
+    >>> static_gear_friction(1.0, -0.5, 0.25, 2.0, 0.5, 0.25)
+    0.875
+    """
+    Q = quadratic_gear_friction(motor_torque, external_torque_on_gear, load_friction_motor_quad,
+                                load_friction_external_quad)
+    return (breakaway_torque(coulomb_torque, breakaway_ratio) - coulomb_torque
+            + torque_share(motor_torque, external_torque_on_gear, load_friction_motor_stribeck,
+                           load_friction_external_stribeck) + Q)
 
 
 def gear_friction_budget(
-    output_speed: Real, motor_torque: Real, external_torque_on_gear: Real, *, coulomb_torque: Real,
-    breakaway_ratio: Real = 1.0, stribeck_speed: Real | None = None, stribeck_exponent: Real = 1.0,
-    load_friction_motor: Real = 0.0, load_friction_external: Real = 0.0,
-    load_friction_motor_stribeck: Real = 0.0, load_friction_external_stribeck: Real = 0.0,
-    load_friction_motor_quad: Real = 0.0, load_friction_external_quad: Real = 0.0,
-) -> Real:
+    output_speed: float, motor_torque: float, external_torque_on_gear: float, *, coulomb_torque: float,
+    breakaway_ratio: float = 1.0, stribeck_speed: float = 0.0, stribeck_exponent: float = 1.0,
+    load_friction_motor: float = 0.0, load_friction_external: float = 0.0,
+    load_friction_motor_stribeck: float = 0.0, load_friction_external_stribeck: float = 0.0,
+    load_friction_motor_quad: float = 0.0, load_friction_external_quad: float = 0.0,
+) -> float:
     """Return the dry friction that the gear can bring up against a motion, or against its start.
 
     Parameters
@@ -136,18 +261,20 @@ def gear_friction_budget(
     0.35
     """
     tau_m, tau_e, N_F_c = motor_torque, external_torque_on_gear, coulomb_torque
-    K_m, K_e = load_friction_motor, load_friction_external
-    K_ms, K_es = load_friction_motor_stribeck, load_friction_external_stribeck
     S = stribeck_factor(output_speed, stribeck_speed, stribeck_exponent)
-    Q = quadratic_gear_friction(tau_m, tau_e, load_friction_motor_quad, load_friction_external_quad)
-    static = N_F_c * (breakaway_ratio - 1.0) + np.abs(K_ms * tau_m - K_es * tau_e) + Q
-    return N_F_c + np.abs(K_m * tau_m - K_e * tau_e) + S * static
+    static = static_gear_friction(
+        tau_m, tau_e, N_F_c, breakaway_ratio, load_friction_motor_stribeck, load_friction_external_stribeck,
+        load_friction_motor_quad, load_friction_external_quad)
+    return sliding_gear_friction(tau_m, tau_e, N_F_c, load_friction_motor, load_friction_external) + S * static
 
 
 def gear_sticks(
-    motor_torque: Real, external_torque_on_gear: Real, *, coulomb_torque_forward: Real,
-    coulomb_torque_backward: Real, load_coulomb_torque: Real = 0.0, **shares: Real,
-) -> bool | NDArray[np.bool_]:
+    motor_torque: float, external_torque_on_gear: float, *, coulomb_torque_forward: float,
+    coulomb_torque_backward: float, load_coulomb_torque: float = 0.0, breakaway_ratio: float = 1.0,
+    load_friction_motor: float = 0.0, load_friction_external: float = 0.0,
+    load_friction_motor_stribeck: float = 0.0, load_friction_external_stribeck: float = 0.0,
+    load_friction_motor_quad: float = 0.0, load_friction_external_quad: float = 0.0,
+) -> bool:
     """Return whether a gear at rest stays at rest.
 
     Parameters
@@ -160,8 +287,9 @@ def gear_sticks(
         N F_ec1 and N F_ec2 [N m].
     load_coulomb_torque : float or array
         c_L, dry friction of the load itself [N m].
-    **shares : float or array
-        `breakaway_ratio` and the shares of `gear_friction_budget`.
+    breakaway_ratio, load_friction_motor, load_friction_external, load_friction_motor_stribeck, \
+    load_friction_external_stribeck, load_friction_motor_quad, load_friction_external_quad : float or array
+        As in `gear_friction_budget`.
 
     Returns
     -------
@@ -180,14 +308,16 @@ def gear_sticks(
     (False, True)
     """
     tau = motor_torque + external_torque_on_gear
-    common: dict[str, Any] = shares
-    G_f, G_b = (gear_friction_budget(0.0, motor_torque, external_torque_on_gear, coulomb_torque=F, **common)
-                for F in (coulomb_torque_forward, coulomb_torque_backward))
-    held = np.asarray((-(G_b + load_coulomb_torque) <= tau) & (tau <= G_f + load_coulomb_torque))
-    return held if held.ndim else bool(held)
+    more = load_coulomb_torque + sliding_gear_friction(
+        motor_torque, external_torque_on_gear, 0.0, load_friction_motor, load_friction_external)
+    more += static_gear_friction(
+        motor_torque, external_torque_on_gear, 0.0, 1.0, load_friction_motor_stribeck, load_friction_external_stribeck,
+        load_friction_motor_quad, load_friction_external_quad)
+    return sticks(tau, breakaway_torque(coulomb_torque_forward, breakaway_ratio) + more,
+                  breakaway_torque(coulomb_torque_backward, breakaway_ratio) + more)
 
 
-def forward_efficiency(load_friction_motor: Real, load_friction_external: Real) -> Real:
+def forward_efficiency(load_friction_motor: float, load_friction_external: float) -> float:
     """Return what part of the motor's torque beyond Coulomb friction reaches a load that it drives.
 
     Parameters
@@ -215,7 +345,7 @@ def forward_efficiency(load_friction_motor: Real, load_friction_external: Real) 
     return (1.0 - load_friction_motor) / (1.0 + load_friction_external)
 
 
-def back_drive_torque(coulomb_torque: Real, load_friction_external: Real) -> Real:
+def back_drive_torque(coulomb_torque: float, load_friction_external: float) -> float:
     """Return the torque at the output that begins to turn an unpowered gear.
 
     Parameters
@@ -239,6 +369,5 @@ def back_drive_torque(coulomb_torque: Real, load_friction_external: Real) -> Rea
     >>> float(back_drive_torque(0.2, 0.5)), float(back_drive_torque(0.2, 1.0))
     (0.4, inf)
     """
-    turns = np.asarray(1.0 - load_friction_external)
-    tau: Real = np.where(turns > 0.0, coulomb_torque / np.where(turns > 0.0, turns, 1.0), np.inf)[()]
-    return tau
+    turns = 1.0 - load_friction_external
+    return coulomb_torque / turns if turns > 0.0 else math.inf

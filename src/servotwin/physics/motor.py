@@ -1,15 +1,13 @@
 """The permanent-magnet DC motor: torque, back-EMF and armature circuit.
 
 Equation numbers are those of Urrea and Kern, "A New Model for Analog Servo Motors", Canadian Journal on Automation,
-Control and Intelligent Systems 2(2), 2011. Every law broadcasts: numbers give a number, arrays an array.
+Control and Intelligent Systems 2(2), 2011.
 """
 
 from __future__ import annotations
 
-from servotwin.physics._typing import Real
 
-
-def electromagnetic_torque(armature_current: Real, torque_constant: Real) -> Real:
+def electromagnetic_torque(armature_current: float, torque_constant: float) -> float:
     """Return the torque that the current makes in the armature.
 
     Parameters
@@ -37,7 +35,7 @@ def electromagnetic_torque(armature_current: Real, torque_constant: Real) -> Rea
     return k_a * i_a
 
 
-def back_emf(motor_speed: Real, back_emf_constant: Real) -> Real:
+def back_emf(motor_speed: float, back_emf_constant: float) -> float:
     """Return the voltage that the turning armature induces in itself.
 
     Parameters
@@ -66,13 +64,13 @@ def back_emf(motor_speed: Real, back_emf_constant: Real) -> Real:
 
 
 def armature_current_rate(
-    armature_voltage: Real,
-    armature_current: Real,
-    motor_speed: Real,
-    armature_resistance: Real,
-    armature_inductance: Real,
-    back_emf_constant: Real,
-) -> Real:
+    armature_voltage: float,
+    armature_current: float,
+    motor_speed: float,
+    armature_resistance: float,
+    armature_inductance: float,
+    back_emf_constant: float,
+) -> float:
     """Return the rate of change of the armature current.
 
     Parameters
@@ -110,8 +108,8 @@ def armature_current_rate(
 
 
 def steady_armature_current(
-    armature_voltage: Real, motor_speed: Real, armature_resistance: Real, back_emf_constant: Real
-) -> Real:
+    armature_voltage: float, motor_speed: float, armature_resistance: float, back_emf_constant: float
+) -> float:
     """Return the current that flows where the armature inductance is neglected.
 
     Parameters
@@ -139,13 +137,64 @@ def steady_armature_current(
     >>> steady_armature_current(6.0, 600.0, 3.0, 0.005)
     1.0
     """
-    v_a, R_a = armature_voltage, armature_resistance
-    return (v_a - back_emf(motor_speed, back_emf_constant)) / R_a
+    return circuit_current(armature_voltage, back_emf(motor_speed, back_emf_constant), armature_resistance)
+
+
+def circuit_current(voltage: float, back_emf: float, resistance: float) -> float:
+    """Return the current that a voltage drives through a circuit against the back-EMF, inductance neglected.
+
+    Parameters
+    ----------
+    voltage : float or array
+        What drives the current, drops taken off [V].
+    back_emf : float or array
+        v_b = k_b q̇_m [V].
+    resistance : float or array
+        R of the circuit, positive [Ω].
+
+    Returns
+    -------
+    float or array
+        i = (V − v_b)/R [A].
+
+    Notes
+    -----
+    Eq. 7 with L_a = 0.
+
+    Examples
+    --------
+    >>> circuit_current(6.0, 3.0, 3.0)
+    1.0
+    """
+    return (voltage - back_emf) / resistance
+
+
+def magnetic_energy(armature_current: float, armature_inductance: float) -> float:
+    """Return the energy in the magnetic field of the armature.
+
+    Parameters
+    ----------
+    armature_current : float or array
+        i_a [A].
+    armature_inductance : float or array
+        L_a [H].
+
+    Returns
+    -------
+    float or array
+        L_a i_a²/2 [J].
+
+    Examples
+    --------
+    >>> magnetic_energy(2.0, 0.5)
+    1.0
+    """
+    return 0.5 * armature_inductance * armature_current * armature_current
 
 
 def required_motor_torque(
-    motor_acceleration: Real, motor_speed: Real, rotor_inertia: Real, motor_viscous_friction: Real
-) -> Real:
+    motor_acceleration: float, motor_speed: float, rotor_inertia: float, motor_viscous_friction: float
+) -> float:
     """Return the torque that moves the bare rotor as stated.
 
     Parameters

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from servotwin.errors import InputError
+from servotwin.physics.laws import array_form
 
 _FEW = 16  # pieces, for which plain Python is faster than arrays
 
@@ -158,9 +159,7 @@ class Pieces:
         """Return the values at `time` [s], any shape."""
         t = np.asarray(time, dtype=np.float64)
         k = np.maximum(np.searchsorted(self.rows[:, 0], t, side="right") - 1, 0)
-        start, value, slope, amplitude, frequency, phase, sweep = self.rows[k].transpose((-1, *range(t.ndim)))
-        s = t - start
-        return np.asarray(value + slope * s + amplitude * np.sin(phase + (frequency + 0.5 * sweep * s) * s))
+        return np.asarray(array_form(piece_value)(Piece(*self.rows[k].transpose((-1, *range(t.ndim)))), t))
 
     def scaled(self, gain: float, offset: float) -> Pieces:
         """Return gain · y + offset.

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from servotwin.physics._typing import Real
+from servotwin.physics.laws import array_form
 
 _HALVINGS = 100  # from any table of volts to the last bit of an angle
 
 
-def feedback_voltage(output_angle: Real, feedback_gain: Real, feedback_offset: Real = 0.0) -> Real:
+def feedback_voltage(output_angle: float, feedback_gain: float, feedback_offset: float = 0.0) -> float:
     """Return the voltage of an ideal potentiometer.
 
     Parameters
@@ -40,7 +43,7 @@ def feedback_voltage(output_angle: Real, feedback_gain: Real, feedback_offset: R
     return p * q + b_o
 
 
-def angle_from_voltage(feedback_voltage: Real, feedback_gain: Real, feedback_offset: Real = 0.0) -> Real:
+def angle_from_voltage(feedback_voltage: float, feedback_gain: float, feedback_offset: float = 0.0) -> float:
     """Return the angle at which an ideal potentiometer gives this voltage.
 
     Parameters
@@ -70,7 +73,7 @@ def angle_from_voltage(feedback_voltage: Real, feedback_gain: Real, feedback_off
     return (v_o - b_o) / p
 
 
-def quantised(voltage: Real, quantisation: Real) -> Real:
+def quantised(voltage: float, quantisation: float) -> float:
     """Return the nearest voltage that a converter can tell from its neighbours.
 
     Parameters
@@ -94,7 +97,32 @@ def quantised(voltage: Real, quantisation: Real) -> Real:
     >>> float(quantised(1.30, 0.25))
     1.25
     """
-    return quantisation * np.floor(voltage / quantisation + 0.5)
+    return quantisation * math.floor(voltage / quantisation + 0.5)
+
+
+def error_between(output_angle: float, angle: float, error: float, next_angle: float, next_error: float) -> float:
+    """Return the linearity error between two angles of a table.
+
+    Parameters
+    ----------
+    output_angle : float or array
+        q, between the two [rad].
+    angle, next_angle : float or array
+        Neighbours in the table, the second one larger [rad].
+    error, next_error : float or array
+        Voltage added at these angles [V].
+
+    Returns
+    -------
+    float or array
+        ε(q) [V].
+
+    Examples
+    --------
+    >>> error_between(0.5, 0.0, 0.0, 1.0, 0.02)
+    0.01
+    """
+    return error + (next_error - error) * ((output_angle - angle) / (next_angle - angle))
 
 
 def linearity_error(output_angle: Real, angles: ArrayLike, errors: ArrayLike) -> Real:
@@ -119,8 +147,12 @@ def linearity_error(output_angle: Real, angles: ArrayLike, errors: ArrayLike) ->
     >>> [float(linearity_error(q, [0.0, 1.0], [0.0, 0.02])) for q in (-1.0, 0.5, 2.0)]
     [0.0, 0.01, 0.02]
     """
-    epsilon: Real = np.interp(output_angle, np.asarray(angles, dtype=np.float64), np.asarray(errors, dtype=np.float64))
-    return epsilon
+    q, a, e = (np.asarray(x, dtype=np.float64) for x in (output_angle, angles, errors))
+    epsilon = np.where(np.isnan(q), q, e[0])
+    for k in range(1, len(a)):
+        between = array_form(error_between)(q, a[k - 1], e[k - 1], a[k], e[k])
+        epsilon = np.where(q >= a[k - 1], np.where(q < a[k], between, e[k]), epsilon)
+    return epsilon[()]
 
 
 def sensed_voltage(wiper_angle: Real, feedback_gain: Real, feedback_offset: Real = 0.0, angles: ArrayLike = (0.0,),
@@ -150,8 +182,9 @@ def sensed_voltage(wiper_angle: Real, feedback_gain: Real, feedback_offset: Real
     >>> round(float(sensed_voltage(1.0, 0.42, 0.588, [0.0, 2.0], [0.0, 0.02], 0.0025)), 9)
     1.0175
     """
-    v_o = feedback_voltage(wiper_angle, feedback_gain, feedback_offset) + linearity_error(wiper_angle, angles, errors)
-    return v_o if quantisation is None else quantised(v_o, quantisation)
+    v_o: Real = array_form(feedback_voltage)(wiper_angle, feedback_gain, feedback_offset)
+    v_o = v_o + linearity_error(wiper_angle, angles, errors)
+    return v_o if quantisation is None else array_form(quantised)(v_o, quantisation)
 
 
 def angle_from_sensed_voltage(sensed_voltage: Real, feedback_gain: Real, feedback_offset: Real = 0.0,
@@ -180,7 +213,7 @@ def angle_from_sensed_voltage(sensed_voltage: Real, feedback_gain: Real, feedbac
     >>> round(float(angle_from_sensed_voltage(1.018, 0.42, 0.588, [0.0, 2.0], [0.0, 0.02])), 9)
     1.0
     """
-    ideal = angle_from_voltage(sensed_voltage, feedback_gain, feedback_offset)
+    ideal: Real = array_form(angle_from_voltage)(sensed_voltage, feedback_gain, feedback_offset)
     low, high = (np.asarray(ideal - bound / feedback_gain) for bound in (np.max(errors), np.min(errors)))
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from servotwin.physics._typing import Real
+from servotwin.physics.electronics import pulse_width_from_feedback
 
 
-def one_shot_width(feedback_voltage: Real, one_shot_slope: Real, one_shot_offset: Real = 0.0) -> Real:
+def one_shot_width(feedback_voltage: float, one_shot_slope: float, one_shot_offset: float = 0.0) -> float:
     """Return the width of the chip's own pulse, with which it compares the command's.
 
     Parameters
@@ -29,11 +29,87 @@ def one_shot_width(feedback_voltage: Real, one_shot_slope: Real, one_shot_offset
     >>> round(float(one_shot_width(1.0, 1.36e-3, -0.16e-3)), 9)
     0.0012
     """
-    return np.maximum(0.0, one_shot_offset + one_shot_slope * feedback_voltage)
+    return max(0.0, pulse_width_from_feedback(feedback_voltage, one_shot_slope, one_shot_offset))
 
 
-def drive_time(error_time: Real, stretcher_gain: Real, deadband: Real = 0.0, minimum_drive_time: Real = 0.0,
-               stretcher_time_constant: Real | None = None) -> Real:
+def effective_voltage(feedback_voltage: float, noise: float, motor_voltage: float, sag: float,
+                      back_emf_injection: float, supply_coupling: float) -> float:
+    """Return what the one-shot sees of the potentiometer.
+
+    Parameters
+    ----------
+    feedback_voltage : float or array
+        v_o of the potentiometer [V].
+    noise : float or array
+        Added at this frame [V].
+    motor_voltage : float or array
+        v_m at the motor's terminals, at the rising edge [V].
+    sag : float or array
+        V_bus − V_oc there [V].
+    back_emf_injection, supply_coupling : float or array
+        β and c_s [1].
+
+    Returns
+    -------
+    float or array
+        v_eff = v_o + noise + β v_m + c_s (V_bus − V_oc) [V].
+
+    Examples
+    --------
+    >>> effective_voltage(1.0, 0.0, 2.0, -0.5, 0.125, 0.5)
+    1.0
+    """
+    return feedback_voltage + noise + back_emf_injection * motor_voltage + supply_coupling * sag
+
+
+def error_time(pulse_width: float, one_shot_width: float) -> float:
+    """Return the difference that the chip decides on.
+
+    Parameters
+    ----------
+    pulse_width : float or array
+        t_in of the command [s].
+    one_shot_width : float or array
+        T_os of the chip's own pulse [s].
+
+    Returns
+    -------
+    float or array
+        e = t_in − T_os, positive where the shaft has to go to +q [s].
+
+    Examples
+    --------
+    >>> round(error_time(0.0015, 0.0012), 9)
+    0.0003
+    """
+    return pulse_width - one_shot_width
+
+
+def decision_delay(pulse_width: float, one_shot_width: float) -> float:
+    """Return how long after its rising edge a pulse is decided on.
+
+    Parameters
+    ----------
+    pulse_width : float or array
+        t_in of the command [s].
+    one_shot_width : float or array
+        T_os of the chip's own pulse [s].
+
+    Returns
+    -------
+    float or array
+        The longer of the two [s].
+
+    Examples
+    --------
+    >>> decision_delay(0.0015, 0.0012)
+    0.0015
+    """
+    return max(pulse_width, one_shot_width)
+
+
+def drive_time(error_time: float, stretcher_gain: float, deadband: float = 0.0, minimum_drive_time: float = 0.0,
+               stretcher_time_constant: float = 0.0) -> float:
     """Return for how long the bridge drives after a decision, if no other decision comes first.
 
     Parameters
@@ -47,7 +123,7 @@ def drive_time(error_time: Real, stretcher_gain: Real, deadband: Real = 0.0, min
     minimum_drive_time : float or array
         t_min [s].
     stretcher_time_constant : float or array, optional
-        τ_s of an RC stretcher; a linear one without it [s].
+        τ_s of an RC stretcher; a linear one without it, or with 0 [s].
 
     Returns
     -------
@@ -59,16 +135,17 @@ def drive_time(error_time: Real, stretcher_gain: Real, deadband: Real = 0.0, min
     >>> round(float(drive_time(54e-6, 60.0, 8e-6)), 9), float(drive_time(4e-6, 60.0, 8e-6))
     (0.003, 0.0)
     """
-    u = np.maximum(np.abs(error_time) - 0.5 * deadband, 0.0)
-    stretched = stretcher_gain * u
-    if stretcher_time_constant is not None:
-        stretched = stretcher_time_constant * np.log1p(stretched / stretcher_time_constant)
-    t_on: Real = np.where(u > 0.0, minimum_drive_time + stretched, 0.0)[()]
-    return t_on
+    K, t_min, tau_s = stretcher_gain, minimum_drive_time, stretcher_time_constant
+    u = abs(error_time) - 0.5 * deadband
+    if u <= 0.0:
+        return 0.0
+    if tau_s > 0.0:
+        return t_min + tau_s * math.log1p(K * u / tau_s)
+    return t_min + K * u
 
 
-def full_drive_error(frame_period: Real, stretcher_gain: Real, deadband: Real = 0.0, minimum_drive_time: Real = 0.0,
-                     stretcher_time_constant: Real | None = None) -> Real:
+def full_drive_error(frame_period: float, stretcher_gain: float, deadband: float = 0.0, minimum_drive_time: float = 0.0,
+                     stretcher_time_constant: float = 0.0) -> float:
     """Return the error from which on the bridge drives without a pause.
 
     Parameters
@@ -89,13 +166,13 @@ def full_drive_error(frame_period: Real, stretcher_gain: Real, deadband: Real = 
     0.000204
     """
     rest = frame_period - minimum_drive_time
-    if stretcher_time_constant is not None:
-        rest = stretcher_time_constant * np.expm1(rest / stretcher_time_constant)
+    if stretcher_time_constant > 0.0:
+        rest = stretcher_time_constant * math.expm1(rest / stretcher_time_constant)
     return 0.5 * deadband + rest / stretcher_gain
 
 
-def pulse_stiffness(torque_per_volt: Real, drive_voltage: Real, stretcher_gain: Real, pulse_per_angle: Real,
-                    frame_period: Real) -> Real:
+def pulse_stiffness(torque_per_volt: float, drive_voltage: float, stretcher_gain: float, pulse_per_angle: float,
+                    frame_period: float) -> float:
     """Return the mean torque per angle of a pulse-level servo just outside its deadband.
 
     Parameters

@@ -7,12 +7,14 @@ than its limit and takes nothing back. Where the two lines meet is the bus volta
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from servotwin.physics._typing import Real
+from servotwin.physics.laws import array_form
 
 Array: TypeAlias = NDArray[np.float64]
 
@@ -24,7 +26,7 @@ class Conduction(NamedTuple):
     returns_below: Real
 
 
-def conduction(drive: Real, back_emf: Real, voltage_drop: Real) -> Conduction:
+def conduction(drive: float, back_emf: float, voltage_drop: float) -> Conduction:
     """Return the bus voltages above which a bridge draws current, and below which it returns some.
 
     Parameters
@@ -51,13 +53,12 @@ def conduction(drive: Real, back_emf: Real, voltage_drop: Real) -> Conduction:
     (-1.5, 1.5)
     """
     s, v_b, D = drive, back_emf, voltage_drop
-    driven = np.asarray(s) != 0.0
-    above: Real = np.where(driven, s * v_b + D, np.inf)[()]
-    below: Real = np.where(driven, s * v_b, np.abs(v_b))[()] - D
-    return Conduction(above, below)
+    if s == 0.0:
+        return Conduction(math.inf, abs(v_b) - D)
+    return Conduction(s * v_b + D, s * v_b - D)
 
 
-def bridge_supply_current(bus_voltage: Real, draws_above: Real, returns_below: Real, resistance: Real) -> Real:
+def bridge_supply_current(bus_voltage: float, draws_above: float, returns_below: float, resistance: float) -> float:
     """Return the current that a bridge draws from the bus, negative where it returns some.
 
     Parameters
@@ -79,11 +80,34 @@ def bridge_supply_current(bus_voltage: Real, draws_above: Real, returns_below: R
     >>> [round(float(bridge_supply_current(V, 2.4, 1.6, 2.0)), 9) for V in (0.6, 2.0, 6.0)]
     [-0.5, 0.0, 1.8]
     """
-    return (np.maximum(bus_voltage - draws_above, 0.0) - np.maximum(returns_below - bus_voltage, 0.0)) / resistance
+    return (max(bus_voltage - draws_above, 0.0) - max(returns_below - bus_voltage, 0.0)) / resistance
 
 
-def source_voltage(current: Real, open_circuit_voltage: Real, internal_resistance: Real = 0.0, *,
-                   regulated: bool = False) -> Real:
+def supply_current(armature_current: float, drive: float) -> float:
+    """Return what a connected bridge draws from the supply.
+
+    Parameters
+    ----------
+    armature_current : float or array
+        i_a [A].
+    drive : float or array
+        s: +1 or −1 while the bridge drives; 0 while it coasts, whose diodes only return [1].
+
+    Returns
+    -------
+    float or array
+        s i_a, or −abs(i_a); negative where current comes back. A bridge that brakes is not on the bus [A].
+
+    Examples
+    --------
+    >>> supply_current(2.0, -1.0), supply_current(2.0, 0.0)
+    (-2.0, -2.0)
+    """
+    return drive * armature_current if drive != 0.0 else -abs(armature_current)
+
+
+def source_voltage(current: float, open_circuit_voltage: float, internal_resistance: float = 0.0, *,
+                   regulated: bool = False) -> float:
     """Return the voltage of a source that gives a current below its limit.
 
     Parameters
@@ -111,8 +135,8 @@ def source_voltage(current: Real, open_circuit_voltage: Real, internal_resistanc
     >>> [float(source_voltage(i, 6.0, 0.5)) for i in (2.0, -2.0)], float(source_voltage(-2.0, 6.0, 0.5, regulated=True))
     ([5.0, 7.0], 6.0)
     """
-    current = np.maximum(current, 0.0) if regulated else current
-    return open_circuit_voltage - internal_resistance * current
+    taken = max(current, 0.0) if regulated else current
+    return open_circuit_voltage - internal_resistance * taken
 
 
 def bus_voltage(draws_above: ArrayLike, returns_below: ArrayLike, resistance: ArrayLike, open_circuit_voltage: Real,
@@ -167,15 +191,15 @@ def bus_voltage(draws_above: ArrayLike, returns_below: ArrayLike, resistance: Ar
 
 def _current(V: Array, above: Array, below: Array, R: Array) -> Array:
     """Return Σ I_j(V), shape (...)."""
-    return np.asarray(np.sum(bridge_supply_current(np.asarray(V)[..., None], above, below, R), axis=-1))
+    return np.asarray(np.sum(array_form(bridge_supply_current)(np.asarray(V)[..., None], above, below, R), axis=-1))
 
 
 def _meeting(above: Array, below: Array, R: Array, a: float, b: Array, c: Array) -> Array:
     """Return the V with a V + b Σ I_j(V) = c, shape (...); some number where there is none."""
     corners = np.concatenate([above, below], axis=-1)
     corners = np.where(np.isfinite(corners), corners, 0.0)  # a corner more does no harm
-    at_corners = np.sum(bridge_supply_current(corners[..., None], above[..., None, :], below[..., None, :],
-                                              R[..., None, :]), axis=-1)
+    at_corners = np.sum(array_form(bridge_supply_current)(
+        corners[..., None], above[..., None, :], below[..., None, :], R[..., None, :]), axis=-1)
     b, c = np.asarray(b)[..., None], np.asarray(c)[..., None]
     left = np.max(np.where(a * corners + b * at_corners <= c, corners, -np.inf), axis=-1, initial=-np.inf)[..., None]
     conducting = np.where(above <= left, above, np.where(below > left, below, np.nan))  # right of the corner `left`

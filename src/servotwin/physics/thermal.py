@@ -7,9 +7,8 @@ The current heats the winding, the winding heats the housing, and the housing th
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
-
-import numpy as np
 
 from servotwin.physics._typing import Real
 
@@ -34,7 +33,7 @@ class ThermalTimes(NamedTuple):
     slow: Real
 
 
-def winding_resistance(winding_temperature: Real, armature_resistance: Real) -> Real:
+def winding_resistance(winding_temperature: float, armature_resistance: float) -> float:
     """Return the resistance of a copper winding at its temperature.
 
     Parameters
@@ -61,7 +60,7 @@ def winding_resistance(winding_temperature: Real, armature_resistance: Real) -> 
     return armature_resistance * (1.0 + COPPER_COEFFICIENT * (winding_temperature - REFERENCE_TEMPERATURE))
 
 
-def magnet_factor(housing_temperature: Real, magnet_coefficient: Real) -> Real:
+def magnet_factor(housing_temperature: float, magnet_coefficient: float) -> float:
     """Return by what factor both motor constants change with the temperature of the magnets.
 
     Parameters
@@ -84,8 +83,77 @@ def magnet_factor(housing_temperature: Real, magnet_coefficient: Real) -> Real:
     return 1.0 + magnet_coefficient * (housing_temperature - REFERENCE_TEMPERATURE)
 
 
-def thermal_time_constants(*, winding_capacity: Real, housing_capacity: Real, winding_to_housing: Real,
-                           housing_to_ambient: Real) -> ThermalTimes:
+def copper_loss(armature_current: float, armature_resistance: float) -> float:
+    """Return the heat that a current makes in the winding.
+
+    Parameters
+    ----------
+    armature_current : float or array
+        i_a [A].
+    armature_resistance : float or array
+        R_a at the winding's temperature [Ω].
+
+    Returns
+    -------
+    float or array
+        P = R_a i_a² [W].
+
+    Examples
+    --------
+    >>> copper_loss(2.0, 3.0)
+    12.0
+    """
+    return armature_resistance * armature_current * armature_current
+
+
+def heat_flow(temperature: float, other_temperature: float, conductance: float) -> float:
+    """Return the heat that goes from one body to another.
+
+    Parameters
+    ----------
+    temperature, other_temperature : float or array
+        T_1 and T_2 [K].
+    conductance : float or array
+        G = 1/R_12 [W/K].
+
+    Returns
+    -------
+    float or array
+        G (T_1 − T_2), positive from the first to the second [W].
+
+    Examples
+    --------
+    >>> heat_flow(310.0, 300.0, 0.125)
+    1.25
+    """
+    return (temperature - other_temperature) * conductance
+
+
+def warming_rate(power_in: float, power_out: float, capacity: float) -> float:
+    """Return how fast a body gets warmer.
+
+    Parameters
+    ----------
+    power_in, power_out : float or array
+        Heat that it gets and gives [W].
+    capacity : float or array
+        C, positive [J/K].
+
+    Returns
+    -------
+    float or array
+        Ṫ = (P_in − P_out)/C [K/s].
+
+    Examples
+    --------
+    >>> warming_rate(12.0, 2.0, 5.0)
+    2.0
+    """
+    return (power_in - power_out) / capacity
+
+
+def thermal_time_constants(*, winding_capacity: float, housing_capacity: float, winding_to_housing: float,
+                           housing_to_ambient: float) -> ThermalTimes:
     """Return the two time constants with which winding and housing warm up.
 
     Parameters
@@ -114,12 +182,12 @@ def thermal_time_constants(*, winding_capacity: Real, housing_capacity: Real, wi
     """
     a, b, c = 1.0 / (winding_capacity * winding_to_housing), 1.0 / (housing_capacity * winding_to_housing), \
         1.0 / (housing_capacity * housing_to_ambient)
-    fast = 0.5 * (a + b + c + np.sqrt((a - b - c) ** 2 + 4.0 * a * b))
+    fast = 0.5 * (a + b + c + math.sqrt((a - b - c) ** 2 + 4.0 * a * b))
     return ThermalTimes(1.0 / fast, fast / (a * c))
 
 
-def steady_temperatures(power: Real, *, winding_to_housing: Real, housing_to_ambient: Real,
-                        ambient: Real = REFERENCE_TEMPERATURE) -> Temperatures:
+def steady_temperatures(power: float, *, winding_to_housing: float, housing_to_ambient: float,
+                        ambient: float = REFERENCE_TEMPERATURE) -> Temperatures:
     """Return the temperatures to which a constant power leads in the end.
 
     Parameters
@@ -146,9 +214,10 @@ def steady_temperatures(power: Real, *, winding_to_housing: Real, housing_to_amb
 
 
 def two_mass_temperatures(
-    time: Real, power: Real, winding_start: Real = REFERENCE_TEMPERATURE, housing_start: Real = REFERENCE_TEMPERATURE,
-    *, winding_capacity: Real, housing_capacity: Real, winding_to_housing: Real, housing_to_ambient: Real,
-    ambient: Real = REFERENCE_TEMPERATURE,
+    time: float, power: float, winding_start: float = REFERENCE_TEMPERATURE,
+    housing_start: float = REFERENCE_TEMPERATURE,
+    *, winding_capacity: float, housing_capacity: float, winding_to_housing: float, housing_to_ambient: float,
+    ambient: float = REFERENCE_TEMPERATURE,
 ) -> Temperatures:
     """Return the temperatures of winding and housing under a constant power, in closed form.
 
@@ -186,10 +255,10 @@ def two_mass_temperatures(
     end = steady_temperatures(power, winding_to_housing=winding_to_housing, housing_to_ambient=housing_to_ambient,
                               ambient=ambient)
     y_w, y_h = winding_start - end.winding, housing_start - end.housing
-    gap = np.sqrt((a - b - c) ** 2 + 4.0 * a * b)
+    gap = math.sqrt((a - b - c) ** 2 + 4.0 * a * b)
     l_1 = 0.5 * (a + b + c + gap)
     l_2 = a * c / l_1
-    e_1, e_2 = np.exp(-l_1 * time), np.exp(-l_2 * time)
+    e_1, e_2 = math.exp(-l_1 * time), math.exp(-l_2 * time)
     share, rest = (e_2 - e_1) / gap, (l_1 * e_2 - l_2 * e_1) / gap
     T_w = end.winding + rest * y_w + share * (-a * y_w + a * y_h)
     T_h = end.housing + rest * y_h + share * (b * y_w - (b + c) * y_h)

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from servotwin import physics
 from servotwin.models.circuit import circuit_of
 from servotwin.models.kernels import motion
 from servotwin.models.outputs import torques_of, warm_plant
+from servotwin.physics import motor, shaft
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -70,8 +72,10 @@ def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -
         torques = torques_of(model, samples, drive, load)
         own_viscous = (plant.b - load.viscous_friction) * w_m
         to_load = (load.viscous_friction * w + torques.load_friction + torques.external) * w
-        return np.array([circuit.supply_power, plant.R * i * i, circuit.bridge_power, circuit.brush_power,
-                         (plant.K_b - plant.K) * i * w_m, (own_viscous + torques.servo_friction) * w_m, to_load])
+        heat = physics.copper_loss(i, plant.R)
+        return np.array([circuit.supply_power, heat, circuit.bridge_power, circuit.brush_power,
+                         physics.back_emf(w_m, plant.K_b) * i - physics.electromagnetic_torque(i, plant.K) * w_m,
+                         (own_viscous + torques.servo_friction) * w_m, to_load])
 
     supply, winding, bridge, brush, conversion, friction, to_load = trajectory.integral(powers).tolist()
     stored, stops = _kinetic(model.plant(load), trajectory)
@@ -89,8 +93,8 @@ def _kinetic(plant: Plant, trajectory: Trajectory) -> tuple[float, float]:
     def stored(k: int, at: float) -> float:
         m = motion.prepared(segments[k].motion)
         _, w, i, _, _, _, w_m = motion.state(m, at - segments[k].anchor)
-        kinetic = 0.5 * plant.J_out * w * w + 0.5 * (plant.J - plant.J_out) * w_m * w_m
-        return kinetic + 0.5 * plant.L * i * i
+        kinetic = shaft.kinetic_energy(w, plant.J_out) + shaft.kinetic_energy(w_m, plant.J - plant.J_out)
+        return kinetic + motor.magnetic_energy(i, plant.L)
 
     for k in range(1, len(segments)):
         if segments[k].anchor == segments[k].start:

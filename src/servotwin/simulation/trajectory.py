@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.kernels import motion
 from servotwin.models.samples import Samples
-from servotwin.physics.backlash import play
+from servotwin.physics import play
 from servotwin.simulation.engine import Segment
 
 Array = NDArray[np.float64]

@@ -24,6 +24,7 @@ from servotwin.models.kernels.plant import (
     SHORT_FORWARD,
     Plant,
 )
+from servotwin.physics import bridge, electronics, motor, potentiometer, supply
 
 _TIE = 1e-13  # V
 
@@ -35,13 +36,20 @@ def drop(plant: Plant, u: float) -> float:
 
 def loop(plant: Plant, zone: int, u: float) -> tuple[float, float]:
     """Return voltage [V], with its drop, and resistance [Ω] of the loop through which the current of a zone flows."""
+    sign = sign_of(zone)
     if u == 0.0:
-        return -sign_of(zone) * plant.D_off, plant.R_off
+        return bridge.driving_voltage(0.0, sign, plant.D_off), plant.R_off
     if zone == SHORT_FORWARD or zone == SHORT_BACKWARD:
-        return -sign_of(zone) * plant.D_drive, plant.R_drive - plant.R_b
-    if plant.I_max < math.inf and sign_of(zone) * u < 0.0:  # returned past a regulator
-        return u - sign_of(zone) * plant.D_drive, plant.R_drive - plant.R_b
-    return u - sign_of(zone) * plant.D_drive, plant.R_drive
+        return bridge.driving_voltage(0.0, sign, plant.D_drive), plant.R_drive - plant.R_b
+    R = plant.R_drive
+    if plant.I_max < math.inf and sign * u < 0.0:  # returned past a regulator
+        R -= plant.R_b
+    return bridge.driving_voltage(u, sign, plant.D_drive), R
+
+
+def error_of(plant: Plant, u: float, q: float) -> float:
+    """Return the error v_e [V] of a servo without bridge."""
+    return electronics.feedback_error(u, potentiometer.feedback_voltage(q, plant.p, plant.b_o))
 
 
 def sign_of(zone: int) -> float:
@@ -76,7 +84,7 @@ def zone_limits(plant: Plant, zone: int, u: float) -> tuple[float, float]:
     if zone >= CONDUCTING:
         return _bridge_limits(plant, zone, u)
     e1 = plant.half_deadband
-    e2 = e1 + plant.V_max / plant.gain
+    e2 = saturating_error(plant)
     if zone == SATURATED:
         return e2, math.inf
     if zone == SATURATED_BACKWARD:
@@ -88,6 +96,11 @@ def zone_limits(plant: Plant, zone: int, u: float) -> tuple[float, float]:
     return (e1, e2) if zone == LINEAR else (-e2, -e1)
 
 
+def saturating_error(plant: Plant) -> float:
+    """Return the error v_e [V] at which the voltage reaches its limit."""
+    return plant.half_deadband + plant.V_max / electronics.proportional_voltage(1.0, plant.gain)
+
+
 def _bridge_limits(plant: Plant, zone: int, u: float) -> tuple[float, float]:
     D, I_max = drop(plant, u), plant.I_max
     if zone == CONDUCTING:
@@ -95,7 +108,8 @@ def _bridge_limits(plant: Plant, zone: int, u: float) -> tuple[float, float]:
     if zone == NO_CURRENT:
         return -D, D
     # A regulator's most, in the direction of the drive: from x1 on it gives that, from x2 on the bus has broken down.
-    x1, x2 = D + plant.R_drive * I_max, D + (plant.R_drive - plant.R_b) * I_max + abs(u)
+    x1 = bridge.needed_voltage(I_max, 0.0, D, plant.R_drive)
+    x2 = bridge.needed_voltage(I_max, 0.0, D, plant.R_drive - plant.R_b) + abs(u)
     if by_current(plant, zone):
         D, x1, x2 = 0.0, I_max, I_max
     forward, backward = (x1 if u > 0.0 else math.inf), (x1 if u < 0.0 else math.inf)
@@ -113,28 +127,33 @@ def _bridge_limits(plant: Plant, zone: int, u: float) -> tuple[float, float]:
 def zone_variable(plant: Plant, zone: int, u: float, q: float, w: float, i: float) -> float:
     """Return what a zone lasts by: the error v_e [V]; behind a bridge what drives the current [V], or itself [A]."""
     if plant.V > 0.0:
-        return i if by_current(plant, zone) else u - plant.K_b * w
-    return u - plant.p * q - plant.b_o
+        return i if by_current(plant, zone) else u - motor.back_emf(w, plant.K_b)
+    return error_of(plant, u, q)
 
 
 def zone_rate(plant: Plant, zone: int, du: float, w: float, dw: float, di: float) -> float:
     """Return the rate of `zone_variable`, where the motor turns with w and the output at the same speed."""
     if plant.V > 0.0:
-        return di if by_current(plant, zone) else du - plant.K_b * dw
-    return du - plant.p * w
+        return di if by_current(plant, zone) else du - motor.back_emf(dw, plant.K_b)
+    return error_rate(plant, du, w)
+
+
+def error_rate(plant: Plant, du: float, w: float) -> float:
+    """Return the rate of `error_of` [V/s] at an output speed [rad/s]."""
+    return electronics.feedback_error(du, potentiometer.feedback_voltage(w, plant.p))
 
 
 def zone_of(plant: Plant, u: float, du: float, q: float, w: float, i: float) -> int:
     """Return the zone of a state; on a boundary of the error, the one that it moves into."""
     if plant.V > 0.0:
-        return _bridge_zone(plant, u, u - plant.K_b * w, i)
-    x = u - plant.p * q - plant.b_o
-    rate = du - plant.p * w
+        return _bridge_zone(plant, u, u - motor.back_emf(w, plant.K_b), i)
+    x = error_of(plant, u, q)
+    rate = error_rate(plant, du, w)
     e = x
     if rate != 0.0:
         e += math.copysign(2.0 * _TIE * (1.0 + abs(x)), rate)
     size = abs(e)
-    if size > plant.half_deadband + plant.V_max / plant.gain:
+    if size > saturating_error(plant):
         return SATURATED if e > 0.0 else SATURATED_BACKWARD
     if plant.half_deadband == 0.0:
         return LINEAR
@@ -162,8 +181,10 @@ def _bridge_zone(plant: Plant, u: float, x: float, i: float) -> int:
             return zone
         if abs(i) > plant.I_max:
             return zone + 2 * step
-    zone += step if abs(x) > D + plant.R_drive * plant.I_max else 0
-    return zone + (step if abs(x) > D + (plant.R_drive - plant.R_b) * plant.I_max + abs(u) else 0)
+    most = bridge.needed_voltage(plant.I_max, 0.0, D, plant.R_drive)
+    zone += step if abs(x) > most else 0
+    short = bridge.needed_voltage(plant.I_max, 0.0, D, plant.R_drive - plant.R_b) + abs(u)
+    return zone + (step if abs(x) > short else 0)
 
 
 def neighbour(plant: Plant, zone: int, up: bool) -> int:
@@ -177,23 +198,25 @@ def neighbour(plant: Plant, zone: int, up: bool) -> int:
 def current(plant: Plant, zone: int, u: float, q: float, w: float) -> float:
     """Return the armature current [A] where it has no inertia."""
     if zone < CONDUCTING:
-        return (voltage(plant, zone, u - plant.p * q - plant.b_o) - plant.K_b * w) / plant.R
+        v = voltage(plant, zone, error_of(plant, u, q))
+        return motor.steady_armature_current(v, w, plant.R, plant.K_b)
     if zone == NO_CURRENT:
         return 0.0
     if limited(zone):
         return sign_of(zone) * plant.I_max
     v, R = loop(plant, zone, u)
-    return (v - plant.K_b * w) / R
+    return motor.steady_armature_current(v, w, R, plant.K_b)
 
 
 def current_rate(plant: Plant, zone: int, u: float, q: float, w: float, i: float) -> float:
     """Return di/dt [A/s] of a current with inertia."""
     if zone < CONDUCTING:
-        return (voltage(plant, zone, u - plant.p * q - plant.b_o) - plant.R * i - plant.K_b * w) / plant.L
+        v = voltage(plant, zone, error_of(plant, u, q))
+        return motor.armature_current_rate(v, i, w, plant.R, plant.L, plant.K_b)
     if constant_current(zone):
         return 0.0
     v, R = loop(plant, zone, u)
-    return (v - R * i - plant.K_b * w) / plant.L
+    return motor.armature_current_rate(v, i, w, R, plant.L, plant.K_b)
 
 
 def voltage(plant: Plant, zone: int, error: float) -> float:
@@ -202,39 +225,58 @@ def voltage(plant: Plant, zone: int, error: float) -> float:
         return 0.0
     if zone == SATURATED or zone == SATURATED_BACKWARD:
         return math.copysign(plant.V_max, zone)
-    return plant.gain * (error - zone * plant.half_deadband)
+    return electronics.proportional_voltage(
+        electronics.error_beyond_deadband(error, zone, 2.0 * plant.half_deadband), plant.gain)
 
 
 def conductance(plant: Plant, zone: int, u: float) -> float:
     """Return by how much the current changes per volt in this zone [S]."""
     if zone < CONDUCTING:
-        return 1.0 / plant.R
+        return motor.steady_armature_current(1.0, 0.0, plant.R, plant.K_b)
     if constant_current(zone):
         return 0.0
     _, R = loop(plant, zone, u)
-    return 1.0 / R
+    return motor.steady_armature_current(1.0, 0.0, R, plant.K_b)
+
+
+def current_slope(plant: Plant, zone: int, du: float) -> float:
+    """Return di/dt [A/s] at a standstill of a current without inertia, where the command changes by du [V/s]."""
+    if not in_linear_zone(zone):
+        return 0.0
+    return conductance(plant, zone, 0.0) * electronics.proportional_voltage(du, plant.gain)
 
 
 def bus_voltage(plant: Plant, zone: int, u: float, w: float, i: float, coasts: bool) -> float:
     """Return what is left of the source's voltage [V] under this servo's current."""
     if i == 0.0 or not (u != 0.0 or coasts):
         return plant.V
-    if u == 0.0 or sign_of(zone) * u < 0.0:  # returned
-        return plant.V if plant.I_max < math.inf else plant.V + plant.R_b * abs(i)
     if zone == SHORT_FORWARD or zone == SHORT_BACKWARD:
         return 0.0
     if limited(zone):
-        return abs((plant.R_drive - plant.R_b) * i + sign_of(zone) * plant.D_drive + plant.K_b * w)
-    return plant.V - plant.R_b * math.copysign(1.0, u) * i
+        drops = sign_of(zone) * plant.D_drive
+        return abs(bridge.needed_voltage(i, motor.back_emf(w, plant.K_b), drops, plant.R_drive - plant.R_b))
+    taken = supply.supply_current(i, _direction(u))
+    return supply.source_voltage(taken, plant.V, plant.R_b, regulated=plant.I_max < math.inf)
+
+
+def _direction(u: float) -> float:
+    """Return how the bridge drives: −1, 0 or +1."""
+    return math.copysign(1.0, u) if u != 0.0 else 0.0
 
 
 def terminal_voltage(plant: Plant, V_br: float, u: float, w: float, i: float, V_bus: float, coasts: bool) -> float:
     """Return the voltage v_m [V] at the motor's terminals."""
-    if i == 0.0:
-        return plant.K_b * w if u != 0.0 or coasts else 0.0
-    if plant.L == 0.0:
-        return plant.K_b * w + plant.R * i + math.copysign(V_br, i)
+    if plant.L == 0.0 or i == 0.0:
+        v_b = motor.back_emf(w, plant.K_b)
+        return bridge.motor_voltage(i, v_b, plant.R, V_br, v_b if u != 0.0 or coasts else 0.0)
+    if u == 0.0 and not coasts:
+        return 0.0
+    drive = _direction(u) if u != 0.0 else -math.copysign(1.0, i)
+    return bridge.bridge_voltage(i, V_bus, drive, *bridge_drops(plant, V_br, u))
+
+
+def bridge_drops(plant: Plant, V_br: float, u: float) -> tuple[float, float]:
+    """Return V_ce0 [V] and r_c [Ω] of what conducts: transistors while the bridge drives, diodes while it coasts."""
     if u == 0.0:
-        return -math.copysign(V_bus + plant.D_off - V_br - plant.V, i) if coasts else 0.0
-    r_c = plant.R_drive - plant.R - plant.R_b
-    return math.copysign(V_bus, u) - math.copysign(plant.D_drive - V_br, i) - r_c * i
+        return plant.D_off - V_br - plant.V, 0.0
+    return plant.D_drive - V_br, plant.R_drive - plant.R - plant.R_b

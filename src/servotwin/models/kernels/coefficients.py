@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from servotwin.models.kernels import armature, contact
 from servotwin.models.kernels.plant import CONDUCTING, Mode, Plant
+from servotwin.physics import electronics, motor, potentiometer, shaft
 
 
 def linear_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], tau: tuple[float, ...],
@@ -13,26 +14,28 @@ def linear_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], tau: tup
     `u` is (value, slope, amplitude, frequency, phase) of the command at the start of the motion, `tau` (value,
     slope) of the external torque; see `second_order`.
     """
-    per_volt = plant.K * armature.conductance(plant, mode.zone, u[0])
-    damping = plant.b + per_volt * plant.K_b
-    stiffness = plant.stiffness
-    torque = plant.stiffness * plant.rest_angle - contact.friction_torque(plant, mode.contact, w, 0.0, 0.0) - tau[0]
+    per_volt = motor.electromagnetic_torque(armature.conductance(plant, mode.zone, u[0]), plant.K)
+    damping = plant.b + per_volt * motor.back_emf(1.0, plant.K_b)
+    stiffness = shaft.spring_torque(1.0, plant.stiffness)
+    torque = -shaft.spring_torque(0.0, plant.stiffness, plant.rest_angle) - contact.friction_torque(
+        plant, mode.contact, w, 0.0, 0.0) - tau[0]
     rate = -tau[1]
     sinusoid = 0.0
     if armature.in_linear_zone(mode.zone):
-        gain = per_volt * plant.gain
-        stiffness += gain * plant.p
-        torque += gain * (u[0] - plant.b_o - mode.zone * plant.half_deadband)
+        gain = per_volt * electronics.proportional_voltage(1.0, plant.gain)
+        stiffness += gain * potentiometer.feedback_voltage(1.0, plant.p)
+        torque += per_volt * armature.voltage(plant, mode.zone, armature.error_of(plant, u[0], 0.0))
         rate += gain * u[1]
         sinusoid = gain * u[2]
     elif armature.constant_current(mode.zone):
-        torque += plant.K * armature.current(plant, mode.zone, u[0], q, w)
+        torque += motor.electromagnetic_torque(armature.current(plant, mode.zone, u[0], q, w), plant.K)
     elif mode.zone >= CONDUCTING:
         torque += per_volt * armature.loop(plant, mode.zone, u[0])[0]
     else:
         torque += per_volt * armature.voltage(plant, mode.zone, 0.0)
-    J = plant.J
-    return (0.5 * damping / J, stiffness / J, torque / J, rate / J, sinusoid / J, u[3], u[4], q, w)
+    return (0.5 * contact.accelerated(plant, damping), contact.accelerated(plant, stiffness),
+            contact.accelerated(plant, torque), contact.accelerated(plant, rate),
+            contact.accelerated(plant, sinusoid), u[3], u[4], q, w)
 
 
 def speed_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], against: tuple[float, ...],
@@ -42,15 +45,21 @@ def speed_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], against: 
     From L di/dt = v − R i − K_b w and J ẇ = K i − b w − τ, where `against` is (value, slope) of all constant and
     external torque τ, and `u` as in `linear_coefficients`.
     """
-    J, b, K, R, L = plant.J, plant.b, plant.K, plant.R, plant.L
-    per_volt = K / (L * J)
+    R, L, K_b = plant.R, plant.L, plant.K_b
     follows = armature.in_linear_zone(mode.zone)
     if mode.zone >= CONDUCTING:
         v, R = armature.loop(plant, mode.zone, u[0])
     else:
-        v = armature.voltage(plant, mode.zone, u[0] - plant.b_o)
-    dv, wave = (plant.gain * u[1], plant.gain * u[2]) if follows else (0.0, 0.0)
-    f0 = per_volt * v - R / (L * J) * against[0] - against[1] / J
-    f1 = per_volt * dv - R / (L * J) * against[1]
-    return (0.5 * (R / L + b / J), (R * b + K * plant.K_b) / (L * J), f0, f1, per_volt * wave, u[3], u[4], w,
-            (K * i - b * w - against[0]) / J)
+        v = armature.voltage(plant, mode.zone, armature.error_of(plant, u[0], 0.0))
+    gain = electronics.proportional_voltage(1.0, plant.gain) if follows else 0.0
+    # ẅ + (R/L + b/J) ẇ + … : rates of the current by a volt, an ampere and a radian per second
+    rise = motor.armature_current_rate(1.0, 0.0, 0.0, R, L, K_b)
+    fade = -motor.armature_current_rate(0.0, 1.0, 0.0, R, L, K_b)
+    brake = -motor.armature_current_rate(0.0, 0.0, 1.0, R, L, K_b)
+    per_ampere = contact.accelerated(plant, motor.electromagnetic_torque(1.0, plant.K))
+    drag = contact.accelerated(plant, plant.b)
+    held, held_more = contact.accelerated(plant, against[0]), contact.accelerated(plant, against[1])
+    per_volt = per_ampere * rise
+    return (0.5 * (fade + drag), fade * drag + per_ampere * brake, per_volt * v - fade * held - held_more,
+            per_volt * gain * u[1] - fade * held_more, per_volt * gain * u[2], u[3], u[4], w,
+            shaft.shaft_acceleration(motor.electromagnetic_torque(i, plant.K), w, 0.0, against[0], plant.b, plant.J))

@@ -25,6 +25,7 @@ from servotwin.models.kernels.plant import (
     Vector,
     at_rest,
 )
+from servotwin.physics import backlash, friction, load_friction, motor, shaft
 
 _SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
 _REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
@@ -40,18 +41,18 @@ def core_speed(plant: Plant) -> float:
 
 def external_torque(plant: Plant, tau: float, q: float) -> float:
     """Return τ_ext [N m] against +q, given its part `tau` that depends on time alone."""
-    torque = tau + plant.stiffness * (q - plant.rest_angle)
+    torque = tau + shaft.spring_torque(q, plant.stiffness, plant.rest_angle)
     if plant.gravity != 0.0:
         if not abs(q) < _TOO_FAR:  # a trial step may be far too long
             return math.nan
-        torque += plant.gravity * math.sin(q - plant.hanging_angle)
+        torque += shaft.pendulum_torque(q, plant.gravity, plant.hanging_angle)
     return torque
 
 
 def drive_torque(plant: Plant, zone: int, u: float, y: Vector) -> float:
     """Return the motor's torque N k_a i [N m]."""
     i = y[2] if plant.L > 0.0 else armature.current(plant, zone, u, y[0], y[6])
-    return plant.K * i
+    return motor.electromagnetic_torque(i, plant.K)
 
 
 def has_friction(plant: Plant) -> bool:
@@ -77,8 +78,8 @@ def friction_torque(plant: Plant, contact: int, w: float, tau_m: float, tau_e: f
     if contact == BACKWARD:
         return -gear_friction.sliding_friction(plant, False, w, tau_m, tau_e) - plant.coulomb
     if contact == CORE:
-        x = math.tanh(plant.kappa * w)
-        return ((plant.F_forward if w >= 0.0 else plant.F_backward) + plant.coulomb) * x
+        forward, backward = plant.F_forward + plant.coulomb, plant.F_backward + plant.coulomb
+        return friction.smoothed_coulomb_torque(w, forward, backward, plant.kappa)
     return 0.0
 
 
@@ -127,9 +128,9 @@ def _sliding(forward: bool, dry: bool) -> int:
 
 
 def _from_rest(torque: float, backward: float, forward: float, at_upper: bool, at_lower: bool, dry: bool) -> int:
-    if torque > forward:
-        return ON_UPPER if at_upper else _sliding(True, dry)
-    if torque < -backward:
+    if not friction.sticks(torque, forward, backward):
+        if torque > 0.0:
+            return ON_UPPER if at_upper else _sliding(True, dry)
         return ON_LOWER if at_lower else _sliding(False, dry)
     if dry:
         return STUCK
@@ -142,19 +143,19 @@ def motor_acceleration(plant: Plant, motor: int, torque: float, w: float) -> flo
     """Return the acceleration [rad/s²] of the motor alone, inside the play."""
     if at_rest(motor):
         return 0.0
-    friction = 0.0
+    dry = 0.0
     if motor == FORWARD or motor == BACKWARD:
-        friction = gear_friction.sliding_friction(plant, motor == FORWARD, w, torque, 0.0)
-    return (torque - (plant.b - plant.b_out) * w - (friction if motor == FORWARD else -friction)) / (
-        plant.J - plant.J_out)
+        dry = gear_friction.sliding_friction(plant, motor == FORWARD, w, torque, 0.0)
+    return shaft.shaft_acceleration(
+        torque, w, dry if motor == FORWARD else -dry, 0.0, plant.b - plant.b_out, plant.J - plant.J_out)
 
 
 def output_acceleration(plant: Plant, contact: int, against: float, w: float) -> float:
     """Return the acceleration [rad/s²] of the output side alone, inside the play."""
     if at_rest(contact):
         return 0.0
-    friction = plant.coulomb if contact == FORWARD else -plant.coulomb if contact == BACKWARD else 0.0
-    return (-against - plant.b_out * w - friction) / plant.J_out
+    dry = plant.coulomb if contact == FORWARD else -plant.coulomb if contact == BACKWARD else 0.0
+    return shaft.shaft_acceleration(0.0, w, dry, against, plant.b_out, plant.J_out)
 
 
 def pressing(plant: Plant, mode: Mode, u: float, tau: float, y: Vector) -> float:
@@ -173,8 +174,7 @@ def pressing(plant: Plant, mode: Mode, u: float, tau: float, y: Vector) -> float
 
 def met(plant: Plant, forward: bool, y: Vector) -> Vector:
     """Return the state after motor and output have met at an end of the play: one speed, momentum kept."""
-    share = plant.J_out / plant.J
-    w = (1.0 - share) * y[6] + share * y[1]
+    w = backlash.impact_speed(plant.J - plant.J_out, y[6], plant.J_out, y[1])
     if abs(w) < _LAST_IMPACT:
         w = 0.0
     return with_motor(plant, ON_FORWARD if forward else ON_BACKWARD, (y[0], w, y[2], y[3], y[4], y[5], w))
@@ -190,7 +190,7 @@ def with_motor(plant: Plant, mesh: int, y: Vector) -> Vector:
 def rebound(plant: Plant, mode: Mode, upper: bool, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     """Return mode and state after the output has hit a stop; with it the motor, unless it only follows."""
     q = plant.upper if upper else plant.lower
-    w = -plant.restitution * y[1]
+    w = backlash.rebound_speed(y[1], plant.restitution)
     pushes = mode.mesh == (ON_FORWARD if upper else ON_BACKWARD)
     together = plant.half_play == 0.0 or pushes
     mesh = mode.mesh if together else INSIDE
@@ -218,5 +218,10 @@ def acceleration(plant: Plant, mode: Mode, u: float, tau: float, y: Vector) -> f
         return 0.0
     q, w = y[0], y[1]
     torque, against = drive_torque(plant, mode.zone, u, y), external_torque(plant, tau, q)
-    friction = friction_torque(plant, mode.contact, w, torque, -against - plant.b_out * w)
-    return (torque - plant.b * w - friction - against) / plant.J
+    dry = friction_torque(plant, mode.contact, w, torque, load_friction.torque_on_gear(against, w, plant.b_out))
+    return shaft.shaft_acceleration(torque, w, dry, against, plant.b, plant.J)
+
+
+def accelerated(plant: Plant, torque: float) -> float:
+    """Return ẇ [rad/s²] of motor and output as one by a torque alone."""
+    return shaft.shaft_acceleration(torque, 0.0, 0.0, 0.0, 0.0, plant.J)

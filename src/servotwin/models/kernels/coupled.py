@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from servotwin.models.kernels import armature, hybrid
 from servotwin.models.kernels.plant import NO_CURRENT, Mode, Plant, Vector
+from servotwin.physics import bridge, motor, supply
 from servotwin.physics.pieces import Piece
 
 _EDGE = 1e-8  # of a limit: so near to it the sum of currents counts as being there
@@ -63,8 +64,9 @@ def _demand(members: Sequence[Member], states: Sequence[Vector]) -> tuple[float,
         if plant.L > 0.0:
             given += sign * y[2]
         elif mode.zone != NO_CURRENT:
-            g += 1.0 / warm.R_drive
-            h += sign * (armature.sign_of(mode.zone) * warm.D_drive + warm.K_b * y[6]) / warm.R_drive
+            g += motor.steady_armature_current(1.0, 0.0, warm.R_drive, warm.K_b)
+            v = bridge.driving_voltage(0.0, armature.sign_of(mode.zone), warm.D_drive)
+            h -= sign * motor.steady_armature_current(v, y[6], warm.R_drive, warm.K_b)
     return g, h, given
 
 
@@ -76,16 +78,17 @@ def bus_voltage(source: Source, state: int, members: Sequence[Member], states: S
         return source.V
     g, h, given = _demand(members, states)
     if state == FOLLOWING:
-        return (source.V + source.R_b * (h - given)) / (1.0 + source.R_b * g)
+        free = supply.source_voltage(given - h, source.V, source.R_b)
+        return free / (1.0 - supply.source_voltage(g, 0.0, source.R_b))
     if g > 0.0:
         return (source.I_max + h - given) / g
     above = below = 0.0  # the currents have inertia: their sum has to stay
     for (plant, mode, sign, _, _), y in zip(members, states, strict=True):
         if mode.zone != NO_CURRENT:
             warm = hybrid.warm(plant, y)
-            drop = armature.sign_of(mode.zone) * warm.D_drive
-            above += sign * (drop + warm.R_drive * y[2] + warm.K_b * y[6]) / plant.L
-            below += 1.0 / plant.L
+            v = bridge.driving_voltage(0.0, armature.sign_of(mode.zone), warm.D_drive)
+            above -= sign * motor.armature_current_rate(v, y[2], y[6], warm.R_drive, plant.L, warm.K_b)
+            below += motor.armature_current_rate(1.0, 0.0, 0.0, warm.R_drive, plant.L, warm.K_b)
     return above / below
 
 
@@ -112,7 +115,7 @@ def source_state(source: Source, members: Sequence[Member], states: Sequence[Vec
     V = bus_voltage(source, LIMITED, members, states)
     if V < 0.0:
         return BROKEN_DOWN
-    return LIMITED if V <= source.V - source.R_b * source.I_max else FOLLOWING
+    return LIMITED if V <= supply.source_voltage(source.I_max, source.V, source.R_b) else FOLLOWING
 
 
 def source_guards(source: Source, state: int, V_bus: float, total: float) -> tuple[float, float]:
@@ -122,7 +125,7 @@ def source_guards(source: Source, state: int, V_bus: float, total: float) -> tup
     if state == FOLLOWING:
         return source.I_max - total, total
     if state == LIMITED:
-        return source.V - source.R_b * source.I_max - V_bus, V_bus
+        return supply.source_voltage(source.I_max, source.V, source.R_b) - V_bus, V_bus
     if state == KEEPING:
         return -total, 1.0
     return total - source.I_max, 1.0

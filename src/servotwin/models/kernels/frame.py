@@ -10,6 +10,7 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.models.kernels.noise import gaussian
+from servotwin.physics import backlash, potentiometer, pulse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,27 +73,13 @@ NO_CHIP = Chip(*[0.0] * 21)  # of a plant that follows its command at all times
 AT_START = Frame(0, 0, 0.0, math.inf, math.inf, 0.0, NOTHING, NOTHING)
 
 
-def one_shot(T_0: float, slope: float, v_eff: float) -> float:
-    """Return the width of the one-shot's pulse at the voltage v_eff."""
-    return max(0.0, T_0 + slope * v_eff)
-
-
-def drive_time(u: float, K: float, t_min: float, tau_s: float) -> float:
-    """Return how long the stretcher drives for an error that exceeds half the deadband by u."""
-    if u <= 0.0:
-        return 0.0
-    if tau_s > 0.0:
-        return t_min + tau_s * math.log1p(K * u / tau_s)
-    return t_min + K * u
-
-
 def feedback_voltage(chip: Chip, curve: Sequence[Sequence[float]] | NDArray[np.float64], q: float) -> float:
     """Return v_o [V] of the potentiometer with its wiper at q; `curve` has angles and errors of its linearity."""
-    v_o = chip.p * q + chip.b_o
+    v_o = potentiometer.feedback_voltage(q, chip.p, chip.b_o)
     if len(curve[0]) > 0:
         v_o += _interpolated(curve, q)
     if chip.step > 0.0:
-        v_o = chip.step * math.floor(v_o / chip.step + 0.5)
+        v_o = potentiometer.quantised(v_o, chip.step)
     return v_o
 
 
@@ -102,23 +89,23 @@ def _interpolated(curve: Sequence[Sequence[float]] | NDArray[np.float64], q: flo
         return errors[0]
     for k in range(1, len(angles)):
         if q < angles[k]:
-            return errors[k - 1] + (errors[k] - errors[k - 1]) * ((q - angles[k - 1]) / (angles[k] - angles[k - 1]))
+            return potentiometer.error_between(q, angles[k - 1], errors[k - 1], angles[k], errors[k])
     return errors[len(errors) - 1]
 
 
 def wiper_at(half_slack: float, wiper: float, q: float) -> float:
     """Return where a potentiometer with play stands after the shaft has gone one way to q."""
-    return min(max(wiper, q - half_slack), q + half_slack)
+    return backlash.play(wiper, q, 2.0 * half_slack)
 
 
 def decide(chip: Chip, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, draw: float) -> Decision:
     """Return what the frame that starts at `time` decides; `draw` is its Gaussian draw."""
-    v_eff = v_o + chip.noise * draw + chip.beta * v_m + chip.c_s * (V_bus - chip.V_oc)
-    T_os = one_shot(chip.T_0, chip.slope, v_eff)
-    e = t_in - T_os
-    t_on = drive_time(abs(e) - chip.half_deadband, chip.K, chip.t_min, chip.tau_s)
+    v_eff = pulse.effective_voltage(v_o, chip.noise * draw, v_m, V_bus - chip.V_oc, chip.beta, chip.c_s)
+    T_os = pulse.one_shot_width(v_eff, chip.slope, chip.T_0)
+    e = pulse.error_time(t_in, T_os)
+    t_on = pulse.drive_time(e, chip.K, 2.0 * chip.half_deadband, chip.t_min, chip.tau_s)
     sign = 0.0 if t_on == 0.0 else math.copysign(1.0, e)
-    return Decision(time + max(t_in, T_os), sign, t_on, e)
+    return Decision(time + pulse.decision_delay(t_in, T_os), sign, t_on, e)
 
 
 def accepted(chip: Chip, t_in: float) -> bool:

@@ -1,11 +1,7 @@
 """Dry friction of the gear: Coulomb and static friction, Stribeck, and what the torques through the gear add.
 
-The budget at the output shaft, with S = exp(−|w/w_s|^α), is
-
-    F_c + |K_m τ_m − K_e τ_e| + S [(r − 1) F_c + |K_ms τ_m − K_es τ_e| + Q]
-
-where one share K_l for all torque through the gear means K_m = K_e = K_l (M3, M4 of Duclusaud et al. 2025). At rest
-S = 1, and friction takes whatever is to be held, up to the budget.
+The budget at the output shaft is `load_friction.gear_friction_budget`; at rest S = 1, and friction takes whatever is
+to be held, up to the budget.
 """
 
 from __future__ import annotations
@@ -13,40 +9,35 @@ from __future__ import annotations
 import math
 
 from servotwin.models.kernels.plant import Plant
+from servotwin.physics import friction, load_friction
 
 
 def sliding_friction(plant: Plant, forward: bool, w: float, tau_m: float, tau_e: float) -> float:
     """Return the magnitude of the gear's friction [N m] at the speed w, for the torques of motor and load in +q."""
-    F = plant.F_forward if forward else plant.F_backward
+    F = coulomb(plant, forward)
     if plant.varies == 0.0:
         return F
-    budget = F + abs(plant.K_m * tau_m - plant.K_e * tau_e)
-    if plant.w_s > 0.0:
-        budget += _fading(plant, abs(w)) * ((plant.breakaway - 1.0) * F + _static_share(plant, tau_m, tau_e))
-    return budget
+    speed = w if plant.w_s > 0.0 else math.inf  # else static friction ends as soon as the shaft moves
+    return load_friction.gear_friction_budget(
+        speed, tau_m, tau_e, coulomb_torque=F, breakaway_ratio=plant.breakaway, stribeck_speed=plant.w_s,
+        stribeck_exponent=plant.alpha, load_friction_motor=plant.K_m, load_friction_external=plant.K_e,
+        load_friction_motor_stribeck=plant.K_ms, load_friction_external_stribeck=plant.K_es,
+        load_friction_motor_quad=plant.K_mq, load_friction_external_quad=plant.K_eq)
 
 
-def _fading(plant: Plant, speed: float) -> float:
-    """Return S, what is left of static friction at this speed [rad/s]."""
-    if speed == 0.0:
-        return 1.0
-    power = plant.alpha * math.log(speed / plant.w_s)
-    return math.exp(-math.exp(power)) if power < 7.0 else 0.0  # a trial step may be far too fast
+def coulomb(plant: Plant, forward: bool) -> float:
+    """Return the magnitude of the gear's Coulomb friction [N m]."""
+    return abs(friction.coulomb_torque(1.0 if forward else -1.0, plant.F_forward, plant.F_backward))
 
 
 def holding_friction(plant: Plant, forward: bool, tau_m: float, tau_e: float) -> float:
     """Return the torque [N m] up to which the gear holds against a start forward or backward."""
-    held = plant.breakaway * (plant.F_forward if forward else plant.F_backward)
+    F = coulomb(plant, forward)
     if plant.varies == 0.0:
-        return held
-    return held + abs(plant.K_m * tau_m - plant.K_e * tau_e) + _static_share(plant, tau_m, tau_e)
-
-
-def _static_share(plant: Plant, tau_m: float, tau_e: float) -> float:
-    share = abs(plant.K_ms * tau_m - plant.K_es * tau_e)
-    if tau_m * tau_e < 0.0 and abs(tau_m) != abs(tau_e):
-        share += plant.K_eq * tau_e * tau_e if abs(tau_m) > abs(tau_e) else plant.K_mq * tau_m * tau_m
-    return share
+        return friction.breakaway_torque(F, plant.breakaway)
+    static = load_friction.static_gear_friction(
+        tau_m, tau_e, F, plant.breakaway, plant.K_ms, plant.K_es, plant.K_mq, plant.K_eq)
+    return load_friction.sliding_gear_friction(tau_m, tau_e, F, plant.K_m, plant.K_e) + static
 
 
 def has_gear_friction(plant: Plant) -> bool:

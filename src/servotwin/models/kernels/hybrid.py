@@ -26,6 +26,7 @@ from servotwin.models.kernels.plant import (
     at_rest,
     at_temperature,
 )
+from servotwin.physics import electronics, friction, motor, potentiometer, shaft, thermal
 
 # What can end a mode: first what a shaft and a zone of its own have, then what play adds.
 SPEED, CORE_FORWARD, CORE_BACKWARD, ZONE_UP, ZONE_DOWN, UPPER, LOWER, RELEASE_FORWARD, RELEASE_BACKWARD = range(9)
@@ -56,11 +57,11 @@ def rates(plant: Plant, mode: Mode, u: float, tau: float, y: Vector) -> Vector:
     else:
         i = armature.current(plant, mode.zone, u, y[0], w_m)
     if cold.C_w > 0.0:
-        flow = (y[3] - y[4]) * cold.G_wh
-        dT_w = (plant.R * i * i - flow) / cold.C_w
-        dT_h = (flow - (y[4] - cold.T_amb) * cold.G_ha) / cold.C_h
+        flow = thermal.heat_flow(y[3], y[4], cold.G_wh)
+        dT_w = thermal.warming_rate(thermal.copper_loss(i, plant.R), flow, cold.C_w)
+        dT_h = thermal.warming_rate(flow, thermal.heat_flow(y[4], cold.T_amb, cold.G_ha), cold.C_h)
     if mode.mesh == INSIDE:
-        dw_m = contact.motor_acceleration(plant, mode.motor, plant.K * i, w_m)
+        dw_m = contact.motor_acceleration(plant, mode.motor, motor.electromagnetic_torque(i, plant.K), w_m)
         dw = contact.output_acceleration(plant, mode.contact, contact.external_torque(plant, tau, y[0]), w)
         return w, dw, di, dT_w, dT_h, w_m, dw_m
     dw = contact.acceleration(plant, mode, u, tau, y)
@@ -69,29 +70,33 @@ def rates(plant: Plant, mode: Mode, u: float, tau: float, y: Vector) -> Vector:
 
 def jacobian(plant: Plant, mode: Mode, u: float, du: float, dtau: float, q: float, w: float) -> tuple[float, ...]:
     """Return ∂ẇ/∂(q, w, i), ∂(di/dt)/∂(q, w, i), and the rates of ẇ and di/dt with time alone, of a rigid gear."""
-    gain = plant.gain if armature.in_linear_zone(mode.zone) else 0.0
+    vu = electronics.proportional_voltage(1.0, plant.gain) if armature.in_linear_zone(mode.zone) else 0.0
+    vq = -vu * potentiometer.feedback_voltage(1.0, plant.p)
     Eq = Ew = Ei = Eu = 0.0
-    Fq = -plant.stiffness
+    Fq = -shaft.spring_torque(1.0, plant.stiffness)
     if plant.gravity != 0.0:
-        Fq -= plant.gravity * math.cos(q - plant.hanging_angle)
+        Fq -= shaft.pendulum_stiffness(q, plant.gravity, plant.hanging_angle)
     Fw = -plant.b
     Fi = Fu = 0.0
     if mode.contact == CORE:
-        x = math.tanh(plant.kappa * w)
-        F = (plant.F_forward if w >= 0.0 else plant.F_backward) + plant.coulomb
-        Fw -= F * plant.kappa * (1.0 - x * x)
-    if plant.L > 0.0:
-        Eq, Ew, Ei, Eu = -gain * plant.p / plant.L, -plant.K_b / plant.L, -plant.R / plant.L, gain / plant.L
-        Fi = plant.K
+        forward, backward = plant.F_forward + plant.coulomb, plant.F_backward + plant.coulomb
+        Fw -= friction.smoothed_coulomb_slope(w, forward, backward, plant.kappa)
+    if plant.L > 0.0:  # current and torque are linear, so units give the coefficients
+        R, L, K_b = plant.R, plant.L, plant.K_b
+        Eq = motor.armature_current_rate(vq, 0.0, 0.0, R, L, K_b)
+        Eu = motor.armature_current_rate(vu, 0.0, 0.0, R, L, K_b)
+        Ew = motor.armature_current_rate(0.0, 0.0, 1.0, R, L, K_b)
+        Ei = motor.armature_current_rate(0.0, 1.0, 0.0, R, L, K_b)
+        Fi = motor.electromagnetic_torque(1.0, plant.K)
     else:
-        per_volt = plant.K * armature.conductance(plant, mode.zone, u)
-        Fq -= per_volt * gain * plant.p
-        Fw -= per_volt * plant.K_b
-        Fu = per_volt * gain
-    J = plant.J
+        per_volt = motor.electromagnetic_torque(armature.conductance(plant, mode.zone, u), plant.K)
+        Fq += per_volt * vq
+        Fw -= per_volt * motor.back_emf(1.0, plant.K_b)
+        Fu = per_volt * vu
     if at_rest(mode.contact):
         return 0.0, 0.0, 0.0, 0.0, 0.0, Ei, 0.0, Eu * du
-    return Fq / J, Fw / J, Fi / J, Eq, Ew, Ei, (Fu * du - dtau) / J, Eu * du
+    return (contact.accelerated(plant, Fq), contact.accelerated(plant, Fw), contact.accelerated(plant, Fi), Eq, Ew, Ei,
+            contact.accelerated(plant, Fu * du - dtau), Eu * du)
 
 
 def guards(plant: Plant, mode: Mode, u: float, smooth: bool) -> int:
@@ -167,8 +172,8 @@ def _release_guard(plant: Plant, mode: Mode, kind: int, u: float, du: float, tau
         torque = contact.drive_torque(plant, mode.zone, u, y)
         backward, forward = contact.holding_bounds(plant, torque, -against)
         if plant.L == 0.0:
-            di = plant.gain * du / plant.R if armature.in_linear_zone(mode.zone) else 0.0
-    rate = plant.K * di - dtau if plant.varies == 0.0 else math.nan
+            di = armature.current_slope(plant, mode.zone, du)
+    rate = motor.electromagnetic_torque(di, plant.K) - dtau if plant.varies == 0.0 else math.nan
     if kind == RELEASE_FORWARD:
         return forward - (torque - against), -rate
     return torque - against + backward, rate
@@ -191,7 +196,7 @@ def _play_guard(plant: Plant, mode: Mode, kind: int, u: float, tau: float, dtau:
         if mode.contact == (ON_UPPER if pushes else ON_LOWER):
             return math.inf, 0.0
         return plant.coulomb + (against if pushes else -against), dtau if pushes else -dtau
-    torque, rate = contact.drive_torque(plant, mode.zone, u, y), plant.K * dy[2]
+    torque, rate = contact.drive_torque(plant, mode.zone, u, y), motor.electromagnetic_torque(dy[2], plant.K)
     if kind == MOTOR_RELEASE_FORWARD or (kind == PART_MOTOR and not pushes):
         return gear_friction.holding_friction(plant, True, torque, 0.0) - torque, -rate
     return gear_friction.holding_friction(plant, False, torque, 0.0) + torque, rate

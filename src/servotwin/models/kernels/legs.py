@@ -10,9 +10,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.kernels.contact import holding_bounds
+from servotwin.models.kernels.contact import accelerated, holding_bounds
 from servotwin.models.kernels.elementary import decay, fma, log1p_and_rest
+from servotwin.models.kernels.gear_friction import coulomb
 from servotwin.models.kernels.plant import Plant
+from servotwin.physics import bridge, friction, motor
+from servotwin.physics.shaft import shaft_acceleration
 
 MOST_LEGS = 100  # in one phase; a servo that needs more is left to the general engine
 
@@ -67,28 +70,35 @@ class Leg(NamedTuple):
 
 def shaft_of(plant: Plant, torque: float) -> Shaft:
     """Return what the legs read of a plant with a bridge under a constant external torque [N m]."""
-    J, b, K, K_b = plant.J, plant.b, plant.K, plant.K_b
-    rate_drive = (b + K * K_b / plant.R_drive) / J
-    rate_off = (b + K * K_b / plant.R_off) / J
-    rate_free = b / J
-    push = K * plant.V / (plant.R_drive * J)
-    drag_drive = K * plant.D_drive / (plant.R_drive * J)
-    forward = (plant.F_forward + plant.coulomb) / J
-    backward = (plant.F_backward + plant.coulomb) / J
-    pull = max(plant.K * (plant.V - plant.D_drive) / plant.R_drive, 0.0)
+    emf = motor.back_emf(1.0, plant.K_b)
+    rate_drive = accelerated(plant, plant.b + _torque(plant, emf, plant.R_drive))
+    rate_off = accelerated(plant, plant.b + _torque(plant, emf, plant.R_off))
+    rate_free = accelerated(plant, plant.b)
+    forward = accelerated(plant, coulomb(plant, True) + plant.coulomb)
+    backward = accelerated(plant, coulomb(plant, False) + plant.coulomb)
+    push = _torque(plant, bridge.driving_voltage(plant.V, 0.0, 0.0), plant.R_drive)
+    drag = _torque(plant, bridge.driving_voltage(0.0, -1.0, plant.D_drive), plant.R_drive)
+    drag_off = _torque(plant, bridge.driving_voltage(0.0, -1.0, plant.D_off), plant.R_off)
+    pull = max(_torque(plant, bridge.driving_voltage(plant.V, 1.0, plant.D_drive), plant.R_drive), 0.0)
     hold_backward, hold_forward = holding_bounds(plant, 0.0, 0.0)
-    load = loading(J, pull, hold_forward, hold_backward, torque)
+    load = loading(plant.J, pull, hold_forward, hold_backward, torque)
     return Shaft(
-        rate_drive, rate_off, rate_free, _inverse(rate_drive), _inverse(rate_off), _inverse(rate_free), push,
-        drag_drive, K * plant.D_off / (plant.R_off * J), plant.V / K_b, plant.D_drive / K_b, plant.D_off / K_b,
+        rate_drive, rate_off, rate_free, _inverse(rate_drive), _inverse(rate_off), _inverse(rate_free),
+        accelerated(plant, push), accelerated(plant, drag), accelerated(plant, drag_off),
+        plant.V / emf, plant.D_drive / emf, plant.D_off / emf,
         forward, backward, load.against, load.start_forward, load.start_backward, load.start_off,
-        plant.lower, plant.upper, J, pull, hold_forward, hold_backward)
+        plant.lower, plant.upper, plant.J, pull, hold_forward, hold_backward)
 
 
 def loading(inertia: float, pull: float, hold_forward: float, hold_backward: float, torque: float) -> Loading:
     """Return what a constant external torque [N m] does to a shaft."""
-    return Loading(torque / inertia, _start(hold_forward, hold_backward, pull - torque),
+    return Loading(shaft_acceleration(torque, 0.0, 0.0, 0.0, 0.0, inertia), _start(hold_forward, hold_backward, pull - torque),
                    _start(hold_forward, hold_backward, -pull - torque), _start(hold_forward, hold_backward, -torque))
+
+
+def _torque(plant: Plant, voltage: float, R: float) -> float:
+    """Return the motor's torque [N m] by a voltage [V] at a standstill, in a circuit of R [Ω]."""
+    return motor.electromagnetic_torque(motor.steady_armature_current(voltage, 0.0, R, plant.K_b), plant.K)
 
 
 def _inverse(x: float) -> float:
@@ -97,7 +107,9 @@ def _inverse(x: float) -> float:
 
 def _start(forward: float, backward: float, torque: float) -> float:
     """Return which way a shaft at rest starts under a torque [N m]: −1, 0, +1."""
-    return 1.0 if torque > forward else (-1.0 if torque < -backward else 0.0)
+    if friction.sticks(torque, forward, backward):
+        return 0.0
+    return 1.0 if torque > 0.0 else -1.0
 
 
 def start_of(shaft: Shaft, drive: float) -> float:

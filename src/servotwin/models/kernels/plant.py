@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from servotwin.physics import thermal
+
 
 class Plant(NamedTuple):
     """Everything that the automaton reads, as plain floats in SI; the first five change with temperature."""
@@ -92,9 +94,6 @@ FREE, FORWARD, BACKWARD, CORE, STUCK, ON_LOWER, ON_UPPER = range(7)
 
 RIGID, INSIDE, ON_FORWARD, ON_BACKWARD = range(4)  # forward: where the motor pushes the output forward
 
-_COPPER = 0.00385  # 1/K
-REFERENCE_TEMPERATURE = 298.15  # K, for which resistance and torque constant are given
-
 
 def at_rest(contact: int) -> bool:
     """Tell whether a shaft stands still in this contact."""
@@ -103,7 +102,7 @@ def at_rest(contact: int) -> bool:
 
 def at_temperature(plant: Plant, T_w: float, T_h: float) -> Plant:
     """Return the plant with a winding and a housing of these temperatures [K]: copper and magnets follow them."""
-    more = plant.R * _COPPER * (T_w - REFERENCE_TEMPERATURE)
-    field = 1.0 + plant.magnet * (T_h - REFERENCE_TEMPERATURE)
-    return Plant(plant.K * field, plant.K_b * field, plant.R + more, plant.R_drive + more, plant.R_off + more,
-                 *plant[5:])
+    R = thermal.winding_resistance(T_w, plant.R)
+    more = R - plant.R
+    field = thermal.magnet_factor(T_h, plant.magnet)
+    return Plant(plant.K * field, plant.K_b * field, R, plant.R_drive + more, plant.R_off + more, *plant[5:])

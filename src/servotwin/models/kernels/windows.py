@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 from servotwin.models.kernels import frame, tiles
 from servotwin.models.kernels.frame import Chip
 from servotwin.models.kernels.memory import SAME
+from servotwin.physics import bridge, motor, potentiometer, supply
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
-    from servotwin.models.kernels.tiles import Meter, Numbers
+    from servotwin.models.kernels.tiles import Numbers
 
 
 def begin(listed: Numbers, size: int, own: bool, tile: Any, plan: Any, before: Any) -> int:
@@ -91,16 +92,19 @@ def measure(size: int, tile: Any, plan: Any) -> None:
     """Set what the motor's voltage and the supply's sag add to the one-shot's measure."""
     for j in range(size):
         chip, meter = tiles.chip_at(tile.chip, j), tiles.meter_at(tile.meter, j)
-        drive = tile.servo.drive[j]
-        off = drive == 0.0
-        back_emf = meter.K_b * tile.servo.w[j]
-        D = meter.D_off if off else meter.D_drive
-        R = meter.R_off if off else meter.R_drive
-        x = drive * meter.V - back_emf
-        i = (x - math.copysign(D, x)) / R if abs(x) > D else 0.0
-        v_m, V_bus = _terminal_voltage(chip, meter, drive, back_emf, i)
-        plan.v_m[j] = v_m
-        plan.V_bus[j] = V_bus
+        drive, w = tile.servo.drive[j], tile.servo.w[j]
+        driven = drive != 0.0
+        D = meter.D_drive if driven else meter.D_off
+        R = meter.R_drive if driven else meter.R_off
+        v_b = motor.back_emf(w, meter.K_b)
+        x = drive * meter.V - v_b
+        direction = math.copysign(1.0, x) if abs(x) > D else 0.0
+        v = bridge.driving_voltage(drive * meter.V, direction, D)
+        i = motor.steady_armature_current(v, w, R, meter.K_b) if direction != 0.0 else 0.0
+        connected = driven or chip.coast > 0.0
+        taken = supply.supply_current(i, drive) if connected else 0.0
+        plan.v_m[j] = bridge.motor_voltage(i, v_b, chip.R_a, chip.V_br, v_b if connected else 0.0)
+        plan.V_bus[j] = supply.source_voltage(taken, meter.V, meter.R_b)
 
 
 def divide(size: int, full: bool, tile: Any, plan: Any) -> None:
@@ -125,7 +129,8 @@ def _decide(chip: Chip, v_m: float, V_bus: float, draw: float, tile: Any, plan: 
     """Measure and decide where a pulse rises, and divide the window."""
     servo = tile.servo
     width, due = servo.width[j], servo.due[j]
-    new = frame.decide(chip, 0.0, width, chip.p * servo.q[j] + chip.b_o, v_m, V_bus, draw)
+    v_o = potentiometer.feedback_voltage(servo.q[j], chip.p, chip.b_o)
+    new = frame.decide(chip, 0.0, width, v_o, v_m, V_bus, draw)
     valid = frame.accepted(chip, width) and plan.at_edge[j] != 0.0
     replaces = valid and new.time <= due
     _divide(new.time if valid and not replaces else math.inf, new.time if replaces else due,
@@ -195,13 +200,3 @@ def give_up(size: int, tile: Any, plan: Any, before: Any) -> int:
                     count.number[j] -= 1
                     clock.length[j] = 0.0
     return lost
-
-
-def _terminal_voltage(chip: Chip, meter: Meter, drive: float, back_emf: float, i: float) -> tuple[float, float]:
-    """Return v_m at the motor's terminals and V_bus of the supply, for the current i."""
-    if i != 0.0:
-        v_m = back_emf + chip.R_a * i + math.copysign(chip.V_br, i)
-        if drive != 0.0:
-            return v_m, meter.V - meter.R_b * drive * i
-        return v_m, meter.V + (meter.R_b * abs(i) if chip.coast > 0.0 else 0.0)
-    return (back_emf if drive != 0.0 or chip.coast > 0.0 else 0.0), meter.V

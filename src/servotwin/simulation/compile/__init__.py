@@ -10,8 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
+from servotwin import physics
 from servotwin.models import kernels as models_kernels
-from servotwin.physics import pieces
 from servotwin.simulation.compile import derive as derive_module
 from servotwin.simulation.compile.derive import Recipe, derive, surroundings
 from servotwin.simulation.compile.storage import key_of, loaded, stored
@@ -33,8 +33,9 @@ def kernels(recipe: Recipe) -> ModuleType:
 @cache
 def _sources() -> tuple[str, ...]:
     """Return the text of everything from which a module is derived; to read it is quicker than to derive."""
-    files = [Path(file) for file in (derive_module.__file__, pieces.__file__)]
-    files += sorted(Path(models_kernels.__path__[0]).glob("*.py"))
+    files = [Path(derive_module.__file__)]
+    for package in (physics, models_kernels):
+        files += sorted(Path(package.__path__[0]).glob("*.py"))
     return tuple(file.read_text(encoding="utf-8") for file in files)
 
 

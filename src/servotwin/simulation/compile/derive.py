@@ -1,4 +1,4 @@
-"""Derive one module that numba can compile and cache from the kernels, mechanically.
+"""Derive one module that numba can compile and cache from the kernels and laws, mechanically.
 
 Starting from the entries, every function that is called is collected from its own module under the name
 `module__function`; constants come along by value, classes are imported from where they are. A kernel is changed in
@@ -183,8 +183,20 @@ class _Rewriting(ast.NodeTransformer):
         if ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
         node.body = [self.visit(statement) for statement in node.body]
+        self._by_place(node.args)
         node.args.defaults = [self.visit(default) for default in node.args.defaults]
         return node
+
+    def _by_place(self, arguments: ast.arguments) -> None:
+        """Let arguments that have to be named be named or not, for numba knows no others."""
+        named = list(zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True))
+        for argument, default in sorted(named, key=lambda pair: pair[1] is not None):
+            arguments.args.append(argument)
+            if default is not None:
+                arguments.defaults.append(default)
+            elif arguments.defaults:
+                raise TypeError(f"{self._module}: {argument.arg} has no default, and stands behind some that have one")
+        arguments.kwonlyargs, arguments.kw_defaults = [], []
 
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
         """Leave out the branch that is not taken."""

@@ -1,0 +1,150 @@
+"""Servos that together use every law of the engine, plainly and as lanes of a batch whose kernels are not compiled.
+
+Run as a script in a process of its own: `one_law_runs.py out.npz` keeps all signals of both, and the names of the laws
+that were called.
+"""
+
+import json
+import sys
+import types
+import warnings
+from dataclasses import astuple
+
+import numpy as np
+
+SECONDS = 0.11  # five frames: a drive, its end, plugging back
+PULSES = {"electronics.back_emf_injection": 0.01, "electronics.supply_coupling": 0.02, "potentiometer.noise": 1e-3,
+          "electronics.stretcher_time_constant": 0.02, "electronics.minimum_drive_time": 2e-4,
+          "motor.brush_drop_voltage": 0.1, "supply.internal_resistance": 0.2, "supply.bridge_drop_voltage": 0.3,
+          "supply.bridge_drop_resistance": 0.1, "friction.breakaway_ratio": 1.2}
+COASTING = {**PULSES, "electronics.off_state": "coast"}
+SENSED = {"potentiometer.backlash": 0.01, "potentiometer.quantisation": 1e-3,
+          "potentiometer.linearity_angle": [0.0, 1.0, 2.0], "potentiometer.linearity_error": [0.0, 0.01, -0.01]}
+LOADED = {"gear.backlash": 0.02, "gear.output_inertia": 1e-3, "friction.stribeck_speed": 10.0,
+          "friction.load_friction_motor": 0.06, "friction.load_friction_external": 0.1,
+          "friction.load_friction_motor_stribeck": 0.05, "friction.load_friction_motor_quad": 0.1,
+          "friction.load_friction_external_quad": 0.2, "stops.upper_angle": 0.35, "stops.restitution": 0.4,
+          "thermal.winding_capacity": 0.5, "thermal.housing_capacity": 5.0, "thermal.winding_to_housing": 10.0,
+          "thermal.housing_to_ambient": 20.0, "thermal.magnet_coefficient": -1e-3}
+INDUCTIVE = {"motor.armature_inductance": 5e-4}
+MEAN = {"electronics.bridge_gain": 40.0, "electronics.comparator_gain": 1.0, "electronics.voltage_deadband": 0.01,
+        "electronics.pulse_to_voltage_gain": 735.0, "electronics.command_offset": 0.1,
+        "electronics.voltage_to_pulse_gain": 1.09e-3, "friction.zero_crossing_slope": 0.5}
+
+
+def cases(st):
+    """Return (model, command, load, whether a batch takes it) by name."""
+    servo = st.load_servo("hitec-hs-755hb")
+    step = st.signals.step(10.0, 50.0, at=0.005, unit="deg")
+    volts = st.signals.step(0.7, 1.1, at=0.005, unit="V")
+    pulses = st.signals.step(700.0, 1200.0, at=0.005, unit="us")
+    wave = st.signals.sine(mean=2.0, amplitude=4.0, frequency=20.0, unit="V")
+    swinging = st.loads.Pendulum(mass=0.1, length=0.1) + st.loads.Spring(stiffness=0.1, rest_angle=0.3)
+    dragging = st.loads.Viscous(1e-3) + st.loads.Constant(0.05) + st.loads.Coulomb(0.01)
+    return {
+        "tiles": (st.PulseServo(servo), step, st.loads.Inertia(1e-3), True),
+        "tiles that measure": (st.PulseServo(servo.replace(PULSES)), volts, dragging, True),
+        "coasting": (st.PulseServo(servo.replace({**COASTING, **SENSED})), step, None, True),
+        "loaded": (st.PulseServo(servo.replace({**PULSES, **LOADED, **SENSED})), pulses, swinging + dragging, True),
+        "regulated": (st.PulseServo(servo.replace({**PULSES, "supply.current_limit": 0.8})), step, dragging, True),
+        "inductive": (st.PulseServoInductive(servo.replace({**COASTING, **INDUCTIVE})), step, dragging, True),
+        "bounded": (st.BoundedServo(servo.replace(MEAN)), volts, dragging, True),
+        "bounded pulses": (st.BoundedServo(servo.replace(MEAN)), pulses, st.loads.Spring(stiffness=0.1, rest_angle=0.3),
+                           True),
+        "averaged": (st.AveragedServo(servo.replace(MEAN)), pulses, swinging + dragging, False),
+        "averaged inductive": (st.AveragedServoInductive(servo.replace({**MEAN, **INDUCTIVE})), volts, swinging, False),
+        "motor": (st.DCMotor(servo.replace(INDUCTIVE)), wave, None, False),
+    }
+
+
+def signals_of(st, compiled=False):
+    """Return all signals and the energy of every case, "plain/…" and "batch/…"."""
+    if not compiled:
+        without_compiler()
+    found = {}
+    for name, (model, command, load, batched) in cases(st).items():
+        plain = st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005, seed=0)
+        for signal in model.available:
+            found[f"plain/{name}/{signal}"] = plain[signal]
+        found[f"plain/{name}/energy"] = np.array(astuple(plain.energy))
+        if batched:
+            R = model.value("motor.armature_resistance")
+            batch = st.simulate_many(model, command, duration=SECONDS, load=load, output_step=0.005,
+                                     outputs=model.available,
+                                     parameters={"motor.armature_resistance": [R, 1.01 * R, 1.02 * R]})
+            for signal in model.available:
+                found[f"batch/{name}/{signal}"] = batch[signal][0]
+            found |= ticks(st, name, model, load)
+    return found | on_a_bus(st, *cases(st)["tiles that measure"][:3])
+
+
+def ticks(st, name, model, load):
+    """Return all signals after some ticks of one servo, and of the same one among several."""
+    sim, sims = st.Simulator(model, load), st.VectorSimulator(model, 2, load=load, threads=1)
+    command = st.signals.constant(1200.0, unit="us")
+    sims.reset(pulse_width=700e-6)
+    state = sim.initial(st.signals.constant(700.0, unit="us"))
+    for k in range(15):
+        sims.advance(7e-3, pulse_width=1200e-6)
+        state = sim.advance(state, (k + 1) * 7e-3, command)
+    return {f"{kind}/{name}, ticks/{signal}": np.array([value]) for signal in model.available for kind, value in (
+        ("plain", sim.observe(state, signal, command)), ("batch", sims[signal][0]))}
+
+
+def on_a_bus(st, model, command, load):
+    """Return all signals of a servo alone on a bus, as a batch of the plain one."""
+    own = {name: model.value_or(f"supply.{name}", 0.0) for name in ("open_circuit_voltage", "internal_resistance")}
+    fleet = st.simulate_bus({"alone": (model, command, load)}, supply=st.Supply(**own), duration=SECONDS,
+                            output_step=0.005)
+    plain = st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005)
+    return {f"{kind}/on a bus/{signal}": result[signal] for signal in model.available
+            for kind, result in (("plain", plain), ("batch", fleet["alone"]))}
+
+
+def without_compiler():
+    """Let batches run the derived text as it is."""
+    from servotwin.models.kernels import elementary
+    from servotwin.simulation import lane_runs, vector_store
+    from servotwin.simulation.compile.derive import derive
+
+    numba, intrinsics = types.ModuleType("numba"), types.ModuleType("servotwin.simulation.compile.intrinsics")
+    numba.njit = lambda **_: lambda function: function
+    for name in ("fma", "two_power", "binary_exponent", "nearest"):
+        setattr(intrinsics, name, getattr(elementary, name))
+    sys.modules |= {module.__name__: module for module in (numba, intrinsics)}
+    known = {}
+
+    def kernels(recipe):
+        if recipe not in known:
+            known[recipe] = types.ModuleType(recipe.name)
+            exec(derive(recipe), vars(known[recipe]))
+        return known[recipe]
+
+    lane_runs.kernels = vector_store.kernels = kernels
+
+
+def called_laws(run):
+    """Return what `run` returns, and the names of the functions of `physics` that it has called."""
+    names = set()
+
+    def look(frame, event, _):
+        code = frame.f_code
+        if event == "call" and code.co_filename.startswith("<array form of servotwin.physics."):
+            names.add(code.co_filename[:-1].rpartition(".")[2])
+        elif event == "call" and "/physics/" in code.co_filename.replace("\\", "/"):
+            names.add(code.co_name)
+
+    sys.setprofile(look)
+    try:
+        return run(), names
+    finally:
+        sys.setprofile(None)
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")  # np.float64 says when it divides by 0, which compiled code does not
+    import servotwin
+
+    found, names = called_laws(lambda: signals_of(servotwin, compiled="compiled" in sys.argv))
+    np.savez(sys.argv[1], **found)
+    sys.stdout.write(json.dumps({"package": servotwin.__file__, "laws": sorted(names)}))

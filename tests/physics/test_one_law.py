@@ -1,0 +1,156 @@
+"""A law stands once: change it, and the plain engine, the compiled one and the outputs change alike."""
+
+import ast
+import inspect
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from servotwin import physics
+from servotwin.physics.laws import array_form
+
+HERE = Path(__file__).parent
+PACKAGE = Path(physics.__path__[0]).parent
+PUBLIC = {name: function for name in physics.__all__ if inspect.isfunction(function := getattr(physics, name))}
+LAWS = {name: inspect.unwrap(function) for name, function in PUBLIC.items() if hasattr(function, "__wrapped__")}
+ENGINE = sorted(set(PUBLIC) - set(physics.ANALYSIS))
+SCALED = [name for name in ENGINE if name in LAWS and inspect.signature(LAWS[name]).return_annotation != "bool"]
+FEW = ("breakaway_torque", "drive_time")
+# `block_plan` repeats these where lanes go side by side, most of them only where a chip looks at voltages; and where
+# lanes go side by side no potentiometer has play, so that the law of play is not asked
+REPEATED = {"play": "tiles"}  # side by side there is no play in the potentiometer
+EDGES = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -2.0)
+
+
+class Runs:
+    """A copy of the package in which laws can be changed, and what it gives."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        shutil.copytree(PACKAGE, folder / "servotwin", ignore=shutil.ignore_patterns("__pycache__"))
+        self.before, self.called = self.run()
+
+    def run(self, *words):
+        out = self.folder / "signals.npz"
+        environment = {**os.environ, "PYTHONPATH": str(self.folder), "SERVOTWIN_CACHE_DIR": str(self.folder / "cache")}
+        done = subprocess.run([sys.executable, str(HERE / "one_law_runs.py"), str(out), *words], check=True, text=True,
+                              capture_output=True, env=environment)
+        told = json.loads(done.stdout)
+        assert Path(told["package"]).is_relative_to(self.folder)
+        with np.load(out) as found:
+            return dict(found), set(told["laws"])
+
+    def scaled(self, names, *words):
+        """Return all signals where some laws return 1.01 times as much."""
+        changed = {}
+        for name in names:
+            file = self.folder / "servotwin" / "physics" / Path(inspect.getfile(LAWS[name])).name
+            text = file.read_text(encoding="utf-8")
+            changed.setdefault(file, text)
+            file.write_text(_scaled(text, name), encoding="utf-8")
+        self._forget()
+        try:
+            return self.run(*words)[0]
+        finally:
+            for file, text in changed.items():
+                file.write_text(text, encoding="utf-8")
+            self._forget()
+
+    def _forget(self):
+        shutil.rmtree(self.folder / "servotwin" / "physics" / "__pycache__", ignore_errors=True)
+
+
+def _scaled(text, name):
+    tree = ast.parse(text)
+    law = next(node for node in tree.body if isinstance(node, ast.FunctionDef) and node.name == name)
+    for node in ast.walk(law):
+        if isinstance(node, ast.Return):
+            node.value = ast.BinOp(ast.Constant(1.01), ast.Mult(), node.value)
+    return ast.unparse(ast.fix_missing_locations(tree))
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    return Runs(tmp_path_factory.mktemp("one_law"))
+
+
+def _agree(found, tolerance, but=()):
+    for key, values in found.items():
+        if key.startswith("batch/") and not key.split("/")[1].startswith(but):
+            plain = found["plain/" + key[len("batch/"):]]
+            size = max(np.nanmax(np.abs(plain), initial=0.0), 1e-6)
+            np.testing.assert_allclose(values / size, plain / size, rtol=0.0, atol=tolerance, err_msg=key)
+
+
+def _differs(one, other):
+    return any(key.startswith("plain/") and not np.array_equal(one[key], other[key], equal_nan=True) for key in one)
+
+
+def test_a_batch_of_what_is_derived_is_the_plain_engine(runs):
+    _agree(runs.before, 1e-12)
+
+
+def test_every_law_is_run_by_the_engine_or_named_as_analysis(runs):
+    assert set(physics.ANALYSIS) <= set(PUBLIC)
+    assert not runs.called & set(physics.ANALYSIS)
+    assert set(ENGINE) <= runs.called
+
+
+@pytest.mark.parametrize("name", [name if name in FEW else pytest.param(name, marks=pytest.mark.slow)
+                                  for name in SCALED])
+def test_a_law_that_changes_changes_all_paths_alike(runs, name):
+    found = runs.scaled([name])
+    assert _differs(found, runs.before)
+    _agree(found, 1e-12, REPEATED.get(name, ()))
+
+
+@pytest.mark.slow
+def test_all_laws_changed_and_compiled(runs):
+    found = runs.scaled(SCALED, "compiled")
+    assert _differs(found, runs.before)
+    _agree(found, 1e-9)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_array_form_is_the_law_element_by_element(name):
+    law = LAWS[name]
+    rng = np.random.default_rng(5)
+    parameters = inspect.signature(law).parameters
+    given = {}
+    for key, parameter in parameters.items():
+        values = np.concatenate([rng.uniform(-3.0, 3.0, 200), rng.choice(EDGES, 200)])
+        rng.shuffle(values)
+        given[key] = values > 0.0 if parameter.annotation == "bool" else values
+    together = PUBLIC[name](**given)
+    compared = 0
+    for k in range(400):
+        try:
+            alone = law(**{key: bool(x[k]) if x.dtype == bool else float(x[k]) for key, x in given.items()})
+        except (ArithmeticError, ValueError):  # numbers for which the law says nothing
+            continue
+        for part, of_one in zip(*(x if isinstance(x, tuple) else (x,) for x in (together, alone)), strict=True):
+            if isinstance(of_one, float) and not math.isfinite(of_one):
+                assert not np.isfinite(part[k])
+            else:
+                assert part[k] == pytest.approx(of_one, rel=1e-12, abs=1e-14)
+            compared += 1
+    assert compared > 50
+
+
+def looping(x: float) -> float:
+    """Add up; not a law."""
+    for _ in range(3):
+        x += 1.0
+    return x
+
+
+def test_a_loop_is_refused():
+    with pytest.raises(NotImplementedError, match="looping: no array form of 'for _ in range"):
+        array_form(looping)(np.zeros(2))
