@@ -133,7 +133,8 @@ def test_three_decisions_cannot_wait():
 def test_a_decision_that_comes_first_replaces_the_one_that_waits():
     waits = Decision(5.0, 1.0, 1.0, 1e-3)
     chip = servo().chip()
-    now = frame.edge(chip, Frame(3, 3, 0.0, math.inf, math.inf, 0.0, waits, frame.NOTHING), 2.0, 1.2e-3, 0.0, 0.0, 0.0, 0)
+    before = Frame(3, 3, 0.0, math.inf, math.inf, 0.0, waits, frame.NOTHING)
+    now = frame.edge(chip, before, 2.0, 1.2e-3, 0.0, 0.0, 0.0, 0)
     assert now.pending.time == pytest.approx(2.0012)
     assert now.later == frame.NOTHING
     assert now.number == 4

@@ -4,9 +4,9 @@ import pickle
 
 import numpy as np
 import pytest
-from conftest import EVERYTHING
 
 import servotwin as st
+from conftest import EVERYTHING
 from servotwin.errors import CommandError, InputError, ServotwinError, UnknownNameError
 
 WIDTHS = (1100e-6, 1900e-6, 1500e-6)  # s, one after the other
@@ -331,7 +331,7 @@ def test_a_lane_that_fails_harms_no_other(servo):
     sound = st.VectorSimulator(model, 3)
     for s in (sims, sound):
         s.reset(pulse_width=1500e-6)
-    sims.set(output_speed=[1e200], lanes=[1])
+    sims.set(output_speed=[1e308], lanes=[1])
     for s in (sims, sound):
         s.advance(0.05, pulse_width=1.7e-3)
     assert sims.status.tolist()[::2] == [0, 0]

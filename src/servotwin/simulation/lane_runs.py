@@ -163,8 +163,9 @@ def some_of(lanes: Lanes, which: Indices) -> Lanes:
     """Return the numbers of some lanes."""
     if len(which) == len(lanes.torque):
         return lanes
-    return Lanes(*(x if name in _SHARED else np.ascontiguousarray(x[..., which])
-                   for name, x in zip(Lanes._fields, lanes, strict=True)))
+    columns: Any = (x if name in _SHARED else np.ascontiguousarray(x[..., which])
+                    for name, x in zip(Lanes._fields, lanes, strict=True))
+    return Lanes(*columns)
 
 
 def lanes_of(work: Work) -> Lanes:

@@ -219,6 +219,7 @@ def _outputs(model: Model, outputs: Sequence[str]) -> tuple[str, ...]:
 
 
 def real_type(dtype: DTypeLike) -> str:
+    """Return the name of a type of numbers, or raise InputError."""
     try:
         name = "" if dtype is None else np.dtype(dtype).name
     except TypeError:

@@ -206,7 +206,8 @@ class Simulator:
         changes = tuple(sorted({**dict(state.changes), **parameters}.items()))
         own = self._with(changes)
         self._check(state, "changed(parameters)", own.model)
-        return replace(state, changes=changes, places=own.model.states, memory=with_play(state.memory, own._plant.half_play > 0.0))
+        memory = with_play(state.memory, own._plant.half_play > 0.0)
+        return replace(state, changes=changes, places=own.model.states, memory=memory)
 
     def _with(self, changes: tuple[tuple[str, Any], ...]) -> Simulator:
         """Return the simulator of the servo and load with these numbers."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.models.base import PULSE_RANGE
+from servotwin.models.base import PULSE_RANGE, Model
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.lane_inputs import lanes_of, pick
 from servotwin.simulation.many import own_threads, real_type
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
 
     from servotwin import loads
-    from servotwin.models import Model
 
 Array = NDArray[np.float64]
 
@@ -34,8 +33,8 @@ class VectorSimulator:
     """Many servos (lanes) side by side that remember where they are between calls.
 
     Every lane has a clock of its own: its frames begin when it is reset. Commands and torques stay as they were given
-    last; before the first command it is a pulse in the middle of those that the servo takes. `simulate_many` runs lanes from start to end with outputs in between; here one call is one
-    tick of a robot, an environment or a page.
+    last; before the first command it is a pulse in the middle of those that the servo takes. `simulate_many` runs lanes
+    from start to end with outputs in between; here one call is one tick of a robot, an environment or a page.
 
     Parameters
     ----------
@@ -70,7 +69,7 @@ class VectorSimulator:
     """
 
     def __init__(
-        self, model: Model, lanes: int, *, load: loads.Load | loads.Part | None | list[Any] = None,
+        self, model: Model, lanes: int, *, load: loads.Load | loads.Part | list[Any] | None = None,
         parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
         threads: int | None = None, seed: int = 0,
     ) -> None:
@@ -114,8 +113,9 @@ class VectorSimulator:
     @property
     def failures(self) -> tuple[Failure, ...]:
         """(lane, time [s], cause) of all lanes that have failed."""
-        return tuple(Failure(lane, float(self._store.ended[lane]), Status.of_code(int(self._store.status[lane])).message)
-                     for lane in np.flatnonzero(self._store.status).tolist())
+        status, ended = self._store.status, self._store.ended
+        return tuple(Failure(lane, float(ended[lane]), Status.of_code(int(status[lane])).message)
+                     for lane in np.flatnonzero(status).tolist())
 
     def advance(self, duration: float, *, pulse_width: ArrayLike | None = None, command_angle: ArrayLike | None = None,
                 command_voltage: ArrayLike | None = None, external_torque: ArrayLike | None = None) -> None:
@@ -160,7 +160,7 @@ class VectorSimulator:
             Which; all unless given.
         """
         which = pick(lanes, len(self))
-        angle = None if output_angle is None else self._own("output_angle", output_angle, which)
+        angle = None if output_angle is None else numbers_of("output_angle", output_angle, which)
         command = self._command.copy()
         found = self._translate.command(pulse_width, command_angle, command_voltage, which)
         if found is not None:
@@ -214,7 +214,7 @@ class VectorSimulator:
             raise InputError(f"torque_enable of {type(self._numbers.model).__name__}", got=torque_enable,
                              allowed="nothing: an analog servo has no such switch")
         angle, speed, inertia, bus = (
-            None if value is None else self._own(name, value, which) for name, value in (
+            None if value is None else numbers_of(name, value, which) for name, value in (
                 ("output_angle", output_angle), ("output_speed", output_speed), ("load_inertia", load_inertia),
                 ("bus_voltage", bus_voltage)))
         if inertia is not None:
@@ -264,19 +264,17 @@ class VectorSimulator:
         if found is not None:
             self._command[:] = found
 
-    def _torque_of(self, torque: ArrayLike) -> Any:
+    def _torque_of(self, torque: Any) -> Any:
         if type(torque) is float and math.isfinite(torque):
             return torque
-        return self._own("external_torque", torque, np.arange(len(self)))
-
-    def _own(self, name: str, values: ArrayLike, which: NDArray[np.int64]) -> Array:
-        return numbers_of(name, values, which)
+        return numbers_of("external_torque", torque, np.arange(len(self)))
 
 
-def _neutral(model: Model) -> float:
+def _neutral(model: object) -> float:
     """Return a pulse width that the servo takes [s]."""
-    value = getattr(model, "value_or", lambda _, default: default)
-    return 0.5 * sum(value(f"electronics.pulse_width_{end}", usual)
+    if not isinstance(model, Model):
+        return 1.5e-3  # what is no model is refused in a moment
+    return 0.5 * sum(model.value_or(f"electronics.pulse_width_{end}", usual)
                      for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
 
 

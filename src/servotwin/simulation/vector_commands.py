@@ -84,7 +84,8 @@ class Translator:
         low, high = -math.inf, math.inf
         for chunk in numbers.chunks:
             rows = np.zeros((1, 7))
-            pieces = chunk.model.command(cast("Any", _signal(name, rows, chunk.which, math.nan, math.nan)))
+            pieces = cast("LanePieces", chunk.model.command(
+                cast("Any", _signal(name, rows, chunk.which, math.nan, math.nan))))
             gain[chunk.which], offset[chunk.which] = _flat(pieces.gain), _flat(pieces.offset)
             own_low, own_high = _sure(name, chunk.model, gain[chunk.which], offset[chunk.which])
             low, high = max(low, own_low), min(high, own_high)
@@ -124,8 +125,8 @@ def _sure(name: str, model: Model, gain: Array, offset: Array) -> tuple[float, f
         shortest, longest = (model.value_or(f"electronics.pulse_width_{end}", usual)
                              for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
         return float(np.max(shortest)), float(np.min(longest))
-    longest = np.ravel(model.frame_period)  # type: ignore[attr-defined]  # the others have pulses
-    ends = np.array([(0.0 - offset) / gain, (longest - offset) / gain])
+    frame = np.ravel(cast("Any", model).frame_period)  # the other models have pulses
+    ends = np.array([(0.0 - offset) / gain, (frame - offset) / gain])
     return float(ends.min(axis=0).max()), float(ends.max(axis=0).min())
 
 

@@ -1,4 +1,4 @@
-"""What the lanes of a `VectorSimulator` are: checked inputs as the numbers that the engine reads, and what of them shows."""
+"""What the lanes of a `VectorSimulator` are: checked inputs as numbers of the engine, and what of them shows."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from servotwin.simulation.packing import Asked, Chunk, Commands, groups
 from servotwin.simulation.start import start_vector
 
 if TYPE_CHECKING:
-    from servotwin.models import Model
+    pass
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -89,7 +89,7 @@ class LaneNumbers:
     def _impose(self) -> None:
         """Put what another simulator decides in the place of what load and supply would."""
         plants, (J_L, V) = self.columns.plants, self.imposed
-        plant = Plant(*plants)  # rows that can be written to
+        plant: Any = Plant(*plants)  # rows that can be written to
         own = plant.J_out - self.load_total
         hung = ~np.isnan(J_L)
         plant.J[hung] += (J_L + own - plant.J_out)[hung]
@@ -215,9 +215,9 @@ class LaneNumbers:
             else:
                 V = self.imposed.bus_voltage[which, None]
                 own.bus = np.where(np.isnan(V), self.columns.plants[Plant._fields.index("V"), which, None], V)
-            found[which] = np.broadcast_to(chunk.model.output(
-                name, own, cast("Any", _constant(command[which])), self._load(chunk, samples.time[which], torque)),
-                (len(which), 1))[:, 0]
+            drive, load = _constant(command[which]), self._load(chunk, samples.time[which], torque)
+            values = chunk.model.output(name, cast("Any", own), cast("Any", drive), load)
+            found[which] = np.broadcast_to(values, (len(which), 1))[:, 0]
         return found
 
     def _load(self, chunk: Chunk, time: Array, torque: Array) -> Load:

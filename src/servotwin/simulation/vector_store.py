@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from concurrent.futures import Executor
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -39,7 +39,7 @@ class Store:
     pool : Executor
     """
 
-    def __init__(self, numbers: LaneNumbers, dtype: str, threads: int, pool: Executor) -> None:
+    def __init__(self, numbers: LaneNumbers, dtype: str, threads: int, pool: Any) -> None:
         self._dtype, self._threads, self._pool = dtype, threads, pool
         count = numbers.count
         self.status, self.ended = np.zeros(count, np.int8), np.zeros(count)
@@ -135,7 +135,7 @@ class Store:
 
     def _advance_tiles(self, some: _Tiles, duration: float, command: Array) -> None:
         count, workers = len(some.rows), some.workers
-        arguments = (duration, command, self._total, self._loads_change, some.rows)
+        arguments: tuple[Any, ...] = (duration, command, self._total, self._loads_change, some.rows)
         if workers == 1:
             lost = some.advance(some.which, some.braked, 0, count, *arguments, some.plans[0])
         else:
@@ -163,15 +163,16 @@ class Store:
         go_on = kernels(recipe).go_on
 
         def go(part: slice) -> None:
-            go_on(self._columns, *self._inputs, which[part], durations[part], _NONE, np.zeros(len(which[part]), np.int64),
-                  np.zeros((len(which[part]), 13, 0)), records[part], status[part], ended[part])
+            some = which[part]
+            go_on(self._columns, *self._inputs, some, durations[part], _NONE, np.zeros(len(some), np.int64),
+                  np.zeros((len(some), 13, 0)), records[part], status[part], ended[part])
 
         workers = min(self._threads, len(which))
         if workers == 1:
             go(slice(0, len(which)))
         else:
             cuts = [len(which) * k // workers for k in range(workers + 1)]
-            for run in [self._pool.submit(go, slice(a, b)) for a, b in zip(cuts, cuts[1:], strict=False)]:
+            for run in [self._pool.submit(go, slice(a, b)) for a, b in itertools.pairwise(cuts)]:
                 run.result()
         for k in np.flatnonzero(status).tolist():
             self.status[which[k]], self.ended[which[k]] = status[k], ended[k]

@@ -23,8 +23,9 @@ def drive_or_rest(size: int, tile: Any, plan: Any) -> None:
 def drive(size: int, tile: Any, plan: Any) -> None:
     """Move all lanes through a drive; the power of a lane without one is 0 and its time too."""
     for j in range(size):
-        power, forward, backward = plan.power[j], tile.shaft.start_forward[j], tile.shaft.start_backward[j]
-        _move(power, tile.shaft.rate_drive[j], tile.shaft.per_rate_drive[j], forward if power > 0.0 else backward, tile, plan, j)
+        shaft, power = tile.shaft, plan.power[j]
+        forward, backward = shaft.start_forward[j], shaft.start_backward[j]
+        _move(power, shaft.rate_drive[j], shaft.per_rate_drive[j], forward if power > 0.0 else backward, tile, plan, j)
     _alone(size, tile, plan)
 
 
@@ -49,7 +50,8 @@ def _drive_or_rest(tile: Any, plan: Any, j: int) -> None:
         tile.shaft.rate_drive[j], tile.shaft.per_rate_drive[j], tile.shaft.rate_off[j], tile.shaft.per_rate_off[j])
     forward, backward, start_off = tile.shaft.start_forward[j], tile.shaft.start_backward[j], tile.shaft.start_off[j]
     start = forward if power > 0.0 else backward
-    _move(power, rate_off if off else rate, per_rate_off if off else per_rate, start_off if off else start, tile, plan, j)
+    _move(power, rate_off if off else rate, per_rate_off if off else per_rate, start_off if off else start, tile, plan,
+          j)
 
 
 def _move(power: float, rate: float, per_rate: float, start: float, tile: Any, plan: Any, j: int) -> None:
@@ -93,7 +95,8 @@ def _alone(size: int, tile: Any, plan: Any) -> None:
 
 
 def _leg_by_leg(tile: Any, plan: Any, j: int) -> None:
-    q, w, done = legs.slide(tiles.shaft_at(tile.shaft, j), plan.power[j], tile.servo.q[j], tile.servo.w[j], plan.time[j])
+    shaft = tiles.shaft_at(tile.shaft, j)
+    q, w, done = legs.slide(shaft, plan.power[j], tile.servo.q[j], tile.servo.w[j], plan.time[j])
     tile.servo.q[j] = q
     tile.servo.w[j] = w
     plan.lost[j] = plan.lost[j] if done > 0.0 else 1.0

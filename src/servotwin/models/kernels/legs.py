@@ -92,8 +92,9 @@ def shaft_of(plant: Plant, torque: float) -> Shaft:
 
 def loading(inertia: float, pull: float, hold_forward: float, hold_backward: float, torque: float) -> Loading:
     """Return what a constant external torque [N m] does to a shaft."""
-    return Loading(shaft_acceleration(torque, 0.0, 0.0, 0.0, 0.0, inertia), _start(hold_forward, hold_backward, pull - torque),
-                   _start(hold_forward, hold_backward, -pull - torque), _start(hold_forward, hold_backward, -torque))
+    return Loading(
+        shaft_acceleration(torque, 0.0, 0.0, 0.0, 0.0, inertia), _start(hold_forward, hold_backward, pull - torque),
+        _start(hold_forward, hold_backward, -pull - torque), _start(hold_forward, hold_backward, -torque))
 
 
 def _torque(plant: Plant, voltage: float, R: float) -> float:

@@ -1,8 +1,8 @@
 """What a servo remembers between two calls, whole: where it stands, what its chip has decided, and its clock.
 
 Times within it count from the beginning of a frame, a new one after so many, so that they keep their digits for days;
-`frames` says which one that is. An instant within a billionth of a frame of an edge *is* the edge, so that twenty ticks of a millisecond are
-a frame of twenty, however their sum is rounded.
+`frames` says which one that is. An instant within a billionth of a frame of an edge *is* the edge, so that twenty ticks
+of a millisecond are a frame of twenty, however their sum is rounded.
 """
 
 from __future__ import annotations

@@ -92,9 +92,10 @@ def _writing(kind: Any, to: str, of: str) -> Iterator[str]:
             yield from (f"    {to}.{field}[{k}] = {of}.{field}[{k}]\n" for k in range(len(get_args(hint))))
 
 
-def _made(name: str, text: str, kinds: Mapping[str, type[Any]]) -> Any:
+def _made(name: str, text: str, kinds: Mapping[str, type[Any]]) -> Callable[..., Any]:
     space: dict[str, Any] = dict(kinds)
     exec(text, space)
-    function = space[name]
+    function: Any = space[name]
     function.__module__, function.text, function.kinds = __name__, text, kinds
-    return function
+    made: Callable[..., Any] = function
+    return made

@@ -90,9 +90,9 @@ def run(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, duration: floa
         done: int, outputs: Numbers) -> tuple[Memory, int]:
     """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
 
-    What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (13, n): angle, speed, contact,
-    drive, error, and what only few servos have: current, temperatures of winding and housing, angle and speed of the
-    motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there.
+    What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (13, n): angle, speed,
+    contact, drive, error, and what only few servos have: current, temperatures of winding and housing, angle and speed
+    of the motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there.
     """
     pulsed = chip.frame_period > 0.0
     memory = resumed(pulsed, inputs, memory, False)

@@ -215,15 +215,17 @@ def set_numbers(plants: Numbers, chips: Numbers, torque: Numbers, first: int, si
         tile.clock.period[j] = chips[14, first + j]
     for j in range(size):
         plant = plant_at(plants, first + j)
-        put_meter(tile.meter, j, Meter(plant.V, plant.R_b, plant.K_b, plant.D_drive, plant.R_drive, plant.D_off, plant.R_off))
+        put_meter(tile.meter, j, Meter(plant.V, plant.R_b, plant.K_b, plant.D_drive, plant.R_drive, plant.D_off,
+                                       plant.R_off))
 
 
 def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -> None:
     """Put lanes as they start into a tile, from the column `first` on."""
     set_numbers(lanes.plants, lanes.chips, lanes.torque, first, size, tile)
     for j in range(size):
-        put_servo(tile.servo, j, Servo(lanes.start[0, first + j], lanes.start[1, first + j], 0.0, 0.0, math.inf, 0.0, 0.0,
-                                       math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0))
+        q, w = lanes.start[0, first + j], lanes.start[1, first + j]
+        put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
+                                       0.0))
     for j in range(size):
         own = lanes.edge_count[first + j]
         late = lanes.edges[lanes.edge_first[first + j]] if own > 0 else math.inf if own == 0 else 0.0

@@ -193,8 +193,9 @@ def give_up(size: int, tile: Any, plan: Any, before: Any) -> int:
             if plan.lost[j] > 0.0:
                 servo.q[j], servo.w[j], servo.drive[j] = plan.q_before[j], plan.w_before[j], plan.drive1[j]
                 servo.left[j], servo.silence[j] = plan.left_before[j], plan.silence_before[j]
-                servo.error[j], servo.due[j], servo.sign[j] = plan.error_before[j], plan.due_before[j], plan.sign_before[j]
-                servo.duration[j], servo.decided[j] = plan.duration_before[j], plan.decided_before[j]
+                servo.error[j], servo.due[j] = plan.error_before[j], plan.due_before[j]
+                servo.sign[j], servo.duration[j] = plan.sign_before[j], plan.duration_before[j]
+                servo.decided[j] = plan.decided_before[j]
                 clock.since[j], clock.owed[j], clock.remaining[j] = before.since[j], before.remaining[j], 0.0
                 if plan.at_edge[j] > 0.0:  # the edge is still before it
                     count.number[j] -= 1

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin import parameters
 from servotwin.errors import ParameterError, UnknownNameError
 from servotwin.parameters.groups import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
-from servotwin.simulation.lane_inputs import _check_name
+from servotwin.simulation.lane_inputs import check_name
 from servotwin.simulation.lane_loads import _PARTS, LOAD_NAMES
 from servotwin.simulation.sweep.joint import DIMENSIONS, TINY
 from servotwin.simulation.sweep.stated import Together
@@ -87,7 +87,7 @@ def parameter(name: str, model: Model, load: Load) -> Parameter:
         if name.startswith(_PLACES_OF_JOINTS):
             return _of_joint(name, together, model)
         if name not in together.unread:
-            _check_name(model, name)
+            check_name(model, name)
     group, _, key = name.partition(".")
     metadata = parameters.GROUPS[group].__dataclass_fields__[key].metadata
     rule, dimension, nominal = metadata["rule"], dimension_of(name), model.servo.get(name)
