@@ -92,10 +92,14 @@ def ticks(st, name, model, load):
 
 
 def on_a_bus(st, model, command, load):
-    """Return all signals of a servo alone on a bus, as a batch of the plain one."""
-    own = {name: model.value_or(f"supply.{name}", 0.0) for name in ("open_circuit_voltage", "internal_resistance")}
-    fleet = st.simulate_bus({"alone": (model, command, load)}, supply=st.Supply(**own), duration=SECONDS,
-                            output_step=0.005)
+    """Return all signals of a servo alone on a stiff bus, as a batch of the plain one.
+
+    Behind a soft one a servo's circuit is a loop through the source, and that of several a balance of currents: a law
+    of currents that is 1 % off makes two different things of these.
+    """
+    model = type(model)(model.servo.replace({"supply.internal_resistance": 0.0}))
+    supply = st.Supply(open_circuit_voltage=model.value("supply.open_circuit_voltage"))
+    fleet = st.simulate_bus({"alone": (model, command, load)}, supply=supply, duration=SECONDS, output_step=0.005)
     plain = st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005)
     return {f"{kind}/on a bus/{signal}": result[signal] for signal in model.available
             for kind, result in (("plain", plain), ("batch", fleet["alone"]))}

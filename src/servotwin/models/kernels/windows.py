@@ -104,7 +104,7 @@ def measure(size: int, tile: Any, plan: Any) -> None:
         connected = driven or chip.coast > 0.0
         taken = supply.supply_current(i, drive) if connected else 0.0
         plan.v_m[j] = bridge.motor_voltage(i, v_b, chip.R_a, chip.V_br, v_b if connected else 0.0)
-        plan.V_bus[j] = supply.source_voltage(taken, meter.V, meter.R_b)
+        plan.V_bus[j] = supply.source_voltage(taken, meter.V, meter.R_b) if taken != 0.0 else meter.V
 
 
 def divide(size: int, full: bool, tile: Any, plan: Any) -> None:
