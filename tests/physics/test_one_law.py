@@ -26,6 +26,10 @@ FEW = ("breakaway_torque", "drive_time")
 # Where lanes go side by side no potentiometer has play, so that its law is not asked; and the voltage of a bus is what
 # the currents of all balance at, while that of a servo's own supply follows from its one current
 REPEATED = {"play": "tiles", "source_voltage": "on a bus", "supply_current": "on a bus"}
+# Laws of which the balance of energy is made: 1 % off, it cannot close
+BALANCE = {"armature_current_rate", "back_emf", "bridge_loss", "brush_loss", "circuit_current", "copper_loss",
+           "driving_voltage", "electromagnetic_torque", "kinetic_energy", "magnetic_energy", "needed_voltage",
+           "shaft_acceleration", "source_voltage", "steady_armature_current", "supply_current"}
 EDGES = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -2.0)
 
 
@@ -93,6 +97,12 @@ def _differs(one, other):
     return any(key.startswith("plain/") and not np.array_equal(one[key], other[key], equal_nan=True) for key in one)
 
 
+def _unbalanced(found):
+    """Return the largest residual of an energy balance, relative to its largest entry."""
+    energies = [values for key, values in found.items() if key.startswith("plain/") and key.endswith("/energy")]
+    return max(abs(energy[-1]) / np.abs(energy[:-1]).max() for energy in energies)
+
+
 def test_a_batch_of_what_is_derived_is_the_plain_engine(runs):
     _agree(runs.before, 1e-12)
 
@@ -109,6 +119,10 @@ def test_a_law_that_changes_changes_all_paths_alike(runs, name):
     found = runs.scaled([name])
     assert _differs(found, runs.before)
     _agree(found, 1e-12, REPEATED.get(name, ()))
+    if name in BALANCE:
+        assert _unbalanced(found) > 1e-6
+    else:
+        assert _unbalanced(found) < 1e-10
 
 
 @pytest.mark.slow

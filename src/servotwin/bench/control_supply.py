@@ -168,7 +168,7 @@ def _checked(bench: Bench, control: ControlSupply) -> float:
 def _advanced(simulator: Simulator, state: State, until: float, pulses: Signal) -> tuple[State, float]:
     """Return the state at `until` [s], and the voltage of the supply there [V]."""
     record = Record([], [])
-    after = simulator._run(state, until, pulses, 0.0, record)
+    after = simulator.recorded(state, until, pulses, record)
     samples = Trajectory(tuple(record.segments)).at(np.array([until]))
     bus = simulator.model.output("bus_voltage", samples, simulator.drive(pulses), simulator.load)
     return after, float(bus[0])

@@ -130,7 +130,7 @@ class Batch:
         for name, values in self.signals.items():
             own = values[lane].astype(np.float64)
             own.setflags(write=False)
-            result._computed[name] = own
+            result.keep(name, own)
         return result
 
     def raise_if_failed(self) -> Batch:

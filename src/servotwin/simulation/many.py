@@ -23,7 +23,7 @@ from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.packing import Asked, Chunk, Commands, groups
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import lane_remarks
-from servotwin.simulation.simulator import _times
+from servotwin.simulation.simulator import times_asked
 from servotwin.simulation.status import Status
 from servotwin.units import is_finite
 
@@ -132,10 +132,10 @@ def simulate_lanes(
         raise InputError("executor", got=executor, allowed="one with a submit method, as in concurrent.futures")
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
-    times = np.array(_times(duration, output_step, output_times))  # a copy: it becomes read-only
+    times = np.array(times_asked(duration, output_step, output_times))  # a copy: it becomes read-only
     asked = Asked(float(duration), times, _outputs(lanes.model, outputs), real_type(dtype))
     commands = Commands(lanes)
-    packs = _packs(lanes, commands, asked, chunk, _workers(executor))
+    packs = _packs(lanes, commands, asked, chunk, workers_of(executor))
     signals = _space(lanes, asked)
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
@@ -184,7 +184,7 @@ def grid(values: Mapping[str, ArrayLike] | None = None, /, **more: ArrayLike) ->
         raise InputError(f"grid: {twice[0]}", got="two lists", allowed="one list of values for each name")
     axes = {name: _axis(name, axis) for name, axis in {**(values or {}), **more}.items()}
     total = math.prod(axis.size for axis in axes.values())
-    if total * sum(axis.itemsize for axis in axes.values()) > 0.8 * _memory():
+    if total * sum(axis.itemsize for axis in axes.values()) > 0.8 * memory_limit():
         raise InputError("grid", got=f"{total:.3g} combinations", allowed="what fits into memory: take fewer values")
     found, after = {}, total
     for name, axis in axes.items():
@@ -233,7 +233,7 @@ def _space(lanes: Lanes, asked: Asked) -> dict[str, NDArray[Any]]:
     """Return the arrays of the outputs, if the machine has the memory."""
     shape = (lanes.count, len(asked.times))
     size = len(asked.outputs) * math.prod(shape) * np.dtype(asked.dtype).itemsize
-    memory = _memory() if size > _SMALL else math.inf
+    memory = memory_limit() if size > _SMALL else math.inf
     try:
         if size > 0.8 * memory:
             raise MemoryError
@@ -245,7 +245,7 @@ def _space(lanes: Lanes, asked: Asked) -> dict[str, NDArray[Any]]:
             allowed=f"what fits into memory{room}: take fewer of them, or float32") from None
 
 
-def _memory() -> float:
+def memory_limit() -> float:
     """Return how much memory this process may use [bytes]; inf where that is not known."""
     sizes = [math.inf]
     try:
@@ -260,7 +260,8 @@ def _memory() -> float:
     return min(sizes)
 
 
-def _workers(executor: Any) -> int:
+def workers_of(executor: Any) -> int:
+    """Return how many jobs run at once: what the executor says, else the cores of this process."""
     own = getattr(executor, "_max_workers", None)
     if isinstance(own, int) and own > 0:
         return own
@@ -310,7 +311,7 @@ def _run(packs: list[_Pack], asked: Asked,
     waiting = _chunks(packs, asked)
     try:
         while True:
-            while len(flying) < 2 * _workers(executor) and (following := next(waiting, None)) is not None:
+            while len(flying) < 2 * workers_of(executor) and (following := next(waiting, None)) is not None:
                 flying.append((following[0], executor.submit(run_lanes, following[1])))
             if not flying:
                 return
@@ -333,4 +334,4 @@ def _chunks(packs: list[_Pack], asked: Asked) -> Iterator[tuple[Chunk, Work]]:
 @cache
 def own_threads(process: int) -> ThreadPoolExecutor:
     """Return the threads of this process, kept from call to call; a forked child has none of its parent's."""
-    return ThreadPoolExecutor(_workers(None), thread_name_prefix="servotwin")
+    return ThreadPoolExecutor(workers_of(None), thread_name_prefix="servotwin")

@@ -102,6 +102,10 @@ class Result:
             self._computed[name] = values
         return self._computed[name]
 
+    def keep(self, name: str, values: NDArray[np.float64]) -> None:
+        """Take the values of a signal (SI) at the output times as given; not to be written to afterwards."""
+        self._computed[name] = values
+
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
 

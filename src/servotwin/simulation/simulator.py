@@ -132,7 +132,7 @@ class Simulator:
         SimulationError
             If the run cannot go on.
         """
-        return self._run(state, until, command, external_torque, None)
+        return self.recorded(state, until, command, None, external_torque=external_torque)
 
     def observe(self, state: State, name: str, command: Signal, *, external_torque: float = 0.0) -> float:
         """Return a signal (SI) of a state, as it is before anything happens at its time.
@@ -236,8 +236,9 @@ class Simulator:
             raise InputError(what, got=f"a state of {', '.join(state.names)}",
                              allowed=f"one of {', '.join(own)}, as {type(model).__name__} has")
 
-    def _run(self, state: State, until: float, command: Signal, external_torque: float,
-             record: Record | None) -> State:
+    def recorded(self, state: State, until: float, command: Signal, record: Record | None, *,
+                 external_torque: float = 0.0) -> State:
+        """Return what `advance` does, and add motions and events to a record, where one is given."""
         self._check(state, "advance(state)")
         if not (is_finite(until) and until >= state.time):
             raise InputError("advance(until)", got=until, allowed=f"a finite time from {state.time:g} s on")
@@ -303,7 +304,7 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
     """
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
-    times = _times(duration, output_step, output_times)
+    times = times_asked(duration, output_step, output_times)
     simulator = Simulator(model, load, seed)
     simulator.drive(command)  # raises if the model cannot follow it
     warn_of(model.servo, [command], duration)
@@ -317,7 +318,7 @@ def simulated(simulator: Simulator, command: Signal, duration: float, times: NDA
     with shown(progress, _THOUSAND, "simulating") as show:
         record = Record([], [], _thousandths(duration, show) if progress else None)
         try:
-            simulator._run(simulator.initial(command, initial), duration, command, 0.0, record)
+            simulator.recorded(simulator.initial(command, initial), duration, command, record)
         except SimulationError as error:
             status, ended, cause = Status[error.status], error.time, error.cause
     return Result(model=simulator.model, command=command, load=simulator.load, drive=simulator.drive(command),
@@ -350,7 +351,8 @@ def _seed(seed: int) -> int:
     return int(seed)
 
 
-def _times(duration: float, output_step: float | None, output_times: ArrayLike | None) -> NDArray[np.float64]:
+def times_asked(duration: float, output_step: float | None, output_times: ArrayLike | None) -> NDArray[np.float64]:
+    """Return the output times [s] that a call asks for, or raise InputError."""
     if output_times is not None:
         if output_step is not None:
             raise InputError("output_step and output_times", allowed="one of them")

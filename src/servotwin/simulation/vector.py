@@ -14,7 +14,7 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.base import PULSE_RANGE, Model
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.lane_inputs import lanes_of, pick
-from servotwin.simulation.many import own_threads, real_type
+from servotwin.simulation.many import own_threads, real_type, workers_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.vector_commands import Translator
 from servotwin.simulation.vector_memory import VectorMemory
@@ -86,7 +86,7 @@ class VectorSimulator:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
         self._numbers = LaneNumbers(inputs)
-        self._threads = _whole("threads", threads, 1) if threads is not None else os.cpu_count() or 1
+        self._threads = _whole("threads", threads, 1) if threads is not None else workers_of(None)
         self._pool = own_threads(os.getpid())
         self._store = Store(self._numbers, real_type(dtype), self._threads, self._pool)
         self._translate = Translator(self._numbers)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.loads import Load, as_load
 from servotwin.simulation.lane_inputs import lanes_of
-from servotwin.simulation.many import _memory
+from servotwin.simulation.many import memory_limit
 from servotwin.simulation.packing import Chunk, Commands, groups
 from servotwin.simulation.sweep.draws import (
     SAMPLINGS,
@@ -195,7 +195,7 @@ def _count(lanes: int | None, drawing: Mapping[str, Any], table: Mapping[str, Co
 
 
 def _check_memory(lanes: int, columns: int) -> None:
-    size, memory = 3.0 * 8.0 * lanes * columns, _memory()
+    size, memory = 3.0 * 8.0 * lanes * columns, memory_limit()
     if size > 0.8 * memory:
         raise InputError("lanes", got=f"{lanes}, which take {size / 1e9:.3g} GB",
                          allowed=f"what fits into memory ({memory / 1e9:.3g} GB)")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServotwinError
-from servotwin.simulation.many import _workers
+from servotwin.simulation.many import workers_of
 from servotwin.simulation.remarks import COLUMNS
 from servotwin.simulation.status import Status
 from servotwin.simulation.sweep.jobs import run_chunk
@@ -85,7 +85,7 @@ def _own(executor: Any) -> Iterator[Any]:
     if executor is not None:
         yield executor
         return
-    with ThreadPoolExecutor(_workers(None), thread_name_prefix="servotwin-sweep") as own:
+    with ThreadPoolExecutor(workers_of(None), thread_name_prefix="servotwin-sweep") as own:
         yield own
 
 
@@ -93,7 +93,7 @@ def _finished(plan: Plan, missing: list[int], executor: Any, *,
               given: bool) -> Generator[tuple[int, Mapping[str, Any]]]:
     """Run chunks, some ahead; return number and columns of each, in order."""
     known = isinstance(getattr(executor, "_max_workers", None), int)
-    ahead = 2 * _workers(executor) if known else _AHEAD
+    ahead = 2 * workers_of(executor) if known else _AHEAD
     waiting, flying = deque(missing), deque[tuple[int, Any]]()
     try:
         while waiting or flying:
