@@ -56,7 +56,7 @@ def settled_sag(period, torque):
 def held_in_the_mean(period, torque):
     """Part of the load [N m] that friction holds in the mean, once the pulses have settled."""
     result = st.simulate(models(period)[0], st.signals.constant(0.0, unit="deg"), duration=4.0,
-                         load=st.loads.Constant(torque), output_times=3.0 + 1e-5 * np.arange(100_000))
+                         load=st.loads.Constant(torque), output_times=3.0 + 1e-5 * (np.arange(100_000) + 0.5))
     return torque - float(result["motor_torque"].mean())
 
 
