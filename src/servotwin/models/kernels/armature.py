@@ -229,6 +229,11 @@ def voltage(plant: Plant, zone: int, error: float) -> float:
         electronics.error_beyond_deadband(error, zone, 2.0 * plant.half_deadband), plant.gain)
 
 
+def slope(plant: Plant, zone: int) -> float:
+    """Return by how much the armature voltage of a linear zone changes per volt of error."""
+    return electronics.proportional_voltage(electronics.error_beyond_deadband(1.0, zone, 0.0), plant.gain)
+
+
 def conductance(plant: Plant, zone: int, u: float) -> float:
     """Return by how much the current changes per volt in this zone [S]."""
     if zone < CONDUCTING:
@@ -278,5 +283,5 @@ def terminal_voltage(plant: Plant, V_br: float, u: float, w: float, i: float, V_
 def bridge_drops(plant: Plant, V_br: float, u: float) -> tuple[float, float]:
     """Return V_ce0 [V] and r_c [Ω] of what conducts: transistors while the bridge drives, diodes while it coasts."""
     if u == 0.0:
-        return plant.D_off - V_br - plant.V, 0.0
-    return plant.D_drive - V_br, plant.R_drive - plant.R - plant.R_b
+        return max(plant.D_off - V_br - plant.V, 0.0), 0.0
+    return max(plant.D_drive - V_br, 0.0), max(plant.R_drive - plant.R - plant.R_b, 0.0)

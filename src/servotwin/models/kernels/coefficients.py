@@ -22,11 +22,11 @@ def linear_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], tau: tup
     rate = -tau[1]
     sinusoid = 0.0
     if armature.in_linear_zone(mode.zone):
-        gain = per_volt * electronics.proportional_voltage(1.0, plant.gain)
-        stiffness += gain * potentiometer.feedback_voltage(1.0, plant.p)
+        gain = per_volt * armature.slope(plant, mode.zone)
+        stiffness -= gain * electronics.feedback_error(0.0, potentiometer.feedback_voltage(1.0, plant.p))
         torque += per_volt * armature.voltage(plant, mode.zone, armature.error_of(plant, u[0], 0.0))
-        rate += gain * u[1]
-        sinusoid = gain * u[2]
+        rate += gain * electronics.feedback_error(u[1], 0.0)
+        sinusoid = gain * electronics.feedback_error(u[2], 0.0)
     elif armature.constant_current(mode.zone):
         torque += motor.electromagnetic_torque(armature.current(plant, mode.zone, u[0], q, w), plant.K)
     elif mode.zone >= CONDUCTING:
@@ -51,7 +51,7 @@ def speed_coefficients(plant: Plant, mode: Mode, u: tuple[float, ...], against: 
         v, R = armature.loop(plant, mode.zone, u[0])
     else:
         v = armature.voltage(plant, mode.zone, armature.error_of(plant, u[0], 0.0))
-    gain = electronics.proportional_voltage(1.0, plant.gain) if follows else 0.0
+    gain = armature.slope(plant, mode.zone) * electronics.feedback_error(1.0, 0.0) if follows else 0.0
     # ẅ + (R/L + b/J) ẇ + … : rates of the current by a volt, an ampere and a radian per second
     rise = motor.armature_current_rate(1.0, 0.0, 0.0, R, L, K_b)
     fade = -motor.armature_current_rate(0.0, 1.0, 0.0, R, L, K_b)

@@ -93,6 +93,9 @@ def _through(size: int, full: bool, noisy: bool, braked: bool, keep: bool, tile:
     if noisy:
         for j in range(size):
             plan.draw[j] = gaussian(tile.count.seed[j], tile.count.first_draw[j] + tile.count.number[j] - 1)
+    elif full:
+        for j in range(size):
+            plan.draw[j] = 0.0
     if full:
         windows.measure(size, tile, plan)
     windows.divide(size, full, tile, plan)
