@@ -5,6 +5,7 @@ It drives the kernels and keeps what they leave behind: states to go on from, se
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -197,14 +198,16 @@ def failure(status: Status, time: float) -> SimulationError:
 
 def _keep(record: Record, inputs: Inputs, chip: Chip, before: Memory, memory: Memory, m: Motion, event: int) -> None:
     """Add a step to a record: its chip's doings, its motion, its event."""
-    start, now = time_of(before), time_of(memory)
-    point, angle = memory.point, before.point.y[0]
-    keep_switch(record, before.chip, memory.chip, start, angle)
-    if memory.chip.number > before.chip.number and not frame.accepted(chip, pulse_width(inputs, before)):
-        record.events.append(Event(start, "pulse refused", angle))
+    origin, point, angle = origin_of(memory), memory.point, before.point.y[0]
+    start, now = origin + before.point.time, origin + point.time
+    if memory.chip is not before.chip:
+        keep_switch(record, before.chip, memory.chip, start, angle)
+        bounded = chip.shortest > 0.0 or chip.longest < math.inf
+        if (bounded and memory.chip.number > before.chip.number
+                and not frame.accepted(chip, pulse_width(inputs, before))):
+            record.events.append(Event(start, "pulse refused", angle))
     if now > start or not record.segments:
-        record.segments.append(Segment(start, now, m, memory.chip.error, before.point.wiper, memory.chip.drive,
-                                       origin_of(memory)))
+        record.segments.append(Segment(start, now, m, memory.chip.error, before.point.wiper, memory.chip.drive, origin))
     if record.tell is not None:
         record.tell(now)
     if event >= 0:

@@ -89,8 +89,6 @@ def time_of(memory: Memory) -> float:
 
 def since(piece: Piece, origin: float) -> Piece:
     """Return a piece by the time since `origin` [s]."""
-    if origin == 0.0:
-        return piece
     return Piece(piece.start - origin, piece.value, piece.slope, piece.amplitude, piece.frequency, piece.phase,
                  piece.sweep)
 

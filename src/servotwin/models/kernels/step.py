@@ -39,7 +39,7 @@ def step(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, m: Motion, un
     `m` is the motion of the step before, or `motion.nothing`.
     """
     frames, beat, point, now, u, u_end, tau, tau_end = memory
-    origin, t = origin_of(memory), point.time
+    origin, t = frames * beat, point.time
     new = point.anchor_time == math.inf
     if t >= tau_end:
         tau, tau_end = in_force(inputs.torque, origin, t, inputs.constant_torque)
@@ -47,17 +47,19 @@ def step(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, m: Motion, un
     if chip.frame_period > 0.0:
         if frame.next_switch(now) <= t:
             now = frame.switched(now, t)
-        if edge_of(inputs, memory, now.number) <= t:
+        edge = edge_of(inputs, memory, now.number)
+        if edge <= t:
             now = measured(plant, chip, inputs, now, point, pulse_width(inputs, memory))
             if now.number == frame.CROWDED:
                 return Stepped(memory, m, -1, CROWDED)
-        u_end = min(frame.next_switch(now), edge_of(inputs, memory, now.number))
+            edge = edge_of(inputs, memory, now.number)
+        u_end = min(frame.next_switch(now), edge)
         if new or u.value != now.drive * plant.V:
             u, new = source(plant, now), True
     elif t >= u_end:
         u, u_end = in_force(inputs.command, origin, t, 0.0)
         new = True
-    local_u, local_tau = since(u, origin), since(tau, origin)
+    local_u, local_tau = (since(u, origin), since(tau, origin)) if origin != 0.0 else (u, tau)
     if new:
         point = anchored(plant, local_u, local_tau, t, point)
         m = motion.nothing(plant, local_u, local_tau)
@@ -103,7 +105,7 @@ def in_one_piece(plant: Plant, u: Piece) -> bool:
 
 def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
     """Follow a motion to its first event, its end or the horizon [s]; return also the event (−1: none) and a status."""
-    t0 = m.t0
+    t0, integrated = m.t0, motion.is_step(m)
     step_end = t0 + m.length
     if abs(step_end - horizon) <= 4e-16 * (abs(t0) + abs(horizon)):
         step_end = horizon
@@ -112,11 +114,11 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
         fine, settled = motion.scales(m)
         if min(end - t0, settled) > _MOST_OSCILLATIONS * fine:
             return point, -1, TOO_FAST
-    if motion.is_step(m) and (point.time > t0 or end < step_end):
+    if integrated and (point.time > t0 or end < step_end):
         m = motion.prepared(m)
     v = piece_value(m.u, point.time)
     kinds = hybrid.guards(m.plant, m.mode, v, in_one_piece(m.plant, m.u))
-    if motion.is_step(m):  # looked at as a whole, however a run is split
+    if integrated:  # looked at as a whole, however a run is split
         s, kind = events.first_event(m, kinds, 0.0, m.length)
         kind = kind if s <= end - t0 else -1
     else:
@@ -124,7 +126,7 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
     if kind < 0:
         y = motion.state(m, end - t0)
         wiper = frame.wiper_at(m.plant.half_slack, point.wiper, y[0])
-        if motion.is_step(m) and end == step_end:
+        if integrated and end == step_end:
             return Point(end, y, m.mode, end, y, m.next_step, wiper), -1, status_of(y)
         return Point(end, y, m.mode, t0, point.anchor, point.step, wiper), -1, status_of(y)
     t = min(max(t0 + s, point.time), end)
