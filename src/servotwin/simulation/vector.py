@@ -19,7 +19,7 @@ from servotwin.simulation.status import Status
 from servotwin.simulation.vector_commands import Translator
 from servotwin.simulation.vector_memory import VectorMemory
 from servotwin.simulation.vector_numbers import LaneNumbers
-from servotwin.simulation.vector_store import Store
+from servotwin.simulation.vector_store import SHAFT, Store
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
@@ -174,6 +174,8 @@ class VectorSimulator:
         """Return a signal (SI) of all lanes at their present time, shape (lanes,)."""
         if name == "time":
             return self.time
+        if name in SHAFT:
+            return self._store.shaft(name)
         if name not in self._numbers.model.available:
             raise UnknownNameError(f"signal of {type(self._numbers.model).__name__}", name,
                                    ("time", *self._numbers.model.available))

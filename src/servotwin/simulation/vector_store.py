@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+SHAFT = {"output_angle": ("q", 0), "output_speed": ("w", 1)}  # where tiles and records have them
 _WORTH = 8  # tiles for a thread: fewer cost more in waking it
 
 
@@ -103,6 +104,13 @@ class Store:
         found = np.zeros(len(self.status), RECORD)
         for some in self._sets:
             found[some.which] = some.records(self._columns)
+        return found
+
+    def shaft(self, name: str) -> Array:
+        """Return angle [rad] or speed [rad/s] of each shaft."""
+        found = np.empty(len(self.status))
+        for some in self._sets:
+            found[some.which] = some.shaft(name)
         return found
 
     @property
@@ -247,6 +255,9 @@ class _Tiles:
     def records(self, columns: tiles.Lanes) -> NDArray[Any]:
         return records_of(self.rows, np.arange(len(self.which)), columns.start[3:5, self.which])
 
+    def shaft(self, name: str) -> Array:
+        return np.asarray(self.rows["servo"][SHAFT[name][0]].reshape(-1)[:len(self.which)], dtype=np.float64)
+
     @property
     def time(self) -> Array:
         edge, since = (flat(self.rows, "clock", name)[:len(self.which)] for name in ("edge", "since"))
@@ -277,6 +288,9 @@ class _Records:
 
     def records(self, columns: tiles.Lanes) -> NDArray[Any]:
         return self.rows.copy()
+
+    def shaft(self, name: str) -> Array:
+        return np.asarray(self.rows["point"]["y"][:, SHAFT[name][1]])
 
     @property
     def time(self) -> Array:
