@@ -69,6 +69,24 @@ def test_it_is_many_simulators(servo, name):
         np.testing.assert_allclose(sims[signal], expected, rtol=1e-9, atol=1e-10, err_msg=signal)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["plain", "coasting, with noise", "frames as short as pulses", "stops"])
+def test_a_thousand_cuts(servo, name):
+    changes, load = CASES[name]
+    model = model_of(servo, changes)
+    cuts = np.sort(np.random.default_rng(8).uniform(0.0, 3.0, 1000))
+    every = np.repeat(WIDTHS, 334)
+    sims, sim = st.VectorSimulator(model, 1, load=load), st.Simulator(model, load)
+    sims.reset(pulse_width=1500e-6)
+    state = sim.initial(st.signals.constant(1500.0, unit="us"))
+    for k, (before, until) in enumerate(zip((0.0, *cuts), cuts, strict=False)):
+        sims.advance(until - before, pulse_width=every[k])
+        if k % 334 == 333:  # here the width changes: one run for the other
+            state = sim.advance(state, until, st.signals.constant(1e6 * every[k], unit="us"))
+            np.testing.assert_allclose(sims["output_angle"], state["output_angle"], rtol=0.0, atol=1e-12)
+            np.testing.assert_allclose(sims["output_speed"], state["output_speed"], rtol=1e-10, atol=1e-10)
+
+
 @pytest.mark.parametrize("kind", [st.PulseServoInductive, st.BoundedServo])
 def test_the_other_models(servo, kind):
     model = model_of(servo, {}, kind)
@@ -103,13 +121,12 @@ def test_a_million_ticks(servo, kind):
     model = model_of(servo, changes)
     sims = st.VectorSimulator(model, 2, load=load)
     sims.reset(pulse_width=1500e-6)
-    command = st.signals.samples(np.arange(100) * 10.0, 1e6 * np.resize(WIDTHS, 100), unit="us")
     sim = st.Simulator(model, load)
     state = sim.initial(st.signals.constant(1500.0, unit="us"))
     for k in range(100):
         for _ in range(10_000):
             sims.advance(1e-3, pulse_width=WIDTHS[k % 3])
-        state = sim.advance(state, 10.0 * (k + 1), command)
+        state = sim.advance(state, 10.0 * (k + 1), st.signals.constant(1e6 * WIDTHS[k % 3], unit="us"))
         np.testing.assert_allclose(sims["output_angle"], state["output_angle"], rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(sims.time, 1000.0, rtol=1e-13)
 
