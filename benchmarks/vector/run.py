@@ -12,7 +12,8 @@ import numpy as np
 
 import servotwin as st
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).resolve().parents[1] / "pulse_servo")]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "pulse_servo"))
 import peer_mujoco
 from common import best
 from fleet import random_fleet
@@ -116,7 +117,8 @@ def calls() -> None:
         call()
         time = best(call, 15)
         speed = LANES * DURATION / time
-        print(f"{name + ', ' + dtype:36} {1e3 * time:9.2f} {speed:10.2e} {'' if peer is None else f'{speed / peer:12.0f}x'}")
+        ratio = "" if peer is None else f"{speed / peer:12.0f}x"
+        print(f"{name + ', ' + dtype:36} {1e3 * time:9.2f} {speed:10.2e} {ratio}")
 
 
 def main() -> None:
