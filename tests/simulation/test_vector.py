@@ -289,6 +289,9 @@ BAD = {
     "angle beyond": (lambda s: s.advance(1e-3, command_angle=[0.1, 0.2, 99.0]), "lane 2"),
     "two commands": (lambda s: s.advance(1e-3, pulse_width=1.5e-3, command_angle=0.1), "command"),
     "torque of nan": (lambda s: s.advance(1e-3, external_torque=[0.0, 0.0, np.nan]), "external_torque of lane 2"),
+    "masked": (lambda s: s.advance(1e-3, pulse_width=np.ma.masked_array([1.5e-3] * 3, [0, 1, 0])), "masked"),
+    "no time": (lambda s: s.advance(None), "advance"),
+    "years": (lambda s: s.advance(1e9), "advance"),
     "a word": (lambda s: s.advance(1e-3, pulse_width="long"), "pulse_width"),
     "unknown signal": (lambda s: s["oil_pressure"], "oil_pressure"),
     "lane out of range": (lambda s: s.reset(lanes=[3]), "lanes"),
@@ -324,11 +327,19 @@ def test_a_memory_belongs_to_its_model(servo):
         st.VectorSimulator(st.BoundedServo(servo), 2).restore(memory)
 
 
-@pytest.mark.parametrize(("lanes", "more"), [(0, {}), (2.5, {}), (2, {"bus": 6.0}), (2, {"threads": 0}),
+@pytest.mark.parametrize(("lanes", "more"), [(0, {}), (2.5, {}), (10**12, {}), (2, {"bus": 6.0}), (2, {"threads": 0}),
                                              (2, {"parameters": {"load.inertia": [1e-3] * 3}}), (2, {"dtype": "int8"})])
 def test_what_cannot_be_built(servo, lanes, more):
     with pytest.raises(InputError):
         st.VectorSimulator(st.PulseServo(servo), lanes, **more)
+
+
+def test_a_recorded_load_that_ends_is_said_before_it_does(servo):
+    sims = st.VectorSimulator(st.PulseServo(servo), 2, load=st.loads.Recorded([0.0, 0.05], [0.0, 0.1]))
+    sims.advance(0.05)
+    with pytest.raises(InputError, match="lane 0"):
+        sims.advance(1e-3)
+    assert sims.time.tolist() == pytest.approx([0.05, 0.05])
 
 
 def test_models_without_lanes_are_refused(servo):

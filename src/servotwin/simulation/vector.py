@@ -14,12 +14,13 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.base import PULSE_RANGE, Model
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.lane_inputs import lanes_of, pick
-from servotwin.simulation.many import own_threads, real_type, workers_of
+from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.vector_commands import Translator
 from servotwin.simulation.vector_memory import VectorMemory
 from servotwin.simulation.vector_numbers import LaneNumbers
 from servotwin.simulation.vector_store import SHAFT, Store
+from servotwin.units import is_finite
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from servotwin import loads
 
 Array = NDArray[np.float64]
+_BYTES = 4000  # of a lane, and of what is made of it now and then
+_LONGEST = 1e5  # s: nothing stops a kernel, and millions of frames take seconds
 
 
 class VectorSimulator:
@@ -74,6 +77,8 @@ class VectorSimulator:
         threads: int | None = None, seed: int = 0,
     ) -> None:
         count = _whole("lanes", lanes, 1)
+        if count * _BYTES > 0.8 * memory_limit():
+            raise InputError("lanes", got=count, allowed="what fits into memory: take fewer")
         if bus is not None:
             raise InputError("bus of VectorSimulator", got=bus, allowed="None: several servos on one supply are run by "
                              "simulate_bus")
@@ -135,8 +140,10 @@ class VectorSimulator:
         InputError
             On bad input, before any lane moves; names lane and argument. A lane that fails later says so in `status`.
         """
-        if not (duration >= 0.0 and duration < math.inf):
-            raise InputError("advance(duration)", got=duration, allowed="a number of seconds, at least 0")
+        if not (type(duration) is float or is_finite(duration)) or not 0.0 <= duration <= _LONGEST:
+            raise InputError("advance(duration)", got=duration,
+                             allowed=f"a number of seconds, from 0 to {_LONGEST:.0e} in one call")
+        self._numbers.check_recorded(lambda: self.time, float(duration))
         torque = self._torque_of(external_torque) if external_torque is not None else None
         self._take_command(pulse_width, command_angle, command_voltage)
         if torque is not None and not np.array_equal(torque, self._torque):

@@ -61,6 +61,8 @@ class Translator:
         if type(given) is float:
             good = scale.low < given < scale.high
         else:
+            if isinstance(given, np.ma.MaskedArray):
+                raise InputError(name, got="a masked array", allowed="numbers, none of them masked")
             try:
                 given = np.asarray(given, dtype=np.float64)
             except (TypeError, ValueError, OverflowError):

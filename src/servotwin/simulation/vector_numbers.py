@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError
+from servotwin.errors import InputError, LoadError
 from servotwin.loads import Load
 from servotwin.models.columns import LanePieces
 from servotwin.models.kernels.frame import Chip
@@ -199,6 +199,18 @@ class LaneNumbers:
             k = int(np.argmin(good))
             raise InputError(f"output_angle of lane {which[k]}", got=float(angle[k]),
                              allowed=f"{lower[k]:.6g} to {upper[k]:.6g} rad, between the stops")
+
+    def check_recorded(self, time: Callable[[], Array], duration: float) -> None:
+        """Raise LoadError if a recorded torque ends before lanes that go on for a duration [s] do; names the lane."""
+        if not self.torque.count.any():
+            return
+        now = time()
+        for lane in np.flatnonzero(self.torque.count).tolist():
+            load = self.inputs.loads[self.inputs.load_of[lane]]
+            try:
+                load.check_span(0.0, float(now[lane]) + duration)
+            except LoadError as error:
+                raise LoadError(f"{error.what} of lane {lane}", got=error.got, allowed=error.allowed) from None
 
     # --- what shows ---------------------------------------------------------------------------------------------------
 
