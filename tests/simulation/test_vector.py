@@ -174,10 +174,10 @@ def test_lanes_are_reset_on_their_own(servo):
 def test_threads_and_neighbours_change_nothing(servo):
     model = st.PulseServo(servo)
     rng = np.random.default_rng(1)
-    widths = rng.uniform(1.1e-3, 1.9e-3, (5, 3000))
+    widths = rng.uniform(1.1e-3, 1.9e-3, (5, 20_000))
     ends = []
     for threads in (1, 3):
-        sims = st.VectorSimulator(model, 3000, threads=threads)
+        sims = st.VectorSimulator(model, 20_000, threads=threads)
         for row in widths:
             sims.advance(0.013, pulse_width=row)
         ends.append(sims["output_angle"])

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 SHAFT = {"output_angle": ("q", 0), "output_speed": ("w", 1)}  # where tiles and records have them
-_WORTH = 8  # tiles for a thread: fewer cost more in waking it
+_WORTH = 64  # tiles for a thread: fewer cost more in waking it
 
 
 class Store:
