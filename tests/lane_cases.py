@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.plant import Plant
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.plant import Plant
 from servotwin.simulation.lanes import Tables, Work, no_tables, regular_edges
 
 STEPS = 4  # of each command

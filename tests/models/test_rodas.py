@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from servotwin.models.kernels import hybrid, rodas
-from servotwin.models.kernels.plant import FREE, LINEAR, RIGID, Mode, Plant
+from servotwin.models.engine import hybrid, rodas
+from servotwin.models.terms.plant import FREE, LINEAR, RIGID, Mode, Plant
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # A pendulum behind a motor with inductance: ẇ = −sin q − 0.3 w + i + cos 2t, di/dt = −50 i + 50 (sin 3t − w)

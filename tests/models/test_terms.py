@@ -9,8 +9,8 @@ import servotwin as st
 from conftest import EVERYTHING
 from reference.drivetrain_steps import LAWS, Rotor, budget
 from servotwin.models import MODELS
-from servotwin.models.kernels.gear_friction import holding_friction, sliding_friction
-from servotwin.models.kernels.plant import at_temperature
+from servotwin.models.terms.gear_friction import holding_friction, sliding_friction
+from servotwin.models.terms.plant import at_temperature
 
 HEAT = {name: value for name, value in EVERYTHING.items() if name.startswith("thermal.")}
 PLAY = {"gear.backlash": 0.02, "gear.output_inertia": 1e-3}

@@ -15,9 +15,9 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.loads import Load, as_load
-from servotwin.models.kernels import armature, contact
-from servotwin.models.kernels.memory import started
-from servotwin.models.kernels.plant import FORWARD, FREE, RIGID, Mode, Plant, Vector
+from servotwin.models.engine.memory import started
+from servotwin.models.terms import armature, contact
+from servotwin.models.terms.plant import FORWARD, FREE, RIGID, Mode, Plant, Vector
 from servotwin.physics import motor
 from servotwin.physics.pieces import constant_pieces
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE

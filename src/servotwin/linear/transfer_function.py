@@ -9,7 +9,7 @@ import numpy as np
 from servotwin.errors import InputError, LoadError, UnknownNameError
 from servotwin.loads import as_load
 from servotwin.models import DCMotor, GearedMotor, Model, PulseServo, PulseServoInductive
-from servotwin.models.kernels.plant import Plant
+from servotwin.models.terms.plant import Plant
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,8 +8,8 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.base import KINDS, Line, Model, check_accepted, check_travel, feedback_line, solved
-from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
+from servotwin.models.terms.plant import Plant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

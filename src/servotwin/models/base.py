@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
-    from servotwin.models.kernels.frame import Chip
-    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
+    from servotwin.models.terms.frame import Chip
+    from servotwin.models.terms.plant import Plant
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 

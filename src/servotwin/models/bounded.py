@@ -20,8 +20,8 @@ from servotwin.models.base import (
     feedback_line,
     solved,
 )
-from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
+from servotwin.models.terms.plant import Plant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

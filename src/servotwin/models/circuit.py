@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin import physics
-from servotwin.models.kernels import armature
+from servotwin.models.terms import armature
 from servotwin.physics.laws import array_form
 
 if TYPE_CHECKING:
     from servotwin.models.base import Model
-    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
+    from servotwin.models.terms.plant import Plant
     from servotwin.physics.pieces import Pieces
 
 Array = NDArray[np.float64]

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, final
 
 from servotwin.errors import CommandError
 from servotwin.models.base import Model
-from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
+from servotwin.models.terms.plant import Plant
 
 if TYPE_CHECKING:
     from servotwin.loads import Load

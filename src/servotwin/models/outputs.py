@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 
 from servotwin import physics
 from servotwin.models.circuit import circuit_of
-from servotwin.models.kernels import contact
-from servotwin.models.kernels.plant import INSIDE, STUCK, at_temperature
+from servotwin.models.terms import contact
+from servotwin.models.terms.plant import INSIDE, STUCK, at_temperature
 from servotwin.physics.laws import array_form
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
     from servotwin.models.base import Model
-    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
+    from servotwin.models.terms.plant import Plant
     from servotwin.physics.pieces import Pieces
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from servotwin import physics
-from servotwin.models.kernels.plant import Plant
+from servotwin.models.terms.plant import Plant
 
 if TYPE_CHECKING:
     from servotwin.loads import Load

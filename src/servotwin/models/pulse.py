@@ -13,10 +13,10 @@ from servotwin import physics
 from servotwin.errors import InputError
 from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
 from servotwin.models.bounded import BoundedServo
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.plant import Plant
 from servotwin.models.plant import make_plant
 from servotwin.models.pulse_plant import gear_numbers, sensor_numbers, source_numbers, thermal_numbers
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.plant import Plant
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """What a pulse servo's plant has beyond motor and shaft: the source, the gear, the sensor's play, the heat.
 
-Each function gives fields of `kernels.plant.Plant`; numbers may be columns, one per lane.
+Each function gives fields of `terms.plant.Plant`; numbers may be columns, one per lane.
 """
 
 from __future__ import annotations

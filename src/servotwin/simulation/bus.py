@@ -12,12 +12,12 @@ import numpy as np
 
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model, PulseServo, PulseServoInductive
-from servotwin.models.kernels import coupled
-from servotwin.models.kernels.coupled import Source
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.plant import Mode
+from servotwin.models.engine import shared_source
+from servotwin.models.engine.shared_source import Source
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.plant import Mode
 from servotwin.parameters.groups import Supply
 from servotwin.physics.pieces import Piece
 from servotwin.signals import Signal
@@ -328,7 +328,7 @@ class _BusVoltage:
             if drive == 0.0 and not (chip.coast > 0.0 and (y[2] != 0.0 or y[6] != 0.0)):
                 continue
             mode = Mode(int(s.zone[k]), int(s.contact[k]), int(s.mesh[k]), int(s.motor[k]))
-            stiff = coupled.on_stiff_source(plan.plant, drive == 0.0)
-            members.append(coupled.member_of(stiff, mode, drive, Piece(), y))
+            stiff = shared_source.on_stiff_source(plan.plant, drive == 0.0)
+            members.append(shared_source.member_of(stiff, mode, drive, Piece(), y))
             states.append(y)
-        return coupled.zoned(self.source, members, states, self.source.V)[2]
+        return shared_source.zoned(self.source, members, states, self.source.V)[2]

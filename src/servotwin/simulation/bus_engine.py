@@ -10,12 +10,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from servotwin.models.kernels import armature, coupled, frame, hybrid, motion, step
-from servotwin.models.kernels.frame import Chip, Frame
-from servotwin.models.kernels.memory import Point
-from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.plant import Plant, Vector
-from servotwin.models.kernels.step import MOST_IDLE
+from servotwin.models.engine import hybrid, motion, shared_source, step
+from servotwin.models.engine.memory import Point
+from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.step import MOST_IDLE
+from servotwin.models.terms import armature, frame
+from servotwin.models.terms.frame import Chip, Frame
+from servotwin.models.terms.plant import Plant, Vector
 from servotwin.physics.pieces import Piece, piece_value
 from servotwin.simulation.bus_group import Connected, Group
 from servotwin.simulation.engine import Event, Plan, Record, Segment, event_name, failure, keep_switch
@@ -43,7 +44,7 @@ class Unit:
 
     def __post_init__(self) -> None:
         for returning in (False, True):
-            self.stiff[returning] = coupled.on_stiff_source(self.plan.plant, returning)
+            self.stiff[returning] = shared_source.on_stiff_source(self.plan.plant, returning)
 
     def plan_ahead(self) -> None:
         """Find out when chip and load do something next."""

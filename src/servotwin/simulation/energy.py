@@ -9,7 +9,7 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.circuit import circuit_of
-from servotwin.models.kernels import motion
+from servotwin.models.engine import motion
 from servotwin.models.outputs import torques_of, warm_plant
 from servotwin.physics import motor, shaft
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from servotwin.loads import Load
     from servotwin.models import Model
-    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
+    from servotwin.models.terms.plant import Plant
     from servotwin.physics.pieces import Pieces
     from servotwin.simulation.trajectory import Trajectory
 

@@ -12,11 +12,13 @@ from typing import NamedTuple
 
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
-from servotwin.models.kernels import frame, hybrid, motion
-from servotwin.models.kernels.frame import NO_CHIP, Chip, Frame
-from servotwin.models.kernels.memory import Inputs, Memory, counted_anew, due, instant, origin_of, resumed, time_of
-from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.plant import (
+from servotwin.models.engine import hybrid, motion
+from servotwin.models.engine.memory import Inputs, Memory, counted_anew, due, instant, origin_of, resumed, time_of
+from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
+from servotwin.models.terms import frame
+from servotwin.models.terms.frame import NO_CHIP, Chip, Frame
+from servotwin.models.terms.plant import (
     CONDUCTING,
     CORE,
     LIMITED_BACKWARD,
@@ -26,7 +28,6 @@ from servotwin.models.kernels.plant import (
     Plant,
     at_rest,
 )
-from servotwin.models.kernels.step import COMPLETED, MOST_IDLE, pulse_width, step
 from servotwin.physics.pieces import Pieces
 from servotwin.simulation.status import Status
 

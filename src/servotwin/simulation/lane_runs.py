@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels import tiles
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.plant import Plant
-from servotwin.models.kernels.records import room
-from servotwin.models.kernels.tiles import Lanes, Outputs
+from servotwin.models.engine import tiles
+from servotwin.models.engine.records import room
+from servotwin.models.engine.tiles import Lanes, Outputs
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.plant import Plant
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.lane_memory import RECORD, flat, records_of
 from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
@@ -20,11 +20,11 @@ Indices = NDArray[np.int64]
 
 SIDE_BY_SIDE = {
     dtype: Recipe(f"side_by_side_{dtype}", tuple(
-        f"servotwin.models.kernels.side_by_side:{name}" for name in ("start", "go_on", "advance", "renew")),
+        f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "renew")),
         vector=True, single=dtype == "float32")
     for dtype in ("float64", "float32")
 }
-_ENTRIES = tuple(f"servotwin.models.kernels.runs:{name}" for name in ("start", "go_on", "settle"))
+_ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on", "settle"))
 _RUNS = Recipe("runs", _ENTRIES)  # everything
 _RARE = {"varies": 0.0, "half_play": 0.0, "C_w": 0.0, "half_slack": 0.0, "L": 0.0, "gravity": 0.0, "kappa": 0.0,
          "I_max": np.inf}
@@ -35,7 +35,7 @@ _SWINGING = Recipe(
     "pendulum_runs", _ENTRIES,
     absent=(*((name, x) for name, x in _RARE.items() if name != "gravity"), ("sweep", 0.0)),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
-_ENDING = Recipe("ending", ("servotwin.models.kernels.ending:look_at_lanes",), vector=True)
+_ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once

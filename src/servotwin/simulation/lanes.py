@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from servotwin.models.kernels.frame import Chip
-    from servotwin.models.kernels.plant import Plant
+    from servotwin.models.terms.frame import Chip
+    from servotwin.models.terms.plant import Plant
 
 Floats = NDArray[np.float64]
 Numbers = TypeVar("Numbers", bound=tuple[object, ...])
@@ -86,7 +86,7 @@ class Work:
     edges : Tables
         Frame edges [s]; count −1: regular frames of `chip.frame_period`.
     start : ndarray, shape (7, B)
-        The state at t = 0, as in `kernels.plant.Vector`.
+        The state at t = 0, as in `terms.plant.Vector`.
     seeds : ndarray of int64, shape (B,)
         Of the noise.
     duration : float
@@ -94,7 +94,7 @@ class Work:
     times : ndarray, shape (T,)
         Output times [s], not decreasing, within [0, duration].
     fields : tuple of str
-        Of "angle" [rad], "speed" [rad/s], "contact" (`kernels.plant.FREE` … `ON_UPPER`), "drive" (−1, 0, +1) and
+        Of "angle" [rad], "speed" [rad/s], "contact" (`terms.plant.FREE` … `ON_UPPER`), "drive" (−1, 0, +1) and
         "error" (of the latest decision [s]), or of `MORE_FIELDS`; only these are computed and kept.
     dtype : str
         "float64" or "float32".
@@ -157,7 +157,7 @@ class Raw:
     refused : ndarray of float64, shape (B,)
         From when on all pulses are refused [s]; nan where the last one is not.
     marks : ndarray of int8, shape (B,)
-        Sums of `kernels.ending.ON_STOP` and `CANNOT_HOLD`.
+        Sums of `engine.ending.ON_STOP` and `CANNOT_HOLD`.
     """
 
     fields: dict[str, NDArray[np.generic]]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
-from servotwin.models.kernels.plant import Plant
 from servotwin.models.outputs import FIELDS as FIELDS_OF
+from servotwin.models.terms.plant import Plant
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
 from servotwin.simulation.lane_inputs import LAWS, Lanes

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from servotwin.models.kernels import ending
-from servotwin.models.kernels.frame import Chip
+from servotwin.models.engine import ending
+from servotwin.models.terms.frame import Chip
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:

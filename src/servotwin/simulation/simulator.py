@@ -12,11 +12,11 @@ import numpy as np
 from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
 from servotwin.loads import Constant, as_load
 from servotwin.models import Model
-from servotwin.models.kernels.frame import NO_CHIP
-from servotwin.models.kernels.memory import started, with_play
-from servotwin.models.kernels.plant import INSIDE, RIGID
-from servotwin.models.kernels.runs import mode_of
+from servotwin.models.engine.memory import started, with_play
+from servotwin.models.engine.runs import mode_of
 from servotwin.models.samples import Samples
+from servotwin.models.terms.frame import NO_CHIP
+from servotwin.models.terms.plant import INSIDE, RIGID
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine

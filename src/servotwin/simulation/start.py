@@ -9,7 +9,7 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.models.base import Place
-from servotwin.models.kernels.plant import Plant
+from servotwin.models.terms.plant import Plant
 from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE
 
 _SLACK = 1e-12  # rad
@@ -17,7 +17,7 @@ COLDEST_WINDING = REFERENCE_TEMPERATURE - 1.0 / COPPER_COEFFICIENT  # K
 
 
 def start_vector(places: Sequence[Place], plant: Plant, angle: Any, initial: Mapping[str, Any]) -> Any:
-    """Return the numbers of `kernels.plant.Vector`, at rest and at ambient temperature but for `initial`.
+    """Return the numbers of `terms.plant.Vector`, at rest and at ambient temperature but for `initial`.
 
     Parameters
     ----------

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.loads import Load
 from servotwin.models.columns import LanePieces
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.memory import Memory, started
-from servotwin.models.kernels.plant import INSIDE, RIGID, Plant
-from servotwin.models.kernels.tiles import Lanes as Columns
+from servotwin.models.engine.memory import Memory, started
+from servotwin.models.engine.tiles import Lanes as Columns
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.plant import INSIDE, RIGID, Plant
 from servotwin.simulation import lane_runs
 from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
 from servotwin.simulation.lanes import Tables
@@ -44,7 +44,7 @@ class LaneNumbers:
 
     Attributes
     ----------
-    columns : models.kernels.tiles.Lanes
+    columns : models.engine.tiles.Lanes
     torque : Tables
         Recorded torque over time; a lane without one has no row.
     curve : ndarray, shape (2, n)

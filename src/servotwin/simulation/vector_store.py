@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels import tiles
-from servotwin.models.kernels.plant import BACKWARD, FORWARD, FREE, INSIDE, RIGID, STUCK, Plant
-from servotwin.models.kernels.records import TILE, room
+from servotwin.models.engine import tiles
+from servotwin.models.engine.records import TILE, room
+from servotwin.models.terms.plant import BACKWARD, FORWARD, FREE, INSIDE, RIGID, STUCK, Plant
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
@@ -256,7 +256,7 @@ class _Tiles:
         """Return in which contact each shaft is."""
         n = len(self.which)
         shaft, servo = ({name: flat(self.rows, group, name)[:n] for name in names} for group, names in (
-            ("shaft", ("friction_forward", "friction_backward", "start_forward", "start_backward", "start_off")),
+            ("arc", ("friction_forward", "friction_backward", "start_forward", "start_backward", "start_off")),
             ("servo", ("w", "drive"))))
         start = np.select([servo["drive"] > 0.0, servo["drive"] < 0.0],
                           [shaft["start_forward"], shaft["start_backward"]], shaft["start_off"])

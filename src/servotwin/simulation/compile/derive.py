@@ -1,10 +1,10 @@
 """Derive one module that numba can compile and cache from the kernels and laws, mechanically.
 
 Starting from the entries, every function that is called is collected from its own module under the name
-`module__function`; constants come along by value, classes are imported from where they are. A kernel is changed in
-these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out; in the float32 form
-every float literal gets that type; in the vector form `math.exp`, `math.log` and `math.log1p` become the polynomials of
-`kernels.elementary`.
+`package_module__function`; constants come along by value, classes are imported from where they are. A kernel is changed
+in these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out; in the float32
+form every float literal gets that type; in the vector form `math.exp`, `math.log` and `math.log1p` become the
+polynomials of `engine.elementary`.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, cast
 
-_ELEMENTARY = "servotwin.models.kernels.elementary"
+_ELEMENTARY = "servotwin.models.engine.elementary"
 _INTRINSICS = "servotwin.simulation.compile.intrinsics"
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instructions in the vector form
 _POLYNOMIALS = ("exp", "log", "log1p")
-_DOUBLE = ("servotwin.models.kernels.noise", "servotwin.physics.pieces")  # in float64 throughout
+_DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
 _PACKAGE = "servotwin."
 _LONG = 12  # a tuple of more numbers is a table
 
@@ -132,7 +132,7 @@ class _Derivation:
         return self.function(module, name)
 
     def _generated(self, function: Any) -> str:
-        """Collect a function of `kernels.records`, which comes as text."""
+        """Collect a function of `engine.records`, which comes as text."""
         flat = _flat(function.__module__, function.__name__)
         if flat not in self.functions:
             aliases = {name: self.value(kind.__module__, name, kind) for name, kind in function.kinds.items()}
@@ -336,7 +336,7 @@ def _home(module: str, name: str, value: object) -> tuple[str, str, object]:
 
 
 def _flat(module: str, name: str) -> str:
-    return f"{module.rpartition('.')[2]}__{name}"
+    return f"{'_'.join(module.split('.')[-2:])}__{name}"
 
 
 @cache

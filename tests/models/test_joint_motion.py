@@ -6,12 +6,12 @@ import pytest
 
 import servotwin as st
 from servotwin.loads import Constant, Inertia, as_load
-from servotwin.models.kernels import coupled, together
-from servotwin.models.kernels.plant import BACKWARD, CURRENT_BACKWARD, CURRENT_FORWARD, FORWARD, FREE, RIGID, Mode
+from servotwin.models.engine import joint_motion, shared_source
+from servotwin.models.terms.plant import BACKWARD, CURRENT_BACKWARD, CURRENT_FORWARD, FORWARD, FREE, RIGID, Mode
 from servotwin.physics.pieces import Piece
 
-SOURCE = coupled.Source(6.0, 0.4, 1.5)
-STATES = (coupled.FOLLOWING, coupled.LIMITED, coupled.BROKEN_DOWN, coupled.KEEPING)
+SOURCE = shared_source.Source(6.0, 0.4, 1.5)
+STATES = (shared_source.FOLLOWING, shared_source.LIMITED, shared_source.BROKEN_DOWN, shared_source.KEEPING)
 
 
 def members(stiffness=0.0):
@@ -19,9 +19,9 @@ def members(stiffness=0.0):
     model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
     found, states = [], []
     for k, (sign, contact, zone) in enumerate([(1.0, FORWARD, CURRENT_FORWARD), (-1.0, BACKWARD, CURRENT_BACKWARD)]):
-        plant = coupled.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
+        plant = shared_source.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
         plant = plant._replace(stiffness=stiffness)
-        found.append(coupled.Member(plant, Mode(zone, contact, RIGID, FREE), sign, Piece(value=0.1), False))
+        found.append(shared_source.Member(plant, Mode(zone, contact, RIGID, FREE), sign, Piece(value=0.1), False))
         w = sign * (1.0 + k)
         states.append((0.5, w, 0.0, 0.0, 0.0, 0.5, w))
     return found, states
@@ -29,9 +29,9 @@ def members(stiffness=0.0):
 
 @pytest.mark.parametrize("state", STATES)
 def test_the_short_way_for_plain_members_is_the_general_one(state):
-    length = 0.4 * together.longest_series(members()[0])
-    short = together.series(SOURCE, state, *members(), 0.0, length)
-    general = together.series(SOURCE, state, *members(1e-300), 0.0, length)  # a spring that nobody feels
+    length = 0.4 * joint_motion.longest_series(members()[0])
+    short = joint_motion.series(SOURCE, state, *members(), 0.0, length)
+    general = joint_motion.series(SOURCE, state, *members(1e-300), 0.0, length)  # a spring that nobody feels
     for one, other in zip(short, general, strict=True):
         for ours, theirs in ((one.speed, other.speed), (one.current, other.current)):
             at_end = [sum(c * length**n for n, c in enumerate(series)) for series in (ours, theirs)]
@@ -41,14 +41,14 @@ def test_the_short_way_for_plain_members_is_the_general_one(state):
 @pytest.mark.parametrize("state", STATES)
 def test_a_series_is_what_the_step_finds(state):
     found, states = members()
-    length, _, _, ends = together.joint_step(SOURCE, state, found, states, 0.0, 1e-3)
-    for one, end in zip(together.series(SOURCE, state, found, states, 0.0, length), ends, strict=True):
+    length, _, _, ends = joint_motion.joint_step(SOURCE, state, found, states, 0.0, 1e-3)
+    for one, end in zip(joint_motion.series(SOURCE, state, found, states, 0.0, length), ends, strict=True):
         assert sum(c * length**n for n, c in enumerate(one.speed)) == pytest.approx(end[1], abs=1e-11)
 
 
 def test_a_step_that_cannot_be_made_says_so():
     found, states = members()
     broken = [(y[0], math.nan, *y[2:]) for y in states]
-    length, _, dense, _ = together.joint_step(SOURCE, coupled.FOLLOWING, found, broken, 0.0, 1e-3)
+    length, _, dense, _ = joint_motion.joint_step(SOURCE, shared_source.FOLLOWING, found, broken, 0.0, 1e-3)
     assert length == 0.0
     assert not dense

@@ -1,6 +1,6 @@
-"""A leg: a shaft that slides one way, with the same current path, under constant voltage and torque.
+"""An arc: a stretch with one law. A shaft slides one way, by the same current path, under constant voltage and torque.
 
-There its speed solves ẇ = f − λ w, so it moves monotonically towards f/λ. A leg is over when its time is, when the
+There its speed solves ẇ = f − λ w, so it moves monotonically towards f/λ. An arc is over when its time is, when the
 shaft stops, or when the speed reaches the edge of the bridge's dead zone, where the current starts or stops. This
 serves pulse servos without inductance, spring, pendulum and recorded torque; everything is divided by the inertia.
 """
@@ -10,18 +10,18 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.kernels.contact import accelerated, holding_bounds
-from servotwin.models.kernels.elementary import decay, fma, log1p_and_rest
-from servotwin.models.kernels.gear_friction import coulomb
-from servotwin.models.kernels.plant import Plant
+from servotwin.models.engine.elementary import decay, fma, log1p_and_rest
+from servotwin.models.terms.contact import accelerated, holding_bounds
+from servotwin.models.terms.gear_friction import coulomb
+from servotwin.models.terms.plant import Plant
 from servotwin.physics import bridge, friction, motor
 from servotwin.physics.shaft import shaft_acceleration
 
-MOST_LEGS = 100  # in one phase; a servo that needs more is left to the general engine
+MOST_ARCS = 100  # in one phase; a servo that needs more is left to the general engine
 
 
-class Shaft(NamedTuple):
-    """What the legs of one servo read."""
+class ArcNumbers(NamedTuple):
+    """What the arcs of one servo read."""
 
     rate_drive: float  # λ = (b + K K_b/R)/J while driving with current [1/s]
     rate_off: float  # while off with current
@@ -50,7 +50,7 @@ class Shaft(NamedTuple):
 
 
 class Loading(NamedTuple):
-    """What a constant external torque is to the legs of a servo."""
+    """What a constant external torque is to the arcs of a servo."""
 
     against: float  # τ_ext/J [rad/s²]
     start_forward: float  # which way a shaft at rest starts while driven forward: −1, 0, +1
@@ -58,18 +58,18 @@ class Loading(NamedTuple):
     start_off: float
 
 
-class Leg(NamedTuple):
-    """One leg: ẇ = pull − rate (w − start speed)."""
+class Arc(NamedTuple):
+    """One arc: ẇ = pull − rate (w − start speed)."""
 
     rate: float
     per_rate: float
     pull: float  # ẇ at the start [rad/s²]
-    edge: float  # the speed at which the leg ends [rad/s]
+    edge: float  # the speed at which the arc ends [rad/s]
     pull_there: float  # ẇ there
 
 
-def shaft_of(plant: Plant, torque: float) -> Shaft:
-    """Return what the legs read of a plant with a bridge under a constant external torque [N m]."""
+def arc_numbers(plant: Plant, torque: float) -> ArcNumbers:
+    """Return what the arcs read of a plant with a bridge under a constant external torque [N m]."""
     emf = motor.back_emf(1.0, plant.K_b)
     rate_drive = accelerated(plant, plant.b + _torque(plant, emf, plant.R_drive))
     rate_off = accelerated(plant, plant.b + _torque(plant, emf, plant.R_off))
@@ -82,7 +82,7 @@ def shaft_of(plant: Plant, torque: float) -> Shaft:
     pull = max(_torque(plant, bridge.driving_voltage(plant.V, 1.0, plant.D_drive), plant.R_drive), 0.0)
     hold_backward, hold_forward = holding_bounds(plant, 0.0, 0.0)
     load = loading(plant.J, pull, hold_forward, hold_backward, torque)
-    return Shaft(
+    return ArcNumbers(
         rate_drive, rate_off, rate_free, _inverse(rate_drive), _inverse(rate_off), _inverse(rate_free),
         accelerated(plant, push), accelerated(plant, drag), accelerated(plant, drag_off),
         plant.V / emf, plant.D_drive / emf, plant.D_off / emf,
@@ -113,45 +113,45 @@ def _start(forward: float, backward: float, torque: float) -> float:
     return 1.0 if torque > 0.0 else -1.0
 
 
-def start_of(shaft: Shaft, drive: float) -> float:
+def start_of(numbers: ArcNumbers, drive: float) -> float:
     """Return which way a shaft at rest starts: −1, 0, +1."""
-    driven = shaft.start_forward if drive > 0.0 else shaft.start_backward
-    return driven if drive != 0.0 else shaft.start_off
+    driven = numbers.start_forward if drive > 0.0 else numbers.start_backward
+    return driven if drive != 0.0 else numbers.start_off
 
 
-def leg_of(shaft: Shaft, drive: float, w: float) -> Leg:
-    """Return the leg of a shaft with the speed w; at rest, the one in which it starts."""
-    forward = w > 0.0 or (w == 0.0 and start_of(shaft, drive) > 0.0)
+def arc_of(numbers: ArcNumbers, drive: float, w: float) -> Arc:
+    """Return the arc of a shaft with the speed w; at rest, the one in which it starts."""
+    forward = w > 0.0 or (w == 0.0 and start_of(numbers, drive) > 0.0)
     off = drive == 0.0
-    gap = shaft.gap_off if off else shaft.gap_drive
-    balance = drive * shaft.speed
+    gap = numbers.gap_off if off else numbers.gap_drive
+    balance = drive * numbers.speed
     low, high = balance - gap, balance + gap  # below `low` the current pushes forward, above `high` backward
-    load = (shaft.friction_forward if forward else -shaft.friction_backward) + shaft.against
-    coasting = -fma(shaft.rate_free, w, load)
+    load = (numbers.friction_forward if forward else -numbers.friction_backward) + numbers.against
+    coasting = -fma(numbers.rate_free, w, load)
     below = w < low or (w == low and coasting < 0.0)  # on an edge, whereto it moves decides
     above = w > high or (w == high and coasting > 0.0)
-    drag = shaft.drag_off if off else shaft.drag_drive
+    drag = numbers.drag_off if off else numbers.drag_drive
     flows = below or above
-    rate = (shaft.rate_off if off else shaft.rate_drive) if flows else shaft.rate_free
-    per_rate = (shaft.per_rate_off if off else shaft.per_rate_drive) if flows else shaft.per_rate_free
-    push = fma(drive, shaft.push, -drag if below else drag)
+    rate = (numbers.rate_off if off else numbers.rate_drive) if flows else numbers.rate_free
+    per_rate = (numbers.per_rate_off if off else numbers.per_rate_drive) if flows else numbers.per_rate_free
+    push = fma(drive, numbers.push, -drag if below else drag)
     f = (push if flows else 0.0) - load
     pull = fma(-rate, w, f)
     up = low if below else (math.inf if above else high)
     down = high if above else (-math.inf if below else low)
     edge = (up if forward else min(up, 0.0)) if pull > 0.0 else (max(down, 0.0) if forward else down)
-    return Leg(rate, per_rate, pull, edge, fma(-rate, edge, f))
+    return Arc(rate, per_rate, pull, edge, fma(-rate, edge, f))
 
 
-def reaches_edge(leg: Leg, w: float) -> bool:
-    """Tell whether a leg that would have the speed w at the end of its time reaches its edge before."""
-    if leg.pull > 0.0:
-        return w >= leg.edge and leg.pull_there > 0.0
-    return w <= leg.edge and leg.pull_there < 0.0
+def reaches_edge(arc: Arc, w: float) -> bool:
+    """Tell whether a arc that would have the speed w at the end of its time reaches its edge before."""
+    if arc.pull > 0.0:
+        return w >= arc.edge and arc.pull_there > 0.0
+    return w <= arc.edge and arc.pull_there < 0.0
 
 
 def way_to_edge(w: float, edge: float, pull_there: float, rate: float, per_rate: float) -> tuple[float, float]:
-    """Return time [s] and angle [rad] of a leg that goes from the speed w to its edge, all of them with their signs."""
+    """Return time [s] and angle [rad] of a arc that goes from the speed w to its edge, all of them with their signs."""
     y = (edge - w) / pull_there
     log, rest = log1p_and_rest(rate * y)
     if rate == 0.0:
@@ -160,34 +160,34 @@ def way_to_edge(w: float, edge: float, pull_there: float, rate: float, per_rate:
     return t, fma(edge, t, -pull_there * (per_rate * per_rate) * rest)
 
 
-def moves(shaft: Shaft, drive: float, w: float) -> bool:
+def moves(numbers: ArcNumbers, drive: float, w: float) -> bool:
     """Tell whether a shaft with the speed w is in motion, or starts."""
-    return w != 0.0 or start_of(shaft, drive) != 0.0
+    return w != 0.0 or start_of(numbers, drive) != 0.0
 
 
-def within_stops(shaft: Shaft, q: float) -> bool:
+def within_stops(numbers: ArcNumbers, q: float) -> bool:
     """Tell whether an angle lies between the stops; false for nan too."""
-    return shaft.lower < q < shaft.upper
+    return numbers.lower < q < numbers.upper
 
 
-def slide(shaft: Shaft, drive: float, q: float, w: float, time: float) -> tuple[float, float, float]:
+def slide(numbers: ArcNumbers, drive: float, q: float, w: float, time: float) -> tuple[float, float, float]:
     """Return angle and speed after `time` [s] under one drive (−1, 0, +1), and 1.0, or 0.0 where this gave up.
 
-    It gives up at a stop and after too many legs.
+    It gives up at a stop and after too many arcs.
     """
-    legs = 0
-    while moves(shaft, drive, w):
-        leg = leg_of(shaft, drive, w)
-        once, twice = decay(leg.rate, leg.per_rate, time)
-        after = fma(leg.pull, once, w)
-        ends = reaches_edge(leg, after)
+    arcs = 0
+    while moves(numbers, drive, w):
+        arc = arc_of(numbers, drive, w)
+        once, twice = decay(arc.rate, arc.per_rate, time)
+        after = fma(arc.pull, once, w)
+        ends = reaches_edge(arc, after)
         if ends:
-            t, turn = way_to_edge(w, leg.edge, leg.pull_there, leg.rate, leg.per_rate)
-            q, w, time = q + turn, leg.edge, max(time - t, 0.0)
+            t, turn = way_to_edge(w, arc.edge, arc.pull_there, arc.rate, arc.per_rate)
+            q, w, time = q + turn, arc.edge, max(time - t, 0.0)
         else:
-            q, w = fma(leg.pull, twice, fma(w, time, q)), after
-        legs += 1
-        if not within_stops(shaft, q) or legs > MOST_LEGS:
+            q, w = fma(arc.pull, twice, fma(w, time, q)), after
+        arcs += 1
+        if not within_stops(numbers, q) or arcs > MOST_ARCS:
             return q, w, 0.0
         if not ends:
             break

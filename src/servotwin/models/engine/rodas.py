@@ -9,8 +9,8 @@ Julia Differential Equations package", BIT Numerical Mathematics 63, 27 (2023).
 
 from __future__ import annotations
 
-from servotwin.models.kernels import hybrid
-from servotwin.models.kernels.plant import Mode, Plant, Vector
+from servotwin.models.engine import hybrid
+from servotwin.models.terms.plant import Mode, Plant, Vector
 from servotwin.physics.pieces import Piece, piece_value
 
 Triple = tuple[float, float, float]  # angle, speed, current

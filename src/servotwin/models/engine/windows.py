@@ -9,14 +9,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.kernels import frame, tiles
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.memory import SAME
+from servotwin.models.engine import tiles
+from servotwin.models.engine.memory import SAME
+from servotwin.models.terms import frame
+from servotwin.models.terms.frame import Chip
 from servotwin.physics import bridge, motor, potentiometer, supply
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
-    from servotwin.models.kernels.tiles import Numbers
+    from servotwin.models.engine.tiles import Numbers
 
 
 def begin(listed: Numbers, size: int, own: bool, tile: Any, plan: Any, before: Any) -> int:

@@ -6,8 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from servotwin.models.kernels import armature, contact, dormand_prince, hybrid
-from servotwin.models.kernels.coupled import (
+from servotwin.models.engine import dormand_prince, hybrid
+from servotwin.models.engine.dormand_prince import STAGES
+from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.shared_source import (
     BROKEN_DOWN,
     FOLLOWING,
     KEEPING,
@@ -17,9 +19,8 @@ from servotwin.models.kernels.coupled import (
     behind,
     bus_voltage,
 )
-from servotwin.models.kernels.dormand_prince import STAGES
-from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.plant import (
+from servotwin.models.terms import armature, contact
+from servotwin.models.terms.plant import (
     BACKWARD,
     FORWARD,
     INSIDE,

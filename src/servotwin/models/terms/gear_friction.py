@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.kernels.plant import Plant
+from servotwin.models.terms.plant import Plant
 from servotwin.physics import friction, load_friction
 
 

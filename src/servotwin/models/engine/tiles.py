@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from servotwin.models.kernels import legs
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.legs import Shaft
-from servotwin.models.kernels.plant import Plant
-from servotwin.models.kernels.records import TILE, reader, rows_of, tile_of, writer
+from servotwin.models.engine import arcs
+from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.records import TILE, reader, rows_of, tile_of, writer
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.plant import Plant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -116,7 +116,7 @@ class Plan(NamedTuple):
     w3: float
     q4: float
     w4: float
-    edge_speed: float  # of a leg
+    edge_speed: float  # of a arc
     pull_there: float
     rate: float
     per_rate: float
@@ -144,7 +144,7 @@ class Times(NamedTuple):
 
 def tile_type(real: str) -> np.dtype[Any]:
     """Return the type of a tile whose servos have numbers of this type."""
-    return tile_of({"shaft": rows_of(Shaft, real), "chip": rows_of(Chip, real), "meter": rows_of(Meter, real),
+    return tile_of({"arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real), "meter": rows_of(Meter, real),
                     "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
                     "count": rows_of(Count, np.int64)})
 
@@ -156,8 +156,8 @@ def plan_type(real: str) -> np.dtype[Any]:
 
 chip_at = reader("chip_at", Chip)
 put_chip = writer("put_chip", Chip)
-shaft_at = reader("shaft_at", Shaft)
-put_shaft = writer("put_shaft", Shaft)
+arc_numbers_at = reader("arc_numbers_at", ArcNumbers)
+put_arc_numbers = writer("put_arc_numbers", ArcNumbers)
 put_servo = writer("put_servo", Servo)
 put_clock = writer("put_clock", Clock)
 put_count = writer("put_count", Count)
@@ -209,7 +209,7 @@ def chip_in(c: Numbers, j: int) -> Chip:
 def set_numbers(plants: Numbers, chips: Numbers, torque: Numbers, first: int, size: int, tile: Any) -> None:
     """Put what servos are into a tile, from the columns `first` on."""
     for j in range(size):
-        put_shaft(tile.shaft, j, legs.shaft_of(plant_at(plants, first + j), torque[first + j]))
+        put_arc_numbers(tile.arc, j, arcs.arc_numbers(plant_at(plants, first + j), torque[first + j]))
     for j in range(size):
         put_chip(tile.chip, j, chip_in(chips, first + j))
         tile.clock.period[j] = chips[14, first + j]
@@ -235,22 +235,23 @@ def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -
                                        lanes.edge_first[first + j], own, 0))
 
 
-def driven_shaft_at(rows: Any, j: int) -> Shaft:
+def driven_numbers_at(rows: Any, j: int) -> ArcNumbers:
     """Return a shaft for drives alone: the numbers between drives are replaced, so that choosing costs nothing."""
-    x = shaft_at(rows, j)
-    return Shaft(x.rate_drive, x.rate_drive, x.rate_free, x.per_rate_drive, x.per_rate_drive, x.per_rate_free, x.push,
-                 x.drag_drive, x.drag_drive, x.speed, x.gap_drive, x.gap_drive, x.friction_forward,
-                 x.friction_backward, x.against, x.start_forward, x.start_backward, 0.0, x.lower, x.upper,
-                 x.inertia, x.pull, x.hold_forward, x.hold_backward)
+    x = arc_numbers_at(rows, j)
+    return ArcNumbers(
+        x.rate_drive, x.rate_drive, x.rate_free, x.per_rate_drive, x.per_rate_drive, x.per_rate_free, x.push,
+        x.drag_drive, x.drag_drive, x.speed, x.gap_drive, x.gap_drive, x.friction_forward, x.friction_backward,
+        x.against, x.start_forward, x.start_backward, 0.0, x.lower, x.upper, x.inertia, x.pull, x.hold_forward,
+        x.hold_backward)
 
 
-def idle_shaft_at(rows: Any, j: int) -> Shaft:
+def idle_numbers_at(rows: Any, j: int) -> ArcNumbers:
     """Return a shaft for the time between drives alone."""
-    x = shaft_at(rows, j)
-    return Shaft(x.rate_off, x.rate_off, x.rate_free, x.per_rate_off, x.per_rate_off, x.per_rate_free, 0.0,
-                 x.drag_off, x.drag_off, 0.0, x.gap_off, x.gap_off, x.friction_forward, x.friction_backward,
-                 x.against, x.start_off, x.start_off, x.start_off, x.lower, x.upper, x.inertia, x.pull,
-                 x.hold_forward, x.hold_backward)
+    x = arc_numbers_at(rows, j)
+    return ArcNumbers(
+        x.rate_off, x.rate_off, x.rate_free, x.per_rate_off, x.per_rate_off, x.per_rate_free, 0.0, x.drag_off,
+        x.drag_off, 0.0, x.gap_off, x.gap_off, x.friction_forward, x.friction_backward, x.against, x.start_off,
+        x.start_off, x.start_off, x.lower, x.upper, x.inertia, x.pull, x.hold_forward, x.hold_backward)
 
 
 def plain_chip_at(rows: Any, j: int) -> Chip:
@@ -260,4 +261,4 @@ def plain_chip_at(rows: Any, j: int) -> Chip:
                 x.timeout, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-__all__ = ["FEW", "TILE", "Lanes", "Outputs", "Plan", "Servo", "chip_at", "plan_type", "shaft_at", "tile_type"]
+__all__ = ["FEW", "TILE", "Lanes", "Outputs", "Plan", "Servo", "arc_numbers_at", "chip_at", "plan_type", "tile_type"]

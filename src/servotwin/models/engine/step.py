@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.kernels import armature, events, frame, hybrid, motion
-from servotwin.models.kernels.frame import Chip, Frame
-from servotwin.models.kernels.memory import SAME, Inputs, Memory, Point, edge_of, in_force, origin_of, since
-from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.plant import Plant, Vector
+from servotwin.models.engine import events, hybrid, motion
+from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, edge_of, in_force, origin_of, since
+from servotwin.models.engine.motion import Motion
+from servotwin.models.terms import armature, frame
+from servotwin.models.terms.frame import Chip, Frame
+from servotwin.models.terms.plant import Plant, Vector
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 MOST_IDLE = 200  # events without time going on

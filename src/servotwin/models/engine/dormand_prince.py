@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.kernels import hybrid
-from servotwin.models.kernels.plant import NOWHERE, Mode, Plant, Vector
+from servotwin.models.engine import hybrid
+from servotwin.models.terms.plant import NOWHERE, Mode, Plant, Vector
 from servotwin.physics.pieces import Piece, piece_value
 
 STAGES = 12

@@ -1,6 +1,6 @@
 """Pulse servos side by side: a tile of lanes goes from window to window, each through up to four phases.
 
-A lane that hits a stop, has two decisions waiting or needs too many legs stays where the window began, and what is
+A lane that hits a stop, has two decisions waiting or needs too many arcs stays where the window began, and what is
 left of the call is for `runs`. What a lane does never depends on its neighbours.
 """
 
@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.kernels import legs, phases, tiles, windows
-from servotwin.models.kernels.legs import Shaft
-from servotwin.models.kernels.noise import gaussian
-from servotwin.models.kernels.plant import BACKWARD, FORWARD, FREE, STUCK
+from servotwin.models.engine import arcs, phases, tiles, windows
+from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.noise import gaussian
+from servotwin.models.terms.plant import BACKWARD, FORWARD, FREE, STUCK
 
 if TYPE_CHECKING:
-    from servotwin.models.kernels.tiles import Indices, Lanes, Numbers, Outputs
+    from servotwin.models.engine.tiles import Indices, Lanes, Numbers, Outputs
 
 
 def go_on(pieces: Numbers, listed: Numbers, braked: bool, which: Indices, duration: float, times: Numbers,
@@ -111,14 +111,14 @@ def _needs_all(size: int, tile: Any) -> tuple[bool, bool]:
 
 def _hang(which: Indices, torques: Numbers, tile: Any) -> None:
     """Hang constant external torques [N m] on the shafts of a tile."""
-    shaft = tile.shaft
+    numbers = tile.arc
     for j in range(which.size):
-        load = legs.loading(shaft.inertia[j], shaft.pull[j], shaft.hold_forward[j], shaft.hold_backward[j],
+        load = arcs.loading(numbers.inertia[j], numbers.pull[j], numbers.hold_forward[j], numbers.hold_backward[j],
                             torques[which[j]])
-        shaft.against[j] = load.against
-        shaft.start_forward[j] = load.start_forward
-        shaft.start_backward[j] = load.start_backward
-        shaft.start_off[j] = load.start_off
+        numbers.against[j] = load.against
+        numbers.start_forward[j] = load.start_forward
+        numbers.start_backward[j] = load.start_backward
+        numbers.start_off[j] = load.start_off
 
 
 def renew(lanes: Lanes, tile_rows: Any) -> None:
@@ -144,7 +144,7 @@ def _is_wanted(tile: Any, plan: Any, before: Any, j: int) -> bool:
 
 
 def _write(which: Indices, times: Numbers, outputs: Outputs, tile: Any, plan: Any, before: Any) -> None:
-    """Write the outputs of this window, each from the leg that holds it."""
+    """Write the outputs of this window, each from the arc that holds it."""
     for j in range(which.size):
         while plan.lost[j] == 0.0 and _is_wanted(tile, plan, before, j):
             o = tile.count.output[j]
@@ -164,25 +164,25 @@ def _write_one(lane: int, o: int, j: int, outputs: Outputs, tile: Any, plan: Any
             drive, q, w, begin = 0.0, plan.q4[j], plan.w4[j], plan.end3[j]
     elif plan.end1[j] <= x and plan.end1[j] < end:
         drive, q, w, begin = 0.0, plan.q2[j], plan.w2[j], plan.end1[j]
-    shaft = tiles.shaft_at(tile.shaft, j)
-    q, w, _ = legs.slide(shaft, drive, q, w, x - begin)
+    numbers = tiles.arc_numbers_at(tile.arc, j)
+    q, w, _ = arcs.slide(numbers, drive, q, w, x - begin)
     if outputs.angle.size > 0:
         outputs.angle[lane, o] = q
     if outputs.speed.size > 0:
         outputs.speed[lane, o] = w
     if outputs.contact.size > 0:
-        outputs.contact[lane, o] = contact_of(shaft, drive, w)
+        outputs.contact[lane, o] = contact_of(numbers, drive, w)
     if outputs.drive.size > 0:
         outputs.drive[lane, o] = 1 if drive > 0.0 else (-1 if drive < 0.0 else 0)
     if outputs.error.size > 0:
         outputs.error[lane, o] = error
 
 
-def contact_of(shaft: Shaft, drive: float, w: float) -> int:
+def contact_of(numbers: ArcNumbers, drive: float, w: float) -> int:
     """Return the contact of a shaft that has this speed [rad/s] under this drive."""
-    if shaft.friction_forward == 0.0 and shaft.friction_backward == 0.0:
+    if numbers.friction_forward == 0.0 and numbers.friction_backward == 0.0:
         return FREE
-    way = w if w != 0.0 else legs.start_of(shaft, drive)
+    way = w if w != 0.0 else arcs.start_of(numbers, drive)
     if way == 0.0:
         return STUCK
     return FORWARD if way > 0.0 else BACKWARD

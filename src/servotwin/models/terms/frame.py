@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.models.kernels.noise import gaussian
+from servotwin.models.engine.noise import gaussian
 from servotwin.physics import backlash, potentiometer, pulse
 
 if TYPE_CHECKING:

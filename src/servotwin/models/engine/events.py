@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.kernels import armature, first_order, hybrid
-from servotwin.models.kernels.motion import FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
-from servotwin.models.kernels.plant import FREE, RIGID, Vector
-from servotwin.models.kernels.rodas import not_constant
+from servotwin.models.engine import first_order, hybrid
+from servotwin.models.engine.motion import FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
+from servotwin.models.engine.rodas import not_constant
+from servotwin.models.terms import armature
+from servotwin.models.terms.plant import FREE, RIGID, Vector
 from servotwin.physics.pieces import piece_rate, piece_value
 
 _BELOW = -1e-13  # a guard counts as crossed below this (V, rad, rad/s, N m): rounding is not an event

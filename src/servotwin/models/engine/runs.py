@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.kernels import frame, motion
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.memory import (
+from servotwin.models.engine import motion
+from servotwin.models.engine.memory import (
     Inputs,
     Memory,
     counted_anew,
@@ -21,12 +20,14 @@ from servotwin.models.kernels.memory import (
     started,
     time_of,
 )
-from servotwin.models.kernels.plant import INSIDE, RIGID, Mode, Plant
-from servotwin.models.kernels.step import CHATTER, COMPLETED, MOST_IDLE, anchored, source, step
-from servotwin.models.kernels.tiles import chip_in, plant_at
+from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, source, step
+from servotwin.models.engine.tiles import chip_in, plant_at
+from servotwin.models.terms import frame
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.plant import INSIDE, RIGID, Mode, Plant
 
 if TYPE_CHECKING:
-    from servotwin.models.kernels.tiles import Indices, Lanes, Numbers
+    from servotwin.models.engine.tiles import Indices, Lanes, Numbers
 
 
 def start(lanes: Lanes, which: Indices, records: Any) -> None:

@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.kernels import armature, contact, dormand_prince, first_order, hybrid, rodas, second_order
-from servotwin.models.kernels.coefficients import linear_coefficients, speed_coefficients
-from servotwin.models.kernels.plant import CONDUCTING, CORE, INSIDE, NOWHERE, RIGID, Mode, Plant, Vector, at_rest
-from servotwin.models.kernels.rodas import Triple
+from servotwin.models.engine import dormand_prince, first_order, hybrid, rodas, second_order
+from servotwin.models.engine.coefficients import linear_coefficients, speed_coefficients
+from servotwin.models.engine.rodas import Triple
+from servotwin.models.terms import armature, contact
+from servotwin.models.terms.plant import CONDUCTING, CORE, INSIDE, NOWHERE, RIGID, Mode, Plant, Vector, at_rest
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.

@@ -10,8 +10,9 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from servotwin.models.kernels import armature, hybrid
-from servotwin.models.kernels.plant import NO_CURRENT, Mode, Plant, Vector
+from servotwin.models.engine import hybrid
+from servotwin.models.terms import armature
+from servotwin.models.terms.plant import NO_CURRENT, Mode, Plant, Vector
 from servotwin.physics import bridge, motor, supply
 from servotwin.physics.pieces import Piece
 

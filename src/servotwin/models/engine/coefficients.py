@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from servotwin.models.kernels import armature, contact
-from servotwin.models.kernels.plant import CONDUCTING, Mode, Plant
+from servotwin.models.terms import armature, contact
+from servotwin.models.terms.plant import CONDUCTING, Mode, Plant
 from servotwin.physics import electronics, motor, potentiometer, shaft
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from servotwin.models.kernels import contact, frame
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.plant import Plant, at_temperature
-from servotwin.models.kernels.tiles import chip_in, plant_at
+from servotwin.models.engine.tiles import chip_in, plant_at
+from servotwin.models.terms import contact, frame
+from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.plant import Plant, at_temperature
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from servotwin.models.kernels.tiles import Indices, Lanes, Numbers, Smalls
+    from servotwin.models.engine.tiles import Indices, Lanes, Numbers, Smalls
 
 ON_STOP, CANNOT_HOLD = 1, 2  # added up
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.models.kernels import frame
-from servotwin.models.kernels.frame import Decision, Frame
-from servotwin.models.kernels.plant import INSIDE, RIGID, Mode, Vector
-from servotwin.models.kernels.records import record_reader, record_writer
+from servotwin.models.engine.records import record_reader, record_writer
+from servotwin.models.terms import frame
+from servotwin.models.terms.frame import Decision, Frame
+from servotwin.models.terms.plant import INSIDE, RIGID, Mode, Vector
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:

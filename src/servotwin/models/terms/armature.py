@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.kernels.plant import (
+from servotwin.models.terms.plant import (
     CONDUCTING,
     CURRENT_BACKWARD,
     CURRENT_FORWARD,

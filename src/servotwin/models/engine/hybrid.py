@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.kernels import armature, contact, gear_friction
-from servotwin.models.kernels.plant import (
+from servotwin.models.terms import armature, contact, gear_friction
+from servotwin.models.terms.plant import (
     BACKWARD,
     CORE,
     FORWARD,

@@ -2,15 +2,15 @@
 
 It serves servos whose bridge brakes and whose brushes drop nothing, so that between drives the current always flows.
 While driving it takes for granted that the current flows the way of the drive, and that no stop is near; a lane for
-which this does not hold, before or after, is marked and goes through the phase leg by leg.
+which this does not hold, before or after, is marked and goes through the phase arc by arc.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.kernels import legs, tiles
-from servotwin.models.kernels.elementary import fading, fma, log
+from servotwin.models.engine import arcs, tiles
+from servotwin.models.engine.elementary import fading, fma, log
 
 
 def drive_or_rest(size: int, tile: Any, plan: Any) -> None:
@@ -23,16 +23,17 @@ def drive_or_rest(size: int, tile: Any, plan: Any) -> None:
 def drive(size: int, tile: Any, plan: Any) -> None:
     """Move all lanes through a drive; the power of a lane without one is 0 and its time too."""
     for j in range(size):
-        shaft, power = tile.shaft, plan.power[j]
-        forward, backward = shaft.start_forward[j], shaft.start_backward[j]
-        _move(power, shaft.rate_drive[j], shaft.per_rate_drive[j], forward if power > 0.0 else backward, tile, plan, j)
+        numbers, power = tile.arc, plan.power[j]
+        forward, backward = numbers.start_forward[j], numbers.start_backward[j]
+        start = forward if power > 0.0 else backward
+        _move(power, numbers.rate_drive[j], numbers.per_rate_drive[j], start, tile, plan, j)
     _alone(size, tile, plan)
 
 
 def rest(size: int, tile: Any, plan: Any) -> None:
     """Move all lanes through a time without drive."""
     for j in range(size):
-        _move(0.0, tile.shaft.rate_off[j], tile.shaft.per_rate_off[j], tile.shaft.start_off[j], tile, plan, j)
+        _move(0.0, tile.arc.rate_off[j], tile.arc.per_rate_off[j], tile.arc.start_off[j], tile, plan, j)
     _alone(size, tile, plan)
 
 
@@ -40,15 +41,15 @@ def alone(tile: Any, plan: Any, j: int) -> None:
     """Move one lane through a time with or without drive."""
     _drive_or_rest(tile, plan, j)
     if plan.ends[j] > 0.0:
-        _leg_by_leg(tile, plan, j)
+        _arc_by_arc(tile, plan, j)
 
 
 def _drive_or_rest(tile: Any, plan: Any, j: int) -> None:
     power = plan.power[j]
     off = power == 0.0
     rate, per_rate, rate_off, per_rate_off = (
-        tile.shaft.rate_drive[j], tile.shaft.per_rate_drive[j], tile.shaft.rate_off[j], tile.shaft.per_rate_off[j])
-    forward, backward, start_off = tile.shaft.start_forward[j], tile.shaft.start_backward[j], tile.shaft.start_off[j]
+        tile.arc.rate_drive[j], tile.arc.per_rate_drive[j], tile.arc.rate_off[j], tile.arc.per_rate_off[j])
+    forward, backward, start_off = tile.arc.start_forward[j], tile.arc.start_backward[j], tile.arc.start_off[j]
     start = forward if power > 0.0 else backward
     _move(power, rate_off if off else rate, per_rate_off if off else per_rate, start_off if off else start, tile, plan,
           j)
@@ -57,10 +58,10 @@ def _drive_or_rest(tile: Any, plan: Any, j: int) -> None:
 def _move(power: float, rate: float, per_rate: float, start: float, tile: Any, plan: Any, j: int) -> None:
     """Slide to the end, or stop on the way and go on from rest: w + λ (q − q0) − f t is constant while it slides."""
     time, q, w = plan.time[j], tile.servo.q[j], tile.servo.w[j]
-    forward, backward = tile.shaft.friction_forward[j], tile.shaft.friction_backward[j]
-    lower, upper = tile.shaft.lower[j], tile.shaft.upper[j]
-    top = tile.shaft.speed[j] - tile.shaft.gap_drive[j]
-    free = fma(power, tile.shaft.push[j] - tile.shaft.drag_drive[j], -tile.shaft.against[j])
+    forward, backward = tile.arc.friction_forward[j], tile.arc.friction_backward[j]
+    lower, upper = tile.arc.lower[j], tile.arc.upper[j]
+    top = tile.arc.speed[j] - tile.arc.gap_drive[j]
+    free = fma(power, tile.arc.push[j] - tile.arc.drag_drive[j], -tile.arc.against[j])
     f = free - (forward if w > 0.0 else -backward)
     settled = f * per_rate
     turns = w * settled < 0.0
@@ -84,19 +85,19 @@ def _move(power: float, rate: float, per_rate: float, start: float, tile: Any, p
 
 
 def _alone(size: int, tile: Any, plan: Any) -> None:
-    """Move the marked lanes leg by leg."""
+    """Move the marked lanes arc by arc."""
     marked = 0
     for j in range(size):
         marked += 1 if plan.ends[j] > 0.0 else 0
     if marked > 0:
         for j in range(size):
             if plan.ends[j] > 0.0:
-                _leg_by_leg(tile, plan, j)
+                _arc_by_arc(tile, plan, j)
 
 
-def _leg_by_leg(tile: Any, plan: Any, j: int) -> None:
-    shaft = tiles.shaft_at(tile.shaft, j)
-    q, w, done = legs.slide(shaft, plan.power[j], tile.servo.q[j], tile.servo.w[j], plan.time[j])
+def _arc_by_arc(tile: Any, plan: Any, j: int) -> None:
+    numbers = tiles.arc_numbers_at(tile.arc, j)
+    q, w, done = arcs.slide(numbers, plan.power[j], tile.servo.q[j], tile.servo.w[j], plan.time[j])
     tile.servo.q[j] = q
     tile.servo.w[j] = w
     plan.lost[j] = plan.lost[j] if done > 0.0 else 1.0

@@ -1,4 +1,4 @@
-"""Legs against a fine numerical solution, and the block of lanes against one by one, plain and compiled."""
+"""Arcs against a fine numerical solution, and the block of lanes against one by one, plain and compiled."""
 
 import math
 from dataclasses import replace
@@ -9,9 +9,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from lane_cases import case
-from servotwin.models.kernels import contact, legs, side_by_side, tiles
-from servotwin.models.kernels.plant import Plant
-from servotwin.models.kernels.records import room
+from servotwin.models.engine import arcs, side_by_side, tiles
+from servotwin.models.engine.records import room
+from servotwin.models.terms import contact
+from servotwin.models.terms.plant import Plant
 from servotwin.simulation import lane_runs
 from servotwin.simulation.lanes import FIELDS, Tables, empty_raw, run_lanes
 
@@ -23,7 +24,7 @@ LOADS = (0.0, -0.3, 0.6, 1.5, -3.0)
 
 
 def fine(plant, torque, drive, q, w, end):
-    """Solve the leg's differential equation, stopping wherever the speed is zero."""
+    """Solve the arc's differential equation, stopping wherever the speed is zero."""
     D, R = (plant.D_drive, plant.R_drive) if drive else (plant.D_off, plant.R_off)
 
     def current(w):
@@ -60,7 +61,7 @@ def fine(plant, torque, drive, q, w, end):
 def test_legs_against_a_fine_solution(zones, torque):
     plant = Plant(**PLANT | {"D_drive": zones[0], "D_off": zones[1]})
     for drive, w in product((-1.0, 0.0, 1.0), (0.0, 4.0, -9.0)):
-        q, speed, done = legs.slide(legs.shaft_of(plant, torque), drive, 0.3, w, 0.06)
+        q, speed, done = arcs.slide(arcs.arc_numbers(plant, torque), drive, 0.3, w, 0.06)
         assert done == 1.0
         assert (q, speed) == pytest.approx(fine(plant, torque, drive, 0.3, w, 0.06), abs=2e-8), (drive, w)
 
@@ -68,7 +69,7 @@ def test_legs_against_a_fine_solution(zones, torque):
 @pytest.mark.parametrize("time", [1e-12, 1e-6, 1e-3, 1.0, 100.0])
 def test_a_free_shaft_has_no_cancellation(time):
     plant = Plant(**PLANT | {"b": 0.0, "F_forward": 0.0, "F_backward": 0.0, "R_off": 1e15})
-    q, w, _ = legs.slide(legs.shaft_of(plant, -0.006), 0.0, 0.0, 0.0, time)
+    q, w, _ = arcs.slide(arcs.arc_numbers(plant, -0.006), 0.0, 0.0, 0.0, time)
     assert q == pytest.approx(0.5 * time * time, rel=1e-9)  # a winding of 1e15 ohm hardly brakes
     assert w == pytest.approx(time, rel=1e-9)
 
