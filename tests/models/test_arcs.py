@@ -1,4 +1,4 @@
-"""Arcs against a fine numerical solution, and the block of lanes against one by one, plain and compiled."""
+"""Arcs against a fine numerical solution, and lanes side by side against one by one, plain and compiled."""
 
 import math
 from dataclasses import replace
@@ -8,42 +8,47 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from lane_cases import case
-from servotwin.models.engine import arcs, side_by_side, tiles
+from lane_cases import case, replaced
+from servotwin.models.engine import arcs, contacts, side_by_side, tiles
 from servotwin.models.engine.records import room
-from servotwin.models.terms import contact
-from servotwin.models.terms.plant import Plant
+from servotwin.models.terms.bridge import NO_BRIDGE
+from servotwin.models.terms.friction import NO_FRICTION
+from servotwin.models.terms.motor import Motor
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.shaft import Shaft
+from servotwin.models.terms.source import Source
 from servotwin.simulation import lane_runs
 from servotwin.simulation.lanes import FIELDS, Tables, empty_raw, run_lanes
 
-PLANT = dict.fromkeys(Plant._fields, 0.0) | {
-    "J": 6e-3, "b": 1e-3, "K": 1.03, "K_b": 1.0, "F_forward": 0.2, "F_backward": 0.25, "breakaway": 1.0,
-    "lower": -math.inf, "upper": math.inf, "V": 6.0, "R_drive": 3.1, "R_off": 3.0}
+NUMBERS = Numbers(
+    motor=Motor(1.03, 1.0, 3.0, 0.0), shaft=Shaft(6e-3, 1e-3, 0.0, 0.0), source=Source(6.0, 0.0, math.inf),
+    bridge=NO_BRIDGE._replace(R_drive=3.1, R_off=3.0), friction=NO_FRICTION._replace(F_forward=0.2, F_backward=0.25))
 DEAD_ZONES = ((0.0, 0.0), (0.5, 0.1), (0.4, 7.0))
 LOADS = (0.0, -0.3, 0.6, 1.5, -3.0)
 
 
-def fine(plant, torque, drive, q, w, end):
+def fine(numbers, torque, drive, q, w, end):
     """Solve the arc's differential equation, stopping wherever the speed is zero."""
-    D, R = (plant.D_drive, plant.R_drive) if drive else (plant.D_off, plant.R_off)
+    D, R = (numbers.bridge.D_drive, numbers.bridge.R_drive) if drive else (numbers.bridge.D_off, numbers.bridge.R_off)
 
     def current(w):
-        x = drive * plant.V - plant.K_b * w
+        x = drive * numbers.source.V - numbers.motor.K_b * w
         return 0.0 if abs(x) <= D else (x - math.copysign(D, x)) / R
 
     t = 0.0
     while t < end:
         way = np.sign(w)
         if w == 0.0:
-            backward, forward = contact.holding_bounds(plant, 0.0, 0.0)
-            pull = plant.K * current(0.0) - torque
+            backward, forward = contacts.holding_bounds(numbers, 0.0, 0.0)
+            pull = numbers.motor.K * current(0.0) - torque
             way = 1.0 if pull > forward else -1.0 if pull < -backward else 0.0
         if way == 0.0:
             break
-        friction = plant.F_forward if way > 0.0 else -plant.F_backward
+        friction = numbers.friction.F_forward if way > 0.0 else -numbers.friction.F_backward
 
         def rates(_, y, friction=friction):
-            return [y[1], (plant.K * current(y[1]) - plant.b * y[1] - friction - torque) / plant.J]
+            pull = numbers.motor.K * current(y[1]) - torque
+            return [y[1], (pull - numbers.shaft.b * y[1] - friction) / numbers.shaft.J]
 
         def stands(t, y, way=way, begin=t):
             return y[1] if t > begin else way
@@ -58,30 +63,34 @@ def fine(plant, torque, drive, q, w, end):
 
 @pytest.mark.parametrize("zones", DEAD_ZONES)
 @pytest.mark.parametrize("torque", LOADS)
-def test_legs_against_a_fine_solution(zones, torque):
-    plant = Plant(**PLANT | {"D_drive": zones[0], "D_off": zones[1]})
+def test_arcs_against_a_fine_solution(zones, torque):
+    numbers = replaced(NUMBERS, {"bridge.D_drive": zones[0], "bridge.D_off": zones[1]})
     for drive, w in product((-1.0, 0.0, 1.0), (0.0, 4.0, -9.0)):
-        q, speed, done = arcs.slide(arcs.arc_numbers(plant, torque), drive, 0.3, w, 0.06)
+        q, speed, done = arcs.slide(arcs.arc_numbers(numbers, torque), drive, 0.3, w, 0.06)
         assert done == 1.0
-        assert (q, speed) == pytest.approx(fine(plant, torque, drive, 0.3, w, 0.06), abs=2e-8), (drive, w)
+        assert (q, speed) == pytest.approx(fine(numbers, torque, drive, 0.3, w, 0.06), abs=2e-8), (drive, w)
 
 
 @pytest.mark.parametrize("time", [1e-12, 1e-6, 1e-3, 1.0, 100.0])
 def test_a_free_shaft_has_no_cancellation(time):
-    plant = Plant(**PLANT | {"b": 0.0, "F_forward": 0.0, "F_backward": 0.0, "R_off": 1e15})
-    q, w, _ = arcs.slide(arcs.arc_numbers(plant, -0.006), 0.0, 0.0, 0.0, time)
+    numbers = replaced(NUMBERS, {"shaft.b": 0.0, "friction.F_forward": 0.0, "friction.F_backward": 0.0,
+                               "bridge.R_off": 1e15})
+    q, w, _ = arcs.slide(arcs.arc_numbers(numbers, -0.006), 0.0, 0.0, 0.0, time)
     assert q == pytest.approx(0.5 * time * time, rel=1e-9)  # a winding of 1e15 ohm hardly brakes
     assert w == pytest.approx(time, rel=1e-9)
 
 
+OPEN = {"bridge.coast": 1.0, "bridge.D_off": 6.7, "bridge.R_off": 3.2}
 FEATURES = {
-    "plain": {}, "coast": {"coast": 1.0, "D_off": 6.7, "R_off": 3.2}, "RC stretcher": {"tau_s": 0.02},
-    "couplings": {"beta": 0.01, "c_s": 0.02}, "noise": {"noise": 1e-3}, "timeout": {"timeout": 0.013},
-    "limits": {"shortest": 1e-3, "longest": 2e-3, "timeout": 0.05}, "stops": {"lower": 0.2, "upper": 1.6},
-    "no drops": {"D_drive": 0.0, "D_off": 0.0}, "brush drop": {"D_off": 0.15},
-    "no friction": {"F_forward": 0.0, "F_backward": 0.0}, "short frames": {"frame_period": 0.004},
-    "everything": {"coast": 1.0, "D_off": 6.7, "R_off": 3.2, "tau_s": 0.02, "beta": 0.01, "c_s": 0.02, "noise": 1e-3,
-                   "timeout": 0.025, "shortest": 0.9e-3, "lower": 0.1, "upper": 2.0}}
+    "plain": {}, "coast": OPEN, "RC stretcher": {"chip.tau_s": 0.02},
+    "couplings": {"chip.beta": 0.01, "chip.c_s": 0.02}, "noise": {"chip.noise": 1e-3},
+    "timeout": {"chip.timeout": 0.013},
+    "limits": {"chip.shortest": 1e-3, "chip.longest": 2e-3, "chip.timeout": 0.05},
+    "stops": {"stops.lower": 0.2, "stops.upper": 1.6}, "no drops": {"bridge.D_drive": 0.0, "bridge.D_off": 0.0},
+    "brush drop": {"bridge.D_off": 0.15}, "no friction": {"friction.F_forward": 0.0, "friction.F_backward": 0.0},
+    "short frames": {"chip.frame_period": 0.004},
+    "everything": OPEN | {"chip.tau_s": 0.02, "chip.beta": 0.01, "chip.c_s": 0.02, "chip.noise": 1e-3,
+                          "chip.timeout": 0.025, "chip.shortest": 0.9e-3, "stops.lower": 0.1, "stops.upper": 2.0}}
 
 
 def one_by_one(work):
@@ -92,7 +101,7 @@ def one_by_one(work):
 
 @pytest.mark.parametrize("name", FEATURES)
 def test_side_by_side_against_one_by_one(name):
-    work = case(40, duration=0.7, times=np.linspace(0.0, 0.7, 39), fields=FIELDS, **FEATURES[name])
+    work = case(40, duration=0.7, times=np.linspace(0.0, 0.7, 39), fields=FIELDS, changes=FEATURES[name])
     assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
@@ -121,7 +130,7 @@ def plain(work):
 
 @pytest.mark.parametrize("name", [name for name in FEATURES if name not in ("stops", "everything")])
 def test_plain_source_against_compiled(name):
-    work = case(18, duration=0.12, times=np.linspace(0.0, 0.12, 7), fields=FIELDS, **FEATURES[name])
+    work = case(18, duration=0.12, times=np.linspace(0.0, 0.12, 7), fields=FIELDS, changes=FEATURES[name])
     assert_same(plain(work), run_lanes(work), 1e-12)
 
 
@@ -160,7 +169,7 @@ def test_float32_follows_float64():
 
 def test_lanes_that_need_the_general_way_are_mixed_with_others():
     spring = np.where(np.arange(12) % 3 == 0, 0.1, 0.0)
-    work = case(12, duration=0.3, times=np.array([0.1, 0.3]), fields=FIELDS, stiffness=spring)
+    work = case(12, duration=0.3, times=np.array([0.1, 0.3]), fields=FIELDS, changes={"load.stiffness": spring})
     assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 

@@ -7,10 +7,11 @@ import pytest
 import servotwin as st
 from servotwin.loads import Constant, Inertia, as_load
 from servotwin.models.engine import joint_motion, shared_source
-from servotwin.models.terms.plant import BACKWARD, CURRENT_BACKWARD, CURRENT_FORWARD, FORWARD, FREE, RIGID, Mode
+from servotwin.models.engine.modes import BACKWARD, CURRENT_BACKWARD, CURRENT_FORWARD, FORWARD, FREE, RIGID, Mode
+from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece
 
-SOURCE = shared_source.Source(6.0, 0.4, 1.5)
+SOURCE = Source(6.0, 0.4, 1.5)
 STATES = (shared_source.FOLLOWING, shared_source.LIMITED, shared_source.BROKEN_DOWN, shared_source.KEEPING)
 
 
@@ -19,9 +20,9 @@ def members(stiffness=0.0):
     model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
     found, states = [], []
     for k, (sign, contact, zone) in enumerate([(1.0, FORWARD, CURRENT_FORWARD), (-1.0, BACKWARD, CURRENT_BACKWARD)]):
-        plant = shared_source.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
-        plant = plant._replace(stiffness=stiffness)
-        found.append(shared_source.Member(plant, Mode(zone, contact, RIGID, FREE), sign, Piece(value=0.1), False))
+        numbers = shared_source.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
+        numbers = numbers._replace(load=numbers.load._replace(stiffness=stiffness))
+        found.append(shared_source.Member(numbers, Mode(zone, contact, RIGID, FREE), sign, Piece(value=0.1), False))
         w = sign * (1.0 + k)
         states.append((0.5, w, 0.0, 0.0, 0.0, 0.5, w))
     return found, states

@@ -6,12 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from servotwin.models.engine import hybrid, joint_motion, motion, shared_source
+from servotwin.models.engine import guards, joint_motion, motion, shared_source
 from servotwin.models.engine.memory import FIRST_STEP, Point
+from servotwin.models.engine.modes import NO_CURRENT, Mode, Vector
 from servotwin.models.engine.motion import Motion
-from servotwin.models.engine.shared_source import Member, Source
-from servotwin.models.terms import frame
-from servotwin.models.terms.plant import NO_CURRENT, Mode, Plant, Vector
+from servotwin.models.engine.shared_source import Member
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.sensor import wiper_at
+from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 from servotwin.simulation.engine import failure
 from servotwin.simulation.status import Status
@@ -20,13 +22,13 @@ _BELOW = -1e-13  # rounding is not an event
 _BELOW_OF_SUM = -1e-10  # A: nor what the currents of all have gathered
 _HALVINGS = 200
 _LOOKS = (0.25, 0.5, 0.75, 1.0)  # parts of a motion at which its guards are looked at
-_JUMPS = (hybrid.UPPER, hybrid.LOWER, hybrid.MEET_FORWARD, hybrid.MEET_BACKWARD, hybrid.SPEED)  # signs may turn
+_JUMPS = (guards.UPPER, guards.LOWER, guards.MEET_FORWARD, guards.MEET_BACKWARD, guards.SPEED)  # signs may turn
 
 
 class Connected(NamedTuple):
-    """A servo on the bus: its plant on a stiff source, where it stands, how its bridge drives, and its load."""
+    """A servo on the bus: its numbers on a stiff source, where it stands, how its bridge drives, and its load."""
 
-    plant: Plant
+    numbers: Numbers
     point: Point
     drive: float
     tau: Piece
@@ -63,7 +65,7 @@ class Group:
         return self._zoned(connected)[2]
 
     def _zoned(self, connected: Sequence[Connected]) -> tuple[list[Member], int, float]:
-        members = [shared_source.member_of(one.plant, one.point.mode, one.drive, one.tau, one.point.y)
+        members = [shared_source.member_of(one.numbers, one.point.mode, one.drive, one.tau, one.point.y)
                    for one in connected]
         return shared_source.zoned(self._source, members, [one.point.y for one in connected], self._voltage)
 
@@ -75,7 +77,7 @@ class Group:
         """
         states = [one.point.y for one in connected]
         if same and not self._jumped:
-            self._members = [shared_source.member_of(one.plant, one.point.mode, one.drive, one.tau, one.point.y)
+            self._members = [shared_source.member_of(one.numbers, one.point.mode, one.drive, one.tau, one.point.y)
                              for one in connected]
             self._voltage = shared_source.bus_voltage(self._source, self._state, self._members, states)
         else:
@@ -94,12 +96,12 @@ class Group:
     def _settled(self, member: Member, y: Vector, time: float) -> Member:
         mode = member.mode
         u = shared_source.behind(member, self._voltage)
-        mode = hybrid.settled(member.plant, mode.zone, u, piece_value(member.tau, time), y, mode.mesh, False)
-        return Member(member.plant, mode, member.sign, member.tau, member.returns)
+        mode = guards.settled(member.numbers, mode.zone, u, piece_value(member.tau, time), y, mode.mesh, False)
+        return Member(member.numbers, mode, member.sign, member.tau, member.returns)
 
     def _by_series(self, states: Sequence[Vector], time: float, length: float) -> list[Motion]:
         series = joint_motion.series(self._source, self._state, self._members, states, time, length)
-        return [motion.by_series(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length,
+        return [motion.by_series(m.numbers, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length,
                                  one.speed, one.current)
                 for m, y, one in zip(self._members, states, series, strict=True)]
 
@@ -111,7 +113,7 @@ class Group:
             raise failure(Status.STEP_TOO_SMALL, time)
         self._step = max(self._step, following) if length == limit else following
         return length, [
-            motion.by_step(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length, vectors, end)
+            motion.by_step(m.numbers, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length, vectors, end)
             for m, y, vectors, end in zip(self._members, states, dense, ends, strict=True)]
 
     # --- what ends it ----------------------------------------------------------------------------------------------
@@ -137,10 +139,10 @@ class Group:
     @staticmethod
     def _kinds(member: Member) -> list[int]:
         """Return which guards can end the mode of a member."""
-        kinds = hybrid.guards(member.plant, member.mode, member.sign, False)
+        kinds = guards.guards(member.numbers, member.mode, member.sign, False)
         if member.returns and member.mode.zone == NO_CURRENT:  # its diodes block the other way
-            kinds &= ~(1 << (hybrid.ZONE_UP if member.sign > 0.0 else hybrid.ZONE_DOWN))
-        return [kind for kind in range(hybrid.MOTOR_RELEASE_BACKWARD + 1) if kinds >> kind & 1]
+            kinds &= ~(1 << (guards.ZONE_UP if member.sign > 0.0 else guards.ZONE_DOWN))
+        return [kind for kind in range(guards.MOTOR_RELEASE_BACKWARD + 1) if kinds >> kind & 1]
 
     def _crossing(self, j: int, kind: int, time: float, length: float) -> float:
         """Return when a guard falls below zero, at most `length` [s]; inf where it does not."""
@@ -185,7 +187,7 @@ class Group:
             return shared_source.source_guards(self._source, self._state, V, total)[kind]
         member, t = self._members[j], time + s
         u = shared_source.behind(member, V)
-        return hybrid.guard(member.plant, member.mode, kind, u, 0.0, piece_value(member.tau, t),
+        return guards.guard(member.numbers, member.mode, kind, u, 0.0, piece_value(member.tau, t),
                             piece_rate(member.tau, t), states[j], states[j])[0]
 
     def arrivals(self) -> list[tuple[Point, int]]:
@@ -199,9 +201,9 @@ class Group:
         V = shared_source.bus_voltage(self._source, self._state, self._members, states)
         for j, (member, point, y) in enumerate(zip(self._members, self._points, states, strict=True)):
             mode, event = point.mode, -1
-            wiper = frame.wiper_at(member.plant.half_slack, point.wiper, y[0])
+            wiper = wiper_at(member.numbers.sensor, point.wiper, y[0])
             if j == whose:
-                mode, y = hybrid.cross(member.plant, mode, kind, shared_source.behind(member, V),
+                mode, y = guards.cross(member.numbers, mode, kind, shared_source.behind(member, V),
                                        piece_value(member.tau, time), y)
                 mode = Mode(shared_source.let_through(member, mode.zone), mode.contact, mode.mesh, mode.motor)
                 event = kind

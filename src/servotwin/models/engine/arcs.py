@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from servotwin.models.engine.contacts import holding_bounds
 from servotwin.models.engine.elementary import decay, fma, log1p_and_rest
-from servotwin.models.terms.contact import accelerated, holding_bounds
-from servotwin.models.terms.gear_friction import coulomb
-from servotwin.models.terms.plant import Plant
+from servotwin.models.terms.friction import coulomb
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.shaft import accelerated
 from servotwin.physics import bridge, friction, motor
 from servotwin.physics.shaft import shaft_acceleration
 
@@ -68,26 +69,26 @@ class Arc(NamedTuple):
     pull_there: float  # ẇ there
 
 
-def arc_numbers(plant: Plant, torque: float) -> ArcNumbers:
-    """Return what the arcs read of a plant with a bridge under a constant external torque [N m]."""
-    emf = motor.back_emf(1.0, plant.K_b)
-    rate_drive = accelerated(plant, plant.b + _torque(plant, emf, plant.R_drive))
-    rate_off = accelerated(plant, plant.b + _torque(plant, emf, plant.R_off))
-    rate_free = accelerated(plant, plant.b)
-    forward = accelerated(plant, coulomb(plant, True) + plant.coulomb)
-    backward = accelerated(plant, coulomb(plant, False) + plant.coulomb)
-    push = _torque(plant, bridge.driving_voltage(plant.V, 0.0, 0.0), plant.R_drive)
-    drag = _torque(plant, bridge.driving_voltage(0.0, -1.0, plant.D_drive), plant.R_drive)
-    drag_off = _torque(plant, bridge.driving_voltage(0.0, -1.0, plant.D_off), plant.R_off)
-    pull = max(_torque(plant, bridge.driving_voltage(plant.V, 1.0, plant.D_drive), plant.R_drive), 0.0)
-    hold_backward, hold_forward = holding_bounds(plant, 0.0, 0.0)
-    load = loading(plant.J, pull, hold_forward, hold_backward, torque)
+def arc_numbers(numbers: Numbers, torque: float) -> ArcNumbers:
+    """Return what the arcs read of a servo with a bridge under a constant external torque [N m]."""
+    own, path, V = numbers.shaft, numbers.bridge, numbers.source.V
+    emf = motor.back_emf(1.0, numbers.motor.K_b)
+    rate_drive = accelerated(own, own.b + _torque(numbers, emf, path.R_drive))
+    rate_off = accelerated(own, own.b + _torque(numbers, emf, path.R_off))
+    rate_free = accelerated(own, own.b)
+    forward = accelerated(own, coulomb(numbers.friction, True) + numbers.load.coulomb)
+    backward = accelerated(own, coulomb(numbers.friction, False) + numbers.load.coulomb)
+    push = _torque(numbers, bridge.driving_voltage(V, 0.0, 0.0), path.R_drive)
+    drag = _torque(numbers, bridge.driving_voltage(0.0, -1.0, path.D_drive), path.R_drive)
+    drag_off = _torque(numbers, bridge.driving_voltage(0.0, -1.0, path.D_off), path.R_off)
+    pull = max(_torque(numbers, bridge.driving_voltage(V, 1.0, path.D_drive), path.R_drive), 0.0)
+    hold_backward, hold_forward = holding_bounds(numbers, 0.0, 0.0)
+    load = loading(own.J, pull, hold_forward, hold_backward, torque)
     return ArcNumbers(
         rate_drive, rate_off, rate_free, _inverse(rate_drive), _inverse(rate_off), _inverse(rate_free),
-        accelerated(plant, push), accelerated(plant, drag), accelerated(plant, drag_off),
-        plant.V / emf, plant.D_drive / emf, plant.D_off / emf,
-        forward, backward, load.against, load.start_forward, load.start_backward, load.start_off,
-        plant.lower, plant.upper, plant.J, pull, hold_forward, hold_backward)
+        accelerated(own, push), accelerated(own, drag), accelerated(own, drag_off), V / emf, path.D_drive / emf,
+        path.D_off / emf, forward, backward, load.against, load.start_forward, load.start_backward, load.start_off,
+        numbers.stops.lower, numbers.stops.upper, own.J, pull, hold_forward, hold_backward)
 
 
 def loading(inertia: float, pull: float, hold_forward: float, hold_backward: float, torque: float) -> Loading:
@@ -97,9 +98,10 @@ def loading(inertia: float, pull: float, hold_forward: float, hold_backward: flo
         _start(hold_forward, hold_backward, -pull - torque), _start(hold_forward, hold_backward, -torque))
 
 
-def _torque(plant: Plant, voltage: float, R: float) -> float:
+def _torque(numbers: Numbers, voltage: float, R: float) -> float:
     """Return the motor's torque [N m] by a voltage [V] at a standstill, in a circuit of R [Ω]."""
-    return motor.electromagnetic_torque(motor.steady_armature_current(voltage, 0.0, R, plant.K_b), plant.K)
+    i = motor.steady_armature_current(voltage, 0.0, R, numbers.motor.K_b)
+    return motor.electromagnetic_torque(i, numbers.motor.K)
 
 
 def _inverse(x: float) -> float:

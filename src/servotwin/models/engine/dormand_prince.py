@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine import hybrid
-from servotwin.models.terms.plant import NOWHERE, Mode, Plant, Vector
+from servotwin.models.engine.modes import NOWHERE, Mode, Vector
+from servotwin.models.engine.rates import rates_of
+from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Piece, piece_value
 
 STAGES = 12
@@ -70,11 +71,11 @@ _DENSE = (
 )
 
 
-def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h: float) -> tuple[Vector, float]:
+def step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h: float) -> tuple[Vector, float]:
     """Return the state after a step of `h` [s], and its error relative to 1 + |state|."""
     ks = [NOWHERE] * STAGES
     for j in range(STAGES):
-        ks[j] = _rates(plant, mode, u, tau, t + FRACTIONS[j] * h, moved(y, ks, j, h))
+        ks[j] = _rates(numbers, mode, u, tau, t + FRACTIONS[j] * h, moved(y, ks, j, h))
     after = moved(y, ks, STAGES, h)
     return after, error_of(y, after, ks, h)
 
@@ -94,7 +95,7 @@ def error_of(y: Vector, after: Vector, ks: list[Vector], h: float) -> float:
     return h * sum_5 / math.sqrt(sum_5 + 0.01 * sum_3) if sum_5 != 0.0 else 0.0
 
 
-def dense(plant: Plant, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h: float) -> tuple[Vector, ...]:
+def dense(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h: float) -> tuple[Vector, ...]:
     """Return the seven vectors of the dense output of a step."""
     ks = [NOWHERE] * 16
     after = y
@@ -102,7 +103,7 @@ def dense(plant: Plant, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h
         at = moved(y, ks, j, h)
         if j == STAGES:
             after = at
-        ks[j] = _rates(plant, mode, u, tau, t + FRACTIONS[j] * h, at)
+        ks[j] = _rates(numbers, mode, u, tau, t + FRACTIONS[j] * h, at)
     return dense_of(y, after, ks, h)
 
 
@@ -129,8 +130,8 @@ def interpolate(y: Vector, vectors: tuple[Vector, ...], x: float) -> Vector:
     )
 
 
-def _rates(plant: Plant, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector) -> Vector:
-    return hybrid.rates(plant, mode, piece_value(u, t), piece_value(tau, t), y)
+def _rates(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector) -> Vector:
+    return rates_of(numbers, mode, piece_value(u, t), piece_value(tau, t), y)
 
 
 def moved(y: Vector, ks: list[Vector], stage: int, h: float) -> Vector:

@@ -8,10 +8,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from servotwin.models.engine.tiles import chip_in, plant_at
-from servotwin.models.terms import contact, frame
-from servotwin.models.terms.frame import Chip
-from servotwin.models.terms.plant import Plant, at_temperature
+from servotwin.models.engine import contacts
+from servotwin.models.engine.tiles import chip_of, numbers_of
+from servotwin.models.terms import frame, heat
+from servotwin.models.terms import source as source_term
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.load import external_torque
+from servotwin.models.terms.numbers import Numbers, at_temperature
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from servotwin.models.engine.tiles import Indices, Lanes, Numbers, Smalls
+    from servotwin.models.engine.tiles import Floats, Indices, Lanes, Smalls
 
 ON_STOP, CANNOT_HOLD = 1, 2  # added up
 
@@ -72,33 +75,35 @@ def refused_from(chip: Chip, command: NDArray[np.float64], period: float,
     return first
 
 
-def told(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], period: float,
+def told(pulsed: bool, numbers: Numbers, chip: Chip, command: NDArray[np.float64], period: float,
          edges: Sequence[float] | NDArray[np.float64], duration: float) -> tuple[float, float]:
     """Return the angle [rad] that the servo was told last, and how far from it nothing is done."""
+    p, b_o = numbers.sensor.p, numbers.sensor.b_o
     if not pulsed:
         voltage = piece_value(piece_before(command, duration, False), duration)
-        return (voltage - plant.b_o) / plant.p, plant.half_deadband / plant.p
+        return (voltage - b_o) / p, numbers.follower.half_deadband / p
     k = last_frame(period, edges, duration)
     width = width_at(command, frame.edge_time(period, edges, k) if k >= 0 else duration)
-    return ((width - chip.T_0) / chip.slope - chip.b_o) / chip.p, chip.half_deadband / (chip.slope * chip.p)
+    return ((width - chip.T_0) / chip.slope - b_o) / p, chip.half_deadband / (chip.slope * p)
 
 
-def standstill_torque(plant: Plant, source: float) -> float:
+def standstill_torque(numbers: Numbers, source: float) -> float:
     """Return the torque [N m] of full drive at a standstill, from a source of so many volts; friction apart."""
-    if plant.V > 0.0:
-        return plant.K * min(max(source - plant.D_drive, 0.0) / plant.R_drive, plant.I_max)
-    return plant.K * plant.V_max / plant.R
+    if source_term.present(numbers.source):
+        bridge = numbers.bridge
+        return numbers.motor.K * min(max(source - bridge.D_drive, 0.0) / bridge.R_drive, numbers.source.I_max)
+    return numbers.motor.K * numbers.follower.V_max / numbers.motor.R
 
 
-def starts(plant: Plant, forward: bool, torque: float, tau: float, q: float) -> bool:
+def starts(numbers: Numbers, forward: bool, torque: float, tau: float, q: float) -> bool:
     """Tell whether a motor's torque [N m] turns a shaft that stands at q, against friction and load."""
-    against = contact.external_torque(plant, tau, q)
+    against = external_torque(numbers.load, tau, q)
     if forward:
-        return torque - against > contact.holding_bounds(plant, torque, -against)[1]
-    return -torque - against < -contact.holding_bounds(plant, -torque, -against)[0]
+        return torque - against > contacts.holding_bounds(numbers, torque, -against)[1]
+    return -torque - against < -contacts.holding_bounds(numbers, -torque, -against)[0]
 
 
-def marks(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], tau: float, period: float,
+def marks(pulsed: bool, numbers: Numbers, chip: Chip, command: NDArray[np.float64], tau: float, period: float,
           edges: Sequence[float] | NDArray[np.float64], duration: float, source: float, refused: bool,
           final: Sequence[float] | NDArray[np.float64]) -> int:
     """Return what is so at the end of a run, as a sum of `ON_STOP` and `CANNOT_HOLD`.
@@ -106,41 +111,41 @@ def marks(pulsed: bool, plant: Plant, chip: Chip, command: NDArray[np.float64], 
     `tau` is the part of the load's torque that depends on time alone [N m], `source` the voltage of the supply, other
     servos' currents apart [V], `final` the last angle and speed, and temperatures of winding and housing.
     """
-    if plant.p == 0.0:  # a motor is told no angle
+    if numbers.sensor.p == 0.0:  # a motor is told no angle
         return 0
     q, w, T_w, T_h = final[0], final[1], final[2], final[3]
-    target, slack = told(pulsed, plant, chip, command, period, edges, duration)
+    target, slack = told(pulsed, numbers, chip, command, period, edges, duration)
     if abs(target - q) <= slack + _ROUNDING:
         return 0
     found = 0
-    above = q >= plant.upper - _AT_STOP * max(abs(plant.upper), 1.0)
-    if w == 0.0 and (above or q <= plant.lower + _AT_STOP * max(abs(plant.lower), 1.0)):
+    above = q >= numbers.stops.upper - _AT_STOP * max(abs(numbers.stops.upper), 1.0)
+    if w == 0.0 and (above or q <= numbers.stops.lower + _AT_STOP * max(abs(numbers.stops.lower), 1.0)):
         found += ON_STOP
-    if plant.C_w > 0.0:
-        plant = at_temperature(plant, T_w, T_h)
-    torque = standstill_torque(plant, source)
+    if heat.present(numbers.heat):
+        numbers = at_temperature(numbers, T_w, T_h)
+    torque = standstill_torque(numbers, source)
     if refused or not torque < math.inf:
         return found
     forward = target > q
-    sent = min(max(target, plant.lower), plant.upper)
-    if not (starts(plant, forward, torque, tau, q) and starts(plant, forward, torque, tau, sent)):
+    sent = min(max(target, numbers.stops.lower), numbers.stops.upper)
+    if not (starts(numbers, forward, torque, tau, q) and starts(numbers, forward, torque, tau, sent)):
         found += CANNOT_HOLD
     return found
 
 
-def look_at_lanes(pulsed: bool, lanes: Lanes, torques: Numbers, torque_first: Indices, torque_count: Indices,
-                  duration: float, final: Numbers, refused: Numbers, found: Smalls) -> None:
+def look_at_lanes(pulsed: bool, lanes: Lanes, torques: Floats, torque_first: Indices, torque_count: Indices,
+                  duration: float, final: Floats, refused: Floats, found: Smalls) -> None:
     """Look at the end of every lane: fill `refused` with `refused_from`, and `found` with `marks`."""
     for lane in range(lanes.torque.size):
         command = lanes.pieces[lanes.piece_first[lane]:lanes.piece_first[lane] + lanes.piece_count[lane]]
         own = lanes.edge_count[lane]
         edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
-        plant, chip = plant_at(lanes.plants, lane), chip_in(lanes.chips, lane)
+        numbers, chip = numbers_of(lanes, lane), chip_of(lanes, lane)
         period = 0.0 if own >= 0 else chip.frame_period
         tau = lanes.torque[lane]
         if torque_count[lane] > 0:
             own_torque = torques[torque_first[lane]:torque_first[lane] + torque_count[lane]]
             tau += piece_value(piece_before(own_torque, duration, False), duration)
         refused[lane] = refused_from(chip, command, period, edges, duration) if pulsed else math.nan
-        found[lane] = marks(pulsed, plant, chip, command, tau, period, edges, duration, plant.V,
+        found[lane] = marks(pulsed, numbers, chip, command, tau, period, edges, duration, numbers.source.V,
                             not math.isnan(refused[lane]), final[lane])

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine import first_order, hybrid
+from servotwin.models.engine import currents, first_order, guards
+from servotwin.models.engine.modes import FREE, RIGID, Vector
 from servotwin.models.engine.motion import FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
 from servotwin.models.engine.rodas import not_constant
-from servotwin.models.terms import armature
-from servotwin.models.terms.plant import FREE, RIGID, Vector
 from servotwin.physics.pieces import piece_rate, piece_value
 
 _BELOW = -1e-13  # a guard counts as crossed below this (V, rad, rad/s, N m): rounding is not an event
@@ -24,7 +23,7 @@ def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float
     if kinds == 0 or (motion.kind == REST and not not_constant(motion.u) and not not_constant(motion.tau)):
         return math.inf, -1
     alone = motion.mode.contact != FREE and motion.mode.mesh == RIGID
-    if motion.kind == FIRST_ORDER and motion.plant.V > 0.0 and alone:
+    if motion.kind == FIRST_ORDER and motion.numbers.source.V > 0.0 and alone:
         return _outright(motion, kinds, s0, s1)
     left, at_left = s0, state(motion, s0)
     while left < s1:
@@ -41,11 +40,11 @@ def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float
 
 def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int]:
     """Return the same behind a bridge, where zones end at a speed: outright for these, by search for a stop."""
-    plant, c = motion.plant, motion.coefficients
+    numbers, c = motion.numbers, motion.coefficients
     rate, f, w0 = 2.0 * c[0], c[2], c[8]
     before, after = state(motion, s0), state(motion, s1)
     first, found = math.inf, -1
-    for kind in range(hybrid.SPEED, hybrid.ZONE_DOWN + 1):
+    for kind in range(guards.SPEED, guards.ZONE_DOWN + 1):
         if not kinds >> kind & 1:
             continue
         if _guard(motion, kind, s1, after)[0] >= _BELOW:  # monotone: what holds at the end has held
@@ -55,10 +54,10 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
         if s < first:
             first, found = s, kind
     end = min(first, s1)
-    stops = kinds & (1 << hybrid.UPPER | 1 << hybrid.LOWER)
+    stops = kinds & (1 << guards.UPPER | 1 << guards.LOWER)
     if stops != 0:
         q = after[0] if end == s1 else state(motion, end)[0]
-        if q > plant.upper or q < plant.lower:
+        if q > numbers.stops.upper or q < numbers.stops.lower:
             s, kind = _first_of(motion, stops, s0, before, end, state(motion, end))
             if kind >= 0 and s < first:
                 return s, kind
@@ -67,17 +66,17 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
 
 def _boundary_speed(motion: Motion, kind: int) -> float:
     """Return the speed [rad/s] at which sliding, or a zone behind a bridge, ends."""
-    if kind == hybrid.SPEED:
+    if kind == guards.SPEED:
         return 0.0
     u = motion.u.value
-    low, high = armature.zone_limits(motion.plant, motion.mode.zone, u)
-    return (u - (high if kind == hybrid.ZONE_UP else low)) / motion.plant.K_b
+    low, high = currents.zone_limits(motion.numbers, motion.mode.zone, u)
+    return (u - (high if kind == guards.ZONE_UP else low)) / motion.numbers.motor.K_b
 
 
 def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b: Vector) -> tuple[float, int]:
     """Return when the first of several guards falls below zero in [a, b], and which; (inf, -1) where none does."""
     first, found = math.inf, -1
-    for kind in range(hybrid.MOTOR_RELEASE_BACKWARD + 1):
+    for kind in range(guards.MOTOR_RELEASE_BACKWARD + 1):
         if kinds >> kind == 0:
             break
         if not kinds >> kind & 1:
@@ -96,7 +95,7 @@ def _guard(motion: Motion, kind: int, s: float, y: Vector) -> tuple[float, float
     """Return a guard and its rate at s, where the state is y."""
     t = motion.t0 + s
     u, tau = motion.u, motion.tau
-    return hybrid.guard(motion.plant, motion.mode, kind, piece_value(u, t), piece_rate(u, t), piece_value(tau, t),
+    return guards.guard(motion.numbers, motion.mode, kind, piece_value(u, t), piece_rate(u, t), piece_value(tau, t),
                         piece_rate(tau, t), y, rates(motion, s, y))
 
 

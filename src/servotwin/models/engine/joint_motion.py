@@ -6,21 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from servotwin.models.engine import dormand_prince, hybrid
+from servotwin.models.engine import contacts, dormand_prince
 from servotwin.models.engine.dormand_prince import STAGES
-from servotwin.models.engine.motion import Motion
-from servotwin.models.engine.shared_source import (
-    BROKEN_DOWN,
-    FOLLOWING,
-    KEEPING,
-    LIMITED,
-    Member,
-    Source,
-    behind,
-    bus_voltage,
-)
-from servotwin.models.terms import armature, contact
-from servotwin.models.terms.plant import (
+from servotwin.models.engine.modes import (
     BACKWARD,
     FORWARD,
     INSIDE,
@@ -30,7 +18,24 @@ from servotwin.models.terms.plant import (
     STUCK,
     Vector,
     at_rest,
+    sign_of,
 )
+from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.rates import rates_of
+from servotwin.models.engine.shared_source import (
+    BROKEN_DOWN,
+    FOLLOWING,
+    KEEPING,
+    LIMITED,
+    Member,
+    behind,
+    bus_voltage,
+)
+from servotwin.models.terms import heat
+from servotwin.models.terms.friction import varying
+from servotwin.models.terms.load import external_torque, springy, swings
+from servotwin.models.terms.motor import inductive
+from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import piece_value
 
 _MOST_TERMS = 40
@@ -40,19 +45,20 @@ _TOLERANCE = 1e-12  # error of one step, relative to 1 + |state|
 
 def is_linear(member: Member) -> bool:
     """Tell whether a member moves by linear laws."""
-    plant, mode = member.plant, member.mode
-    return (plant.C_w == 0.0 and plant.gravity == 0.0 and mode.mesh != INSIDE
-            and (plant.varies == 0.0 or at_rest(mode.contact)))
+    numbers, mode = member.numbers, member.mode
+    return (not heat.present(numbers.heat) and not swings(numbers.load) and mode.mesh != INSIDE
+            and (not varying(numbers.friction) or at_rest(mode.contact)))
 
 
 def fastest_rate(members: Sequence[Member]) -> float:
     """Return the fastest rate [1/s] of linear members."""
     rate = 0.0
-    for plant, mode, _, _, _ in members:
-        one = plant.b / plant.J + math.sqrt(plant.stiffness / plant.J)
+    for numbers, mode, _, _, _ in members:
+        own, body, R = numbers.motor, numbers.shaft, numbers.bridge.R_drive
+        one = body.b / body.J + math.sqrt(numbers.load.stiffness / body.J)
         if mode.zone != NO_CURRENT:
-            one += plant.R_drive / plant.L if plant.L > 0.0 else plant.K * plant.K_b / (plant.R_drive * plant.J)
-            one += math.sqrt(plant.K * plant.K_b / (plant.L * plant.J)) if plant.L > 0.0 else 0.0
+            one += R / own.L if own.L > 0.0 else own.K * own.K_b / (R * body.J)
+            one += math.sqrt(own.K * own.K_b / (own.L * body.J)) if own.L > 0.0 else 0.0
         rate = max(rate, one)
     return rate
 
@@ -78,7 +84,7 @@ def series(source: Source, state: int, members: Sequence[Member], states: Sequen
         return _plain_series(source, state, members, terms, states, length)
     speeds = [[0.0 if at_rest(m.mode.contact) else y[1]] for m, y in zip(members, states, strict=True)]
     angles = [y[0] for y in states]
-    currents = [[y[2]] if m.plant.L > 0.0 else [] for m, y in zip(members, states, strict=True)]
+    currents = [[y[2]] if inductive(m.numbers.motor) else [] for m, y in zip(members, states, strict=True)]
     for n in range(_MOST_TERMS):
         V_n = _series_voltage(source, state, members, terms, speeds, currents, n)
         size = 0.0
@@ -102,24 +108,24 @@ def series(source: Source, state: int, members: Sequence[Member], states: Sequen
 
 def is_calm(member: Member, m: Motion, end: Vector, length: float) -> bool:
     """Tell by speed and current, and by how they change at both ends, that nothing ends a member's mode."""
-    plant, mode = member.plant, member.mode
-    if mode.mesh != RIGID or mode.zone == NO_CURRENT or plant.varies > 0.0:
+    numbers, mode = member.numbers, member.mode
+    if mode.mesh != RIGID or mode.zone == NO_CURRENT or varying(numbers.friction):
         return False
-    sign = armature.sign_of(mode.zone)
+    sign = sign_of(mode.zone)
     if sign != 0.0 and not _keeps_its_sign(m.against, end[2], sign, length):
         return False
     if mode.contact == STUCK:
         i0, i1 = m.against[0], end[2]
-        if plant.stiffness != 0.0 or m.tau.slope != 0.0 or m.tau.amplitude != 0.0 or _turns(m.against, length):
+        if springy(numbers.load) or m.tau.slope != 0.0 or m.tau.amplitude != 0.0 or _turns(m.against, length):
             return False
-        against = contact.external_torque(plant, m.tau.value, end[0])
-        low, high = contact.holding_bounds(plant, 0.0, 0.0)
-        return -low < plant.K * min(i0, i1) - against and plant.K * max(i0, i1) - against < high
+        against = external_torque(numbers.load, m.tau.value, end[0])
+        low, high = contacts.holding_bounds(numbers, 0.0, 0.0)
+        return -low < numbers.motor.K * min(i0, i1) - against and numbers.motor.K * max(i0, i1) - against < high
     if mode.contact != FORWARD and mode.contact != BACKWARD:
         return False
     if not _keeps_its_sign(m.coefficients, end[1], 1.0 if mode.contact == FORWARD else -1.0, length):
         return False
-    return plant.lower < end[0] < plant.upper
+    return numbers.stops.lower < end[0] < numbers.stops.upper
 
 
 def _keeps_its_sign(series: Sequence[float], end: float, sign: float, length: float) -> bool:
@@ -190,12 +196,13 @@ class _Linear(NamedTuple):
 
 
 def _linear(member: Member, y: Vector, time: float) -> _Linear:
-    plant, mode, _, tau, _ = member
-    friction = contact.friction_torque(plant, mode.contact, y[1], 0.0, 0.0)
-    against = piece_value(tau, time) - plant.stiffness * plant.rest_angle + friction
+    numbers, mode, _, tau, _ = member
+    friction = contacts.friction_torque(numbers, mode.contact, y[1], 0.0, 0.0)
+    against = piece_value(tau, time) - numbers.load.stiffness * numbers.load.rest_angle + friction
     conducts = 0.0 if mode.zone == NO_CURRENT else 1.0
-    return _Linear(plant.K, plant.K_b, plant.R_drive, plant.L, plant.J, plant.b, plant.stiffness,
-                   armature.sign_of(mode.zone) * plant.D_drive, conducts / plant.R_drive, conducts,
+    own, R = numbers.motor, numbers.bridge.R_drive
+    return _Linear(own.K, own.K_b, R, own.L, numbers.shaft.J, numbers.shaft.b, numbers.load.stiffness,
+                   sign_of(mode.zone) * numbers.bridge.D_drive, conducts / R, conducts,
                    0.0 if at_rest(mode.contact) else 1.0, against, tau.slope)
 
 
@@ -226,7 +233,7 @@ def joint_rates(source: Source, state: int, members: Sequence[Member], time: flo
                 states: Sequence[Vector]) -> list[Vector]:
     """Return the rates of all members."""
     V = bus_voltage(source, state, members, states)
-    return [hybrid.rates(m.plant, m.mode, behind(m, V), piece_value(m.tau, time), y)
+    return [rates_of(m.numbers, m.mode, behind(m, V), piece_value(m.tau, time), y)
             for m, y in zip(members, states, strict=True)]
 
 

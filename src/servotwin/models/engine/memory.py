@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from servotwin.models.engine.modes import INSIDE, RIGID, Mode, Vector
 from servotwin.models.engine.records import record_reader, record_writer
 from servotwin.models.terms import frame
 from servotwin.models.terms.frame import Decision, Frame
-from servotwin.models.terms.plant import INSIDE, RIGID, Mode, Vector
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Memory(NamedTuple):
     beat: float  # s, of such a frame
     point: Point
     chip: Frame
-    u: Piece  # what the plant follows, by the time since the start
+    u: Piece  # what the numbers follows, by the time since the start
     u_end: float
     tau: Piece  # torque of the load that depends on time alone
     tau_end: float

@@ -8,11 +8,28 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine import dormand_prince, first_order, hybrid, rodas, second_order
+from servotwin.models.engine import contacts, currents, dormand_prince, first_order, rodas, second_order
 from servotwin.models.engine.coefficients import linear_coefficients, speed_coefficients
+from servotwin.models.engine.modes import (
+    CONDUCTING,
+    CORE,
+    INSIDE,
+    NOWHERE,
+    RIGID,
+    Mode,
+    Vector,
+    at_rest,
+    constant_current,
+    in_linear_zone,
+)
+from servotwin.models.engine.rates import jacobian, rates_of
 from servotwin.models.engine.rodas import Triple
-from servotwin.models.terms import armature, contact
-from servotwin.models.terms.plant import CONDUCTING, CORE, INSIDE, NOWHERE, RIGID, Mode, Plant, Vector, at_rest
+from servotwin.models.terms import heat, source
+from servotwin.models.terms.friction import varying
+from servotwin.models.terms.load import springy, swings
+from servotwin.models.terms.motor import inductive
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.play import with_motor
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
@@ -32,7 +49,7 @@ class Motion(NamedTuple):
     """What moves, from where, and how."""
 
     kind: int
-    plant: Plant
+    numbers: Numbers
     mode: Mode
     u: Piece
     tau: Piece
@@ -49,9 +66,9 @@ class Motion(NamedTuple):
     long_dense: tuple[Vector, ...]
 
 
-def nothing(plant: Plant, u: Piece, tau: Piece) -> Motion:
+def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
     """Return a motion that is none yet."""
-    return _closed(IMPOSSIBLE, plant, Mode(0, 0, 0, 0), u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+    return _closed(IMPOSSIBLE, numbers, Mode(0, 0, 0, 0), u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
 
 
 def is_step(motion: Motion) -> bool:
@@ -59,95 +76,98 @@ def is_step(motion: Motion) -> bool:
     return motion.kind == STEP or motion.kind == LONG_STEP
 
 
-def begin(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float) -> Motion:
+def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
+          limit: float) -> Motion:
     """Return the motion from y at t0 [s]: exact, or one accepted step of at most `limit` [s]."""
     still = at_rest(mode.contact) and (mode.mesh != INSIDE or at_rest(mode.motor))
-    if still and plant.C_w == 0.0 and (plant.L == 0.0 or armature.constant_current(mode.zone)):
-        return _closed(REST, plant, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if (plant.C_w > 0.0 or (not still and (plant.varies > 0.0 or mode.mesh == INSIDE))
-            or (plant.V > 0.0 and (plant.gravity != 0.0 or (plant.L > 0.0 and plant.stiffness != 0.0)))):
-        return _long_step(plant, mode, u, tau, t0, y, step, limit)
-    if plant.L > 0.0 and still and mode.zone >= CONDUCTING:
-        v, R = armature.loop(plant, mode.zone, u.value)
-        fading = (R / plant.L, v / R, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return _closed(HELD, plant, mode, u, tau, t0, y, fading, (0.0, 0.0), step)
-    follows = armature.in_linear_zone(mode.zone)
-    if (plant.gravity != 0.0 or mode.contact == CORE or (follows and u.sweep != 0.0)
-            or (plant.L > 0.0 and (still or (plant.V == 0.0 and (plant.p != 0.0 or plant.stiffness != 0.0))))):
-        return _integrated(plant, mode, u, tau, t0, y, step, limit)
+    heats, inertial = heat.present(numbers.heat), inductive(numbers.motor)
+    bridged, swinging, sprung = source.present(numbers.source), swings(numbers.load), springy(numbers.load)
+    if still and not heats and (not inertial or constant_current(mode.zone)):
+        return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+    if (heats or (not still and (varying(numbers.friction) or mode.mesh == INSIDE))
+            or (bridged and (swinging or (inertial and sprung)))):
+        return _long_step(numbers, mode, u, tau, t0, y, step, limit)
+    if inertial and still and mode.zone >= CONDUCTING:
+        v, R = currents.loop(numbers, mode.zone, u.value)
+        fading = (R / numbers.motor.L, v / R, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return _closed(HELD, numbers, mode, u, tau, t0, y, fading, (0.0, 0.0), step)
+    follows = in_linear_zone(mode.zone)
+    if (swinging or mode.contact == CORE or (follows and u.sweep != 0.0)
+            or (inertial and (still or (not bridged and (numbers.sensor.p != 0.0 or sprung))))):
+        return _integrated(numbers, mode, u, tau, t0, y, step, limit)
     wave = (u.value + u.slope * (t0 - u.start), u.slope, 0.0, 0.0, 0.0)
     if follows:
         wave = (wave[0], u.slope, u.amplitude, u.frequency, u.phase + u.frequency * (t0 - u.start))
     torque = (tau.value + tau.slope * (t0 - tau.start), tau.slope)
-    if plant.L > 0.0 and not armature.constant_current(mode.zone):
-        against = (torque[0] + contact.friction_torque(plant, mode.contact, y[1], 0.0, 0.0), torque[1])
-        coefficients = speed_coefficients(plant, mode, wave, against, y[1], y[2])
-        return _closed(WITH_CURRENT, plant, mode, u, tau, t0, y, coefficients, against, step)
-    coefficients = linear_coefficients(plant, mode, wave, torque, y[0], y[1])
+    if inertial and not constant_current(mode.zone):
+        against = (torque[0] + contacts.friction_torque(numbers, mode.contact, y[1], 0.0, 0.0), torque[1])
+        coefficients = speed_coefficients(numbers, mode, wave, against, y[1], y[2])
+        return _closed(WITH_CURRENT, numbers, mode, u, tau, t0, y, coefficients, against, step)
+    coefficients = linear_coefficients(numbers, mode, wave, torque, y[0], y[1])
     _, c, _, f1, fs, _, _, _, _ = coefficients
     kind = FIRST_ORDER if c == 0.0 and f1 == 0.0 and fs == 0.0 else SECOND_ORDER
-    return _closed(kind, plant, mode, u, tau, t0, y, coefficients, (0.0, 0.0), step)
+    return _closed(kind, numbers, mode, u, tau, t0, y, coefficients, (0.0, 0.0), step)
 
 
-def _closed(kind: int, plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
+def _closed(kind: int, numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
             coefficients: tuple[float, ...], against: tuple[float, ...], step: float) -> Motion:
-    return Motion(kind, plant, mode, u, tau, t0, y, math.inf, coefficients, against, y, step, False, _NO_STAGES,
+    return Motion(kind, numbers, mode, u, tau, t0, y, math.inf, coefficients, against, y, step, False, _NO_STAGES,
                   _NO_DENSE, _NO_LONG_DENSE)
 
 
-def by_series(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
+def by_series(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
               speed: tuple[float, ...], current: tuple[float, ...]) -> Motion:
     """Return a motion whose speed and current are given as powers of time."""
-    return Motion(SERIES, plant, mode, u, tau, t0, y, length, speed, current, y, 0.0, False, _NO_STAGES, _NO_DENSE,
+    return Motion(SERIES, numbers, mode, u, tau, t0, y, length, speed, current, y, 0.0, False, _NO_STAGES, _NO_DENSE,
                   _NO_LONG_DENSE)
 
 
-def by_step(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
+def by_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
             dense: tuple[Vector, ...], end: Vector) -> Motion:
     """Return a motion whose dense output is given."""
-    return Motion(LONG_STEP, plant, mode, u, tau, t0, y, length, _NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, True,
+    return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, length, _NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, True,
                   _NO_STAGES, _NO_DENSE, dense)
 
 
-def _integrated(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
+def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
                 limit: float) -> Motion:
-    jac = hybrid.jacobian(plant, mode, piece_value(u, t0), piece_rate(u, t0), piece_rate(tau, t0), y[0], y[1])
+    jac = jacobian(numbers, mode, piece_value(u, t0), piece_rate(u, t0), piece_rate(tau, t0), y[0], y[1])
     h = min(step, limit)
     h = min(h, period(u, tau, t0, t0 + h) / 6.0)
     for _ in range(60):
-        y1, error, stages = rodas.step(plant, mode, u, tau, jac, t0, y, h)
+        y1, error, stages = rodas.step(numbers, mode, u, tau, jac, t0, y, h)
         size = max(abs(error[0]) / (1.0 + abs(y1[0])), abs(error[1]) / (1.0 + abs(y1[1])),
                    abs(error[2]) / (1.0 + abs(y1[2]))) / _TOLERANCE
         if not size < 1e6:
             size = 1e6
         factor = min(5.0, max(0.1, 0.85 * size**-0.2)) if size > 0.0 else 5.0
         if size <= 1.0:
-            return Motion(STEP, plant, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, h * factor, False,
+            return Motion(STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, h * factor, False,
                           stages, _NO_DENSE, _NO_LONG_DENSE)
         h *= factor
         if t0 + h == t0:
             break
-    return _closed(IMPOSSIBLE, plant, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+    return _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
 
 
-def _long_step(plant: Plant, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
+def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
                limit: float) -> Motion:
     h = min(step, limit)
     h = min(h, period(u, tau, t0, t0 + h) / 3.0)
     for _ in range(60):
-        y1, error = dormand_prince.step(plant, mode, u, tau, t0, y, h)
+        y1, error = dormand_prince.step(numbers, mode, u, tau, t0, y, h)
         size = error / _FINE_TOLERANCE
         if not size < 1e12:
             size = 1e12
         factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
         if size <= 1.0:
             following = max(step, h * factor) if h == limit else h * factor  # a step that was cut short tells little
-            return Motion(LONG_STEP, plant, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, following,
+            return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, following,
                           False, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
         h *= factor
         if t0 + h == t0:
             break
-    return _closed(IMPOSSIBLE, plant, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+    return _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
 
 
 def prepared(motion: Motion) -> Motion:
@@ -158,9 +178,9 @@ def prepared(motion: Motion) -> Motion:
     if motion.kind == STEP:
         dense = rodas.dense_coefficients(motion.stages)
     elif motion.kind == LONG_STEP:
-        long_dense = dormand_prince.dense(motion.plant, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
+        long_dense = dormand_prince.dense(motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
                                           motion.length)
-    return Motion(motion.kind, motion.plant, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
+    return Motion(motion.kind, motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
                   motion.length, motion.coefficients, motion.against, motion.end, motion.next_step, True,
                   motion.stages, dense, long_dense)
 
@@ -179,8 +199,8 @@ def state(motion: Motion, s: float) -> Vector:
         return _moved(motion, q, w, start[2])
     if kind == WITH_CURRENT:
         w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
-        plant, against = motion.plant, motion.against
-        i = (plant.J * dw + plant.b * w + against[0] + against[1] * s) / plant.K
+        numbers, against = motion.numbers, motion.against
+        i = (numbers.shaft.J * dw + numbers.shaft.b * w + against[0] + against[1] * s) / numbers.motor.K
         return _moved(motion, start[0] + way, w, i)
     if kind == HELD:
         rate, final = motion.coefficients[0], motion.coefficients[1]
@@ -213,7 +233,7 @@ def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:
         return q, w, i, T_w, T_h, q_m, w_m
     if mesh == RIGID:
         return q, w, i, T_w, T_h, q, w
-    return contact.with_motor(motion.plant, mesh, (q, w, i, T_w, T_h, q_m, w_m))
+    return with_motor(motion.numbers.play, mesh, (q, w, i, T_w, T_h, q_m, w_m))
 
 
 def rates(motion: Motion, s: float, y: Vector) -> Vector:
@@ -225,16 +245,17 @@ def rates(motion: Motion, s: float, y: Vector) -> Vector:
     if kind == FIRST_ORDER or kind == SECOND_ORDER:
         dw = second_order.acceleration(motion.coefficients, s, y[0], w)
         return w, dw, 0.0, 0.0, 0.0, w_m, dw
-    plant = motion.plant
+    numbers = motion.numbers
     if kind == WITH_CURRENT:
         w, dw = second_order.propagate(motion.coefficients, s)
         ddw = second_order.acceleration(motion.coefficients, s, w, dw)
-        return w, dw, (plant.J * ddw + plant.b * dw + motion.against[1]) / plant.K, 0.0, 0.0, w_m, dw
+        di = (numbers.shaft.J * ddw + numbers.shaft.b * dw + motion.against[1]) / numbers.motor.K
+        return w, dw, di, 0.0, 0.0, w_m, dw
     if kind == HELD:
         return 0.0, 0.0, motion.coefficients[0] * (motion.coefficients[1] - y[2]), 0.0, 0.0, 0.0, 0.0
     if is_step(motion):
         t = motion.t0 + s
-        return hybrid.rates(plant, motion.mode, piece_value(motion.u, t), piece_value(motion.tau, t), y)
+        return rates_of(numbers, motion.mode, piece_value(motion.u, t), piece_value(motion.tau, t), y)
     return NOWHERE
 
 

@@ -9,8 +9,9 @@ Julia Differential Equations package", BIT Numerical Mathematics 63, 27 (2023).
 
 from __future__ import annotations
 
-from servotwin.models.engine import hybrid
-from servotwin.models.terms.plant import Mode, Plant, Vector
+from servotwin.models.engine.modes import Mode, Vector
+from servotwin.models.engine.rates import rates_of
+from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Piece, piece_value
 
 Triple = tuple[float, float, float]  # angle, speed, current
@@ -50,7 +51,7 @@ DENSE = (
 )
 
 
-def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...], t: float, y: Vector,
+def step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...], t: float, y: Vector,
          h: float) -> tuple[Vector, Triple, tuple[Triple, ...]]:
     """Return the state after a step of `h` [s], its error estimate, and the stages for the dense output.
 
@@ -58,7 +59,7 @@ def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...],
 
     Parameters
     ----------
-    plant, mode, u, tau
+    numbers, mode, u, tau
         What moves, and under which inputs.
     jac : tuple
         ∂F/∂(q, w, i), ∂E/∂(q, w, i), ∂F/∂t, ∂E/∂t at the start.
@@ -95,7 +96,7 @@ def step(plant: Plant, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, ...],
             u_now = piece_value(u, t + FRACTIONS[j] * h)
         if follows_tau:
             tau_now = piece_value(tau, t + FRACTIONS[j] * h)
-        _, F, E, _, _, _, _ = hybrid.rates(plant, mode, u_now, tau_now, (qs, ws, cs, T_w, T_h, qs, ws))
+        _, F, E, _, _, _, _ = rates_of(numbers, mode, u_now, tau_now, (qs, ws, cs, T_w, T_h, qs, ws))
         hd = h * WEIGHTS[j]
         rq = rq * inv_h + ws
         rw = rw * inv_h + F + hd * Ft

@@ -20,29 +20,32 @@ from servotwin.models.engine.memory import (
     started,
     time_of,
 )
+from servotwin.models.engine.modes import INSIDE, RIGID, Mode
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, source, step
-from servotwin.models.engine.tiles import chip_in, plant_at
-from servotwin.models.terms import frame
-from servotwin.models.terms.frame import Chip
-from servotwin.models.terms.plant import INSIDE, RIGID, Mode, Plant
+from servotwin.models.engine.tiles import chip_of, numbers_of
+from servotwin.models.terms import play
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.chip import present as pulsed_chip
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.sensor import wiper_at
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.tiles import Indices, Lanes, Numbers
+    from servotwin.models.engine.tiles import Floats, Indices, Lanes
 
 
 def start(lanes: Lanes, which: Indices, records: Any) -> None:
     """Put the lanes named in `which` into records, as they start."""
     for k in range(which.size):
         lane, y = which[k], lanes.start
-        plant = plant_at(lanes.plants, lane)
+        numbers = numbers_of(lanes, lane)
         put_memory(records[k], started(
             (y[0, lane], y[1, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane]),
-            INSIDE if plant.half_play > 0.0 else RIGID))
+            INSIDE if play.present(numbers.play) else RIGID))
 
 
-def go_on(lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indices, torque_count: Indices,
-          which: Indices, durations: Numbers, times: Numbers, first_output: Indices, outputs: Numbers, records: Any,
-          status: Indices, ended: Numbers) -> None:
+def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
+          which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, records: Any,
+          status: Indices, ended: Floats) -> None:
     """Let the lanes named in `which`, whose memories the records hold, go on for durations of their own [s].
 
     `outputs` has the shape (n, 13, T), as in `run`, and gets what stands at `times` from the one numbered
@@ -51,7 +54,7 @@ def go_on(lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indices,
     for k in range(which.size):
         lane = which[k]
         inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        memory, how = run(plant_at(lanes.plants, lane), chip_in(lanes.chips, lane), inputs, memory_of(records[k]),
+        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_of(records[k]),
                           durations[k], times, first_output[k], outputs[k])
         status[k] = how
         ended[k] = time_of(memory)
@@ -59,47 +62,47 @@ def go_on(lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indices,
             put_memory(records[k], memory)
 
 
-def _inputs(lanes: Lanes, curve: Numbers, torque: Numbers, lane: int) -> Inputs:
+def _inputs(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
     first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
     own = lanes.edge_count[lane]
     edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
-    period = 0.0 if own >= 0 else lanes.chips[14, lane]
+    period = 0.0 if own >= 0 else chip_of(lanes, lane).frame_period
     return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane])
 
 
-def settle(lanes: Lanes, curve: Numbers, torques: Numbers, torque_first: Indices, torque_count: Indices,
+def settle(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
            which: Indices, records: Any, modes: Indices) -> None:
     """Fill `modes`, shape (4, n), with the modes of lanes as they stand, under their present inputs."""
     for k in range(which.size):
         lane = which[k]
         inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        mode = mode_of(plant_at(lanes.plants, lane), chip_in(lanes.chips, lane), inputs, memory_of(records[k]))
+        mode = mode_of(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_of(records[k]))
         modes[0, k], modes[1, k], modes[2, k], modes[3, k] = mode.zone, mode.contact, mode.mesh, mode.motor
 
 
-def mode_of(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory) -> Mode:
+def mode_of(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> Mode:
     """Return the mode of a servo as it stands, under its present inputs."""
-    memory = resumed(chip.frame_period > 0.0, inputs, memory, False)
+    memory = resumed(pulsed_chip(chip), inputs, memory, False)
     origin, point = origin_of(memory), memory.point
-    u = source(plant, memory.chip) if chip.frame_period > 0.0 else since(memory.u, origin)
-    if point.anchor_time < math.inf and (chip.frame_period == 0.0 or u.value == memory.u.value):
+    u = source(numbers, memory.chip) if pulsed_chip(chip) else since(memory.u, origin)
+    if point.anchor_time < math.inf and (not pulsed_chip(chip) or u.value == memory.u.value):
         return point.mode
-    return anchored(plant, u, since(memory.tau, origin), point.time, point).mode
+    return anchored(numbers, u, since(memory.tau, origin), point.time, point).mode
 
 
-def run(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, duration: float, times: Numbers,
-        done: int, outputs: Numbers) -> tuple[Memory, int]:
+def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, times: Floats,
+        done: int, outputs: Floats) -> tuple[Memory, int]:
     """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
 
     What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (13, n): angle, speed,
     contact, drive, error, and what only few servos have: current, temperatures of winding and housing, angle and speed
     of the motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there.
     """
-    pulsed = chip.frame_period > 0.0
+    pulsed = pulsed_chip(chip)
     memory = resumed(pulsed, inputs, memory, False)
     until = instant(pulsed, inputs, memory, memory.point.time + duration)
     origin = origin_of(memory)
-    m = motion.nothing(plant, memory.u, memory.tau)
+    m = motion.nothing(numbers, memory.u, memory.tau)
     idle = 0
     while memory.point.time < until:
         if due(memory):
@@ -107,7 +110,7 @@ def run(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, duration: floa
             until = instant(pulsed, inputs, memory, until - (origin_of(memory) - origin))
             origin = origin_of(memory)
         t, wiper = memory.point.time, memory.point.wiper
-        after = step(plant, chip, inputs, memory, m, until)
+        after = step(numbers, chip, inputs, memory, m, until)
         if after.status != COMPLETED:
             return memory, after.status
         memory, m = after.memory, after.motion
@@ -121,7 +124,7 @@ def run(plant: Plant, chip: Chip, inputs: Inputs, memory: Memory, duration: floa
             outputs[3, done], outputs[4, done] = memory.chip.drive, memory.chip.error
             for k in range(5):
                 outputs[5 + k, done] = y[2 + k]
-            outputs[10, done] = frame.wiper_at(plant.half_slack, wiper, y[0])
+            outputs[10, done] = wiper_at(numbers.sensor, wiper, y[0])
             outputs[11, done], outputs[12, done] = m.mode.mesh, m.mode.motor
             done += 1
     return memory, COMPLETED

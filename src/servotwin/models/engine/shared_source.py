@@ -1,7 +1,7 @@
 """Several servos on one source: who takes part, which way the currents flow, and the bus voltage that they leave.
 
 A servo takes part while its bridge connects the motor to the bus: with the sign of the drive, or through the diodes of
-a coasting bridge against the sign of its current. Its plant is then that of a stiff source, and u = s V_bus.
+a coasting bridge against the sign of its current. Its numbers are then those of a stiff source, and u = s V_bus.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from servotwin.models.engine import hybrid
-from servotwin.models.terms import armature
-from servotwin.models.terms.plant import NO_CURRENT, Mode, Plant, Vector
+from servotwin.models.engine import currents
+from servotwin.models.engine.modes import NO_CURRENT, Mode, Vector, sign_of
+from servotwin.models.terms import source as source_term
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.source import Source
 from servotwin.physics import bridge, motor, supply
 from servotwin.physics.pieces import Piece
 
@@ -22,34 +24,28 @@ _EDGE = 1e-8  # of a limit: so near to it the sum of currents counts as being th
 FOLLOWING, LIMITED, BROKEN_DOWN, KEEPING = range(4)
 
 
-class Source(NamedTuple):
-    """What the servos hang on."""
-
-    V: float  # V_oc
-    R_b: float
-    I_max: float  # inf: a battery
-
-
 class Member(NamedTuple):
     """A servo whose motor is connected to the bus."""
 
-    plant: Plant  # as on a stiff source
+    numbers: Numbers  # as on a stiff source
     mode: Mode
     sign: float  # of the bus voltage in its circuit
     tau: Piece
     returns: bool  # through diodes, against the bus alone
 
 
-def on_stiff_source(plant: Plant, returning: bool) -> Plant:
-    """Return the plant of a servo whose bus voltage is given: driven, or returning current through its diodes."""
-    R_drive = plant.R_off - plant.R_b if returning and plant.I_max == math.inf else plant.R_drive - plant.R_b
-    if returning and plant.I_max < math.inf:
-        R_drive = plant.R_off
-    D = max(plant.D_drive, 1e-300) if returning else plant.D_drive  # a diode without drop still has a direction
-    return plant._replace(R_drive=R_drive, R_b=0.0, I_max=math.inf, D_drive=D)
+def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
+    """Return a servo whose bus voltage is given: driven, or returning current through its diodes."""
+    bridge, R_b, regulated = numbers.bridge, numbers.source.R_b, source_term.regulated(numbers.source)
+    R_drive = bridge.R_off - R_b if returning and not regulated else bridge.R_drive - R_b
+    if returning and regulated:
+        R_drive = bridge.R_off
+    D = max(bridge.D_drive, 1e-300) if returning else bridge.D_drive  # a diode without drop still has a direction
+    return numbers._replace(bridge=bridge._replace(R_drive=R_drive, D_drive=D),
+                            source=numbers.source._replace(R_b=0.0, I_max=math.inf))
 
 
-def member_of(stiff: Plant, mode: Mode, drive: float, tau: Piece, y: Vector) -> Member:
+def member_of(stiff: Numbers, mode: Mode, drive: float, tau: Piece, y: Vector) -> Member:
     """Return a servo as a member, driven or (0) returning current through the diodes of a coasting bridge."""
     sign = drive
     if sign == 0.0:  # against the current, or against the one that the back-EMF would drive
@@ -60,14 +56,14 @@ def member_of(stiff: Plant, mode: Mode, drive: float, tau: Piece, y: Vector) -> 
 def _demand(members: Sequence[Member], states: Sequence[Vector]) -> tuple[float, float, float]:
     """Return g, h and I_B of the current Σ s i = g V − h + I_B that the members take at the bus voltage V."""
     g = h = given = 0.0
-    for (plant, mode, sign, _, _), y in zip(members, states, strict=True):
-        warm = hybrid.warm(plant, y)
-        if plant.L > 0.0:
+    for (numbers, mode, sign, _, _), y in zip(members, states, strict=True):
+        now = warm(numbers, y)
+        if numbers.motor.L > 0.0:
             given += sign * y[2]
         elif mode.zone != NO_CURRENT:
-            g += motor.steady_armature_current(1.0, 0.0, warm.R_drive, warm.K_b)
-            v = bridge.driving_voltage(0.0, armature.sign_of(mode.zone), warm.D_drive)
-            h -= sign * motor.steady_armature_current(v, y[6], warm.R_drive, warm.K_b)
+            g += motor.steady_armature_current(1.0, 0.0, now.bridge.R_drive, now.motor.K_b)
+            v = bridge.driving_voltage(0.0, sign_of(mode.zone), now.bridge.D_drive)
+            h -= sign * motor.steady_armature_current(v, y[6], now.bridge.R_drive, now.motor.K_b)
     return g, h, given
 
 
@@ -84,12 +80,13 @@ def bus_voltage(source: Source, state: int, members: Sequence[Member], states: S
     if g > 0.0:
         return (source.I_max + h - given) / g
     above = below = 0.0  # the currents have inertia: their sum has to stay
-    for (plant, mode, sign, _, _), y in zip(members, states, strict=True):
+    for (numbers, mode, sign, _, _), y in zip(members, states, strict=True):
         if mode.zone != NO_CURRENT:
-            warm = hybrid.warm(plant, y)
-            v = bridge.driving_voltage(0.0, armature.sign_of(mode.zone), warm.D_drive)
-            above -= sign * motor.armature_current_rate(v, y[2], y[6], warm.R_drive, plant.L, warm.K_b)
-            below += motor.armature_current_rate(1.0, 0.0, 0.0, warm.R_drive, plant.L, warm.K_b)
+            now = warm(numbers, y)
+            v = bridge.driving_voltage(0.0, sign_of(mode.zone), now.bridge.D_drive)
+            R, L, K_b = now.bridge.R_drive, now.motor.L, now.motor.K_b
+            above -= sign * motor.armature_current_rate(v, y[2], y[6], R, L, K_b)
+            below += motor.armature_current_rate(1.0, 0.0, 0.0, R, L, K_b)
     return above / below
 
 
@@ -149,18 +146,18 @@ def zoned(source: Source, members: Sequence[Member], states: Sequence[Vector],
 
 
 def _zone(member: Member, y: Vector, V_bus: float) -> int:
-    return let_through(member, armature.zone_of(
-        hybrid.warm(member.plant, y), behind(member, V_bus), 0.0, y[0], y[6], y[2]))
+    return let_through(member, currents.zone_of(
+        warm(member.numbers, y), behind(member, V_bus), 0.0, y[0], y[6], y[2]))
 
 
 def _in_zone(member: Member, zone: int) -> Member:
-    plant, (_, shaft, mesh, motor), sign, tau, returns = member
-    return Member(plant, Mode(zone, shaft, mesh, motor), sign, tau, returns)
+    numbers, (_, shaft, mesh, motor), sign, tau, returns = member
+    return Member(numbers, Mode(zone, shaft, mesh, motor), sign, tau, returns)
 
 
 def let_through(member: Member, zone: int) -> int:
     """Return the zone of a member: diodes block what the bus would drive."""
-    return NO_CURRENT if member.returns and armature.sign_of(zone) * member.sign > 0.0 else zone
+    return NO_CURRENT if member.returns and sign_of(zone) * member.sign > 0.0 else zone
 
 
 def after(state: int, guard: int) -> int:

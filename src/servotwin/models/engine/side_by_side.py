@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import arcs, phases, tiles, windows
 from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, STUCK
 from servotwin.models.engine.noise import gaussian
-from servotwin.models.terms.plant import BACKWARD, FORWARD, FREE, STUCK
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.tiles import Indices, Lanes, Numbers, Outputs
+    from servotwin.models.engine.tiles import Floats, Indices, Lanes, Outputs
 
 
-def go_on(pieces: Numbers, listed: Numbers, braked: bool, which: Indices, duration: float, times: Numbers,
+def go_on(pieces: Floats, listed: Floats, braked: bool, which: Indices, duration: float, times: Floats,
           outputs: Outputs, tile_rows: Any, plans: Any) -> int:
     """Let all lanes go on for a duration [s], all of them `braked` or none; return how many were given up.
 
@@ -40,7 +40,7 @@ def start(lanes: Lanes, first_output: float, tile_rows: Any) -> None:
         tiles.start(lanes, first, min(tiles.TILE, total - first), first_output, tile_rows[k])
 
 
-def advance(which: Indices, braked: bool, first: int, last: int, duration: float, widths: Numbers, torques: Numbers,
+def advance(which: Indices, braked: bool, first: int, last: int, duration: float, widths: Floats, torques: Floats,
             loads_change: bool, tile_rows: Any, plans: Any) -> int:
     """Let the lanes `which` of the tiles from `first` to before `last` go on under constant pulses [s] and torques.
 
@@ -53,7 +53,7 @@ def advance(which: Indices, braked: bool, first: int, last: int, duration: float
     return lost
 
 
-def _advance(which: Indices, braked: bool, duration: float, widths: Numbers, torques: Numbers, loads_change: bool,
+def _advance(which: Indices, braked: bool, duration: float, widths: Floats, torques: Floats, loads_change: bool,
              tile: Any, plan: Any, before: Any) -> int:
     size = which.size
     for j in range(size):
@@ -69,7 +69,7 @@ def _advance(which: Indices, braked: bool, duration: float, widths: Numbers, tor
     return lost
 
 
-def _go_on(pieces: Numbers, listed: Numbers, braked: bool, which: Indices, duration: float, times: Numbers,
+def _go_on(pieces: Floats, listed: Floats, braked: bool, which: Indices, duration: float, times: Floats,
            outputs: Outputs, tile: Any, plan: Any, before: Any) -> int:
     size = which.size
     own = False
@@ -109,7 +109,7 @@ def _needs_all(size: int, tile: Any) -> tuple[bool, bool]:
     return full or noisy, noisy
 
 
-def _hang(which: Indices, torques: Numbers, tile: Any) -> None:
+def _hang(which: Indices, torques: Floats, tile: Any) -> None:
     """Hang constant external torques [N m] on the shafts of a tile."""
     numbers = tile.arc
     for j in range(which.size):
@@ -126,7 +126,7 @@ def renew(lanes: Lanes, tile_rows: Any) -> None:
     total = lanes.torque.size
     for k in range(len(tile_rows)):
         first = k * tiles.TILE
-        tiles.set_numbers(lanes.plants, lanes.chips, lanes.torque, first, min(tiles.TILE, total - first), tile_rows[k])
+        tiles.set_numbers(lanes, first, min(tiles.TILE, total - first), tile_rows[k])
 
 
 def _wanted(size: int, tile: Any, plan: Any, before: Any) -> int:
@@ -143,7 +143,7 @@ def _is_wanted(tile: Any, plan: Any, before: Any, j: int) -> bool:
     return bool(plan.window[j] > 0.0 and (x < plan.window[j] or (plan.last[j] > 0.0 and x < math.inf)))
 
 
-def _write(which: Indices, times: Numbers, outputs: Outputs, tile: Any, plan: Any, before: Any) -> None:
+def _write(which: Indices, times: Floats, outputs: Outputs, tile: Any, plan: Any, before: Any) -> None:
     """Write the outputs of this window, each from the arc that holds it."""
     for j in range(which.size):
         while plan.lost[j] == 0.0 and _is_wanted(tile, plan, before, j):

@@ -13,13 +13,13 @@ import numpy as np
 from servotwin.models.engine import arcs
 from servotwin.models.engine.arcs import ArcNumbers
 from servotwin.models.engine.records import TILE, reader, rows_of, tile_of, writer
-from servotwin.models.terms.frame import Chip
-from servotwin.models.terms.plant import Plant
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Numbers = NDArray[np.float64]
+    Floats = NDArray[np.float64]
     Indices = NDArray[np.int64]
     Smalls = NDArray[np.int8]
 
@@ -32,10 +32,15 @@ class Meter(NamedTuple):
     V: float
     R_b: float
     K_b: float
+    R: float
+    V_br: float
+    coast: float
     D_drive: float
     R_drive: float
     D_off: float
     R_off: float
+    p: float
+    b_o: float
 
 
 class Servo(NamedTuple):
@@ -155,6 +160,7 @@ def plan_type(real: str) -> np.dtype[Any]:
 
 
 chip_at = reader("chip_at", Chip)
+numbers_at = reader("numbers_at", Numbers)
 put_chip = writer("put_chip", Chip)
 arc_numbers_at = reader("arc_numbers_at", ArcNumbers)
 put_arc_numbers = writer("put_arc_numbers", ArcNumbers)
@@ -166,17 +172,17 @@ put_meter = writer("put_meter", Meter)
 
 
 class Lanes(NamedTuple):
-    """What comes in, for all lanes of a chunk; each array has a column or an entry for each lane."""
+    """What comes in, for all lanes of a chunk; each array has a column, an entry or a place in a tile for each lane."""
 
-    plants: Numbers  # (49, B), fields of Plant
-    chips: Numbers  # (21, B), fields of Chip
-    start: Numbers  # (7, B), numbers of the state at t = 0
-    torque: Numbers
+    numbers: Any  # tiles of Numbers
+    chips: Any  # tiles of Chip
+    start: Floats  # (7, B), numbers of the state at t = 0
+    torque: Floats
     seeds: Indices
-    pieces: Numbers  # (n, 7)
+    pieces: Floats  # (n, 7)
     piece_first: Indices
     piece_count: Indices
-    edges: Numbers
+    edges: Floats
     edge_first: Indices
     edge_count: Indices
 
@@ -184,44 +190,42 @@ class Lanes(NamedTuple):
 class Outputs(NamedTuple):
     """What goes out: (B, T) each, or (0, 0) where it is not wanted."""
 
-    angle: Numbers
-    speed: Numbers
+    angle: Floats
+    speed: Floats
     contact: Smalls
     drive: Smalls
-    error: Numbers
+    error: Floats
 
 
-def plant_at(c: Numbers, j: int) -> Plant:
-    """Return the plant in column j."""
-    return Plant(c[0, j], c[1, j], c[2, j], c[3, j], c[4, j], c[5, j], c[6, j], c[7, j], c[8, j], c[9, j], c[10, j],
-                 c[11, j], c[12, j], c[13, j], c[14, j], c[15, j], c[16, j], c[17, j], c[18, j], c[19, j], c[20, j],
-                 c[21, j], c[22, j], c[23, j], c[24, j], c[25, j], c[26, j], c[27, j], c[28, j], c[29, j], c[30, j],
-                 c[31, j], c[32, j], c[33, j], c[34, j], c[35, j], c[36, j], c[37, j], c[38, j], c[39, j], c[40, j],
-                 c[41, j], c[42, j], c[43, j], c[44, j], c[45, j], c[46, j], c[47, j], c[48, j])
+def numbers_of(lanes: Lanes, lane: int) -> Numbers:
+    """Return the numbers of a lane."""
+    return numbers_at(lanes.numbers[lane // TILE], lane % TILE)
 
 
-def chip_in(c: Numbers, j: int) -> Chip:
-    """Return the chip in column j."""
-    return Chip(c[0, j], c[1, j], c[2, j], c[3, j], c[4, j], c[5, j], c[6, j], c[7, j], c[8, j], c[9, j], c[10, j],
-                c[11, j], c[12, j], c[13, j], c[14, j], c[15, j], c[16, j], c[17, j], c[18, j], c[19, j], c[20, j])
+def chip_of(lanes: Lanes, lane: int) -> Chip:
+    """Return the chip of a lane."""
+    return chip_at(lanes.chips[lane // TILE], lane % TILE)
 
 
-def set_numbers(plants: Numbers, chips: Numbers, torque: Numbers, first: int, size: int, tile: Any) -> None:
-    """Put what servos are into a tile, from the columns `first` on."""
+def set_numbers(lanes: Lanes, first: int, size: int, tile: Any) -> None:
+    """Put what servos are into a tile, from the lane `first` on."""
     for j in range(size):
-        put_arc_numbers(tile.arc, j, arcs.arc_numbers(plant_at(plants, first + j), torque[first + j]))
+        put_arc_numbers(tile.arc, j, arcs.arc_numbers(numbers_of(lanes, first + j), lanes.torque[first + j]))
     for j in range(size):
-        put_chip(tile.chip, j, chip_in(chips, first + j))
-        tile.clock.period[j] = chips[14, first + j]
+        chip = chip_of(lanes, first + j)
+        put_chip(tile.chip, j, chip)
+        tile.clock.period[j] = chip.frame_period
     for j in range(size):
-        plant = plant_at(plants, first + j)
-        put_meter(tile.meter, j, Meter(plant.V, plant.R_b, plant.K_b, plant.D_drive, plant.R_drive, plant.D_off,
-                                       plant.R_off))
+        numbers = numbers_of(lanes, first + j)
+        path, motor, source, sensor = numbers.bridge, numbers.motor, numbers.source, numbers.sensor
+        put_meter(tile.meter, j, Meter(
+            source.V, source.R_b, motor.K_b, motor.R, path.V_br, path.coast, path.D_drive, path.R_drive, path.D_off,
+            path.R_off, sensor.p, sensor.b_o))
 
 
 def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -> None:
     """Put lanes as they start into a tile, from the column `first` on."""
-    set_numbers(lanes.plants, lanes.chips, lanes.torque, first, size, tile)
+    set_numbers(lanes, first, size, tile)
     for j in range(size):
         q, w = lanes.start[0, first + j], lanes.start[1, first + j]
         put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
@@ -229,7 +233,7 @@ def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -
     for j in range(size):
         own = lanes.edge_count[first + j]
         late = lanes.edges[lanes.edge_first[first + j]] if own > 0 else math.inf if own == 0 else 0.0
-        put_clock(tile.clock, j, Clock(lanes.chips[14, first + j], 0.0, 0.0, late, 0.0, 0.0, -math.inf, first_output))
+        put_clock(tile.clock, j, Clock(tile.clock.period[j], 0.0, 0.0, late, 0.0, 0.0, -math.inf, first_output))
         begin, count = lanes.piece_first[first + j], lanes.piece_count[first + j]
         put_count(tile.count, j, Count(0, 0, lanes.seeds[first + j], begin, begin + count - 1, 0,
                                        lanes.edge_first[first + j], own, 0))
@@ -257,8 +261,8 @@ def idle_numbers_at(rows: Any, j: int) -> ArcNumbers:
 def plain_chip_at(rows: Any, j: int) -> Chip:
     """Return a chip without noise, coupling and RC stretcher."""
     x = chip_at(rows, j)
-    return Chip(x.T_0, x.slope, x.p, x.b_o, 0.0, 0.0, 0.0, x.half_deadband, x.K, x.t_min, 0.0, x.shortest, x.longest,
-                x.timeout, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Chip(x.T_0, x.slope, 0.0, 0.0, 0.0, x.half_deadband, x.K, x.t_min, 0.0, x.shortest, x.longest, x.timeout,
+                0.0, 0.0)
 
 
 __all__ = ["FEW", "TILE", "Lanes", "Outputs", "Plan", "Servo", "arc_numbers_at", "chip_at", "plan_type", "tile_type"]

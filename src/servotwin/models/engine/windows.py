@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 from servotwin.models.engine import tiles
 from servotwin.models.engine.memory import SAME
 from servotwin.models.terms import frame
-from servotwin.models.terms.frame import Chip
+from servotwin.models.terms.chip import Chip
 from servotwin.physics import bridge, motor, potentiometer, supply
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.tiles import Numbers
+    from servotwin.models.engine.tiles import Floats
 
 
-def begin(listed: Numbers, size: int, own: bool, tile: Any, plan: Any, before: Any) -> int:
+def begin(listed: Floats, size: int, own: bool, tile: Any, plan: Any, before: Any) -> int:
     """Begin a window of every lane that has time left; return how many, and in `plan` which are at an edge.
 
     `listed` are the edges of lanes that bring their own; `own` is whether there are any. The clocks go on to the end
@@ -57,7 +57,7 @@ def begin(listed: Numbers, size: int, own: bool, tile: Any, plan: Any, before: A
     return alive
 
 
-def _own_edge(listed: Numbers, tile: Any, j: int) -> None:
+def _own_edge(listed: Floats, tile: Any, j: int) -> None:
     """Set the frame of a lane whose command brings its own edges."""
     clock, count = tile.clock, tile.count
     k = count.number[j] - 1
@@ -66,7 +66,7 @@ def _own_edge(listed: Numbers, tile: Any, j: int) -> None:
     clock.length[j] = listed[at + 1] - listed[at] if k + 1 < count.edges[j] else math.inf
 
 
-def commands(r: Numbers, size: int, tile: Any, plan: Any) -> None:
+def commands(r: Floats, size: int, tile: Any, plan: Any) -> None:
     """Look up the width of every pulse whose piece is over or not constant, in the rows `r`."""
     clock, count = tile.clock, tile.count
     due = 0
@@ -92,7 +92,7 @@ def commands(r: Numbers, size: int, tile: Any, plan: Any) -> None:
 def measure(size: int, tile: Any, plan: Any) -> None:
     """Set what the motor's voltage and the supply's sag add to the one-shot's measure."""
     for j in range(size):
-        chip, meter = tiles.chip_at(tile.chip, j), tiles.meter_at(tile.meter, j)
+        meter = tiles.meter_at(tile.meter, j)
         drive, w = tile.servo.drive[j], tile.servo.w[j]
         driven = drive != 0.0
         D = meter.D_drive if driven else meter.D_off
@@ -102,9 +102,9 @@ def measure(size: int, tile: Any, plan: Any) -> None:
         direction = math.copysign(1.0, x) if abs(x) > D else 0.0
         v = bridge.driving_voltage(drive * meter.V, direction, D)
         i = motor.steady_armature_current(v, w, R, meter.K_b) if direction != 0.0 else 0.0
-        connected = driven or chip.coast > 0.0
+        connected = driven or meter.coast > 0.0
         taken = supply.supply_current(i, drive) if connected else 0.0
-        plan.v_m[j] = bridge.motor_voltage(i, v_b, chip.R_a, chip.V_br, v_b if connected else 0.0)
+        plan.v_m[j] = bridge.motor_voltage(i, v_b, meter.R, meter.V_br, v_b if connected else 0.0)
         plan.V_bus[j] = supply.source_voltage(taken, meter.V, meter.R_b)
 
 
@@ -130,7 +130,7 @@ def _decide(chip: Chip, v_m: float, V_bus: float, draw: float, tile: Any, plan: 
     """Measure and decide where a pulse rises, and divide the window."""
     servo = tile.servo
     width, due = servo.width[j], servo.due[j]
-    v_o = potentiometer.feedback_voltage(servo.q[j], chip.p, chip.b_o)
+    v_o = potentiometer.feedback_voltage(servo.q[j], tile.meter.p[j], tile.meter.b_o[j])
     new = frame.decide(chip, 0.0, width, v_o, v_m, V_bus, draw)
     valid = frame.accepted(chip, width) and plan.at_edge[j] != 0.0
     replaces = valid and new.time <= due

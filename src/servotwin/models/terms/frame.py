@@ -10,39 +10,14 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.models.engine.noise import gaussian
-from servotwin.physics import backlash, potentiometer, pulse
+from servotwin.models.terms.chip import Chip
+from servotwin.physics import pulse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import numpy as np
     from numpy.typing import NDArray
-
-
-class Chip(NamedTuple):
-    """Everything that the frame logic reads, as plain floats in SI."""
-
-    T_0: float
-    slope: float  # 1/s_r
-    p: float
-    b_o: float
-    beta: float
-    c_s: float
-    noise: float  # V rms
-    half_deadband: float
-    K: float
-    t_min: float
-    tau_s: float  # 0: linear stretcher
-    shortest: float  # pulse widths that are taken, bounds included
-    longest: float
-    timeout: float  # inf: none
-    frame_period: float
-    R_a: float
-    R_b: float
-    V_br: float
-    V_oc: float
-    coast: float  # 1: the bridge opens between drives; 0: it brakes
-    step: float  # V from one step of the potentiometer to the next; 0: none
 
 
 class Decision(NamedTuple):
@@ -69,33 +44,7 @@ class Frame(NamedTuple):
 
 NOTHING = Decision(math.inf, 0.0, 0.0, 0.0)
 CROWDED = -1  # as the number of a frame: more than two decisions would have to wait
-NO_CHIP = Chip(*[0.0] * 21)  # of a plant that follows its command at all times
 AT_START = Frame(0, 0, 0.0, math.inf, math.inf, 0.0, NOTHING, NOTHING)
-
-
-def feedback_voltage(chip: Chip, curve: Sequence[Sequence[float]] | NDArray[np.float64], q: float) -> float:
-    """Return v_o [V] of the potentiometer with its wiper at q; `curve` has angles and errors of its linearity."""
-    v_o = potentiometer.feedback_voltage(q, chip.p, chip.b_o)
-    if len(curve[0]) > 0:
-        v_o += _interpolated(curve, q)
-    if chip.step > 0.0:
-        v_o = potentiometer.quantised(v_o, chip.step)
-    return v_o
-
-
-def _interpolated(curve: Sequence[Sequence[float]] | NDArray[np.float64], q: float) -> float:
-    angles, errors = curve[0], curve[1]
-    if q <= angles[0]:
-        return errors[0]
-    for k in range(1, len(angles)):
-        if q < angles[k]:
-            return potentiometer.error_between(q, angles[k - 1], errors[k - 1], angles[k], errors[k])
-    return errors[len(errors) - 1]
-
-
-def wiper_at(half_slack: float, wiper: float, q: float) -> float:
-    """Return where a potentiometer with play stands after the shaft has gone one way to q."""
-    return backlash.play(wiper, q, 2.0 * half_slack)
 
 
 def decide(chip: Chip, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, draw: float) -> Decision:

@@ -23,12 +23,16 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, cast
 
+from servotwin.models.terms.numbers import NEUTRAL
+from servotwin.physics.pieces import Piece
+
 _ELEMENTARY = "servotwin.models.engine.elementary"
 _INTRINSICS = "servotwin.simulation.compile.intrinsics"
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instructions in the vector form
 _POLYNOMIALS = ("exp", "log", "log1p")
 _DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
 _PACKAGE = "servotwin."
+_TERMS = "servotwin.models.terms."
 _LONG = 12  # a tuple of more numbers is a table
 
 
@@ -47,8 +51,9 @@ class Recipe:
         become polynomials.
     single : bool
         Whether floats have 32 bits.
-    absent : tuple of (str, float)
-        Fields that have this value in all that will run; what depends on another one is left out.
+    absent : tuple of str
+        Terms ("heat"), or numbers of one ("motor.L", of an input "sweep"), that all that will run lack: they have their
+        neutral values, and what depends on others is left out.
     never : tuple of str
         Constants that nothing will be equal to.
     """
@@ -57,7 +62,7 @@ class Recipe:
     entries: tuple[str, ...]
     vector: bool = False
     single: bool = False
-    absent: tuple[tuple[str, float], ...] = ()
+    absent: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
 
 
@@ -240,6 +245,8 @@ class _Rewriting(ast.NodeTransformer):
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
             inner = self._truth(node.operand)
             return None if inner is None else not inner
+        if isinstance(node, ast.Call):
+            return self._told(node)
         if not isinstance(node, ast.Compare) or len(node.ops) != 1:
             return None
         sides, op = (node.left, node.comparators[0]), node.ops[0]
@@ -249,15 +256,42 @@ class _Rewriting(ast.NodeTransformer):
         compare = _COMPARISONS.get(type(op))
         return None if a is None or b is None or compare is None else bool(compare(a, b))
 
+    def _told(self, node: ast.Call) -> bool | None:
+        """Return what a function of one line says of a term, such as `heat.present(numbers.heat)`."""
+        if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name):
+            called = getattr(self._space.get(node.func.value.id), node.func.attr, None)
+        else:
+            called = self._space.get(_last(node.func))
+        if not isinstance(called, FunctionType) or not called.__module__.startswith(_TERMS):
+            return None
+        body = _definition(called.__module__, called.__name__).body
+        line = body[-1]
+        if len(body) > 2 or not isinstance(line, ast.Return) or line.value is None:
+            return None
+        return _Rewriting(self._work, called.__module__, set())._truth(line.value)
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Tell the outcome where it is known."""
+        known = self._truth(node)
+        return self.generic_visit(node) if known is None else ast.Constant(known)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        """Tell the outcome where it is known."""
+        known = self._truth(node)
+        return self.generic_visit(node) if known is None else ast.Constant(known)
+
     def _number(self, node: ast.expr) -> float | None:
         """Return the value of a number that is known."""
         if isinstance(node, ast.Constant) and isinstance(node.value, float | int):
             return node.value
         if isinstance(node, ast.Attribute):
-            if ast.unparse(node) == "math.inf":
-                return math.inf
-            return dict(self._work.recipe.absent).get(node.attr)
+            return math.inf if ast.unparse(node) == "math.inf" else self._absent(node)
         return None
+
+    def _absent(self, node: ast.Attribute) -> float | None:
+        """Return the neutral value of a number that is absent; a term goes by the name of its record."""
+        known = _neutral(self._work.recipe.absent)
+        return known.get(node.attr, known.get(f"{_last(node.value)}.{node.attr}"))
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
         """Drop the annotation of a local variable."""
@@ -282,7 +316,7 @@ class _Rewriting(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Flatten `module.name`, and put in the value of what is absent."""
         owner = node.value
-        value = dict(self._work.recipe.absent).get(node.attr)
+        value = self._absent(node)
         if value is not None and isinstance(node.ctx, ast.Load):
             text = f"_f({value!r})" if math.isfinite(value) else "_f(math.inf)"
             return ast.parse(text, mode="eval").body
@@ -317,6 +351,20 @@ class _Rewriting(ast.NodeTransformer):
 _COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
     ast.GtE: operator.ge}
+
+
+@cache
+def _neutral(absent: tuple[str, ...]) -> dict[str, float]:
+    """Return the values of numbers that are absent, by "term.number", or of an input by "number"."""
+    found: dict[str, float] = {}
+    for name in absent:
+        room, _, field = name.partition(".")
+        record: Any = getattr(NEUTRAL, room, None)
+        if record is None:
+            found[name] = getattr(Piece(), name)
+        else:
+            found |= {f"{room}.{one}": getattr(record, one) for one in ((field,) if field else record._fields)}
+    return found
 
 
 def _last(node: ast.expr) -> str:
