@@ -29,7 +29,7 @@ from servotwin.simulation.engine import Plan
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.remarks import ServoRemark
 from servotwin.simulation.result import Result
-from servotwin.simulation.simulator import Simulator, _times
+from servotwin.simulation.simulator import Simulator, asked_times
 from servotwin.simulation.status import Status
 from servotwin.simulation.trajectory import Trajectory
 from servotwin.units import is_finite
@@ -236,7 +236,7 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     """
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
-    times = _times(duration, output_step, output_times)
+    times = asked_times(duration, output_step, output_times)
     given = _checked(servos, supply, initial)
     sims, units = {}, []
     for k, (name, (model, command, load)) in enumerate(given.items()):

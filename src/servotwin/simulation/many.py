@@ -23,7 +23,7 @@ from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.packing import Asked, Chunk, Commands, groups
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import lane_remarks
-from servotwin.simulation.simulator import _times
+from servotwin.simulation.simulator import asked_times
 from servotwin.simulation.status import Status
 from servotwin.units import is_finite
 
@@ -132,7 +132,7 @@ def simulate_lanes(
         raise InputError("executor", got=executor, allowed="one with a submit method, as in concurrent.futures")
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
-    times = np.array(_times(duration, output_step, output_times))  # a copy: it becomes read-only
+    times = np.array(asked_times(duration, output_step, output_times))  # a copy: it becomes read-only
     asked = Asked(float(duration), times, _outputs(lanes.model, outputs), real_type(dtype))
     commands = Commands(lanes)
     packs = _packs(lanes, commands, asked, chunk, _workers(executor))

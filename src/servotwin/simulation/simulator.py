@@ -303,7 +303,7 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
     """
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
-    times = _times(duration, output_step, output_times)
+    times = asked_times(duration, output_step, output_times)
     simulator = Simulator(model, load, seed)
     simulator.drive(command)  # raises if the model cannot follow it
     warn_of(model.servo, [command], duration)
@@ -350,7 +350,8 @@ def _seed(seed: int) -> int:
     return int(seed)
 
 
-def _times(duration: float, output_step: float | None, output_times: ArrayLike | None) -> NDArray[np.float64]:
+def asked_times(duration: float, output_step: float | None, output_times: ArrayLike | None) -> NDArray[np.float64]:
+    """Return the times [s] of the outputs that a user has asked for."""
     if output_times is not None:
         if output_step is not None:
             raise InputError("output_step and output_times", allowed="one of them")

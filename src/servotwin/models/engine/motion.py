@@ -12,7 +12,6 @@ from servotwin.models.engine import contacts, currents, dormand_prince, first_or
 from servotwin.models.engine.coefficients import linear_coefficients, speed_coefficients
 from servotwin.models.engine.modes import (
     CONDUCTING,
-    CORE,
     INSIDE,
     NOWHERE,
     RIGID,
@@ -24,10 +23,17 @@ from servotwin.models.engine.modes import (
 )
 from servotwin.models.engine.rates import jacobian, rates_of
 from servotwin.models.engine.rodas import Triple
-from servotwin.models.terms import heat, source
-from servotwin.models.terms.friction import varying
-from servotwin.models.terms.load import springy, swings
-from servotwin.models.terms.motor import inductive
+from servotwin.models.terms import follower, friction, heat, load, motor, play, sensor, source
+from servotwin.models.terms.dependence import (
+    CURVED_Q,
+    CURVED_T,
+    CURVED_W,
+    ON_HEAT,
+    ON_I,
+    ON_Q,
+    STEEP_W,
+    TWO_BODIES,
+)
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import with_motor
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
@@ -80,26 +86,23 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
           limit: float) -> Motion:
     """Return the motion from y at t0 [s]: exact, or one accepted step of at most `limit` [s]."""
     still = at_rest(mode.contact) and (mode.mesh != INSIDE or at_rest(mode.motor))
-    heats, inertial = heat.present(numbers.heat), inductive(numbers.motor)
-    bridged, swinging, sprung = source.present(numbers.source), swings(numbers.load), springy(numbers.load)
-    if still and not heats and (not inertial or constant_current(mode.zone)):
+    on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
+    if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
         return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if (heats or (not still and (varying(numbers.friction) or mode.mesh == INSIDE))
-            or (bridged and (swinging or (inertial and sprung)))):
+    if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & ON_Q))):
         return _long_step(numbers, mode, u, tau, t0, y, step, limit)
-    if inertial and still and mode.zone >= CONDUCTING:
+    if on & ON_I and still and mode.zone >= CONDUCTING:
         v, R = currents.loop(numbers, mode.zone, u.value)
         fading = (R / numbers.motor.L, v / R, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return _closed(HELD, numbers, mode, u, tau, t0, y, fading, (0.0, 0.0), step)
-    follows = in_linear_zone(mode.zone)
-    if (swinging or mode.contact == CORE or (follows and u.sweep != 0.0)
-            or (inertial and (still or (not bridged and (numbers.sensor.p != 0.0 or sprung))))):
+    if on & (CURVED_Q | STEEP_W | CURVED_T) or (on & ON_I and (still or (not behind and on & ON_Q))):
         return _integrated(numbers, mode, u, tau, t0, y, step, limit)
+    follows = in_linear_zone(mode.zone)
     wave = (u.value + u.slope * (t0 - u.start), u.slope, 0.0, 0.0, 0.0)
     if follows:
         wave = (wave[0], u.slope, u.amplitude, u.frequency, u.phase + u.frequency * (t0 - u.start))
     torque = (tau.value + tau.slope * (t0 - tau.start), tau.slope)
-    if inertial and not constant_current(mode.zone):
+    if on & ON_I and not constant_current(mode.zone):
         against = (torque[0] + contacts.friction_torque(numbers, mode.contact, y[1], 0.0, 0.0), torque[1])
         coefficients = speed_coefficients(numbers, mode, wave, against, y[1], y[2])
         return _closed(WITH_CURRENT, numbers, mode, u, tau, t0, y, coefficients, against, step)
@@ -107,6 +110,13 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
     _, c, _, f1, fs, _, _, _, _ = coefficients
     kind = FIRST_ORDER if c == 0.0 and f1 == 0.0 and fs == 0.0 else SECOND_ORDER
     return _closed(kind, numbers, mode, u, tau, t0, y, coefficients, (0.0, 0.0), step)
+
+
+def dependence(numbers: Numbers, mode: Mode, u: Piece, still: bool) -> int:
+    """Return on what the acceleration depends in a mode, as the terms have it; `still` where nothing moves."""
+    return (motor.depends(numbers.motor) | heat.depends(numbers.heat) | load.depends(numbers.load)
+            | friction.depends(numbers.friction, mode.contact) | play.depends(mode.mesh, still)
+            | sensor.depends(numbers.sensor, numbers.source) | follower.depends(mode.zone, u))
 
 
 def _closed(kind: int, numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,

@@ -8,8 +8,17 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine.modes import DEAD, LINEAR, LINEAR_BACKWARD, SATURATED, SATURATED_BACKWARD
+from servotwin.models.engine.modes import (
+    DEAD,
+    LINEAR,
+    LINEAR_BACKWARD,
+    SATURATED,
+    SATURATED_BACKWARD,
+    in_linear_zone,
+)
+from servotwin.models.terms.dependence import CURVED_T
 from servotwin.physics.electronics import error_beyond_deadband, proportional_voltage
+from servotwin.physics.pieces import Piece
 
 _TIE = 1e-13  # V
 
@@ -23,6 +32,11 @@ class Follower(NamedTuple):
 
 
 NO_FOLLOWER = Follower(1.0, 0.0, math.inf)
+
+
+def depends(zone: int, u: Piece) -> int:
+    """Return on what the acceleration depends through the voltage u that a servo follows."""
+    return CURVED_T if u.sweep != 0.0 and in_linear_zone(zone) else 0
 
 
 def zone_limits(follower: Follower, zone: int) -> tuple[float, float]:

@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from servotwin import physics
+from servotwin.models.engine.modes import CORE, at_rest
+from servotwin.models.terms.dependence import CURVED_W, STEEP_W
 from servotwin.models.terms.given import Given
 from servotwin.physics.friction import breakaway_torque, coulomb_torque
 from servotwin.physics.load_friction import gear_friction_budget, sliding_gear_friction, static_gear_friction
@@ -55,6 +57,11 @@ def smoothed(friction: Friction) -> bool:
 def varying(friction: Friction) -> bool:
     """Tell whether sliding friction changes with the speed or with the torques."""
     return friction.varies > 0.0
+
+
+def depends(friction: Friction, contact: int) -> int:
+    """Return on what the acceleration depends through the friction of a shaft in a contact."""
+    return STEEP_W if contact == CORE else CURVED_W if friction.varies > 0.0 and not at_rest(contact) else 0
 
 
 def core_speed(friction: Friction) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from servotwin.models.terms.dependence import ON_HEAT
 from servotwin.models.terms.given import Given
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, copper_loss, heat_flow, warming_rate
 
@@ -25,6 +26,11 @@ NO_HEAT = Heat(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 def present(heat: Heat) -> bool:
     """Tell whether temperatures change."""
     return heat.C_w > 0.0
+
+
+def depends(heat: Heat) -> int:
+    """Return on what the acceleration depends through heat."""
+    return ON_HEAT if heat.C_w > 0.0 else 0
 
 
 def warming_rates(heat: Heat, R: float, i: float, T_w: float, T_h: float) -> tuple[float, float]:

@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 from servotwin import loads
+from servotwin.models.terms.dependence import CURVED_Q, ON_Q
 from servotwin.physics.shaft import pendulum_stiffness, pendulum_torque, spring_torque
 
 _TOO_FAR = 1e12  # rad
@@ -37,6 +38,11 @@ def springy(load: Load) -> bool:
 def swings(load: Load) -> bool:
     """Tell whether there is a pendulum."""
     return load.gravity != 0.0
+
+
+def depends(load: Load) -> int:
+    """Return on what the acceleration depends through the load, friction apart."""
+    return (ON_Q if load.stiffness != 0.0 else 0) | (CURVED_Q if load.gravity != 0.0 else 0)
 
 
 def external_torque(load: Load, tau: float, q: float) -> float:

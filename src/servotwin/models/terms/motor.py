@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from servotwin import physics
+from servotwin.models.terms.dependence import ON_I
 from servotwin.models.terms.given import Given
 
 
@@ -23,6 +24,11 @@ NO_MOTOR = Motor(0.0, 0.0, 1.0, 0.0)
 def inductive(motor: Motor) -> bool:
     """Tell whether the current has inertia."""
     return motor.L > 0.0
+
+
+def depends(motor: Motor) -> int:
+    """Return on what the acceleration depends through the motor."""
+    return ON_I if motor.L > 0.0 else 0
 
 
 def pack(model: Given, reduction: float, inductance: float) -> Motor:

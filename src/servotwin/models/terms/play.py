@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from servotwin.models.engine.modes import ON_BACKWARD, ON_FORWARD, Vector
+from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vector
+from servotwin.models.terms.dependence import TWO_BODIES
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.shaft import Shaft
 from servotwin.parameters.groups import Relation
@@ -27,6 +28,11 @@ NO_PLAY = Play(0.0)
 def present(play: Play) -> bool:
     """Tell whether the gear has play."""
     return play.half > 0.0
+
+
+def depends(mesh: int, still: bool) -> int:
+    """Return on what the acceleration depends through the play, unless both bodies stand still."""
+    return TWO_BODIES if mesh == INSIDE and not still else 0
 
 
 def met(play: Play, shaft: Shaft, forward: bool, y: Vector) -> Vector:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from servotwin.models.terms.dependence import ON_Q
 from servotwin.models.terms.given import Given
+from servotwin.models.terms.source import Source
 from servotwin.physics.backlash import play
 from servotwin.physics.electronics import feedback_error
 from servotwin.physics.potentiometer import error_between, feedback_voltage, quantised
@@ -31,6 +33,11 @@ NO_SENSOR = Sensor(0.0, 0.0, 0.0, 0.0)
 def slack(sensor: Sensor) -> bool:
     """Tell whether there is play between output and potentiometer."""
     return sensor.half_slack > 0.0
+
+
+def depends(sensor: Sensor, source: Source) -> int:
+    """Return on what the acceleration depends through the potentiometer: a bridge does not follow it."""
+    return ON_Q if sensor.p != 0.0 and source.V == 0.0 else 0
 
 
 def error_of(sensor: Sensor, u: float, q: float) -> float:

@@ -16,8 +16,9 @@ import math
 import operator
 import sys
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, reduce
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -32,7 +33,7 @@ _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instr
 _POLYNOMIALS = ("exp", "log", "log1p")
 _DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
 _PACKAGE = "servotwin."
-_TERMS = "servotwin.models.terms."
+_MODELS = "servotwin.models."
 _LONG = 12  # a tuple of more numbers is a table
 
 
@@ -178,6 +179,7 @@ class _Rewriting(ast.NodeTransformer):
         self._module = module
         self._local = local
         self._space = vars(import_module(module))
+        self._flags: dict[str, ast.expr] = {}  # what a local variable of flags is
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         """Drop docstring, annotations and decorators."""
@@ -187,6 +189,7 @@ class _Rewriting(ast.NodeTransformer):
             argument.annotation = None
         if ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
+        self._flags = _given_once(node)
         node.body = [self.visit(statement) for statement in node.body]
         self._by_place(node.args)
         node.args.defaults = [self.visit(default) for default in node.args.defaults]
@@ -246,7 +249,10 @@ class _Rewriting(ast.NodeTransformer):
             inner = self._truth(node.operand)
             return None if inner is None else not inner
         if isinstance(node, ast.Call):
-            return self._told(node)
+            line = self._line(node)
+            return None if line is None else line[0]._truth(line[1])
+        if isinstance(node, ast.BinOp):
+            return False if self._possible(node) == 0 else None
         if not isinstance(node, ast.Compare) or len(node.ops) != 1:
             return None
         sides, op = (node.left, node.comparators[0]), node.ops[0]
@@ -256,19 +262,40 @@ class _Rewriting(ast.NodeTransformer):
         compare = _COMPARISONS.get(type(op))
         return None if a is None or b is None or compare is None else bool(compare(a, b))
 
-    def _told(self, node: ast.Call) -> bool | None:
-        """Return what a function of one line says of a term, such as `heat.present(numbers.heat)`."""
+    def _line(self, node: ast.Call) -> tuple[_Rewriting, ast.expr] | None:
+        """Return what a called function of one line returns, such as `heat.present(numbers.heat)`."""
         if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name):
             called = getattr(self._space.get(node.func.value.id), node.func.attr, None)
         else:
             called = self._space.get(_last(node.func))
-        if not isinstance(called, FunctionType) or not called.__module__.startswith(_TERMS):
+        if not isinstance(called, FunctionType) or not called.__module__.startswith(_MODELS) or hasattr(called, "text"):
             return None
         body = _definition(called.__module__, called.__name__).body
         line = body[-1]
         if len(body) > 2 or not isinstance(line, ast.Return) or line.value is None:
             return None
-        return _Rewriting(self._work, called.__module__, set())._truth(line.value)
+        return _Rewriting(self._work, called.__module__, set()), line.value
+
+    def _possible(self, node: ast.expr) -> int | None:
+        """Return all flags that a number may have; None where that is not known."""
+        if isinstance(node, ast.Constant):
+            return node.value if type(node.value) is int else None
+        if isinstance(node, ast.Name):
+            value = self._space.get(node.id) if node.id not in self._local else None
+            given = self._flags.get(node.id)
+            return value if type(value) is int else None if given is None else self._possible(given)
+        if isinstance(node, ast.IfExp):
+            known = self._truth(node.test)
+            parts = [node.body, node.orelse] if known is None else [node.body if known else node.orelse]
+            bits = [self._possible(part) for part in parts]
+            return None if None in bits else reduce(operator.or_, cast("list[int]", bits))
+        if isinstance(node, ast.Call):
+            line = self._line(node)
+            return None if line is None else line[0]._possible(line[1])
+        if isinstance(node, ast.BinOp) and type(node.op) in _FLAG_OPERATIONS:
+            a, b = self._possible(node.left), self._possible(node.right)
+            return None if a is None or b is None else _FLAG_OPERATIONS[type(node.op)](a, b)
+        return None
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """Tell the outcome where it is known."""
@@ -348,6 +375,8 @@ class _Rewriting(ast.NodeTransformer):
         return ast.copy_location(ast.Call(ast.Name("_f", ast.Load()), [node], []), node)
 
 
+_FLAG_OPERATIONS: dict[type[ast.operator], Callable[[int, int], int]] = {
+    ast.BitOr: operator.or_, ast.BitAnd: operator.and_}
 _COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
     ast.GtE: operator.ge}
@@ -365,6 +394,19 @@ def _neutral(absent: tuple[str, ...]) -> dict[str, float]:
         else:
             found |= {f"{room}.{one}": getattr(record, one) for one in ((field,) if field else record._fields)}
     return found
+
+
+def _given_once(node: ast.FunctionDef) -> dict[str, ast.expr]:
+    """Return the values of local variables that get one once and for all."""
+    found: dict[str, ast.expr] = {}
+    stored = [n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    for part in ast.walk(node):
+        if isinstance(part, ast.Assign) and len(part.targets) == 1:
+            names, values = part.targets[0], part.value
+            pairs = (zip(names.elts, values.elts, strict=False)
+                     if isinstance(names, ast.Tuple) and isinstance(values, ast.Tuple) else [(names, values)])
+            found |= {name.id: value for name, value in pairs if isinstance(name, ast.Name)}
+    return {name: deepcopy(value) for name, value in found.items() if stored.count(name) == 1}
 
 
 def _last(node: ast.expr) -> str:
