@@ -9,8 +9,8 @@ import servotwin as st
 from conftest import EVERYTHING
 from reference.drivetrain_steps import LAWS, Rotor, budget
 from servotwin.models import MODELS
-from servotwin.models.kernels.gear_friction import holding_friction, sliding_friction
-from servotwin.models.kernels.plant import at_temperature
+from servotwin.models.terms.friction import holding_friction, sliding_friction
+from servotwin.models.terms.numbers import at_temperature
 
 HEAT = {name: value for name, value in EVERYTHING.items() if name.startswith("thermal.")}
 PLAY = {"gear.backlash": 0.02, "gear.output_inertia": 1e-3}
@@ -92,18 +92,18 @@ def test_one_budget_says_what_six_formulas_say(servo, law, exponent):
               alpha=exponent or 1.0, **shares)
     for tau_m, tau_e, w in numbers.uniform(-1.0, 1.0, (200, 3)).tolist():
         for direction in (1, -1):
-            got = sliding_friction(plant, direction > 0, direction * abs(w), tau_m, tau_e)
+            got = sliding_friction(plant.friction, direction > 0, direction * abs(w), tau_m, tau_e)
             assert got == pytest.approx(budget(R, law, direction, w, tau_m, tau_e), rel=1e-13)
-            held = holding_friction(plant, direction > 0, tau_m, tau_e)
+            held = holding_friction(plant.friction, direction > 0, tau_m, tau_e)
             assert held == pytest.approx(budget(R, law, direction, 0.0, tau_m, tau_e), rel=1e-13)
 
 
 def test_without_a_speed_the_static_part_ends_with_rest(servo):
     changes = {"friction.breakaway_ratio": 1.5, "friction.load_friction_motor_stribeck": 0.2}
     plant = st.PulseServo(servo.replace(changes)).pack(st.loads.Load())
-    F = plant.F_forward
-    assert sliding_friction(plant, True, 1e-9, 0.3, 0.0) == F
-    assert holding_friction(plant, True, 0.3, 0.0) == pytest.approx(1.5 * F + 0.2 * 0.3)
+    F = plant.friction.F_forward
+    assert sliding_friction(plant.friction, True, 1e-9, 0.3, 0.0) == F
+    assert holding_friction(plant.friction, True, 0.3, 0.0) == pytest.approx(1.5 * F + 0.2 * 0.3)
 
 
 # --- heat -------------------------------------------------------------------------------------------------------------
@@ -113,9 +113,9 @@ def test_a_plant_at_its_reference_is_the_plant_itself(servo):
     plant = st.PulseServoInductive(servo.replace(EVERYTHING)).pack(st.loads.Load())
     assert at_temperature(plant, 298.15, 298.15) == plant
     warm = at_temperature(plant, 398.15, 348.15)
-    assert warm.R == pytest.approx(1.385 * plant.R, rel=1e-14)
-    assert warm.R_drive - warm.R == pytest.approx(plant.R_drive - plant.R, rel=1e-13)
-    assert (warm.K, warm.K_b) == pytest.approx((0.95 * plant.K, 0.95 * plant.K_b), rel=1e-14)
+    assert warm.motor.R == pytest.approx(1.385 * plant.motor.R, rel=1e-14)
+    assert warm.bridge.R_drive - warm.motor.R == pytest.approx(plant.bridge.R_drive - plant.motor.R, rel=1e-13)
+    assert (warm.motor.K, warm.motor.K_b) == pytest.approx((0.95 * plant.motor.K, 0.95 * plant.motor.K_b), rel=1e-14)
 
 
 # --- potentiometer ----------------------------------------------------------------------------------------------------

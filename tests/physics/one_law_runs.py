@@ -107,7 +107,7 @@ def on_a_bus(st, model, command, load):
 
 def without_compiler():
     """Let batches run the derived text as it is."""
-    from servotwin.models.kernels import elementary
+    from servotwin.models.engine import elementary
     from servotwin.simulation import lane_runs, vector_store
     from servotwin.simulation.compile.derive import derive
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shaft:
+class ArcNumbers:
     """Motor, gear, supply and load, everything at the output shaft."""
 
     J: float

@@ -7,18 +7,18 @@ import sys
 
 import pytest
 
-from servotwin.models.kernels import legs, tiles
-from servotwin.models.kernels.legs import Shaft
-from servotwin.models.kernels.noise import gaussian
+from servotwin.models.engine import arcs, tiles
+from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.noise import gaussian
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.derive import derive
 
-SLIDE = Recipe("slide", ("servotwin.models.kernels.legs:slide",), vector=True)
-SHAFT = Shaft(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0, -1.0,
-              0.0, -math.inf, math.inf, 6e-3, 2.0, 0.2, 0.2)
+SLIDE = Recipe("slide", ("servotwin.models.engine.arcs:slide",), vector=True)
+NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
+                     -1.0, 0.0, -math.inf, math.inf, 6e-3, 2.0, 0.2, 0.2)
 SCRIPT = """
 from servotwin.simulation.compile import Recipe, kernels
-print(kernels(Recipe("noise", ("servotwin.models.kernels.noise:gaussian",))).gaussian(3, 7))
+print(kernels(Recipe("noise", ("servotwin.models.engine.noise:gaussian",))).gaussian(3, 7))
 """
 
 
@@ -35,29 +35,29 @@ def folder(tmp_path, monkeypatch):
 
 def test_compiled_equals_plain():
     for drive, w, time in ((1.0, -2.0, 0.02), (0.0, 3.0, 0.1), (-1.0, 0.0, 1e-5)):
-        compiled = kernels(SLIDE).slide(SHAFT, drive, 0.3, w, time)
-        assert compiled == pytest.approx(legs.slide(SHAFT, drive, 0.3, w, time), rel=1e-13, abs=1e-15)
+        compiled = kernels(SLIDE).slide(NUMBERS, drive, 0.3, w, time)
+        assert compiled == pytest.approx(arcs.slide(NUMBERS, drive, 0.3, w, time), rel=1e-13, abs=1e-15)
 
 
 def test_what_is_derived():
-    text = derive(Recipe("run", ("servotwin.models.kernels.runs:run",)))
-    assert "def frame__decide(" in text
-    assert "from servotwin.models.kernels.memory import Point as memory__Point" in text
+    text = derive(Recipe("run", ("servotwin.models.engine.runs:run",)))
+    assert "def terms_frame__decide(" in text
+    assert "from servotwin.models.engine.memory import Point as engine_memory__Point" in text
     assert "math.log1p" in text  # the general form leaves it to the system's library
     assert '"""' not in text
     compile(text, "derived", "exec")
 
 
 def test_the_vector_form_has_polynomials():
-    text = derive(Recipe("tiles", ("servotwin.models.kernels.side_by_side:go_on",), vector=True))
-    assert "elementary__log1p(" in text
+    text = derive(Recipe("tiles", ("servotwin.models.engine.side_by_side:go_on",), vector=True))
+    assert "engine_elementary__log1p(" in text
     assert "math.log1p" not in text
 
 
 @pytest.mark.slow
 def test_float32_stays_float32(folder):
-    recipe = Recipe("single", ("servotwin.models.kernels.phases:phases",
-                               "servotwin.models.kernels.windows:divide"), vector=True, single=True)
+    recipe = Recipe("single", ("servotwin.models.engine.phases:phases",
+                               "servotwin.models.engine.windows:divide"), vector=True, single=True)
     module = kernels(recipe)
     from numba import from_dtype, types
 

@@ -57,8 +57,8 @@ def test_saturated_rise_in_closed_form(servo):
     model = st.BoundedServo(servo)
     result = st.simulate(model, st.signals.step(0.0, 150.0, unit="deg"), duration=0.2, output_step=0.01)
     plant = model.pack(loads.Load())
-    tau = plant.J * plant.R / (plant.K * plant.K_b)
-    w_end = (plant.V_max - plant.R * plant.F_forward / plant.K) / plant.K_b
+    tau = plant.shaft.J * plant.motor.R / (plant.motor.K * plant.motor.K_b)
+    w_end = (plant.follower.V_max - plant.motor.R * plant.friction.F_forward / plant.motor.K) / plant.motor.K_b
     t = result.time
     np.testing.assert_allclose(result["output_angle"], w_end * (t - tau * (1.0 - np.exp(-t / tau))), atol=1e-13)
 
@@ -66,7 +66,7 @@ def test_saturated_rise_in_closed_form(servo):
 def test_a_held_servo_does_not_move_at_all_in_a_thousand_seconds(servo):
     model = st.BoundedServo(servo)
     plant = model.pack(loads.Load())
-    load = loads.Constant(0.8 * plant.F_backward)
+    load = loads.Constant(0.8 * plant.friction.F_backward)
     result = st.simulate(model, st.signals.constant(90.0, unit="deg"), duration=1000.0, load=load, output_step=10.0)
     assert np.all(result["output_angle"] == result["output_angle"][0])
     assert result.events == ()
@@ -77,7 +77,7 @@ def test_the_averaged_servo_creeps_under_the_same_load(servo):
     weak = servo.replace({"electronics.bridge_gain": 1e-9})
     model = st.AveragedServo(weak)
     plant = model.pack(loads.Load())
-    torque = 0.8 * plant.F_backward
+    torque = 0.8 * plant.friction.F_backward
     result = st.simulate(model, st.signals.constant(90.0, unit="deg"), duration=20.0, load=loads.Constant(torque),
                          output_step=1.0)
     N = weak.gear.gear_reduction
@@ -98,7 +98,7 @@ def test_breakaway_starts_when_the_torque_exceeds_it(servo):
     result = st.simulate(weak, st.signals.constant(90.0, unit="deg"), duration=1.0, load=load)
     first = result.events[0]
     assert first.kind == "release backward"
-    assert first.time == pytest.approx(1.5 * plant.F_backward, rel=1e-6)
+    assert first.time == pytest.approx(1.5 * plant.friction.F_backward, rel=1e-6)
 
 
 def test_bounces_on_a_stop_lose_speed_by_the_restitution(servo):
@@ -111,7 +111,7 @@ def test_bounces_on_a_stop_lose_speed_by_the_restitution(servo):
     before, after = result.trajectory.inside(0, np.array([hit.time])).speed[0], result.at("output_speed", [hit.time])[0]
     assert after == pytest.approx(-0.5 * before, rel=1e-12)
     assert result["output_angle"].max() <= 1.0
-    assert result.energy.stops == pytest.approx(0.5 * model.pack(loads.Load()).J * 0.75 * before**2, rel=1e-9)
+    assert result.energy.stops == pytest.approx(0.5 * model.pack(loads.Load()).shaft.J * 0.75 * before**2, rel=1e-9)
 
 
 def test_it_rests_on_a_stop_and_leaves_it_when_pulled_away(servo):

@@ -71,4 +71,4 @@ def test_a_load_without_stiffness_has_no_rest_angle():
 @pytest.mark.parametrize("model", [st.PulseServo, st.BoundedServo])
 def test_models_pack_plain_floats(model):
     plant = model(st.load_servo("hitec-hs-755hb")).pack(loads.Load())
-    assert {type(number) for number in plant} == {float}
+    assert {type(number) for term in plant for number in term} == {float}

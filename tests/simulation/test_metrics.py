@@ -134,12 +134,13 @@ def test_slew_of_a_bounded_servo_is_its_no_load_speed(servo):
     model = st.BoundedServo(servo)
     plant = model.pack(loads.Load())
     found = st.simulate(model, st.signals.step(0.0, 170.0, unit="deg"), duration=2.0).step_metrics()
-    no_load = (plant.V_max - plant.R * plant.F_forward / plant.K) / plant.K_b
+    no_load = (plant.follower.V_max - plant.motor.R * plant.friction.F_forward / plant.motor.K) / plant.motor.K_b
     assert found.slew_rate == pytest.approx(no_load, rel=1e-6)
-    assert found.peak_current == pytest.approx(plant.V_max / plant.R, rel=1e-12)
+    assert found.peak_current == pytest.approx(plant.follower.V_max / plant.motor.R, rel=1e-12)
     # It stops short, where half the deadband and what friction holds take all of the error
-    held = plant.half_deadband + plant.R * plant.F_forward / (plant.K * plant.gain)
-    assert 0.0 < found.steady_error <= held / plant.p
+    per_torque = plant.motor.R / (plant.motor.K * plant.follower.gain)
+    held = plant.follower.half_deadband + per_torque * plant.friction.F_forward
+    assert 0.0 < found.steady_error <= held / plant.sensor.p
 
 
 COMMANDS = {

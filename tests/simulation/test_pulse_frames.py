@@ -8,9 +8,9 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import CommandError, InputError
-from servotwin.models.kernels import frame
-from servotwin.models.kernels.frame import AT_START, Decision, Frame
-from servotwin.models.kernels.noise import gaussian
+from servotwin.models.engine.noise import gaussian
+from servotwin.models.terms import frame
+from servotwin.models.terms.frame import AT_START, Decision, Frame
 
 DEGREE = math.pi / 180.0
 MOTOR = dict(armature_resistance=3.0, torque_constant=1.0, back_emf_constant=1.0, rotor_inertia=5e-3,

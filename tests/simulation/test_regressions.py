@@ -49,7 +49,7 @@ def test_an_impact_at_the_start_counts_in_the_energy(servo):
     upper = servo.stops.upper_angle
     result = st.simulate(model, st.signals.constant(90.0, unit="deg"), duration=0.01,
                          initial={"output_angle": upper, "output_speed": 3.0})
-    assert result.energy.stops == pytest.approx(0.5 * model.pack(loads.Load()).J * 9.0 * 0.75, rel=1e-9)
+    assert result.energy.stops == pytest.approx(0.5 * model.pack(loads.Load()).shaft.J * 9.0 * 0.75, rel=1e-9)
     assert abs(result.energy.residual) < 1e-12
 
 

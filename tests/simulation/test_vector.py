@@ -211,7 +211,7 @@ def test_a_speed_that_is_set_is_an_impulse(servo, changes):
     before = sims["motor_speed"].copy()
     sims.set(output_speed=[3.0], lanes=[1])
     plant = model.pack(st.loads.as_load(st.loads.Inertia(2e-3)))
-    J = plant.J_out if changes else plant.J
+    J = plant.shaft.J_out if changes else plant.shaft.J
     np.testing.assert_allclose(sims.impulse_work, [0.0, 0.5 * J * 9.0])
     assert sims["output_speed"].tolist() == [0.0, 3.0]
     if changes:

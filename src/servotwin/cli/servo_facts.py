@@ -52,9 +52,9 @@ def twin_torque(servo: Servo) -> float | None:
             plant = default_model(at).pack(as_load(None))
         except ServotwinError:
             return None
-    driving = plant.V - plant.D_drive if plant.V > 0.0 else plant.V_max
-    current = min(max(driving, 0.0) / plant.R_drive, plant.I_max)
-    return float(stall_torque(current, plant.K, plant.F_forward, plant.K_m, plant.K_e))
+    driving = plant.source.V - plant.bridge.D_drive if plant.source.V > 0.0 else plant.follower.V_max
+    current = min(max(driving, 0.0) / plant.bridge.R_drive, plant.source.I_max)
+    return float(stall_torque(current, plant.motor.K, plant.friction.F_forward, plant.friction.K_m, plant.friction.K_e))
 
 
 def parameters(servo: Servo) -> list[dict[str, Any]]:

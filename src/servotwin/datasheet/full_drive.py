@@ -15,9 +15,16 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.loads import Load, as_load
-from servotwin.models.kernels import armature, contact
-from servotwin.models.kernels.memory import started
-from servotwin.models.kernels.plant import FORWARD, FREE, RIGID, Mode, Plant, Vector
+from servotwin.models.engine import contacts, currents
+from servotwin.models.engine.memory import started
+from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Mode, Vector
+from servotwin.models.terms import bridge as bridge_term
+from servotwin.models.terms import source
+from servotwin.models.terms.heat import NO_HEAT
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.play import NO_PLAY
+from servotwin.models.terms.sensor import NO_SENSOR
+from servotwin.models.terms.stops import NO_STOPS, Stops
 from servotwin.physics import motor
 from servotwin.physics.pieces import constant_pieces
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE
@@ -78,7 +85,7 @@ class FullDrive:
     def __post_init__(self) -> None:
         name = self.model.servo.name
         plant = self._plant
-        if not (plant.V > 0.0 or math.isfinite(plant.V_max)):
+        if not (source.present(plant.source) or math.isfinite(plant.follower.V_max)):
             raise InputError(f"full drive of {type(self.model).__name__}",
                              allowed="a model with a supply: PulseServo, PulseServoInductive or BoundedServo")
         voltage = self.model.value("supply.open_circuit_voltage")
@@ -87,44 +94,46 @@ class FullDrive:
                              allowed="a supply that overcomes bridge, brushes and friction")
 
     @cached_property
-    def _plant(self) -> Plant:
+    def _plant(self) -> Numbers:
         return self.loaded(None)
 
-    def loaded(self, load: Load | Part | None) -> Plant:
+    def loaded(self, load: Load | Part | None) -> Numbers:
         """Return the numbers of servo and load, without what an endless steady motion does not meet."""
-        return self.model.pack(as_load(load))._replace(
-            L=0.0, lower=-math.inf, upper=math.inf, half_play=0.0, half_slack=0.0, C_w=0.0, p=0.0, b_o=0.0,
-            half_deadband=0.0)
+        packed = self.model.pack(as_load(load))
+        return packed._replace(
+            motor=packed.motor._replace(L=0.0), follower=packed.follower._replace(half_deadband=0.0), stops=NO_STOPS,
+            play=NO_PLAY, sensor=NO_SENSOR, heat=NO_HEAT)
 
     @cached_property
     def voltage(self) -> float:
         """What the plant follows at full drive: the supply behind its bridge, or an error that saturates it [V]."""
         plant = self._plant
-        return plant.V if plant.V > 0.0 else 2.0 * plant.V_max / plant.gain
+        return plant.source.V if source.present(plant.source) else 2.0 * plant.follower.V_max / plant.follower.gain
 
     def current(self, speed: float) -> float:
         """Return the current of the supply and the motor [A] at a speed [rad/s]."""
-        zone = armature.zone_of(self._plant, self.voltage, 0.0, 0.0, speed, 0.0)
-        return armature.current(self._plant, zone, self.voltage, 0.0, speed)
+        zone = currents.zone_of(self._plant, self.voltage, 0.0, 0.0, speed, 0.0)
+        return currents.current(self._plant, zone, self.voltage, 0.0, speed)
 
     def bus_voltage(self, speed: float) -> float:
         """Return what is left of the source's voltage [V] at a speed [rad/s]."""
         plant = self._plant
-        if plant.V == 0.0:
+        if plant.source.V == 0.0:
             return self.model.value("supply.open_circuit_voltage")
-        zone = armature.zone_of(plant, self.voltage, 0.0, 0.0, speed, 0.0)
-        return armature.bus_voltage(plant, zone, self.voltage, speed, self.current(speed), False)
+        zone = currents.zone_of(plant, self.voltage, 0.0, 0.0, speed, 0.0)
+        return bridge_term.bus_voltage(
+            plant.bridge, plant.source, plant.motor, zone, self.voltage, speed, self.current(speed))
 
     def acceleration(self, speed: float, torque: float) -> float:
         """Return the acceleration [rad/s²] at a speed [rad/s] that is not negative, against a torque [N m]."""
         plant, y = self._plant, _state(0.0, speed)
-        zone = armature.zone_of(plant, self.voltage, 0.0, 0.0, speed, 0.0)
-        sliding = FORWARD if contact.has_friction(plant) else FREE
-        return contact.acceleration(plant, Mode(zone, sliding, RIGID, FREE), self.voltage, torque, y)
+        zone = currents.zone_of(plant, self.voltage, 0.0, 0.0, speed, 0.0)
+        sliding = FORWARD if contacts.has_friction(plant) else FREE
+        return contacts.acceleration(plant, Mode(zone, sliding, RIGID, FREE), self.voltage, torque, y)
 
     def torque(self, speed: float) -> float:
         """Return the torque [N m] against which the shaft turns steadily at a speed [rad/s]; 0 beyond no load."""
-        most = motor.electromagnetic_torque(self.current(speed), self._plant.K)
+        most = motor.electromagnetic_torque(self.current(speed), self._plant.motor.K)
         if not self.acceleration(speed, 0.0) > 0.0:
             return 0.0
         return _root(lambda tau: self.acceleration(speed, tau), 0.0, most)
@@ -133,13 +142,14 @@ class FullDrive:
     def no_load_speed(self) -> float:
         """Steady speed of the free shaft [rad/s]."""
         plant = self._plant
-        limit = (plant.V if plant.V > 0.0 else plant.V_max) / motor.back_emf(1.0, plant.K_b)
+        most = plant.source.V if source.present(plant.source) else plant.follower.V_max
+        limit = most / motor.back_emf(1.0, plant.motor.K_b)
         return _root(lambda w: self.acceleration(w, 0.0), 0.0, limit)
 
     @cached_property
     def slowest(self) -> float:
         """Speed of the most torque [rad/s]: 0, unless static friction fades with speed."""
-        if self._plant.w_s == 0.0:
+        if self._plant.friction.w_s == 0.0:
             return 0.0
         from scipy.optimize import minimize_scalar
 
@@ -164,10 +174,10 @@ class FullDrive:
     @cached_property
     def starting_torque(self) -> float:
         """The most torque against which the shaft starts from rest [N m]: static friction counts in full."""
-        tau_m = motor.electromagnetic_torque(self.stall_current, self._plant.K)
+        tau_m = motor.electromagnetic_torque(self.stall_current, self._plant.motor.K)
 
         def beyond(tau: float) -> float:
-            return tau_m - tau - contact.holding_bounds(self._plant, tau_m, -tau)[1]
+            return tau_m - tau - contacts.holding_bounds(self._plant, tau_m, -tau)[1]
 
         return _root(beyond, 0.0, tau_m) if beyond(0.0) > 0.0 else 0.0
 
@@ -183,7 +193,7 @@ class FullDrive:
     def swing(self, load: Load | Part | None, start: float, end: float) -> Swing:
         """Return how the shaft turns from rest at one angle to a larger one [rad]; `load` acts all the way."""
         hung = as_load(load)
-        plant = self.loaded(hung)._replace(upper=end, restitution=0.0)
+        plant = self.loaded(hung)._replace(stops=Stops(-math.inf, end, 0.0))
         record = Record([], [])
         state = State(time=0.0, places=self.model.states, memory=started(_state(start, 0.0), RIGID))
         run(Plan(plant, constant_pieces(self.voltage), hung.torque_pieces), state, _LONGEST_SWING, record)

@@ -108,7 +108,7 @@ def _means(result: Result, start: float) -> tuple[float, float, float]:
     def looked_at(samples: Samples) -> NDArray[np.float64]:
         i = model.output("armature_current", samples, drive, load)
         return np.array([samples.angle, model.output(drawn, samples, drive, load),
-                         physics.copper_loss(i, warm_plant(model, samples, load).R)])
+                         physics.copper_loss(i, warm_plant(model, samples, load).motor.R)])
 
     angle, current, heat = (result.trajectory.since(start).integral(looked_at) / (result.ended - start)).tolist()
     return angle, current, heat

@@ -9,7 +9,7 @@ import numpy as np
 from servotwin.errors import InputError, LoadError, UnknownNameError
 from servotwin.loads import as_load
 from servotwin.models import DCMotor, GearedMotor, Model, PulseServo, PulseServoInductive
-from servotwin.models.kernels.plant import Plant
+from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -96,7 +96,7 @@ def transfer_function(model: Model, *, input: str | None = None, output: str | N
     name_out = output or model.layout[0]
     if name_out not in outputs:
         raise UnknownNameError(f"output of {type(model).__name__}", name_out, tuple(outputs))
-    numerator = _input_gain(model, name_in) * plant.gain * outputs[name_out]
+    numerator = _input_gain(model, name_in) * plant.follower.gain * outputs[name_out]
     system: Any = control.TransferFunction(
         np.trim_zeros(numerator, "f"), np.trim_zeros(_denominator(plant, _stiffness(plant, load)), "f"),
         inputs=[name_in], outputs=[name_out], name=type(model).__name__)
@@ -125,46 +125,46 @@ def check_model(model: Model, frame_period: float | None) -> None:
                          allowed="none: only the pulse servos have frames")
 
 
-def _linear_plant(model: Model, load: Load, frame_period: float | None) -> Plant:
+def _linear_plant(model: Model, load: Load, frame_period: float | None) -> Numbers:
     """Return the model's plant, with the mean gain of its pulses where it has any."""
     plant = model.pack(load)
     if isinstance(model, PulseServo | PulseServoInductive):
-        return plant._replace(gain=model.mean_gain(frame_period))
+        return plant._replace(follower=plant.follower._replace(gain=model.mean_gain(frame_period)))
     return plant
 
 
 def slowest_decay(model: Model, load: Load) -> float:
     """Return by how much the slowest mode of the small-signal loop decays [1/s], an integrator apart."""
     plant = _linear_plant(model, load, None)
-    poles = np.roots(np.trim_zeros(_denominator(plant, plant.stiffness), "f"))
+    poles = np.roots(np.trim_zeros(_denominator(plant, plant.load.stiffness), "f"))
     decay = -poles.real[np.abs(poles) > 0.0]
     return float(decay.min())
 
 
-def _stiffness(plant: Plant, load: Load) -> float:
+def _stiffness(plant: Numbers, load: Load) -> float:
     if len({p.hanging_angle for p in load.pendulums}) > 1:
         raise LoadError("load", got="pendulums with several hanging angles", allowed="one hanging angle")
-    return plant.stiffness + plant.gravity
+    return plant.load.stiffness + plant.load.gravity
 
 
-def _denominator(plant: Plant, stiffness: float) -> NDArray[np.float64]:
+def _denominator(plant: Numbers, stiffness: float) -> NDArray[np.float64]:
     # (L s + R)(J s² + b s + k) + K K_b s + K A k_s p
-    electrical = np.array([plant.L, plant.R])
-    mechanical = np.array([plant.J, plant.b, stiffness])
-    loop = np.array([plant.K * plant.K_b, plant.K * plant.gain * plant.p])
+    electrical = np.array([plant.motor.L, plant.motor.R])
+    mechanical = np.array([plant.shaft.J, plant.shaft.b, stiffness])
+    loop = np.array([plant.motor.K * plant.motor.K_b, plant.motor.K * plant.follower.gain * plant.sensor.p])
     return np.polyadd(np.polymul(electrical, mechanical), loop)
 
 
-def _numerators(model: Model, plant: Plant, stiffness: float) -> Mapping[str, NDArray[np.float64]]:
-    angle = np.array([plant.K])
-    speed = np.array([plant.K, 0.0])
-    current = np.array([plant.J, plant.b, stiffness])
+def _numerators(model: Model, plant: Numbers, stiffness: float) -> Mapping[str, NDArray[np.float64]]:
+    angle = np.array([plant.motor.K])
+    speed = np.array([plant.motor.K, 0.0])
+    current = np.array([plant.shaft.J, plant.shaft.b, stiffness])
     N = 1.0 if isinstance(model, DCMotor) else model.value("gear.gear_reduction")
     numerators = {"motor_angle": N * angle, "motor_speed": N * speed, "armature_current": current}
     if not isinstance(model, DCMotor):
         numerators |= {"output_angle": angle, "output_speed": speed}
-    if plant.p > 0.0:
-        numerators["feedback_voltage"] = plant.p * angle
+    if plant.sensor.p > 0.0:
+        numerators["feedback_voltage"] = plant.sensor.p * angle
     return numerators
 
 

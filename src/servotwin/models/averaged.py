@@ -8,8 +8,9 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.base import KINDS, Line, Model, check_accepted, check_travel, feedback_line, solved
-from servotwin.models.kernels.plant import Plant
-from servotwin.models.plant import make_plant
+from servotwin.models.terms import friction, sensor
+from servotwin.models.terms.follower import NO_FOLLOWER
+from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,13 +39,12 @@ class _Averaged(Model):
                 "electronics.pulse_width_max", "potentiometer.feedback_offset", "gear.output_inertia")
     signals = _SIGNALS
 
-    def _plant(self, load: Load, inductance: float) -> Plant:
-        return make_plant(
-            self, load, reduction=self.value("gear.gear_reduction"), inductance=inductance,
-            friction=(self.value("friction.coulomb_torque_forward"), self.value("friction.coulomb_torque_backward")),
-            slope=self.value("friction.zero_crossing_slope"),
-            gain=self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain"),
-            p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0))
+    def _numbers(self, load: Load, inductance: float) -> Numbers:
+        N = self.value("gear.gear_reduction")
+        gain = self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain")
+        return self.body(load, N, inductance)._replace(
+            friction=friction.pack_smoothed(self, N), sensor=sensor.pack(self),
+            follower=NO_FOLLOWER._replace(gain=gain))
 
     def _line(self, kind: str) -> Line:
         """Return how the control voltage [V] follows a command of this kind."""
@@ -101,9 +101,9 @@ class AveragedServo(_Averaged):
     requires = _REQUIRES
     layout = ("output_angle", "output_speed")
 
-    def pack(self, load: Load) -> Plant:
+    def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft."""
-        return self._plant(load, 0.0)
+        return self._numbers(load, 0.0)
 
 
 @final
@@ -123,6 +123,6 @@ class AveragedServoInductive(_Averaged):
     requires = (*_REQUIRES, "motor.armature_inductance")
     layout = ("output_angle", "output_speed", "armature_current")
 
-    def pack(self, load: Load) -> Plant:
+    def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft."""
-        return self._plant(load, self.value("motor.armature_inductance"))
+        return self._numbers(load, self.value("motor.armature_inductance"))

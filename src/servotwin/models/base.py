@@ -12,15 +12,17 @@ from servotwin import physics
 from servotwin.errors import CommandError, InputError, MissingParameterError, UnknownNameError
 from servotwin.models import outputs
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
+from servotwin.models.terms import load as load_term
+from servotwin.models.terms import motor, shaft
+from servotwin.models.terms.numbers import Numbers
 from servotwin.parameters import Servo
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load
-    from servotwin.models.kernels.frame import Chip
-    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
+    from servotwin.models.terms.chip import Chip
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
@@ -62,7 +64,7 @@ class Model(ABC):
     signals: ClassVar[tuple[str, ...]]
     """Names of all output signals that the class can have, `time` apart."""
 
-    _packed: tuple[Load, Plant] | None = None
+    _packed: tuple[Load, Numbers] | None = None
 
     def __init__(self, servo: Servo) -> None:
         if not isinstance(servo, Servo):
@@ -132,6 +134,11 @@ class Model(ABC):
         own = self.value_or("gear.output_inertia", 0.0) if "gear.output_inertia" in self.optional else 0.0
         return load.total_inertia + own
 
+    def body(self, load: Load, reduction: float, inductance: float = 0.0) -> Numbers:
+        """Return motor, shaft and load at the output shaft; all else is absent."""
+        return Numbers(motor=motor.pack(self, reduction, inductance), load=load_term.pack(load),
+                       shaft=shaft.pack(self, load, self.load_inertia(load), reduction))
+
     @property
     def available(self) -> tuple[str, ...]:
         """Names of the output signals that can be computed for this servo, `time` apart.
@@ -149,11 +156,11 @@ class Model(ABC):
         return tuple(Place(name, k, 1.0) for k, name in enumerate(self.layout))
 
     @abstractmethod
-    def pack(self, load: Load) -> Plant:
+    def pack(self, load: Load) -> Numbers:
         """Return everything that the engine reads, as plain floats."""
 
     @final
-    def plant(self, load: Load) -> Plant:
+    def plant(self, load: Load) -> Numbers:
         """Return `pack(load)`, which is kept for the next time."""
         packed = self._packed
         if packed is None or packed[0] is not load:

@@ -20,8 +20,9 @@ from servotwin.models.base import (
     feedback_line,
     solved,
 )
-from servotwin.models.kernels.plant import Plant
-from servotwin.models.plant import make_plant
+from servotwin.models.terms import friction, sensor, stops
+from servotwin.models.terms.follower import Follower
+from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -114,17 +115,14 @@ class BoundedServo(Model):
             self.value("supply.open_circuit_voltage"), 1.0, self.value_or("supply.bridge_drop_voltage", 0.0))
         return limit
 
-    def pack(self, load: Load) -> Plant:
+    def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft."""
-        return make_plant(
-            self, load, reduction=self.value("gear.gear_reduction"),
-            friction=(self.value("friction.coulomb_torque_forward"), self.value("friction.coulomb_torque_backward")),
-            breakaway=self.value_or("friction.breakaway_ratio", 1.0),
-            gain=self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain"),
-            p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0),
-            deadband=self.value_or("electronics.voltage_deadband", 0.0), voltage_limit=self.voltage_limit,
-            stops=(self.value_or("stops.lower_angle", -math.inf), self.value_or("stops.upper_angle", math.inf)),
-            restitution=self.value_or("stops.restitution", 0.0))
+        N = self.value("gear.gear_reduction")
+        return self.body(load, N)._replace(
+            friction=friction.pack_sticking(self, N), sensor=sensor.pack(self), stops=stops.pack(self),
+            follower=Follower(
+                gain=self.value("electronics.bridge_gain") * self.value("electronics.comparator_gain"),
+                half_deadband=0.5 * self.value_or("electronics.voltage_deadband", 0.0), V_max=self.voltage_limit))
 
     def _line(self, kind: str) -> Line:
         """Return how the control voltage [V] follows a command of this kind."""

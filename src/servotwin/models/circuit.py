@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin import physics
-from servotwin.models.kernels import armature
+from servotwin.models.engine import currents
+from servotwin.models.terms import bridge as bridge_term
+from servotwin.models.terms.source import Source
 from servotwin.physics.laws import array_form
 
 if TYPE_CHECKING:
     from servotwin.models.base import Model
-    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
 
 Array = NDArray[np.float64]
@@ -24,10 +26,10 @@ Array = NDArray[np.float64]
 _NO_VOLTAGE = 5e-324  # V: a bus without any is still connected
 _EDGE = 1e-6  # of a limit: what float32 rounds
 
-_zone_of, _error_of, _voltage, _current, _bus_voltage, _terminal_voltage, _bridge_drops = (
+_zone_of, _voltage, _current, _bus_voltage, _terminal_voltage, _bridge_drops = (
     array_form(law, __name__) for law in (
-        armature.zone_of, armature.error_of, armature.voltage, armature.current, armature.bus_voltage,
-        armature.terminal_voltage, armature.bridge_drops))
+        currents.zone_of, currents.voltage, currents.current, bridge_term.bus_voltage, bridge_term.terminal_voltage,
+        bridge_term.drops))
 
 
 class Circuit(NamedTuple):
@@ -42,53 +44,54 @@ class Circuit(NamedTuple):
     brush_power: Array
 
 
-def circuit_of(model: Model, plant: Plant, samples: Samples, drive: Pieces) -> Circuit:
+def circuit_of(model: Model, plant: Numbers, samples: Samples, drive: Pieces) -> Circuit:
     """Return what happens electrically: behind a bridge, or where the voltage follows the command at once.
 
     `plant` is at the temperatures of the samples.
     """
-    if np.any(plant.V > 0.0):
-        return _behind_bridge(model, plant, samples)
+    if np.any(plant.source.V > 0.0):
+        return _behind_bridge(plant, samples)
     u, q, w = drive(samples.time), samples.angle, samples.speed
     zone = _zone_of(plant, u, 0.0, q, w, 0.0)
-    v = np.asarray(_voltage(plant, zone, _error_of(plant, u, q)))
-    i = np.asarray(_current(plant, zone, u, q, w)) if plant.L == 0.0 else samples.current
+    v = np.asarray(_voltage(plant, zone, u, q))
+    i = np.asarray(_current(plant, zone, u, q, w)) if plant.motor.L == 0.0 else samples.current
     return Circuit(v, i, np.full_like(v, np.nan), np.full_like(v, np.nan), v * i, np.zeros_like(v), np.zeros_like(v))
 
 
-def _behind_bridge(model: Model, plant: Plant, samples: Samples) -> Circuit:
+def _behind_bridge(plant: Numbers, samples: Samples) -> Circuit:
     s = samples.drive
-    coasts = plant.D_off >= plant.V  # nothing flows before the back-EMF opens the diodes
+    coasts = plant.bridge.coast > 0.0
     shared = getattr(samples, "bus", None)
     if shared is not None:
         plant = on_bus(plant, shared)
-    V_br = model.value_or("motor.brush_drop_voltage", 0.0)
-    w = samples.motor_speed if np.any(plant.half_play) else samples.speed
-    u = s * np.maximum(plant.V, _NO_VOLTAGE)
-    inductive = np.any(plant.L > 0.0)
+    w = samples.motor_speed if np.any(plant.play.half) else samples.speed
+    u = s * np.maximum(plant.source.V, _NO_VOLTAGE)
+    inductive = np.any(plant.motor.L > 0.0)
     i = _at_limit(plant, samples.current) if inductive else np.zeros_like(w)
     zone = _zone_of(plant, u, 0.0, 0.0, w, i)
     if not inductive:
         i = _current(plant, zone, u, 0.0, w)
-    bus = np.asarray(_bus_voltage(plant, zone, u, w, i, coasts))
-    v = np.asarray(_terminal_voltage(plant, V_br, u, w, i, bus, coasts))
+    bus = np.asarray(_bus_voltage(plant.bridge, plant.source, plant.motor, zone, u, w, i))
+    v = np.asarray(_terminal_voltage(plant.bridge, plant.source, plant.motor, u, w, i, bus))
     connected = (s != 0.0) | coasts
     of_supply = np.where(connected, physics.supply_current(i, s), 0.0)
-    lost = np.where(connected, physics.bridge_loss(i, *_bridge_drops(plant, V_br, u)), 0.0)
-    return Circuit(v, i, bus, of_supply, bus * of_supply, lost, np.asarray(physics.brush_loss(i, V_br)))
+    lost = np.where(connected, physics.bridge_loss(i, *_bridge_drops(plant.bridge, plant.source, plant.motor, u)), 0.0)
+    return Circuit(v, i, bus, of_supply, bus * of_supply, lost, np.asarray(physics.brush_loss(i, plant.bridge.V_br)))
 
 
-def _at_limit(plant: Plant, i: Array) -> Array:
+def _at_limit(plant: Numbers, i: Array) -> Array:
     """Return a current, at the limit of a regulator but for rounding just there."""
     with np.errstate(invalid="ignore"):
-        near = np.abs(np.abs(i) - plant.I_max) <= _EDGE * plant.I_max
-    return np.where(near & np.isfinite(plant.I_max), np.copysign(plant.I_max, i), i)
+        near = np.abs(np.abs(i) - plant.source.I_max) <= _EDGE * plant.source.I_max
+    return np.where(near & np.isfinite(plant.source.I_max), np.copysign(plant.source.I_max, i), i)
 
 
-def on_bus(plant: Plant, bus: Array) -> Plant:
+def on_bus(plant: Numbers, bus: Array) -> Numbers:
     """Return the plant of a servo on a bus whose voltage is known; that of its source is then left out."""
-    coasts = plant.D_off >= plant.V
-    R_off = plant.R_off - np.where(coasts & np.isinf(plant.I_max), plant.R_b, 0.0)
-    changed: dict[str, Any] = {"V": bus, "D_off": np.where(coasts, plant.D_off - plant.V + bus, plant.D_off),
-                               "R_off": R_off, "R_drive": plant.R_drive - plant.R_b, "R_b": 0.0, "I_max": math.inf}
-    return plant._replace(**changed)
+    bridge, source = plant.bridge, plant.source
+    coasts = np.asarray(bridge.coast) > 0.0
+    R_off: Any = bridge.R_off - np.where(coasts & np.isinf(source.I_max), source.R_b, 0.0)
+    D_off: Any = np.where(coasts, bridge.D_off - source.V + bus, bridge.D_off)
+    V: Any = bus
+    return plant._replace(bridge=bridge._replace(D_off=D_off, R_off=R_off, R_drive=bridge.R_drive - source.R_b),
+                          source=Source(V, 0.0, math.inf))

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, final
 
 from servotwin.errors import CommandError
 from servotwin.models.base import Model
-from servotwin.models.kernels.plant import Plant
-from servotwin.models.plant import make_plant
+from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
@@ -40,9 +39,9 @@ class DCMotor(Model):
     layout = ("motor_angle", "motor_speed", "armature_current")
     signals = ("armature_voltage", "armature_current", "motor_angle", "motor_speed", "motor_torque")
 
-    def pack(self, load: Load) -> Plant:
+    def pack(self, load: Load) -> Numbers:
         """Return the plant at the motor's own shaft."""
-        return make_plant(self, load, reduction=1.0, inductance=self.value("motor.armature_inductance"))
+        return self.body(load, 1.0, self.value("motor.armature_inductance"))
 
     def command(self, signal: Signal) -> Pieces:
         """Return the armature voltage [V]; other units are refused."""
@@ -70,10 +69,9 @@ class GearedMotor(Model):
     signals = ("armature_voltage", "armature_current", "motor_angle", "motor_speed", "motor_torque",
                "output_angle", "output_speed", "load_torque")
 
-    def pack(self, load: Load) -> Plant:
+    def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft."""
-        return make_plant(self, load, reduction=self.value("gear.gear_reduction"),
-                          inductance=self.value("motor.armature_inductance"))
+        return self.body(load, self.value("gear.gear_reduction"), self.value("motor.armature_inductance"))
 
     def command(self, signal: Signal) -> Pieces:
         """Return the armature voltage [V]; other units are refused."""

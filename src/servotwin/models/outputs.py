@@ -13,21 +13,23 @@ from numpy.typing import NDArray
 
 from servotwin import physics
 from servotwin.models.circuit import circuit_of
-from servotwin.models.kernels import contact
-from servotwin.models.kernels.plant import INSIDE, STUCK, at_temperature
+from servotwin.models.engine import contacts
+from servotwin.models.engine.modes import INSIDE, STUCK
+from servotwin.models.terms.friction import NO_FRICTION
+from servotwin.models.terms.numbers import at_temperature
 from servotwin.physics.laws import array_form
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
     from servotwin.models.base import Model
-    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
 
 Array = NDArray[np.float64]
 
 _friction_torque, _holding_bounds, _at_temperature = (
-    array_form(law, __name__) for law in (contact.friction_torque, contact.holding_bounds, at_temperature))
+    array_form(law, __name__) for law in (contacts.friction_torque, contacts.holding_bounds, at_temperature))
 
 
 class Output(NamedTuple):
@@ -38,12 +40,12 @@ class Output(NamedTuple):
     compute: Callable[[Model, Samples, Pieces, Load], Array]
 
 
-def warm_plant(model: Model, samples: Samples, load: Load) -> Plant:
+def warm_plant(model: Model, samples: Samples, load: Load) -> Numbers:
     """Return the plant at the temperatures of the samples."""
     plant = model.plant(load)
-    if not np.any(plant.C_w > 0.0):
+    if not np.any(plant.heat.C_w > 0.0):
         return plant
-    return cast("Plant", _at_temperature(plant, samples.winding, samples.housing))
+    return cast("Numbers", _at_temperature(plant, samples.winding, samples.housing))
 
 
 class Torques(NamedTuple):
@@ -59,24 +61,25 @@ class Torques(NamedTuple):
 def torques_of(model: Model, samples: Samples, drive: Pieces, load: Load) -> Torques:
     """Return all torques that act at the output shaft."""
     plant = warm_plant(model, samples, load)
-    tau = np.asarray(physics.electromagnetic_torque(circuit_of(model, plant, samples, drive).armature_current, plant.K))
+    current = circuit_of(model, plant, samples, drive).armature_current
+    tau = np.asarray(physics.electromagnetic_torque(current, plant.motor.K))
     external = load.external_torque(samples.time, samples.angle)
     w, contact_of = samples.speed, samples.contact
-    on_gear = np.asarray(physics.torque_on_gear(external, w, plant.b_out))
+    on_gear = np.asarray(physics.torque_on_gear(external, w, plant.shaft.b_out))
     own, of_load = _friction_of(plant, contact_of, w, tau, on_gear, tau - external)
-    acceleration = physics.shaft_acceleration(tau, w, own + of_load, external, plant.b, plant.J)
-    if np.any(plant.half_play):
+    acceleration = physics.shaft_acceleration(tau, w, own + of_load, external, plant.shaft.b, plant.shaft.J)
+    if np.any(plant.play.half):
         inside = samples.mesh == INSIDE
-        gear, dry = plant._replace(coulomb=0.0), plant._replace(F_forward=0.0, F_backward=0.0, varies=0.0)
+        gear, dry = _without_dry_load(plant), plant._replace(friction=NO_FRICTION)
         own_inside, _ = _friction_of(gear, samples.motor, samples.motor_speed, tau, np.zeros_like(tau), tau)
         _, load_inside = _friction_of(dry, contact_of, w, np.zeros_like(tau), -external, -external)
         own, of_load = np.where(inside, own_inside, own), np.where(inside, load_inside, of_load)
-        alone = physics.shaft_acceleration(0.0, w, of_load, external, plant.b_out, plant.J_out)
+        alone = physics.shaft_acceleration(0.0, w, of_load, external, plant.shaft.b_out, plant.shaft.J_out)
         acceleration = np.where(inside, alone, acceleration)
     return Torques(tau, own, of_load, external, np.where(contact_of >= STUCK, 0.0, acceleration))
 
 
-def _friction_of(plant: Plant, contact_of: Any, w: Array, tau_m: Array, tau_e: Array,
+def _friction_of(plant: Numbers, contact_of: Any, w: Array, tau_m: Array, tau_e: Array,
                  net: Array) -> tuple[Array, Array]:
     """Return the friction torques of servo and load [N m], against +q, where `net` is what they have to hold at rest.
 
@@ -84,13 +87,17 @@ def _friction_of(plant: Plant, contact_of: Any, w: Array, tau_m: Array, tau_e: A
     sharing is assumed: statics does not tell); what remains then is carried by a stop.
     """
     sliding = _friction_torque(plant, contact_of, w, tau_m, tau_e)
-    own = _friction_torque(plant._replace(coulomb=0.0), contact_of, w, tau_m, tau_e)
+    own = _friction_torque(_without_dry_load(plant), contact_of, w, tau_m, tau_e)
     low, high = _holding_bounds(plant, tau_m, tau_e)
     held = np.clip(net, -low, high)
     limit = np.where(held > 0.0, high, low)
-    share = np.divide(plant.coulomb, limit, out=np.zeros_like(held), where=limit > 0.0)
+    share = np.divide(plant.load.coulomb, limit, out=np.zeros_like(held), where=limit > 0.0)
     still = contact_of >= STUCK
     return np.where(still, held * (1.0 - share), own), np.where(still, held * share, sliding - own)
+
+
+def _without_dry_load(plant: Numbers) -> Numbers:
+    return plant._replace(load=plant.load._replace(coulomb=0.0))
 
 
 def load_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
@@ -117,24 +124,24 @@ def _current(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array
 
 def _motor_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
     plant = warm_plant(model, samples, load)
-    k_a = plant.K / _reduction(model)
+    k_a = plant.motor.K / _reduction(model)
     return np.asarray(physics.electromagnetic_torque(
         circuit_of(model, plant, samples, drive).armature_current, k_a))
 
 
 def _feedback(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
-    plant, (angles, errors) = model.plant(load), model.curve()
-    count: Any = model.value_or("potentiometer.quantisation", 0.0) if np.any(plant.V > 0.0) else 0.0
-    if not angles and not np.any(count) and not np.any(plant.half_slack):
-        return np.asarray(physics.feedback_voltage(samples.angle, plant.p, plant.b_o))
+    sensor, (angles, errors) = model.plant(load).sensor, model.curve()
+    if not angles and not np.any(sensor.step) and not np.any(sensor.half_slack):
+        return np.asarray(physics.feedback_voltage(samples.angle, sensor.p, sensor.b_o))
+    count = sensor.step if np.any(sensor.step) else None
     return np.asarray(physics.sensed_voltage(
-        samples.wiper, plant.p, plant.b_o, angles or (0.0,), errors or (0.0,), count if np.any(count) else None))
+        samples.wiper, sensor.p, sensor.b_o, angles or (0.0,), errors or (0.0,), count))
 
 
 def _of_motor(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
     """Angle or speed of the motor: that of the output but inside the play of a gear."""
     def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
-        play = np.any(model.plant(load).half_play)
+        play = np.any(model.plant(load).play.half)
         values: Array = getattr(samples, f"motor_{name}" if play else name)
         return np.asarray(physics.motor_from_output(values, _reduction(model)))
     return compute

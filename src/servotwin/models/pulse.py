@@ -13,10 +13,9 @@ from servotwin import physics
 from servotwin.errors import InputError
 from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
 from servotwin.models.bounded import BoundedServo
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.plant import Plant
-from servotwin.models.plant import make_plant
-from servotwin.models.pulse_plant import gear_numbers, sensor_numbers, source_numbers, thermal_numbers
+from servotwin.models.terms import bridge, chip, friction, heat, play, sensor, source, stops
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.numbers import Numbers
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
@@ -113,16 +112,12 @@ class _Pulsed(Model):
         off: Any = self.servo.get("electronics.off_state")
         return np.where(off == "coast", 1.0, 0.0) if isinstance(off, np.ndarray) else float(off == "coast")
 
-    def _plant(self, load: Load, inductance: float) -> Plant:
-        return make_plant(
-            self, load, reduction=self.value("gear.gear_reduction"), inductance=inductance,
-            friction=(self.value("friction.coulomb_torque_forward"), self.value("friction.coulomb_torque_backward")),
-            breakaway=self.value_or("friction.breakaway_ratio", 1.0),
-            p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0),
-            stops=(self.value_or("stops.lower_angle", -math.inf), self.value_or("stops.upper_angle", math.inf)),
-            restitution=self.value_or("stops.restitution", 0.0),
-            **source_numbers(self, self._coasts()), **gear_numbers(self, load), **thermal_numbers(self),
-            **sensor_numbers(self))
+    def _numbers(self, load: Load, inductance: float) -> Numbers:
+        N = self.value("gear.gear_reduction")
+        return self.body(load, N, inductance)._replace(
+            bridge=bridge.pack(self, self._coasts()), source=source.pack(self), friction=friction.pack(self, N),
+            play=play.pack(self, self.load_inertia(load)), stops=stops.pack(self), sensor=sensor.pack_pulsed(self),
+            heat=heat.pack(self))
 
     def _period(self, signal: Signal | None) -> Any:
         return self.frame_period if signal is None or signal.frame_period is None else signal.frame_period
@@ -130,20 +125,8 @@ class _Pulsed(Model):
     def chip(self, signal: Signal | None = None) -> Chip:
         """Return the numbers of the frame logic; the frame period is that of the command where it gives one."""
         period = self._period(signal)
-        return Chip(
-            T_0=self.value_or("electronics.one_shot_offset", 0.0), slope=self.value("electronics.one_shot_slope"),
-            p=self.value("potentiometer.feedback_gain"), b_o=self.value_or("potentiometer.feedback_offset", 0.0),
-            beta=self.value_or("electronics.back_emf_injection", 0.0),
-            c_s=self.value_or("electronics.supply_coupling", 0.0), noise=self.value_or("potentiometer.noise", 0.0),
-            half_deadband=0.5 * self.value_or("electronics.deadband", 0.0),
-            K=self.value("electronics.stretcher_gain"), t_min=self.value_or("electronics.minimum_drive_time", 0.0),
-            tau_s=self.value_or("electronics.stretcher_time_constant", 0.0),
-            shortest=self.value_or("electronics.pulse_width_min", 0.0),
-            longest=self.value_or("electronics.pulse_width_max", math.inf),
-            timeout=_edges_first(self.value_or("electronics.pulse_timeout", math.inf), period), frame_period=period,
-            R_a=self.value("motor.armature_resistance"), R_b=self.value_or("supply.internal_resistance", 0.0),
-            V_br=self.value_or("motor.brush_drop_voltage", 0.0), V_oc=self.value("supply.open_circuit_voltage"),
-            coast=self._coasts(), step=self.value_or("potentiometer.quantisation", 0.0))
+        timeout = _edges_first(self.value_or("electronics.pulse_timeout", math.inf), period)
+        return chip.pack(self, period, timeout)
 
     def check_mean(self, what: str, more: tuple[str, ...] = ()) -> None:
         """Say in one line where pulses have no mean that grows with the error; `what` is it that would need one.
@@ -186,10 +169,10 @@ class _Pulsed(Model):
         T_f = self.frame_period if frame_period is None else frame_period
         if not (is_finite(T_f) and T_f > 0.0):
             raise InputError("frame_period", got=T_f, allowed="a positive number [s]")
-        source = source_numbers(self, self._coasts())
-        stalled = physics.bridge_current(source["V"], 0.0, source["D_drive"], source["R_drive"])
+        path, supply = bridge.pack(self, self._coasts()), source.pack(self)
+        stalled = physics.bridge_current(supply.V, 0.0, path.D_drive, path.R_drive)
         gain = physics.averaged_bridge_gain(
-            self.value("motor.armature_resistance") * min(float(stalled), source["I_max"]), 0.0,
+            self.value("motor.armature_resistance") * min(float(stalled), supply.I_max), 0.0,
             self.value("electronics.stretcher_gain"), T_f, self.value("electronics.one_shot_slope"))
         return float(gain)
 
@@ -277,9 +260,9 @@ class PulseServo(_Pulsed):
     requires = _REQUIRES
     layout = (*_SHAFT, *_HIDDEN)
 
-    def pack(self, load: Load) -> Plant:
+    def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft, with the bridge before it."""
-        return self._plant(load, 0.0)
+        return self._numbers(load, 0.0)
 
     def averaged(self, frame_period: float | None = None) -> BoundedServo:
         """Return the bounded servo that has the mean voltage of this one's pulses.
@@ -343,6 +326,6 @@ class PulseServoInductive(_Pulsed):
     requires = (*_REQUIRES, "motor.armature_inductance")
     layout = (*_SHAFT, "armature_current", *_HIDDEN)
 
-    def pack(self, load: Load) -> Plant:
+    def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft, with the bridge before it."""
-        return self._plant(load, self.value("motor.armature_inductance"))
+        return self._numbers(load, self.value("motor.armature_inductance"))

@@ -12,12 +12,12 @@ import numpy as np
 
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model, PulseServo, PulseServoInductive
-from servotwin.models.kernels import coupled
-from servotwin.models.kernels.coupled import Source
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.plant import Mode
+from servotwin.models.engine import shared_source
+from servotwin.models.engine.modes import Mode
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
+from servotwin.models.terms.bridge import coasts
+from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.physics.pieces import Piece
 from servotwin.signals import Signal
@@ -259,7 +259,7 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
         status, ended = Status.DIVERGED, max(unit.point.time for unit in units)
         cause = status.message
     alone = {name: Trajectory(tuple(unit.record.segments)) for name, unit in zip(given, units, strict=True)}
-    bus = _BusVoltage(source, [unit.plan for unit in units], [unit.chip for unit in units], list(alone.values()))
+    bus = _BusVoltage(source, [unit.plan for unit in units], list(alone.values()))
     results = {
         name: Result(model=sims[name].model, command=command, load=sims[name].load, drive=sims[name].drive(command),
                      time=times, trajectory=Trajectory(alone[name].segments, bus), events=tuple(unit.record.events),
@@ -311,7 +311,6 @@ class _BusVoltage:
 
     source: Source
     plans: Sequence[Plan]
-    chips: Sequence[Chip]
     trajectories: Sequence[Trajectory]
 
     def __call__(self, time: Array) -> Array:
@@ -320,15 +319,15 @@ class _BusVoltage:
 
     def _at(self, samples: Sequence[Samples], k: int) -> float:
         members, states = [], []
-        for plan, chip, s in zip(self.plans, self.chips, samples, strict=True):
+        for plan, s in zip(self.plans, samples, strict=True):
             y = (s.angle[k], s.speed[k], s.current[k], s.winding[k], s.housing[k], s.motor_angle[k], s.motor_speed[k])
             if not np.isfinite(y[0]):  # after the run has ended
                 return math.nan
             drive = float(s.drive[k])
-            if drive == 0.0 and not (chip.coast > 0.0 and (y[2] != 0.0 or y[6] != 0.0)):
+            if drive == 0.0 and not (coasts(plan.numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
                 continue
             mode = Mode(int(s.zone[k]), int(s.contact[k]), int(s.mesh[k]), int(s.motor[k]))
-            stiff = coupled.on_stiff_source(plan.plant, drive == 0.0)
-            members.append(coupled.member_of(stiff, mode, drive, Piece(), y))
+            stiff = shared_source.on_stiff_source(plan.numbers, drive == 0.0)
+            members.append(shared_source.member_of(stiff, mode, drive, Piece(), y))
             states.append(y)
-        return coupled.zoned(self.source, members, states, self.source.V)[2]
+        return shared_source.zoned(self.source, members, states, self.source.V)[2]

@@ -10,12 +10,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from servotwin.models.kernels import armature, coupled, frame, hybrid, motion, step
-from servotwin.models.kernels.frame import Chip, Frame
-from servotwin.models.kernels.memory import Point
-from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.plant import Plant, Vector
-from servotwin.models.kernels.step import MOST_IDLE
+from servotwin.models.engine import currents, motion, shared_source, step
+from servotwin.models.engine.memory import Point
+from servotwin.models.engine.modes import Vector
+from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.step import MOST_IDLE
+from servotwin.models.terms import frame
+from servotwin.models.terms.bridge import coasts, terminal_voltage
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.motor import inductive
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.sensor import sensed_voltage, wiper_at
 from servotwin.physics.pieces import Piece, piece_value
 from servotwin.simulation.bus_group import Connected, Group
 from servotwin.simulation.engine import Event, Plan, Record, Segment, event_name, failure, keep_switch
@@ -36,14 +42,14 @@ class Unit:
     inputs: tuple[float, Piece] | None = None  # drive and torque of the present motion
     motion: Motion | None = None
     arrival: tuple[Point, int] | None = None  # when left alone: its next point, and the event there (−1: none)
-    stiff: dict[bool, Plant] = field(default_factory=dict)  # the plant on a given bus voltage, driven or returning
+    stiff: dict[bool, Numbers] = field(default_factory=dict)  # its numbers on a given bus voltage, driven or returning
 
     switch: float = -math.inf  # when drive or load change next, as far as is known [s]
     limit: float = -math.inf  # when its chip or its load do something next [s]
 
     def __post_init__(self) -> None:
         for returning in (False, True):
-            self.stiff[returning] = coupled.on_stiff_source(self.plan.plant, returning)
+            self.stiff[returning] = shared_source.on_stiff_source(self.plan.numbers, returning)
 
     def plan_ahead(self) -> None:
         """Find out when chip and load do something next."""
@@ -59,7 +65,7 @@ class Unit:
     def connected(self) -> bool:
         """Whether the motor is connected to the bus, or may become so by itself."""
         y = self.point.y
-        return self.frame.drive != 0.0 or (self.chip.coast > 0.0 and (y[2] != 0.0 or y[6] != 0.0))
+        return self.frame.drive != 0.0 or (coasts(self.plan.numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0))
 
     def at(self, time: float) -> Point:
         """Return where it stands at `time` [s], on its present motion."""
@@ -67,7 +73,7 @@ class Unit:
             return self.point
         self.motion = motion.prepared(self.motion)
         y = motion.state(self.motion, time - self.motion.t0)
-        wiper = frame.wiper_at(self.plan.plant.half_slack, self.point.wiper, y[0])
+        wiper = wiper_at(self.plan.numbers.sensor, self.point.wiper, y[0])
         _, _, mode, anchor_time, anchor, step, _ = self.point
         return Point(time, y, mode, anchor_time, anchor, step, wiper)
 
@@ -87,13 +93,13 @@ class Unit:
 
     def alone(self, until: float) -> None:
         """Find out what it does next when no other motor is connected to the bus."""
-        plant, time = self.plan.plant, self.point.time
+        numbers, time = self.plan.numbers, self.point.time
         new, self.inputs = self.told() != self.inputs, self.told()
-        u = step.source(plant, self.frame)
-        m = motion.nothing(plant, u, self.tau) if new or self.motion is None else self.motion
+        u = step.source(numbers, self.frame)
+        m = motion.nothing(numbers, u, self.tau) if new or self.motion is None else self.motion
         if new:
-            self.point = step.anchored(plant, u, self.tau, time, self.point)
-        point, self.motion, kind, status = step.onward(plant, self.point, u, self.tau, m, self.limit, until)
+            self.point = step.anchored(numbers, u, self.tau, time, self.point)
+        point, self.motion, kind, status = step.onward(numbers, self.point, u, self.tau, m, self.limit, until)
         if status != step.COMPLETED:
             raise failure(Status.of_code(status), time)
         self.arrival = (point, kind)
@@ -169,28 +175,28 @@ class Bus:
         if not frame.accepted(chip, t_in):
             unit.record.events.append(Event(time, "pulse refused", here.y[0]))
         v_m, V_bus = self._voltages(unit, here.y, time)
-        v_o = frame.feedback_voltage(chip, plan.curve, here.wiper)
+        v_o = sensed_voltage(plan.numbers.sensor, plan.curve, here.wiper)
         unit.frame = frame.edge(chip, unit.frame, time, t_in, v_o, v_m, V_bus, plan.seed)
         if unit.frame.number == frame.CROWDED:
             raise failure(Status.CROWDED, time)
 
     def _voltages(self, unit: Unit, y: Vector, time: float) -> tuple[float, float]:
         """Return the voltages at the unit's motor and of the bus [V]."""
-        plant, drive = unit.plan.plant, unit.frame.drive
+        numbers, drive = unit.plan.numbers, unit.frame.drive
         connected = [other for other in self.units if other.connected]
         if not [other for other in connected if other is not unit]:
-            return step.voltages(plant, unit.chip, drive * plant.V, y)
+            return step.voltages(numbers, drive * numbers.source.V, y)
         if len(connected) == 1:
             other = connected[0]
-            u = other.frame.drive * other.plan.plant.V
-            V_bus = step.voltages(other.plan.plant, other.chip, u, other.at(time).y)[1]
+            u = other.frame.drive * other.plan.numbers.source.V
+            V_bus = step.voltages(other.plan.numbers, u, other.at(time).y)[1]
         else:
             V_bus = self._group.voltage_of([_connection(other, time) for other in connected])
-        stiff = hybrid.warm(unit.stiff[False], y)
+        stiff = warm(unit.stiff[False], y)
         u = drive * V_bus
-        zone = armature.zone_of(stiff, u, 0.0, y[0], y[6], y[2])
-        i = y[2] if stiff.L > 0.0 else armature.current(stiff, zone, u, y[0], y[6])
-        return armature.terminal_voltage(stiff, unit.chip.V_br, u, y[6], i, V_bus, unit.chip.coast > 0.0), V_bus
+        zone = currents.zone_of(stiff, u, 0.0, y[0], y[6], y[2])
+        i = y[2] if inductive(stiff.motor) else currents.current(stiff, zone, u, y[0], y[6])
+        return terminal_voltage(stiff.bridge, stiff.source, stiff.motor, u, y[6], i, V_bus), V_bus
 
     def _go_on(self, time: float, until: float) -> None:
         """Take up motions where there are none, or no longer the right ones."""

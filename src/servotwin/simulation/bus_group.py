@@ -6,11 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from servotwin.models.kernels import coupled, frame, hybrid, motion, together
-from servotwin.models.kernels.coupled import Member, Source
-from servotwin.models.kernels.memory import FIRST_STEP, Point
-from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.plant import NO_CURRENT, Mode, Plant, Vector
+from servotwin.models.engine import guards, joint_motion, motion, shared_source
+from servotwin.models.engine.memory import FIRST_STEP, Point
+from servotwin.models.engine.modes import NO_CURRENT, Mode, Vector
+from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.shared_source import Member
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.sensor import wiper_at
+from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 from servotwin.simulation.engine import failure
 from servotwin.simulation.status import Status
@@ -19,13 +22,13 @@ _BELOW = -1e-13  # rounding is not an event
 _BELOW_OF_SUM = -1e-10  # A: nor what the currents of all have gathered
 _HALVINGS = 200
 _LOOKS = (0.25, 0.5, 0.75, 1.0)  # parts of a motion at which its guards are looked at
-_JUMPS = (hybrid.UPPER, hybrid.LOWER, hybrid.MEET_FORWARD, hybrid.MEET_BACKWARD, hybrid.SPEED)  # signs may turn
+_JUMPS = (guards.UPPER, guards.LOWER, guards.MEET_FORWARD, guards.MEET_BACKWARD, guards.SPEED)  # signs may turn
 
 
 class Connected(NamedTuple):
-    """A servo on the bus: its plant on a stiff source, where it stands, how its bridge drives, and its load."""
+    """A servo on the bus: its numbers on a stiff source, where it stands, how its bridge drives, and its load."""
 
-    plant: Plant
+    numbers: Numbers
     point: Point
     drive: float
     tau: Piece
@@ -47,7 +50,7 @@ class Group:
     def __init__(self, source: Source) -> None:
         self.end = math.inf
         self._source = source
-        self._state = coupled.FOLLOWING
+        self._state = shared_source.FOLLOWING
         self._voltage = source.V
         self._members: list[Member] = []
         self._points: list[Point] = []
@@ -62,8 +65,9 @@ class Group:
         return self._zoned(connected)[2]
 
     def _zoned(self, connected: Sequence[Connected]) -> tuple[list[Member], int, float]:
-        members = [coupled.member_of(one.plant, one.point.mode, one.drive, one.tau, one.point.y) for one in connected]
-        return coupled.zoned(self._source, members, [one.point.y for one in connected], self._voltage)
+        members = [shared_source.member_of(one.numbers, one.point.mode, one.drive, one.tau, one.point.y)
+                   for one in connected]
+        return shared_source.zoned(self._source, members, [one.point.y for one in connected], self._voltage)
 
     def begin(self, connected: Sequence[Connected], time: float, limit: float,
               same: bool) -> tuple[list[Point], list[Motion]]:
@@ -73,16 +77,16 @@ class Group:
         """
         states = [one.point.y for one in connected]
         if same and not self._jumped:
-            self._members = [coupled.member_of(one.plant, one.point.mode, one.drive, one.tau, one.point.y)
+            self._members = [shared_source.member_of(one.numbers, one.point.mode, one.drive, one.tau, one.point.y)
                              for one in connected]
-            self._voltage = coupled.bus_voltage(self._source, self._state, self._members, states)
+            self._voltage = shared_source.bus_voltage(self._source, self._state, self._members, states)
         else:
             members, self._state, self._voltage = self._zoned(connected)
             self._members = [self._settled(m, y, time) for m, y in zip(members, states, strict=True)]
         self._points = [Point(time, one.point.y, m.mode, time, one.point.y, one.point.step, one.point.wiper)
                         for one, m in zip(connected, self._members, strict=True)]
-        if all(map(together.is_linear, self._members)):
-            length = min(limit - time, together.longest_series(self._members))
+        if all(map(joint_motion.is_linear, self._members)):
+            length = min(limit - time, joint_motion.longest_series(self._members))
             self._motions = self._by_series(states, time, length)
         else:
             length, self._motions = self._by_step(states, time, limit - time)
@@ -91,25 +95,25 @@ class Group:
 
     def _settled(self, member: Member, y: Vector, time: float) -> Member:
         mode = member.mode
-        u = coupled.behind(member, self._voltage)
-        mode = hybrid.settled(member.plant, mode.zone, u, piece_value(member.tau, time), y, mode.mesh, False)
-        return Member(member.plant, mode, member.sign, member.tau, member.returns)
+        u = shared_source.behind(member, self._voltage)
+        mode = guards.settled(member.numbers, mode.zone, u, piece_value(member.tau, time), y, mode.mesh, False)
+        return Member(member.numbers, mode, member.sign, member.tau, member.returns)
 
     def _by_series(self, states: Sequence[Vector], time: float, length: float) -> list[Motion]:
-        series = together.series(self._source, self._state, self._members, states, time, length)
-        return [motion.by_series(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length,
+        series = joint_motion.series(self._source, self._state, self._members, states, time, length)
+        return [motion.by_series(m.numbers, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length,
                                  one.speed, one.current)
                 for m, y, one in zip(self._members, states, series, strict=True)]
 
     def _by_step(self, states: Sequence[Vector], time: float, limit: float) -> tuple[float, list[Motion]]:
         tried = min(self._step, limit)
-        length, following, dense, ends = together.joint_step(
+        length, following, dense, ends = joint_motion.joint_step(
             self._source, self._state, self._members, states, time, tried)
         if length == 0.0:
             raise failure(Status.STEP_TOO_SMALL, time)
         self._step = max(self._step, following) if length == limit else following
         return length, [
-            motion.by_step(m.plant, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length, vectors, end)
+            motion.by_step(m.numbers, m.mode, Piece(value=m.sign * self._voltage), m.tau, time, y, length, vectors, end)
             for m, y, vectors, end in zip(self._members, states, dense, ends, strict=True)]
 
     # --- what ends it ----------------------------------------------------------------------------------------------
@@ -119,7 +123,7 @@ class Group:
         first, whose = length, (-1, -1)
         ends = self._ends = [motion.state(m, length) for m in self._motions]
         for j, (member, m) in enumerate(zip(self._members, self._motions, strict=True)):
-            if m.kind == motion.SERIES and together.is_calm(member, m, ends[j], length):
+            if m.kind == motion.SERIES and joint_motion.is_calm(member, m, ends[j], length):
                 continue
             for kind in self._kinds(member):
                 s = self._crossing(j, kind, time, first)
@@ -135,10 +139,10 @@ class Group:
     @staticmethod
     def _kinds(member: Member) -> list[int]:
         """Return which guards can end the mode of a member."""
-        kinds = hybrid.guards(member.plant, member.mode, member.sign, False)
+        kinds = guards.guards(member.numbers, member.mode, member.sign, False)
         if member.returns and member.mode.zone == NO_CURRENT:  # its diodes block the other way
-            kinds &= ~(1 << (hybrid.ZONE_UP if member.sign > 0.0 else hybrid.ZONE_DOWN))
-        return [kind for kind in range(hybrid.MOTOR_RELEASE_BACKWARD + 1) if kinds >> kind & 1]
+            kinds &= ~(1 << (guards.ZONE_UP if member.sign > 0.0 else guards.ZONE_DOWN))
+        return [kind for kind in range(guards.MOTOR_RELEASE_BACKWARD + 1) if kinds >> kind & 1]
 
     def _crossing(self, j: int, kind: int, time: float, length: float) -> float:
         """Return when a guard falls below zero, at most `length` [s]; inf where it does not."""
@@ -177,13 +181,13 @@ class Group:
 
     def _guard(self, j: int, kind: int, time: float, s: float) -> float:
         states = [motion.state(m, s) for m in self._motions]
-        V = coupled.bus_voltage(self._source, self._state, self._members, states)
+        V = shared_source.bus_voltage(self._source, self._state, self._members, states)
         if j < 0:
-            total = coupled.drawn(self._source, V, self._members, states)
-            return coupled.source_guards(self._source, self._state, V, total)[kind]
+            total = shared_source.drawn(self._source, V, self._members, states)
+            return shared_source.source_guards(self._source, self._state, V, total)[kind]
         member, t = self._members[j], time + s
-        u = coupled.behind(member, V)
-        return hybrid.guard(member.plant, member.mode, kind, u, 0.0, piece_value(member.tau, t),
+        u = shared_source.behind(member, V)
+        return guards.guard(member.numbers, member.mode, kind, u, 0.0, piece_value(member.tau, t),
                             piece_rate(member.tau, t), states[j], states[j])[0]
 
     def arrivals(self) -> list[tuple[Point, int]]:
@@ -192,16 +196,16 @@ class Group:
         found: list[tuple[Point, int]] = []
         self._jumped = whose >= 0 and kind in _JUMPS
         if whose == -1 and kind >= 0:
-            self._state = coupled.after(self._state, kind)
+            self._state = shared_source.after(self._state, kind)
         states = self._ends if kind < 0 else [motion.state(m, time - m.t0) for m in self._motions]
-        V = coupled.bus_voltage(self._source, self._state, self._members, states)
+        V = shared_source.bus_voltage(self._source, self._state, self._members, states)
         for j, (member, point, y) in enumerate(zip(self._members, self._points, states, strict=True)):
             mode, event = point.mode, -1
-            wiper = frame.wiper_at(member.plant.half_slack, point.wiper, y[0])
+            wiper = wiper_at(member.numbers.sensor, point.wiper, y[0])
             if j == whose:
-                mode, y = hybrid.cross(member.plant, mode, kind, coupled.behind(member, V),
+                mode, y = guards.cross(member.numbers, mode, kind, shared_source.behind(member, V),
                                        piece_value(member.tau, time), y)
-                mode = Mode(coupled.let_through(member, mode.zone), mode.contact, mode.mesh, mode.motor)
+                mode = Mode(shared_source.let_through(member, mode.zone), mode.contact, mode.mesh, mode.motor)
                 event = kind
             found.append((Point(time, y, mode, time, y, point.step, wiper), event))
         self._voltage = V

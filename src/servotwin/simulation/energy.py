@@ -9,7 +9,7 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.circuit import circuit_of
-from servotwin.models.kernels import motion
+from servotwin.models.engine import motion
 from servotwin.models.outputs import torques_of, warm_plant
 from servotwin.physics import motor, shaft
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from servotwin.loads import Load
     from servotwin.models import Model
-    from servotwin.models.kernels.plant import Plant
     from servotwin.models.samples import Samples
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.physics.pieces import Pieces
     from servotwin.simulation.trajectory import Trajectory
 
@@ -70,11 +70,12 @@ def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -
         circuit = circuit_of(model, plant, samples, drive)
         i, w, w_m = circuit.armature_current, samples.speed, samples.motor_speed
         torques = torques_of(model, samples, drive, load)
-        own_viscous = (plant.b - load.viscous_friction) * w_m
+        own_viscous = (plant.shaft.b - load.viscous_friction) * w_m
         to_load = (load.viscous_friction * w + torques.load_friction + torques.external) * w
-        heat = physics.copper_loss(i, plant.R)
+        own = plant.motor
+        heat = physics.copper_loss(i, own.R)
         return np.array([circuit.supply_power, heat, circuit.bridge_power, circuit.brush_power,
-                         physics.back_emf(w_m, plant.K_b) * i - physics.electromagnetic_torque(i, plant.K) * w_m,
+                         physics.back_emf(w_m, own.K_b) * i - physics.electromagnetic_torque(i, own.K) * w_m,
                          (own_viscous + torques.servo_friction) * w_m, to_load])
 
     supply, winding, bridge, brush, conversion, friction, to_load = trajectory.integral(powers).tolist()
@@ -83,7 +84,7 @@ def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -
                   supply - winding - bridge - brush - conversion - friction - stops - to_load - stored)
 
 
-def _kinetic(plant: Plant, trajectory: Trajectory) -> tuple[float, float]:
+def _kinetic(plant: Numbers, trajectory: Trajectory) -> tuple[float, float]:
     """Return the energy stored over the run, and what impacts took."""
     lost = 0.0
     segments = trajectory.segments
@@ -93,8 +94,9 @@ def _kinetic(plant: Plant, trajectory: Trajectory) -> tuple[float, float]:
     def stored(k: int, at: float) -> float:
         m = motion.prepared(segments[k].motion)
         _, w, i, _, _, _, w_m = motion.state(m, at - segments[k].anchor)
-        kinetic = shaft.kinetic_energy(w, plant.J_out) + shaft.kinetic_energy(w_m, plant.J - plant.J_out)
-        return kinetic + motor.magnetic_energy(i, plant.L)
+        J, J_out = plant.shaft.J, plant.shaft.J_out
+        kinetic = shaft.kinetic_energy(w, J_out) + shaft.kinetic_energy(w_m, J - J_out)
+        return kinetic + motor.magnetic_energy(i, plant.motor.L)
 
     for k in range(1, len(segments)):
         if segments[k].anchor == segments[k].start:

@@ -13,21 +13,23 @@ from typing import NamedTuple
 
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
-from servotwin.models.kernels import frame, hybrid, motion
-from servotwin.models.kernels.frame import NO_CHIP, Chip, Frame
-from servotwin.models.kernels.memory import Inputs, Memory, counted_anew, due, instant, origin_of, resumed, time_of
-from servotwin.models.kernels.motion import Motion
-from servotwin.models.kernels.plant import (
+from servotwin.models.engine import guards, motion
+from servotwin.models.engine.memory import Inputs, Memory, counted_anew, due, instant, origin_of, resumed, time_of
+from servotwin.models.engine.modes import (
     CONDUCTING,
     CORE,
     LIMITED_BACKWARD,
     LIMITED_FORWARD,
     NO_CURRENT,
     Mode,
-    Plant,
     at_rest,
 )
-from servotwin.models.kernels.step import COMPLETED, MOST_IDLE, pulse_width, step
+from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
+from servotwin.models.terms import frame
+from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Pieces
 from servotwin.simulation.status import Status
 
@@ -46,7 +48,7 @@ class Plan:
 
     Parameters
     ----------
-    plant : Plant
+    numbers : Numbers
         The numbers of servo and load.
     command : Pieces
         What the plant follows [V]; of a pulse servo the width of the pulses [s].
@@ -64,7 +66,7 @@ class Plan:
         Constant, beside the load's [N m].
     """
 
-    plant: Plant
+    numbers: Numbers
     command: Pieces
     torque: Pieces
     chip: Chip = NO_CHIP
@@ -98,7 +100,7 @@ class State:
         Which signals are states, and where the engine keeps them.
     memory : Memory
         All numbers of the state, its clock, and what the chip of a pulse servo has decided.
-    plant : Plant
+    numbers : Numbers
         The numbers of servo and load by which it moves since its motion began.
     changes : tuple
         (name, value) of the numbers that are others than the simulator's.
@@ -107,7 +109,7 @@ class State:
     time: float
     places: tuple[Place, ...]
     memory: Memory
-    plant: Plant | None = None
+    numbers: Numbers | None = None
     changes: tuple[tuple[str, object], ...] = ()
 
     @property
@@ -167,10 +169,10 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
     SimulationError
         If the run cannot go on; it carries status, time and cause.
     """
-    plant, chip, inputs = plan.plant, plan.chip, plan.inputs
-    memory = resumed(plan.pulsed, inputs, state.memory, plant != state.plant)
+    numbers, chip, inputs = plan.numbers, plan.chip, plan.inputs
+    memory = resumed(plan.pulsed, inputs, state.memory, numbers != state.numbers)
     end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
-    m = motion.nothing(plant, memory.u, memory.tau)
+    m = motion.nothing(numbers, memory.u, memory.tau)
     idle = 0
     while memory.point.time < end:
         if due(memory):
@@ -178,7 +180,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
             end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
         before = memory
         try:
-            memory, m, event, status = step(plant, chip, inputs, before, m, end)
+            memory, m, event, status = step(numbers, chip, inputs, before, m, end)
         except ArithmeticError:  # numbers beyond what a float holds
             raise failure(Status.DIVERGED, time_of(before)) from None
         if status != COMPLETED:
@@ -188,7 +190,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
             raise failure(Status.CHATTER, time_of(before))
         if record is not None:
             _keep(record, inputs, chip, before, memory, m, event)
-    return State(until, state.places, memory, plant, state.changes)
+    return State(until, state.places, memory, numbers, state.changes)
 
 
 def failure(status: Status, time: float) -> SimulationError:
@@ -225,12 +227,12 @@ _DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}
 
 def event_name(kind: int, after: Mode) -> str:
     """Return what to call an event after which this mode holds."""
-    if kind == hybrid.SPEED and at_rest(after.contact):
+    if kind == guards.SPEED and at_rest(after.contact):
         return "stick"
-    if kind == hybrid.SPEED and after.contact != CORE:
+    if kind == guards.SPEED and after.contact != CORE:
         return "reversal"
-    if after.zone >= CONDUCTING and kind in (hybrid.ZONE_UP, hybrid.ZONE_DOWN):
+    if after.zone >= CONDUCTING and kind in (guards.ZONE_UP, guards.ZONE_DOWN):
         if after.zone in (LIMITED_BACKWARD, LIMITED_FORWARD):
             return "current limited"
         return "current stops" if after.zone == NO_CURRENT else "current starts"
-    return hybrid.EVENT_NAMES[kind]
+    return guards.EVENT_NAMES[kind]

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels.memory import BEAT, FIRST_STEP, Memory
-from servotwin.models.kernels.records import TILE, record_of
+from servotwin.models.engine.memory import BEAT, FIRST_STEP, Memory
+from servotwin.models.engine.records import TILE, record_of
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]

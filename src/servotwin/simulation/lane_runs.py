@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels import tiles
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.plant import Plant
-from servotwin.models.kernels.records import room
-from servotwin.models.kernels.tiles import Lanes, Outputs
+from servotwin.models.engine import tiles
+from servotwin.models.engine.records import column, columns_of, numbers_in, room, tiles_with
+from servotwin.models.engine.tiles import Lanes, Outputs
+from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.lane_memory import RECORD, flat, records_of
 from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
@@ -20,24 +21,24 @@ Indices = NDArray[np.int64]
 
 SIDE_BY_SIDE = {
     dtype: Recipe(f"side_by_side_{dtype}", tuple(
-        f"servotwin.models.kernels.side_by_side:{name}" for name in ("start", "go_on", "advance", "renew")),
+        f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "renew")),
         vector=True, single=dtype == "float32")
     for dtype in ("float64", "float32")
 }
-_ENTRIES = tuple(f"servotwin.models.kernels.runs:{name}" for name in ("start", "go_on", "settle"))
+_ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on", "settle"))
 _RUNS = Recipe("runs", _ENTRIES)  # everything
-_RARE = {"varies": 0.0, "half_play": 0.0, "C_w": 0.0, "half_slack": 0.0, "L": 0.0, "gravity": 0.0, "kappa": 0.0,
-         "I_max": np.inf}
+_RARE = ("friction.varies", "friction.kappa", "play", "heat", "sensor.half_slack", "motor.L", "source.I_max")
+_PENDULUM = "load.gravity"
 PLAIN_RUNS = Recipe(
-    "plain_runs", _ENTRIES, absent=(*_RARE.items(), ("sweep", 0.0)),
+    "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep"),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 _SWINGING = Recipe(
-    "pendulum_runs", _ENTRIES,
-    absent=(*((name, x) for name, x in _RARE.items() if name != "gravity"), ("sweep", 0.0)),
+    "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep"),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
-_ENDING = Recipe("ending", ("servotwin.models.kernels.ending:look_at_lanes",), vector=True)
+_ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes
+_TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
 
 
@@ -132,16 +133,17 @@ def kinds_of(lanes: Lanes, pulsed: bool, dtype: str, recorded: NDArray[np.bool_]
     `recorded` is whose load is recorded over time, `curved` whether the potentiometers have a table.
     """
     rare, swinging = has_rare_terms(lanes)
-    plant, chip = Plant(*lanes.plants), Chip(*lanes.chips)
+    total = len(lanes.torque)
+    of = partial(_number, lanes)
     if not pulsed or curved:
-        side = np.zeros(len(lanes.torque), np.bool_)
+        side = np.zeros(total, np.bool_)
     else:
-        side = np.asarray(~(rare | swinging | recorded) & (plant.stiffness == 0.0) & (chip.step == 0.0)
-                          & (plant.K_b > 0.0))
+        side = np.asarray(~(rare | swinging | recorded) & (of("load.stiffness") == 0.0) & (of("sensor.step") == 0.0)
+                          & (of("motor.K_b") > 0.0))
     if dtype == "float32":  # what is not zero has to stay so
-        for x in (lanes.plants, lanes.chips):
-            side &= ((x == 0.0) | (abs(x.astype(np.float32)) > 0.0)).all(axis=0)
-    braked = (plant.D_off == 0.0) & (plant.D_drive < plant.V)
+        for x in (*numbers_in(lanes.numbers), *numbers_in(lanes.chips)):
+            side &= ((x == 0.0) | (abs(x.astype(np.float32)) > 0.0)).ravel()[:total]
+    braked = np.asarray((of("bridge.D_off") == 0.0) & (of("bridge.D_drive") < of("source.V")))
     found: list[SideBySide | OneByOne] = [SideBySide(np.flatnonzero(side & (braked == kind)), kind)
                                           for kind in (True, False)]
     found += [OneByOne(np.flatnonzero(some & ~side), recipe) for recipe, some in (
@@ -151,19 +153,32 @@ def kinds_of(lanes: Lanes, pulsed: bool, dtype: str, recorded: NDArray[np.bool_]
 
 def has_rare_terms(lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Tell which lanes have a term that the plain run leaves out, and which have a pendulum."""
-    plant = Plant(*lanes.plants)
-    terms = [getattr(plant, name) != value for name, value in _RARE.items() if name != "gravity"]
+    terms = [_differs(lanes, name) for name in _RARE]
     if lanes.pieces[:, 6].any():
         swept = np.concatenate([[0], np.cumsum(lanes.pieces[:, 6] != 0.0)])
         terms.append(swept[lanes.piece_first + lanes.piece_count] > swept[lanes.piece_first])
-    return np.asarray(np.logical_or.reduce(terms)), np.asarray(plant.gravity != 0.0)
+    return np.asarray(np.logical_or.reduce(terms)), _differs(lanes, _PENDULUM)
+
+
+def _differs(lanes: Lanes, name: str) -> NDArray[np.bool_]:
+    """Tell which lanes have a term ("heat", told by its first number), or a number of one ("motor.L")."""
+    room, _, field = name.partition(".")
+    neutral = getattr(NEUTRAL, room)
+    field = field or neutral._fields[0]
+    return np.asarray(_number(lanes, f"{room}.{field}") != getattr(neutral, field))
+
+
+def _number(lanes: Lanes, name: str) -> Floats:
+    return column(lanes.numbers, name, len(lanes.torque))
 
 
 def some_of(lanes: Lanes, which: Indices) -> Lanes:
     """Return the numbers of some lanes."""
     if len(which) == len(lanes.torque):
         return lanes
-    columns: Any = (x if name in _SHARED else np.ascontiguousarray(x[..., which])
+    records = {name: tiles_with(kind, columns_of(kind, getattr(lanes, name), which), len(which))
+               for name, kind in _TILED.items()}
+    columns: Any = (records[name] if name in records else x if name in _SHARED else np.ascontiguousarray(x[..., which])
                     for name, x in zip(Lanes._fields, lanes, strict=True))
     return Lanes(*columns)
 
@@ -172,17 +187,10 @@ def lanes_of(work: Work) -> Lanes:
     """Return the numbers of all lanes as the kernels read them."""
     own = np.asarray(work.edges.rows, np.float64).reshape(-1)
     return Lanes(
-        _columns(work.plant, work.lanes), _columns(work.chip or Chip(*([0.0] * len(Chip._fields))), work.lanes),
+        tiles_with(Numbers, work.numbers, work.lanes), tiles_with(Chip, work.chip or NO_CHIP, work.lanes),
         _own(work.start, np.float64), _column(work.constant_torque, work.lanes), _indices(work.seeds),
         _rows(work.command.rows), _indices(work.command.first), _indices(work.command.count),
         _own(own, np.float64), _indices(work.edges.first), _indices(work.edges.count))
-
-
-def _columns(numbers: tuple[Any, ...], lanes: int) -> Floats:
-    columns = np.empty((len(numbers), lanes))
-    for row, values in zip(columns, numbers, strict=True):
-        row[:] = values
-    return columns
 
 
 def _column(values: Any, lanes: int) -> Floats:

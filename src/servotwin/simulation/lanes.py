@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.models.engine.records import mapped
+
 if TYPE_CHECKING:
-    from servotwin.models.kernels.frame import Chip
-    from servotwin.models.kernels.plant import Plant
+    from servotwin.models.terms.chip import Chip
+    from servotwin.models.terms.numbers import Numbers
 
 Floats = NDArray[np.float64]
-Numbers = TypeVar("Numbers", bound=tuple[object, ...])
+Record = TypeVar("Record", bound=tuple[object, ...])
 
 FIELDS = ("angle", "speed", "contact", "drive", "error")
 MORE_FIELDS = ("current", "winding", "housing", "motor_angle", "motor_speed", "wiper", "mesh",
@@ -73,7 +75,7 @@ class Work:
     ----------
     law : str
         "pulse" or "bounded".
-    plant : Plant
+    numbers : Numbers
         Each field a number, or an array (B,).
     chip : Chip or None
         The same; its frame_period is that of the command where that gives one. None for "bounded".
@@ -86,7 +88,7 @@ class Work:
     edges : Tables
         Frame edges [s]; count −1: regular frames of `chip.frame_period`.
     start : ndarray, shape (7, B)
-        The state at t = 0, as in `kernels.plant.Vector`.
+        The state at t = 0, as in `engine.modes.Vector`.
     seeds : ndarray of int64, shape (B,)
         Of the noise.
     duration : float
@@ -94,7 +96,7 @@ class Work:
     times : ndarray, shape (T,)
         Output times [s], not decreasing, within [0, duration].
     fields : tuple of str
-        Of "angle" [rad], "speed" [rad/s], "contact" (`kernels.plant.FREE` … `ON_UPPER`), "drive" (−1, 0, +1) and
+        Of "angle" [rad], "speed" [rad/s], "contact" (`engine.modes.FREE` … `ON_UPPER`), "drive" (−1, 0, +1) and
         "error" (of the latest decision [s]), or of `MORE_FIELDS`; only these are computed and kept.
     dtype : str
         "float64" or "float32".
@@ -103,7 +105,7 @@ class Work:
     """
 
     law: str
-    plant: Plant
+    numbers: Numbers
     chip: Chip | None
     command: Tables
     torque: Tables
@@ -127,17 +129,17 @@ class Work:
         lanes = slice(start, stop)
         torque = self.constant_torque
         return replace(
-            self, plant=_sliced(self.plant, lanes), chip=None if self.chip is None else _sliced(self.chip, lanes),
+            self, numbers=_sliced(self.numbers, lanes), chip=None if self.chip is None else _sliced(self.chip, lanes),
             command=self.command.part(start, stop), torque=self.torque.part(start, stop),
             constant_torque=torque[lanes] if isinstance(torque, np.ndarray) and torque.ndim else torque,
             edges=self.edges.part(start, stop), start=self.start[:, lanes],
             seeds=self.seeds[lanes])
 
 
-def _sliced(numbers: Numbers, lanes: slice) -> Numbers:
+def _sliced(numbers: Record, lanes: slice) -> Record:
     """Return a named tuple of numbers and columns with some rows of the columns."""
-    columns: Any = (x[lanes] if isinstance(x, np.ndarray) and x.ndim else x for x in numbers)
-    return type(numbers)(*columns)
+    sliced: Record = mapped(lambda x: x[lanes] if isinstance(x, np.ndarray) and x.ndim else x, numbers)
+    return sliced
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,7 @@ class Raw:
     refused : ndarray of float64, shape (B,)
         From when on all pulses are refused [s]; nan where the last one is not.
     marks : ndarray of int8, shape (B,)
-        Sums of `kernels.ending.ON_STOP` and `CANNOT_HOLD`.
+        Sums of `engine.ending.ON_STOP` and `CANNOT_HOLD`.
     """
 
     fields: dict[str, NDArray[np.generic]]

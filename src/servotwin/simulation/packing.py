@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, cast
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
-from servotwin.models.kernels.plant import Plant
+from servotwin.models.engine.records import mapped
 from servotwin.models.outputs import FIELDS as FIELDS_OF
+from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
 from servotwin.simulation.lane_inputs import LAWS, Lanes
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-_LOWER, _UPPER, _PLAY, _HEAT = (Plant._fields.index(name) for name in ("lower", "upper", "half_play", "C_w"))
 _MOST_FRAMES = 1e8  # of a lane: they take half a minute, in which nothing stops a kernel
 
 
@@ -164,8 +164,8 @@ class Chunk:
         return cast("LanePieces", self.model.command(cast("Any", self.commands.signal(self.which))))
 
     @cached_property
-    def plant(self) -> Any:
-        """The numbers of the plants, each a number or a column."""
+    def numbers(self) -> Numbers:
+        """What the lanes are, each a number or a column."""
         with np.errstate(all="ignore"):
             return self.model.pack(self.load)
 
@@ -179,7 +179,7 @@ class Chunk:
         if angle is None:
             angle = self.model.start_angle(cast("Any", before.initial))
         y = np.empty((7, len(self.which), 1))
-        for k, values in enumerate(start_vector(self.model.states, self.plant, angle, initial)):
+        for k, values in enumerate(start_vector(self.model.states, self.numbers, angle, initial)):
             y[k] = values
         return y[:, :, 0]
 
@@ -202,14 +202,15 @@ class Chunk:
         if not self.lanes.initial:
             return  # it starts between the stops, and the motor in the middle of its play
         start = self.start
-        lower, upper, play, heat = (_flat(self.plant[k]) for k in (_LOWER, _UPPER, _PLAY, _HEAT))
+        flat = mapped(_flat, self.numbers)
         with np.errstate(invalid="ignore"):
-            inside = (start[0] >= lower) & (start[0] <= upper) & (play == 0.0) & (heat == 0.0)
+            inside = ((start[0] >= flat.stops.lower) & (start[0] <= flat.stops.upper) & (flat.play.half == 0.0)
+                      & (flat.heat.C_w == 0.0))
         if inside.all():
             return
-        plant = [np.broadcast_to(_flat(x), self.which.shape) for x in self.plant]
+        spread = mapped(lambda x: np.broadcast_to(x, self.which.shape), flat)
         for k in np.flatnonzero(~inside).tolist():
-            one = type(self.plant)(*(float(x[k]) for x in plant))
+            one = mapped(partial(_number, k), spread)
             try:
                 check_start(self.model.states, one, start[:, k].tolist())
             except InputError as error:
@@ -233,15 +234,15 @@ class Chunk:
     def work(self, asked: Asked, fields: tuple[str, ...]) -> Work:
         """Return what the kernels need."""
         with np.errstate(all="ignore"):
-            plant, chip = self.plant, self.chip
+            numbers, chip = self.numbers, self.chip
             command = Tables(*self.drive.tables())
         torque = no_tables(len(self.which))
         if any(load.recorded for load in self._of_loads[0]):
             first, count, rows = recorded_torque(*self._of_loads).tables()
             recorded = np.array([bool(load.recorded) for load in self._of_loads[0]])[self._of_loads[1]]
             torque = Tables(first, np.where(recorded, count, 0), rows)
-        return Work(law=LAWS[type(self.model)], plant=type(plant)(*map(_flat, plant)),
-                    chip=None if chip is None else type(chip)(*map(_flat, chip)), command=command, torque=torque,
+        return Work(law=LAWS[type(self.model)], numbers=mapped(_flat, numbers),
+                    chip=None if chip is None else mapped(_flat, chip), command=command, torque=torque,
                     constant_torque=_flat(self.load.torque), edges=self.commands.frame_edges(self.which),
                     start=self.start, seeds=self.lanes.seeds[self.which], duration=asked.duration,
                     times=asked.times, fields=fields, dtype=asked.dtype, curve=self.model.curve())
@@ -286,6 +287,10 @@ class _Probe:
             raise AttributeError(name)
         self.seen.add(name)
         return np.zeros((1, len(self.time)), dtype=np.int8 if name in SMALL_FIELDS else np.float64)
+
+
+def _number(k: int, column: Array) -> float:
+    return float(column[k])
 
 
 def _flat(value: Any) -> Any:

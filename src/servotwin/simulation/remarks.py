@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from servotwin.models.kernels import ending
-from servotwin.models.kernels.frame import Chip
+from servotwin.models.engine import ending
+from servotwin.models.terms.chip import NO_CHIP
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
@@ -26,7 +26,6 @@ COLUMNS = {kind: kind.replace(" ", "_") for kind in KINDS}
 """Name of a table's column that holds the time of a kind."""
 
 _MARKS = {ON_STOP: ending.ON_STOP, CANNOT_HOLD: ending.CANNOT_HOLD}
-_NO_CHIP = Chip(*[0.0] * len(Chip._fields))
 
 
 class Remark(NamedTuple):
@@ -92,17 +91,17 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
     if not result.status.ok:
         return ()
     model, load, end = result.model, result.load, result.ended
-    plant, chip, edges = model.plant(load), model.chip(result.command), model.edges(result.command) or ()
+    numbers, chip, edges = model.plant(load), model.chip(result.command), model.edges(result.command) or ()
     period = 0.0 if chip is None or model.edges(result.command) is not None else chip.frame_period
     refused = math.nan if chip is None else ending.refused_from(chip, result.drive.rows, period, edges, end)
     last = result.trajectory.at(np.array([end]))
-    source = plant.V
+    source = numbers.source.V
     if last.bus is not None:  # what is left by the other servos
         own = float(model.output("supply_current", last, result.drive, load)[0])
-        source = float(last.bus[0]) + plant.R_b * own
+        source = float(last.bus[0]) + numbers.source.R_b * own
     tau = piece_value(ending.piece_before(load.torque_pieces.rows, end, False), end)
     final = [float(values[0]) for values in (last.angle, last.speed, last.winding, last.housing)]
-    marks = ending.marks(chip is not None, plant, chip or _NO_CHIP, result.drive.rows, tau, period, edges, end, source,
+    marks = ending.marks(chip is not None, numbers, chip or NO_CHIP, result.drive.rows, tau, period, edges, end, source,
                          not math.isnan(refused), final)
     return tuple(Remark(remark.kind, remark.time) for remark in lane_remarks([refused], [marks], end))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.errors import MissingExtraError, SimulationError
-from servotwin.models.kernels.motion import is_step
+from servotwin.models.engine.motion import is_step
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
 from servotwin.simulation import files

@@ -12,11 +12,11 @@ import numpy as np
 from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
 from servotwin.loads import Constant, as_load
 from servotwin.models import Model
-from servotwin.models.kernels.frame import NO_CHIP
-from servotwin.models.kernels.memory import started, with_play
-from servotwin.models.kernels.plant import INSIDE, RIGID
-from servotwin.models.kernels.runs import mode_of
+from servotwin.models.engine.memory import started, with_play
+from servotwin.models.engine.modes import INSIDE, RIGID
+from servotwin.models.engine.runs import mode_of
 from servotwin.models.samples import Samples
+from servotwin.models.terms.chip import NO_CHIP
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
@@ -67,7 +67,7 @@ class Simulator:
         self.model = _model(model)
         self.load = as_load(load)
         self.seed = _seed(seed)
-        self._plant = model.pack(self.load)
+        self._numbers = model.pack(self.load)
         self._torque = self.load.torque_pieces
         self._last: tuple[Signal, Plan] | None = None
         self._others: dict[tuple[tuple[str, Any], ...], Simulator] = {}
@@ -106,9 +106,9 @@ class Simulator:
                                        [place.name for place in self.model.states])
             if not is_finite(value):
                 raise InputError(f"initial {name}", got=value, allowed="a finite number (SI)")
-        y = start_vector(self.model.states, self._plant, angle, initial or {})
-        check_start(self.model.states, self._plant, y)
-        mesh = INSIDE if self._plant.half_play > 0.0 else RIGID
+        y = start_vector(self.model.states, self._numbers, angle, initial or {})
+        check_start(self.model.states, self._numbers, y)
+        mesh = INSIDE if self._numbers.play.half > 0.0 else RIGID
         return State(time=0.0, places=self.model.states, memory=started(y, mesh))
 
     def advance(self, state: State, until: float, command: Signal, *, external_torque: float = 0.0) -> State:
@@ -166,7 +166,7 @@ class Simulator:
         if external_torque:
             load = load + Constant(external_torque)
         y, chip = np.array(state.memory.point.y)[:, None], state.memory.chip
-        mode = np.array(mode_of(plan.plant, plan.chip, plan.inputs, state.memory))[:, None]
+        mode = np.array(mode_of(plan.numbers, plan.chip, plan.inputs, state.memory))[:, None]
         samples = Samples.make(np.array([state.time]), y, np.array([state.memory.point.wiper]), mode,
                                np.array([chip.drive]), np.array([chip.error]))
         return float(own.model.output(name, samples, plan.command, load)[0])
@@ -206,7 +206,7 @@ class Simulator:
         changes = tuple(sorted({**dict(state.changes), **parameters}.items()))
         own = self._with(changes)
         self._check(state, "changed(parameters)", own.model)
-        memory = with_play(state.memory, own._plant.half_play > 0.0)
+        memory = with_play(state.memory, own._numbers.play.half > 0.0)
         return replace(state, changes=changes, places=own.model.states, memory=memory)
 
     def _with(self, changes: tuple[tuple[str, Any], ...]) -> Simulator:
@@ -252,7 +252,7 @@ class Simulator:
         """Return what the engine needs for a run under a command, and a constant torque beside the load [N m]."""
         if self._last is not None and self._last[0] is command and self._last[1].external_torque == external_torque:
             return self._last[1]
-        plan = Plan(self._plant, self.drive(command), self._torque, self.model.chip(command) or NO_CHIP,
+        plan = Plan(self._numbers, self.drive(command), self._torque, self.model.chip(command) or NO_CHIP,
                     self.model.edges(command), self.seed, self.model.curve(), float(external_torque))
         self._last = (command, plan)
         return plan

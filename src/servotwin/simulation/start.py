@@ -9,21 +9,21 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.models.base import Place
-from servotwin.models.kernels.plant import Plant
+from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE
 
 _SLACK = 1e-12  # rad
 COLDEST_WINDING = REFERENCE_TEMPERATURE - 1.0 / COPPER_COEFFICIENT  # K
 
 
-def start_vector(places: Sequence[Place], plant: Plant, angle: Any, initial: Mapping[str, Any]) -> Any:
-    """Return the numbers of `kernels.plant.Vector`, at rest and at ambient temperature but for `initial`.
+def start_vector(places: Sequence[Place], plant: Numbers, angle: Any, initial: Mapping[str, Any]) -> Any:
+    """Return the numbers of `engine.modes.Vector`, at rest and at ambient temperature but for `initial`.
 
     Parameters
     ----------
     places : sequence of Place
         What the model has as states.
-    plant : Plant
+    plant : Numbers
     angle : float or ndarray
         Where the command of just before asks for [rad].
     initial : mapping of str to float or ndarray
@@ -34,29 +34,29 @@ def start_vector(places: Sequence[Place], plant: Plant, angle: Any, initial: Map
     tuple
         Seven numbers or columns; the motor in the middle of its play unless `initial` says otherwise.
     """
-    y: list[Any] = [angle, 0.0, 0.0, plant.T_amb, plant.T_amb, None, 0.0]
+    y: list[Any] = [angle, 0.0, 0.0, plant.heat.T_amb, plant.heat.T_amb, None, 0.0]
     moved = {place.at: initial[place.name] / place.factor for place in places if place.name in initial}
     for index, value in moved.items():
         y[index] = value
     if y[5] is None:
         y[5] = y[0]
-    if not np.any(plant.half_play):
+    if not np.any(plant.play.half):
         y[6] = y[1]
     return tuple(y)
 
 
-def check_start(places: Sequence[Place], plant: Plant, y: Sequence[float]) -> None:
+def check_start(places: Sequence[Place], plant: Numbers, y: Sequence[float]) -> None:
     """Raise InputError if a start [rad] is beyond a stop, or the motor outside its play."""
-    if not plant.lower <= y[0] <= plant.upper:
+    if not plant.stops.lower <= y[0] <= plant.stops.upper:
         raise InputError(f"initial {places[0].name}", got=y[0],
-                         allowed=f"{plant.lower:.6g} to {plant.upper:.6g} rad, between the stops")
-    if plant.C_w > 0.0 and not y[3] > COLDEST_WINDING:
+                         allowed=f"{plant.stops.lower:.6g} to {plant.stops.upper:.6g} rad, between the stops")
+    if plant.heat.C_w > 0.0 and not y[3] > COLDEST_WINDING:
         raise InputError("initial winding_temperature", got=y[3],
                          allowed=f"more than {COLDEST_WINDING:.2f} K, where copper's law has no resistance left")
-    if plant.C_w > 0.0 and not y[4] > 0.0:
+    if plant.heat.C_w > 0.0 and not y[4] > 0.0:
         raise InputError("initial housing_temperature", got=y[4], allowed="a positive number of kelvin")
-    if abs(y[5] - y[0]) > plant.half_play + _SLACK:
+    if abs(y[5] - y[0]) > plant.play.half + _SLACK:
         N = next(place.factor for place in places if place.at == 5)
         raise InputError("initial motor_angle", got=N * y[5],
-                         allowed=f"{N * (y[0] - plant.half_play):.6g} to {N * (y[0] + plant.half_play):.6g} rad, "
+                         allowed=f"{N * (y[0] - plant.play.half):.6g} to {N * (y[0] + plant.play.half):.6g} rad, "
                          "within the play of the gear")

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels import motion
+from servotwin.models.engine import motion
 from servotwin.models.samples import Samples
 from servotwin.physics import play
 from servotwin.simulation.engine import Segment
@@ -72,7 +72,7 @@ class Trajectory:
             y[:, where] = _states(segment.motion, s)
             mode[:, where] = np.array(segment.motion.mode)[:, None]
             drive[where], error[where] = segment.drive, segment.error
-            wiper[where] = play(segment.wiper, y[0, where], 2.0 * segment.motion.plant.half_slack)
+            wiper[where] = play(segment.wiper, y[0, where], 2.0 * segment.motion.numbers.sensor.half_slack)
         return Samples.make(t, y, wiper, mode, drive, error, None if self.bus is None else self.bus(t))
 
     def intervals(self, index: int) -> Array:

@@ -20,7 +20,7 @@ class VectorMemory:
     model : str
         Name of the model's class.
     records : ndarray, shape (lanes,)
-        A record of `models.kernels.memory.Memory` for each lane.
+        A record of `models.engine.memory.Memory` for each lane.
     command, torque : ndarray, shape (lanes,)
         What each is told: width of the pulse [s] or control voltage [V]; external torque [N m].
     status, ended : ndarray, shape (lanes,)

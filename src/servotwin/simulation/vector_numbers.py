@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, LoadError
 from servotwin.loads import Load
 from servotwin.models.columns import LanePieces
-from servotwin.models.kernels.frame import Chip
-from servotwin.models.kernels.memory import Memory, started
-from servotwin.models.kernels.plant import INSIDE, RIGID, Plant
-from servotwin.models.kernels.tiles import Lanes as Columns
+from servotwin.models.engine.memory import Memory, started
+from servotwin.models.engine.modes import INSIDE, RIGID
+from servotwin.models.engine.records import columns_of, put_columns, tiles_with
+from servotwin.models.engine.tiles import Lanes as Columns
+from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
 from servotwin.simulation.lanes import Tables
@@ -44,7 +46,9 @@ class LaneNumbers:
 
     Attributes
     ----------
-    columns : models.kernels.tiles.Lanes
+    columns : models.engine.tiles.Lanes
+    numbers : Numbers
+        Of arrays (lanes,).
     torque : Tables
         Recorded torque over time; a lane without one has no row.
     curve : ndarray, shape (2, n)
@@ -68,38 +72,44 @@ class LaneNumbers:
 
     def _packed(self) -> tuple[Columns, Tables]:
         B = self.count
-        plants, chips, start = np.empty((len(Plant._fields), B)), np.empty((len(Chip._fields), B)), np.empty((7, B))
+        numbers, chips, start = tiles_with(Numbers, NEUTRAL, B), tiles_with(Chip, NO_CHIP, B), np.empty((7, B))
         torque, first, count = np.empty(B), np.zeros(B, np.int64), np.zeros(B, np.int64)
         rows: list[Array] = []
         for chunk in self.chunks:
             asked = Asked(1.0, np.zeros(1), (), "float64")
             work = chunk.work(asked, ())
             packed, which = lane_runs.lanes_of(work), chunk.which
-            plants[:, which], chips[:, which], start[:, which] = packed.plants, packed.chips, packed.start
+            put_columns(numbers, which, columns_of(Numbers, packed.numbers, slice(len(which))))
+            put_columns(chips, which, columns_of(Chip, packed.chips, slice(len(which))))
+            start[:, which] = packed.start
             torque[which] = packed.torque
             first[which], count[which] = work.torque.first + sum(map(len, rows)), work.torque.count
             rows.append(work.torque.rows)
             self.neutral[which] = work.command.rows[work.command.first, 1]
         pieces = np.zeros((B, 7))
         index, none = np.arange(B), np.zeros(B, np.int64)
-        columns = Columns(plants, chips, start, torque, self.inputs.seeds.astype(np.int64), pieces, index, none + 1,
+        columns = Columns(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), pieces, index, none + 1,
                           np.zeros(0), none, none - 1)
         return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
 
     def _impose(self) -> None:
         """Put what another simulator decides in the place of what load and supply would."""
-        plants, (J_L, V) = self.columns.plants, self.imposed
-        plant: Any = Plant(*plants)  # rows that can be written to
-        own = plant.J_out - self.load_total
+        J_L, V = self.imposed
+        columns: Any = columns_of(Numbers, self.columns.numbers, slice(self.count))
+        shaft, bridge, source = columns.shaft, columns.bridge, columns.source
+        own = shaft.J_out - self.load_total
         hung = ~np.isnan(J_L)
-        plant.J[hung] += (J_L + own - plant.J_out)[hung]
-        plant.J_out[hung] = (J_L + own)[hung]
+        shaft.J[hung] += (J_L + own - shaft.J_out)[hung]
+        shaft.J_out[hung] = (J_L + own)[hung]
         fed = ~np.isnan(V)
-        coasts = fed & (plant.D_off >= plant.V)
-        plant.D_off[coasts] += (V - plant.V)[coasts]
-        plant.R_off[coasts & np.isinf(plant.I_max)] -= plant.R_b[coasts & np.isinf(plant.I_max)]
-        plant.R_drive[fed] -= plant.R_b[fed]
-        plant.V[fed], plant.R_b[fed], plant.I_max[fed] = V[fed], 0.0, math.inf
+        coasts = fed & (bridge.coast > 0.0)
+        battery = coasts & np.isinf(source.I_max)
+        bridge.D_off[coasts] += (V - source.V)[coasts]
+        bridge.R_off[battery] -= source.R_b[battery]
+        bridge.R_drive[fed] -= source.R_b[fed]
+        source.V[fed], source.R_b[fed], source.I_max[fed] = V[fed], 0.0, math.inf
+        self.numbers: Any = columns
+        self.columns = self.columns._replace(numbers=tiles_with(Numbers, columns, self.count))
 
     def changed(self, which: Indices, parameters: Mapping[str, Any], inertia: Array | None,
                 bus: Array | None) -> LaneNumbers:
@@ -178,11 +188,11 @@ class LaneNumbers:
             part = Chunk(chunk.lanes, chunk.commands, own)
             q = part.model.start_angle(cast("Any", command[own, None])) if angle is None else angle[place[own], None]
             y = np.empty((7, len(own), 1))
-            for k, values in enumerate(start_vector(part.model.states, part.plant, q, {})):
+            for k, values in enumerate(start_vector(part.model.states, part.numbers, q, {})):
                 y[k] = values
             if angle is not None:
                 self.check_angles(angle[place[own]], own)
-            play = self.columns.plants[Plant._fields.index("half_play"), own] > 0.0
+            play = self.numbers.play.half[own] > 0.0
             _fill(records, place[own], started((0.0,) * 7, RIGID))
             point = records["point"]
             for name in ("y", "anchor"):
@@ -193,7 +203,7 @@ class LaneNumbers:
 
     def check_angles(self, angle: Array, which: Indices) -> None:
         """Raise InputError if an angle [rad] is beyond a stop; names the lane."""
-        lower, upper = (self.columns.plants[Plant._fields.index(name), which] for name in ("lower", "upper"))
+        lower, upper = self.numbers.stops.lower[which], self.numbers.stops.upper[which]
         good = (angle >= lower - _SLACK) & (angle <= upper + _SLACK)
         if not good.all():
             k = int(np.argmin(good))
@@ -226,7 +236,7 @@ class LaneNumbers:
                 own.bus = None
             else:
                 V = self.imposed.bus_voltage[which, None]
-                own.bus = np.where(np.isnan(V), self.columns.plants[Plant._fields.index("V"), which, None], V)
+                own.bus = np.where(np.isnan(V), self.numbers.source.V[which, None], V)
             drive, load = _constant(command[which]), self._load(chunk, samples.time[which], torque)
             values = chunk.model.output(name, cast("Any", own), cast("Any", drive), load)
             found[which] = np.broadcast_to(values, (len(which), 1))[:, 0]

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.kernels import tiles
-from servotwin.models.kernels.plant import BACKWARD, FORWARD, FREE, INSIDE, RIGID, STUCK, Plant
-from servotwin.models.kernels.records import TILE, room
+from servotwin.models.engine import tiles
+from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, INSIDE, RIGID, STUCK
+from servotwin.models.engine.records import TILE, columns_of, room
+from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
@@ -71,7 +72,7 @@ class Store:
         """Take other numbers; memories go on."""
         self._build(numbers)
         self.hang(torque)
-        play = numbers.columns.plants[Plant._fields.index("half_play")] > 0.0
+        play = numbers.numbers.play.half > 0.0
         point = memory["point"]
         point["anchor_time"] = math.inf
         mesh = point["mode"]["mesh"]
@@ -209,15 +210,15 @@ class Store:
     def impose(self, which: Indices, angle: Array | None, speed: Array | None) -> None:
         """Set angles [rad] and speeds [rad/s] of the output; book the work of the impulses."""
         records = self.records()[which]
-        plant = Plant(*self._columns.plants[:, which])
+        own = columns_of(Numbers, self._columns.numbers, which)
         point, y = records["point"], records["point"]["y"]
-        play = plant.half_play > 0.0
+        play, half, slack = own.play.half > 0.0, own.play.half, own.sensor.half_slack
         if angle is not None:
-            y[:, 0] = np.clip(angle, plant.lower, plant.upper)
-            y[:, 5] = np.where(play, np.clip(y[:, 5], y[:, 0] - plant.half_play, y[:, 0] + plant.half_play), y[:, 0])
-            point["wiper"] = np.clip(point["wiper"], y[:, 0] - plant.half_slack, y[:, 0] + plant.half_slack)
+            y[:, 0] = np.clip(angle, own.stops.lower, own.stops.upper)
+            y[:, 5] = np.where(play, np.clip(y[:, 5], y[:, 0] - half, y[:, 0] + half), y[:, 0])
+            point["wiper"] = np.clip(point["wiper"], y[:, 0] - slack, y[:, 0] + slack)
         if speed is not None:
-            J = np.where(play, plant.J_out, plant.J)
+            J = np.where(play, own.shaft.J_out, own.shaft.J)
             with np.errstate(over="ignore", invalid="ignore"):
                 self.work[which] += 0.5 * J * (speed**2 - y[:, 1]**2)
             y[:, 1] = speed
@@ -245,7 +246,7 @@ class _Tiles:
 
     def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
         records["beat"] = np.where(records["chip"]["number"] > 0, records["beat"],
-                                   numbers.columns.chips[14, self.which[places]])
+                                   numbers.columns.chips["frame_period"].ravel()[self.which[places]])
         put_records(self.rows, places, records)
 
     def forget(self, places: Indices) -> None:
@@ -267,7 +268,7 @@ class _Tiles:
         """Return in which contact each shaft is."""
         n = len(self.which)
         shaft, servo = ({name: flat(self.rows, group, name)[:n] for name in names} for group, names in (
-            ("shaft", ("friction_forward", "friction_backward", "start_forward", "start_backward", "start_off")),
+            ("arc", ("friction_forward", "friction_backward", "start_forward", "start_backward", "start_off")),
             ("servo", ("w", "drive"))))
         start = np.select([servo["drive"] > 0.0, servo["drive"] < 0.0],
                           [shaft["start_forward"], shaft["start_backward"]], shaft["start_off"])

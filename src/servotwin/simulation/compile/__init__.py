@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 
 from servotwin import physics
-from servotwin.models import kernels as models_kernels
+from servotwin.models import engine, terms
 from servotwin.simulation.compile import derive as derive_module
 from servotwin.simulation.compile.derive import Recipe, derive, surroundings
 from servotwin.simulation.compile.storage import key_of, loaded, stored
@@ -34,7 +34,7 @@ def kernels(recipe: Recipe) -> ModuleType:
 def _sources() -> tuple[str, ...]:
     """Return the text of everything from which a module is derived; to read it is quicker than to derive."""
     files = [Path(derive_module.__file__)]
-    for package in (physics, models_kernels):
+    for package in (physics, terms, engine):
         files += sorted(Path(package.__path__[0]).glob("*.py"))
     return tuple(file.read_text(encoding="utf-8") for file in files)
 

@@ -1,10 +1,10 @@
 """Derive one module that numba can compile and cache from the kernels and laws, mechanically.
 
 Starting from the entries, every function that is called is collected from its own module under the name
-`module__function`; constants come along by value, classes are imported from where they are. A kernel is changed in
-these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out; in the float32 form
-every float literal gets that type; in the vector form `math.exp`, `math.log` and `math.log1p` become the polynomials of
-`kernels.elementary`.
+`package_module__function`; constants come along by value, classes are imported from where they are. A kernel is changed
+in these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out; in the float32
+form every float literal gets that type; in the vector form `math.exp`, `math.log` and `math.log1p` become the
+polynomials of `engine.elementary`.
 """
 
 from __future__ import annotations
@@ -16,19 +16,24 @@ import math
 import operator
 import sys
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, reduce
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, cast
 
-_ELEMENTARY = "servotwin.models.kernels.elementary"
+from servotwin.models.terms.numbers import NEUTRAL
+from servotwin.physics.pieces import Piece
+
+_ELEMENTARY = "servotwin.models.engine.elementary"
 _INTRINSICS = "servotwin.simulation.compile.intrinsics"
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instructions in the vector form
 _POLYNOMIALS = ("exp", "log", "log1p")
-_DOUBLE = ("servotwin.models.kernels.noise", "servotwin.physics.pieces")  # in float64 throughout
+_DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
 _PACKAGE = "servotwin."
+_MODELS = "servotwin.models."
 _LONG = 12  # a tuple of more numbers is a table
 
 
@@ -47,8 +52,9 @@ class Recipe:
         become polynomials.
     single : bool
         Whether floats have 32 bits.
-    absent : tuple of (str, float)
-        Fields that have this value in all that will run; what depends on another one is left out.
+    absent : tuple of str
+        Terms ("heat"), or numbers of one ("motor.L", of an input "sweep"), that all that will run lack: they have their
+        neutral values, and what depends on others is left out.
     never : tuple of str
         Constants that nothing will be equal to.
     """
@@ -57,7 +63,7 @@ class Recipe:
     entries: tuple[str, ...]
     vector: bool = False
     single: bool = False
-    absent: tuple[tuple[str, float], ...] = ()
+    absent: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
 
 
@@ -132,7 +138,7 @@ class _Derivation:
         return self.function(module, name)
 
     def _generated(self, function: Any) -> str:
-        """Collect a function of `kernels.records`, which comes as text."""
+        """Collect a function of `engine.records`, which comes as text."""
         flat = _flat(function.__module__, function.__name__)
         if flat not in self.functions:
             aliases = {name: self.value(kind.__module__, name, kind) for name, kind in function.kinds.items()}
@@ -173,6 +179,7 @@ class _Rewriting(ast.NodeTransformer):
         self._module = module
         self._local = local
         self._space = vars(import_module(module))
+        self._flags: dict[str, ast.expr] = {}  # what a local variable of flags is
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         """Drop docstring, annotations and decorators."""
@@ -182,6 +189,7 @@ class _Rewriting(ast.NodeTransformer):
             argument.annotation = None
         if ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
+        self._flags = _given_once(node)
         node.body = [self.visit(statement) for statement in node.body]
         self._by_place(node.args)
         node.args.defaults = [self.visit(default) for default in node.args.defaults]
@@ -240,6 +248,11 @@ class _Rewriting(ast.NodeTransformer):
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
             inner = self._truth(node.operand)
             return None if inner is None else not inner
+        if isinstance(node, ast.Call):
+            line = self._line(node)
+            return None if line is None else line[0]._truth(line[1])
+        if isinstance(node, ast.BinOp):
+            return False if self._possible(node) == 0 else None
         if not isinstance(node, ast.Compare) or len(node.ops) != 1:
             return None
         sides, op = (node.left, node.comparators[0]), node.ops[0]
@@ -249,15 +262,63 @@ class _Rewriting(ast.NodeTransformer):
         compare = _COMPARISONS.get(type(op))
         return None if a is None or b is None or compare is None else bool(compare(a, b))
 
+    def _line(self, node: ast.Call) -> tuple[_Rewriting, ast.expr] | None:
+        """Return what a called function of one line returns, such as `heat.present(numbers.heat)`."""
+        if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name):
+            called = getattr(self._space.get(node.func.value.id), node.func.attr, None)
+        else:
+            called = self._space.get(_last(node.func))
+        if not isinstance(called, FunctionType) or not called.__module__.startswith(_MODELS) or hasattr(called, "text"):
+            return None
+        body = _definition(called.__module__, called.__name__).body
+        line = body[-1]
+        if len(body) > 2 or not isinstance(line, ast.Return) or line.value is None:
+            return None
+        return _Rewriting(self._work, called.__module__, set()), line.value
+
+    def _possible(self, node: ast.expr) -> int | None:
+        """Return all flags that a number may have; None where that is not known."""
+        if isinstance(node, ast.Constant):
+            return node.value if type(node.value) is int else None
+        if isinstance(node, ast.Name):
+            value = self._space.get(node.id) if node.id not in self._local else None
+            given = self._flags.get(node.id)
+            return value if type(value) is int else None if given is None else self._possible(given)
+        if isinstance(node, ast.IfExp):
+            known = self._truth(node.test)
+            parts = [node.body, node.orelse] if known is None else [node.body if known else node.orelse]
+            bits = [self._possible(part) for part in parts]
+            return None if None in bits else reduce(operator.or_, cast("list[int]", bits))
+        if isinstance(node, ast.Call):
+            line = self._line(node)
+            return None if line is None else line[0]._possible(line[1])
+        if isinstance(node, ast.BinOp) and type(node.op) in _FLAG_OPERATIONS:
+            a, b = self._possible(node.left), self._possible(node.right)
+            return None if a is None or b is None else _FLAG_OPERATIONS[type(node.op)](a, b)
+        return None
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Tell the outcome where it is known."""
+        known = self._truth(node)
+        return self.generic_visit(node) if known is None else ast.Constant(known)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        """Tell the outcome where it is known."""
+        known = self._truth(node)
+        return self.generic_visit(node) if known is None else ast.Constant(known)
+
     def _number(self, node: ast.expr) -> float | None:
         """Return the value of a number that is known."""
         if isinstance(node, ast.Constant) and isinstance(node.value, float | int):
             return node.value
         if isinstance(node, ast.Attribute):
-            if ast.unparse(node) == "math.inf":
-                return math.inf
-            return dict(self._work.recipe.absent).get(node.attr)
+            return math.inf if ast.unparse(node) == "math.inf" else self._absent(node)
         return None
+
+    def _absent(self, node: ast.Attribute) -> float | None:
+        """Return the neutral value of a number that is absent; a term goes by the name of its record."""
+        known = _neutral(self._work.recipe.absent)
+        return known.get(node.attr, known.get(f"{_last(node.value)}.{node.attr}"))
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
         """Drop the annotation of a local variable."""
@@ -282,7 +343,7 @@ class _Rewriting(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Flatten `module.name`, and put in the value of what is absent."""
         owner = node.value
-        value = dict(self._work.recipe.absent).get(node.attr)
+        value = self._absent(node)
         if value is not None and isinstance(node.ctx, ast.Load):
             text = f"_f({value!r})" if math.isfinite(value) else "_f(math.inf)"
             return ast.parse(text, mode="eval").body
@@ -314,9 +375,38 @@ class _Rewriting(ast.NodeTransformer):
         return ast.copy_location(ast.Call(ast.Name("_f", ast.Load()), [node], []), node)
 
 
+_FLAG_OPERATIONS: dict[type[ast.operator], Callable[[int, int], int]] = {
+    ast.BitOr: operator.or_, ast.BitAnd: operator.and_}
 _COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
     ast.GtE: operator.ge}
+
+
+@cache
+def _neutral(absent: tuple[str, ...]) -> dict[str, float]:
+    """Return the values of numbers that are absent, by "term.number", or of an input by "number"."""
+    found: dict[str, float] = {}
+    for name in absent:
+        room, _, field = name.partition(".")
+        record: Any = getattr(NEUTRAL, room, None)
+        if record is None:
+            found[name] = getattr(Piece(), name)
+        else:
+            found |= {f"{room}.{one}": getattr(record, one) for one in ((field,) if field else record._fields)}
+    return found
+
+
+def _given_once(node: ast.FunctionDef) -> dict[str, ast.expr]:
+    """Return the values of local variables that get one once and for all."""
+    found: dict[str, ast.expr] = {}
+    stored = [n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    for part in ast.walk(node):
+        if isinstance(part, ast.Assign) and len(part.targets) == 1:
+            names, values = part.targets[0], part.value
+            pairs = (zip(names.elts, values.elts, strict=False)
+                     if isinstance(names, ast.Tuple) and isinstance(values, ast.Tuple) else [(names, values)])
+            found |= {name.id: value for name, value in pairs if isinstance(name, ast.Name)}
+    return {name: deepcopy(value) for name, value in found.items() if stored.count(name) == 1}
 
 
 def _last(node: ast.expr) -> str:
@@ -336,7 +426,7 @@ def _home(module: str, name: str, value: object) -> tuple[str, str, object]:
 
 
 def _flat(module: str, name: str) -> str:
-    return f"{module.rpartition('.')[2]}__{name}"
+    return f"{'_'.join(module.split('.')[-2:])}__{name}"
 
 
 @cache

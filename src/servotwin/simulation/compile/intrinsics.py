@@ -1,4 +1,4 @@
-"""The primitives of `kernels.elementary` as single instructions; imported by derived modules alone."""
+"""The primitives of `engine.elementary` as single instructions; imported by derived modules alone."""
 
 # numba's and llvmlite's own types are not annotated
 # mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped"

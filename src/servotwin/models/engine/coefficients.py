@@ -1,0 +1,68 @@
+"""The coefficients of a mode's equation of motion, for the exact solutions of `first_order` and `second_order`."""
+
+from __future__ import annotations
+
+from servotwin.models.engine import contacts, currents
+from servotwin.models.engine.modes import CONDUCTING, Mode, constant_current, in_linear_zone
+from servotwin.models.terms import follower
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.shaft import accelerated, acceleration
+from servotwin.physics import electronics, motor, potentiometer, shaft
+
+
+def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau: tuple[float, ...],
+                        q: float, w: float) -> tuple[float, ...]:
+    """Return (a, c, f0, f1, fs, Ω, φ, q0, w0) of the motion of a linear sliding mode without inductance.
+
+    `u` is (value, slope, amplitude, frequency, phase) of the command at the start of the motion, `tau` (value,
+    slope) of the external torque; see `second_order`.
+    """
+    per_volt = motor.electromagnetic_torque(currents.conductance(numbers, mode.zone, u[0]), numbers.motor.K)
+    damping = numbers.shaft.b + per_volt * motor.back_emf(1.0, numbers.motor.K_b)
+    stiffness = shaft.spring_torque(1.0, numbers.load.stiffness)
+    torque = -shaft.spring_torque(0.0, numbers.load.stiffness, numbers.load.rest_angle) - contacts.friction_torque(
+        numbers, mode.contact, w, 0.0, 0.0) - tau[0]
+    rate = -tau[1]
+    sinusoid = 0.0
+    if in_linear_zone(mode.zone):
+        gain = per_volt * follower.voltage_slope(numbers.follower, 1.0)
+        stiffness -= gain * electronics.feedback_error(0.0, potentiometer.feedback_voltage(1.0, numbers.sensor.p))
+        torque += per_volt * currents.voltage(numbers, mode.zone, u[0], 0.0)
+        rate += gain * electronics.feedback_error(u[1], 0.0)
+        sinusoid = gain * electronics.feedback_error(u[2], 0.0)
+    elif constant_current(mode.zone):
+        torque += motor.electromagnetic_torque(currents.current(numbers, mode.zone, u[0], q, w), numbers.motor.K)
+    elif mode.zone >= CONDUCTING:
+        torque += per_volt * currents.loop(numbers, mode.zone, u[0])[0]
+    else:
+        torque += per_volt * follower.voltage(numbers.follower, mode.zone, 0.0)
+    return (0.5 * accelerated(numbers.shaft, damping), accelerated(numbers.shaft, stiffness),
+            accelerated(numbers.shaft, torque), accelerated(numbers.shaft, rate),
+            accelerated(numbers.shaft, sinusoid), u[3], u[4], q, w)
+
+
+def speed_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], against: tuple[float, ...],
+                       w: float, i: float) -> tuple[float, ...]:
+    """Return the coefficients of the speed of a motor with inductance, without feedback or spring.
+
+    From L di/dt = v − R i − K_b w and J ẇ = K i − b w − τ, where `against` is (value, slope) of all constant and
+    external torque τ, and `u` as in `linear_coefficients`.
+    """
+    R, L, K_b = numbers.motor.R, numbers.motor.L, numbers.motor.K_b
+    follows = in_linear_zone(mode.zone)
+    if mode.zone >= CONDUCTING:
+        v, R = currents.loop(numbers, mode.zone, u[0])
+    else:
+        v = currents.voltage(numbers, mode.zone, u[0], 0.0)
+    gain = follower.voltage_slope(numbers.follower, 1.0) * electronics.feedback_error(1.0, 0.0) if follows else 0.0
+    # ẅ + (R/L + b/J) ẇ + … : rates of the current by a volt, an ampere and a radian per second
+    rise = motor.armature_current_rate(1.0, 0.0, 0.0, R, L, K_b)
+    fade = -motor.armature_current_rate(0.0, 1.0, 0.0, R, L, K_b)
+    brake = -motor.armature_current_rate(0.0, 0.0, 1.0, R, L, K_b)
+    per_ampere = accelerated(numbers.shaft, motor.electromagnetic_torque(1.0, numbers.motor.K))
+    drag = accelerated(numbers.shaft, numbers.shaft.b)
+    held, held_more = accelerated(numbers.shaft, against[0]), accelerated(numbers.shaft, against[1])
+    per_volt = per_ampere * rise
+    return (0.5 * (fade + drag), fade * drag + per_ampere * brake, per_volt * v - fade * held - held_more,
+            per_volt * gain * u[1] - fade * held_more, per_volt * gain * u[2], u[3], u[4], w,
+            acceleration(numbers.shaft, motor.electromagnetic_torque(i, numbers.motor.K), w, 0.0, against[0]))

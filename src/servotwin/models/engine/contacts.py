@@ -1,0 +1,176 @@
+"""How the shafts move, stick, meet, part and rebound.
+
+With play in the gear there are two bodies, motor and output. Inside the play each moves, sticks and rests on its own;
+in contact they are one, as without play. The contact ends when the two, left to themselves, would draw apart.
+"""
+
+from __future__ import annotations
+
+from servotwin.models.engine import currents
+from servotwin.models.engine.currents import drive_torque
+from servotwin.models.engine.modes import (
+    BACKWARD,
+    CORE,
+    FORWARD,
+    FREE,
+    INSIDE,
+    ON_BACKWARD,
+    ON_FORWARD,
+    Mode,
+    Vector,
+    at_rest,
+)
+from servotwin.models.terms import friction, play, shaft, source
+from servotwin.models.terms.friction import holding_friction, sliding_friction
+from servotwin.models.terms.load import dry as has_dry_load
+from servotwin.models.terms.load import external_torque
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.play import with_motor
+from servotwin.models.terms.sensor import slack
+from servotwin.models.terms.shaft import from_rest, sliding
+from servotwin.physics.backlash import rebound_speed
+from servotwin.physics.friction import smoothed_coulomb_torque
+from servotwin.physics.load_friction import torque_on_gear
+
+_REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
+_REST_HEIGHT = 4e-15  # relative to the angle: a rebound this low is rounding
+
+
+def has_friction(numbers: Numbers) -> bool:
+    """Tell whether there is any friction other than viscous, or turning points count as much as if there were."""
+    return friction.present(numbers.friction) or holds(numbers)
+
+
+def holds(numbers: Numbers) -> bool:
+    """Tell whether the output side may hold itself: by dry friction; a potentiometer with play marks its turns."""
+    return has_dry_load(numbers.load) or slack(numbers.sensor)
+
+
+def holding_bounds(numbers: Numbers, tau_m: float, tau_e: float) -> tuple[float, float]:
+    """Return the torques [N m] that friction holds at rest, against a start backward and forward."""
+    return (holding_friction(numbers.friction, False, tau_m, tau_e) + numbers.load.coulomb,
+            holding_friction(numbers.friction, True, tau_m, tau_e) + numbers.load.coulomb)
+
+
+def friction_torque(numbers: Numbers, contact: int, w: float, tau_m: float, tau_e: float) -> float:
+    """Return the friction [N m] against +q of motor and output moving as one, the load's own included."""
+    if contact == FORWARD:
+        return sliding_friction(numbers.friction, True, w, tau_m, tau_e) + numbers.load.coulomb
+    if contact == BACKWARD:
+        return -sliding_friction(numbers.friction, False, w, tau_m, tau_e) - numbers.load.coulomb
+    if contact == CORE:
+        forward, backward = core_friction(numbers)
+        return smoothed_coulomb_torque(w, forward, backward, numbers.friction.kappa)
+    return 0.0
+
+
+def core_friction(numbers: Numbers) -> tuple[float, float]:
+    """Return the magnitudes [N m] forward and backward of a smoothed friction, the load's own included."""
+    own, dry = numbers.friction, numbers.load.coulomb
+    return own.F_forward + dry, own.F_backward + dry
+
+
+def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
+    """Return the mode of a state in a zone; `smooth` keeps a smoothed friction in one piece."""
+    q, w = y[0], y[1]
+    if play.present(numbers.play) and mesh == INSIDE:
+        return apart(numbers, zone, u, tau, y)
+    if friction.smoothed(numbers.friction):
+        if not has_friction(numbers):
+            return Mode(zone, FREE, mesh, FREE)
+        if smooth or abs(w) <= friction.core_speed(numbers.friction):
+            return Mode(zone, CORE, mesh, FREE)
+        return Mode(zone, FORWARD if w > 0.0 else BACKWARD, mesh, FREE)
+    if w == 0.0:
+        torque = drive_torque(numbers, zone, u, y)
+        against = external_torque(numbers.load, tau, q)
+        backward, forward = holding_bounds(numbers, torque, -against)
+        contact = from_rest(torque - against, backward, forward, q >= numbers.stops.upper, q <= numbers.stops.lower,
+                            has_friction(numbers))
+    else:
+        contact = sliding(w > 0.0, has_friction(numbers))
+    mode = Mode(zone, contact, mesh, FREE)
+    if play.present(numbers.play) and pressing(numbers, mode, u, tau, y) < 0.0:
+        return apart(numbers, zone, u, tau, y)
+    return mode
+
+
+def apart(numbers: Numbers, zone: int, u: float, tau: float, y: Vector) -> Mode:
+    """Return the mode of two bodies inside the play."""
+    torque, against = drive_torque(numbers, zone, u, y), external_torque(numbers.load, tau, y[0])
+    held, dry = holds(numbers), friction.present(numbers.friction)
+    contact, motor = sliding(y[1] > 0.0, held), sliding(y[6] > 0.0, dry)
+    if y[1] == 0.0:
+        contact = from_rest(-against, numbers.load.coulomb, numbers.load.coulomb, y[0] >= numbers.stops.upper,
+                            y[0] <= numbers.stops.lower, held)
+    if y[6] == 0.0:
+        motor = from_rest(torque, holding_friction(numbers.friction, False, torque, 0.0),
+                          holding_friction(numbers.friction, True, torque, 0.0), False, False, dry)
+    return Mode(zone, contact, INSIDE, motor)
+
+
+def motor_acceleration(numbers: Numbers, motor: int, torque: float, w: float) -> float:
+    """Return the acceleration [rad/s²] of the motor alone, inside the play."""
+    if at_rest(motor):
+        return 0.0
+    dry = 0.0
+    if motor == FORWARD or motor == BACKWARD:
+        dry = sliding_friction(numbers.friction, motor == FORWARD, w, torque, 0.0)
+    return shaft.motor_acceleration(numbers.shaft, torque, w, dry if motor == FORWARD else -dry)
+
+
+def output_acceleration(numbers: Numbers, contact: int, against: float, w: float) -> float:
+    """Return the acceleration [rad/s²] of the output side alone, inside the play."""
+    if at_rest(contact):
+        return 0.0
+    dry = numbers.load.coulomb if contact == FORWARD else -numbers.load.coulomb if contact == BACKWARD else 0.0
+    return shaft.output_acceleration(numbers.shaft, w, dry, against)
+
+
+def pressing(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> float:
+    """Return how motor and output in contact would close in [rad/s²] if each went on alone; below 0 they part."""
+    torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y[0])
+    w = y[1]
+    if w == 0.0:
+        alone = apart(numbers, mode.zone, u, tau, (y[0], 0.0, y[2], y[3], y[4], y[5], 0.0))
+        motor, contact = alone.motor, alone.contact
+    else:
+        motor = sliding(w > 0.0, friction.present(numbers.friction))
+        contact = sliding(w > 0.0, holds(numbers))
+    gain = motor_acceleration(numbers, motor, torque, w) - output_acceleration(numbers, contact, against, w)
+    return gain if mode.mesh == ON_FORWARD else -gain
+
+
+def rebound(numbers: Numbers, mode: Mode, upper: bool, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
+    """Return mode and state after the output has hit a stop; with it the motor, unless it only follows."""
+    q = numbers.stops.upper if upper else numbers.stops.lower
+    w = rebound_speed(y[1], numbers.stops.restitution)
+    pushes = mode.mesh == (ON_FORWARD if upper else ON_BACKWARD)
+    as_one = not play.present(numbers.play) or pushes
+    mesh = mode.mesh if as_one else INSIDE
+    after: Vector = (q, w, y[2], y[3], y[4], y[5], y[6])
+    if as_one:
+        after = with_motor(numbers.play, mesh, after)
+    zone = mode.zone
+    if source.present(numbers.source):  # the current goes with the speed
+        zone = currents.zone_of(numbers, u, 0.0, q, after[6], y[2])
+    if mesh == INSIDE:
+        back = output_acceleration(numbers, sliding(w > 0.0, holds(numbers)), external_torque(numbers.load, tau, q), w)
+    else:
+        back = acceleration(numbers, Mode(zone, sliding(w > 0.0, has_friction(numbers)), mesh, FREE), u, tau, after)
+    low = back * w < 0.0 and 0.5 * w * w < abs(back) * _REST_HEIGHT * max(abs(q), 1.0)
+    if abs(w) < _REST_SPEED or low:
+        after = (q, 0.0, y[2], y[3], y[4], after[5], after[6] if mesh == INSIDE else 0.0)
+        if source.present(numbers.source):
+            zone = currents.zone_of(numbers, u, 0.0, q, after[6], y[2])
+    return settled(numbers, zone, u, tau, after, mesh, False), after
+
+
+def acceleration(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> float:
+    """Return ẇ [rad/s²] of motor and output moving as one."""
+    if at_rest(mode.contact):
+        return 0.0
+    q, w = y[0], y[1]
+    torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, q)
+    dry = friction_torque(numbers, mode.contact, w, torque, torque_on_gear(against, w, numbers.shaft.b_out))
+    return shaft.acceleration(numbers.shaft, torque, w, dry, against)

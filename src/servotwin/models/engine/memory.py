@@ -1,0 +1,205 @@
+"""What a servo remembers between two calls, whole: where it stands, what its chip has decided, and its clock.
+
+Times within it count from the beginning of a frame, a new one after so many, so that they keep their digits for days;
+`frames` says which one that is. An instant within a billionth of a frame of an edge *is* the edge, so that twenty ticks
+of a millisecond are a frame of twenty, however their sum is rounded.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from servotwin.models.engine.modes import INSIDE, RIGID, Mode, Vector
+from servotwin.models.engine.records import record_reader, record_writer
+from servotwin.models.terms import frame
+from servotwin.models.terms.frame import Decision, Frame
+from servotwin.physics.pieces import Piece
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+FIRST_STEP = 1e-4  # s, the first that the integrator tries
+BEAT = 0.0625  # s, by which the clock counts where no pulses come regularly
+FRAMES = 256  # after so many times count anew: not after each, for that would round all of them anew
+SAME = 1e-9  # of a frame: so near to an edge it is the edge
+_USUAL = 0.02  # s, a frame where edges are listed
+
+
+class Point(NamedTuple):
+    """Where a servo stands, and where its present motion began; times from the beginning of a frame [s]."""
+
+    time: float
+    y: Vector
+    mode: Mode
+    anchor_time: float  # inf: no motion has begun yet, or its inputs are no longer the same
+    anchor: Vector
+    step: float  # length that the integrator would try next
+    wiper: float  # angle of the potentiometer, which may lag behind the shaft
+
+
+class Memory(NamedTuple):
+    """Everything that a servo remembers."""
+
+    frames: int  # that have gone by where all times here count from
+    beat: float  # s, of such a frame
+    point: Point
+    chip: Frame
+    u: Piece  # what the numbers follows, by the time since the start
+    u_end: float
+    tau: Piece  # torque of the load that depends on time alone
+    tau_end: float
+
+
+class Inputs(NamedTuple):
+    """What a servo is told and what hangs on its shaft: tables of pieces, a row each; frames of pulses."""
+
+    command: Sequence[Sequence[float]] | NDArray[np.float64]
+    torque: Sequence[Sequence[float]] | NDArray[np.float64]  # no row: none
+    constant_torque: float  # beside it
+    period: float  # of regular frames [s]; 0: as listed
+    edges: Sequence[float] | NDArray[np.float64]
+    curve: Sequence[Sequence[float]] | NDArray[np.float64]  # of the potentiometer: angles and errors
+    seed: int
+
+
+NOTHING = Piece()
+memory_of = record_reader("memory_of", Memory)
+put_memory = record_writer("put_memory", Memory)
+
+
+def started(y: Vector, mesh: int) -> Memory:
+    """Return the memory of a servo at t = 0, in no mode yet."""
+    point = Point(0.0, y, Mode(0, 0, mesh, 0), math.inf, y, FIRST_STEP, y[0])
+    return Memory(0, BEAT, point, frame.AT_START, NOTHING, math.inf, NOTHING, math.inf)
+
+
+def origin_of(memory: Memory) -> float:
+    """Return the instant from which the times of a memory count [s since the start]."""
+    return memory.frames * memory.beat
+
+
+def time_of(memory: Memory) -> float:
+    """Return the time since the start [s]."""
+    return origin_of(memory) + memory.point.time
+
+
+def since(piece: Piece, origin: float) -> Piece:
+    """Return a piece by the time since `origin` [s]."""
+    return Piece(piece.start - origin, piece.value, piece.slope, piece.amplitude, piece.frequency, piece.phase,
+                 piece.sweep)
+
+
+def edge_of(inputs: Inputs, memory: Memory, k: int) -> float:
+    """Return when frame k begins, by the times of a memory [s]; inf after the last."""
+    if inputs.period > 0.0:
+        return frame.edge_time(inputs.period, inputs.edges, k - memory.frames)
+    return frame.edge_time(inputs.period, inputs.edges, k) - origin_of(memory)
+
+
+def instant(pulsed: bool, inputs: Inputs, memory: Memory, time: float) -> float:
+    """Return a time to which a memory shall go [s]: that of the edge where it is next to one."""
+    if not pulsed:
+        return time
+    if inputs.period > 0.0:
+        edge = round(time / inputs.period) * inputs.period
+        return edge if abs(time - edge) <= SAME * inputs.period else time
+    edge = edge_of(inputs, memory, next_frame(inputs, memory, time - SAME * _USUAL))
+    return edge if abs(time - edge) <= SAME * _USUAL else time
+
+
+def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memory:
+    """Return a memory ready to go on under inputs that may be others than before.
+
+    `changed` is whether the servo itself is another one.
+    """
+    beat = inputs.period if pulsed and inputs.period > 0.0 else BEAT
+    if beat != memory.beat:  # its frames are others now
+        origin = origin_of(memory)
+        frames = int((origin + memory.point.time) / beat * (1.0 + 4e-16))
+        memory = shifted(memory, frames, beat, frames * beat - origin)
+    origin, time = origin_of(memory), memory.point.time
+    number = memory.chip.number
+    if pulsed:
+        number = next_frame(inputs, memory, time)
+        u, u_end = memory.u, math.inf
+    else:
+        u, u_end = in_force(inputs.command, origin, time, 0.0)
+    tau, tau_end = in_force(inputs.torque, origin, time, inputs.constant_torque)
+    if changed or u != memory.u or tau != memory.tau:
+        memory = forgotten(memory)
+    return Memory(memory.frames, beat, memory.point, frame.numbered(memory.chip, number), u, u_end, tau, tau_end)
+
+
+def with_play(memory: Memory, play: bool) -> Memory:
+    """Return a memory in which no motion has begun, of a servo whose gear has play, or none."""
+    p = memory.point
+    q, w, i, T_w, T_h, _, _ = p.y
+    mesh = (p.mode.mesh if p.mode.mesh != RIGID else INSIDE) if play else RIGID
+    y = p.y if play else (q, w, i, T_w, T_h, q, w)
+    mode = Mode(p.mode.zone, p.mode.contact, mesh, p.mode.motor)
+    return forgotten(memory._replace(point=p._replace(y=y, mode=mode)))
+
+
+def due(memory: Memory) -> bool:
+    """Tell whether times shall count anew."""
+    return memory.point.time >= FRAMES * memory.beat
+
+
+def counted_anew(memory: Memory) -> Memory:
+    """Return the memory with times that count from later on."""
+    return shifted(memory, memory.frames + FRAMES, memory.beat, FRAMES * memory.beat)
+
+
+def shifted(memory: Memory, frames: int, beat: float, shift: float) -> Memory:
+    """Return a memory whose times count from an instant that is later by `shift` [s]."""
+    p, c = memory.point, memory.chip
+    point = Point(p.time - shift, p.y, p.mode, p.anchor_time - shift, p.anchor, p.step, p.wiper)
+    chip = Frame(c.number, c.draws, c.drive, c.drive_end - shift, c.clock - shift, c.error,
+                 _later(c.pending, shift), _later(c.later, shift))
+    return Memory(frames, beat, point, chip, memory.u, memory.u_end - shift, memory.tau, memory.tau_end - shift)
+
+
+def _later(decision: Decision, shift: float) -> Decision:
+    return Decision(decision.time - shift, decision.sign, decision.duration, decision.error)
+
+
+def forgotten(memory: Memory) -> Memory:
+    """Return a memory in which no motion has begun."""
+    p = memory.point
+    point = Point(p.time, p.y, p.mode, math.inf, p.anchor, p.step, p.wiper)
+    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end)
+
+
+def next_frame(inputs: Inputs, memory: Memory, time: float) -> int:
+    """Return the number of the first frame that begins at `time` [s] or after."""
+    if inputs.period > 0.0:
+        return memory.frames + math.ceil(time / inputs.period - SAME)
+    low, high = 0, len(inputs.edges)
+    while low < high:
+        middle = (low + high) // 2
+        if edge_of(inputs, memory, middle) < time:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+def in_force(table: Sequence[Sequence[float]] | NDArray[np.float64], origin: float, time: float,
+             offset: float) -> tuple[Piece, float]:
+    """Return the row of a table in force at `time` after `origin` [s], moved by `offset`, and when it ends."""
+    if len(table) == 0:
+        return Piece(0.0, offset, 0.0, 0.0, 0.0, 0.0, 0.0), math.inf
+    low, high = 0, len(table)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if table[middle][0] - origin <= time:
+            low = middle
+        else:
+            high = middle
+    row = table[low]
+    return (Piece(row[0], row[1] + offset, row[2], row[3], row[4], row[5], row[6]),
+            table[high][0] - origin if high < len(table) else math.inf)

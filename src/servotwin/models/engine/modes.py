@@ -1,0 +1,65 @@
+"""The modes that a servo can be in, and its state.
+
+A mode says which of the laws hold: the zone of the voltage law, how the shaft moves, and where the play of the gear
+is. All quantities are at the output shaft (a bare motor has N = 1).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Mode(NamedTuple):
+    """Zone of the voltage law, contact of the shaft, place in the play, and contact of the motor inside the play."""
+
+    zone: int
+    contact: int
+    mesh: int
+    motor: int
+
+
+Vector = tuple[float, float, float, float, float, float, float]
+"""Angle, speed and current; temperatures of winding and housing; angle and speed of the motor, at the output shaft.
+
+Without inductance the current is kept as 0, without heat the temperatures stay; where motor and output are one body,
+the motor's angle and speed go with the output's.
+"""
+
+NOWHERE: Vector = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+SATURATED_BACKWARD, LINEAR_BACKWARD, DEAD, LINEAR, SATURATED = -2, -1, 0, 1, 2
+# Behind a bridge, in the order of the voltage that drives the current. Conducting: without drops, either way.
+# Limited: the regulator gives its most. Short: even at no bus voltage more flows.
+CONDUCTING, SHORT_BACKWARD, LIMITED_BACKWARD, CURRENT_BACKWARD, NO_CURRENT = 3, 4, 5, 6, 7
+CURRENT_FORWARD, LIMITED_FORWARD, SHORT_FORWARD = 8, 9, 10
+
+FREE, FORWARD, BACKWARD, CORE, STUCK, ON_LOWER, ON_UPPER = range(7)
+
+RIGID, INSIDE, ON_FORWARD, ON_BACKWARD = range(4)  # forward: where the motor pushes the output forward
+
+
+def at_rest(contact: int) -> bool:
+    """Tell whether a shaft stands still in this contact."""
+    return contact >= STUCK
+
+
+def sign_of(zone: int) -> float:
+    """Return the sign of the current in a zone behind a bridge; 0 where it does not matter."""
+    if zone > NO_CURRENT:
+        return 1.0
+    return -1.0 if CONDUCTING < zone < NO_CURRENT else 0.0
+
+
+def limited(zone: int) -> bool:
+    """Tell whether the source gives its most, so that the current stays."""
+    return zone == LIMITED_FORWARD or zone == LIMITED_BACKWARD
+
+
+def constant_current(zone: int) -> bool:
+    """Tell whether the current of a zone behind a bridge does not change with the speed."""
+    return zone == NO_CURRENT or limited(zone)
+
+
+def in_linear_zone(zone: int) -> bool:
+    """Tell whether the armature voltage follows the error in this zone."""
+    return zone == LINEAR or zone == LINEAR_BACKWARD

@@ -1,0 +1,329 @@
+"""How the state moves within one mode: in closed form wherever the mode is linear, else one integrator step.
+
+A motion starts at its anchor t0 and gives the state at any later time t0 + s until its `length` is over.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from servotwin.models.engine import contacts, currents, dormand_prince, first_order, rodas, second_order
+from servotwin.models.engine.coefficients import linear_coefficients, speed_coefficients
+from servotwin.models.engine.modes import (
+    CONDUCTING,
+    INSIDE,
+    NOWHERE,
+    RIGID,
+    Mode,
+    Vector,
+    at_rest,
+    constant_current,
+    in_linear_zone,
+)
+from servotwin.models.engine.rates import jacobian, rates_of
+from servotwin.models.engine.rodas import Triple
+from servotwin.models.terms import follower, friction, heat, load, motor, play, sensor, source
+from servotwin.models.terms.dependence import (
+    CURVED_Q,
+    CURVED_T,
+    CURVED_W,
+    ON_HEAT,
+    ON_I,
+    ON_Q,
+    STEEP_W,
+    TWO_BODIES,
+)
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.play import with_motor
+from servotwin.physics.pieces import Piece, piece_rate, piece_value
+
+# Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
+REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, IMPOSSIBLE = range(9)
+
+_TURN = 2.0 * math.pi
+_TOLERANCE = 3e-10  # error of one implicit step, relative to 1 + |state|
+_FINE_TOLERANCE = 1e-12  # of an explicit one
+_ORIGIN = (0.0, 0.0, 0.0)
+_NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
+_NO_DENSE = (_ORIGIN, _ORIGIN, _ORIGIN)
+_NO_LONG_DENSE = (NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+_NO_COEFFICIENTS = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Motion(NamedTuple):
+    """What moves, from where, and how."""
+
+    kind: int
+    numbers: Numbers
+    mode: Mode
+    u: Piece
+    tau: Piece
+    t0: float
+    start: Vector
+    length: float
+    coefficients: tuple[float, ...]  # of second_order; FIRST_ORDER (λ, f, …), HELD (R/L, final i), SERIES of w and i
+    against: tuple[float, ...]  # WITH_CURRENT: value and slope of all torque that does not depend on speed
+    end: Vector  # of a step, as all that follows
+    next_step: float  # length to try next [s]
+    has_dense: bool
+    stages: tuple[Triple, ...]
+    dense: tuple[Triple, Triple, Triple]
+    long_dense: tuple[Vector, ...]
+
+
+def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
+    """Return a motion that is none yet."""
+    return _closed(IMPOSSIBLE, numbers, Mode(0, 0, 0, 0), u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+
+
+def is_step(motion: Motion) -> bool:
+    """Tell whether a motion is one step of an integrator."""
+    return motion.kind == STEP or motion.kind == LONG_STEP
+
+
+def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
+          limit: float) -> Motion:
+    """Return the motion from y at t0 [s]: exact, or one accepted step of at most `limit` [s]."""
+    still = at_rest(mode.contact) and (mode.mesh != INSIDE or at_rest(mode.motor))
+    on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
+    if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
+        return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+    if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & ON_Q))):
+        return _long_step(numbers, mode, u, tau, t0, y, step, limit)
+    if on & ON_I and still and mode.zone >= CONDUCTING:
+        v, R = currents.loop(numbers, mode.zone, u.value)
+        fading = (R / numbers.motor.L, v / R, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return _closed(HELD, numbers, mode, u, tau, t0, y, fading, (0.0, 0.0), step)
+    if on & (CURVED_Q | STEEP_W | CURVED_T) or (on & ON_I and (still or (not behind and on & ON_Q))):
+        return _integrated(numbers, mode, u, tau, t0, y, step, limit)
+    follows = in_linear_zone(mode.zone)
+    wave = (u.value + u.slope * (t0 - u.start), u.slope, 0.0, 0.0, 0.0)
+    if follows:
+        wave = (wave[0], u.slope, u.amplitude, u.frequency, u.phase + u.frequency * (t0 - u.start))
+    torque = (tau.value + tau.slope * (t0 - tau.start), tau.slope)
+    if on & ON_I and not constant_current(mode.zone):
+        against = (torque[0] + contacts.friction_torque(numbers, mode.contact, y[1], 0.0, 0.0), torque[1])
+        coefficients = speed_coefficients(numbers, mode, wave, against, y[1], y[2])
+        return _closed(WITH_CURRENT, numbers, mode, u, tau, t0, y, coefficients, against, step)
+    coefficients = linear_coefficients(numbers, mode, wave, torque, y[0], y[1])
+    _, c, _, f1, fs, _, _, _, _ = coefficients
+    kind = FIRST_ORDER if c == 0.0 and f1 == 0.0 and fs == 0.0 else SECOND_ORDER
+    return _closed(kind, numbers, mode, u, tau, t0, y, coefficients, (0.0, 0.0), step)
+
+
+def dependence(numbers: Numbers, mode: Mode, u: Piece, still: bool) -> int:
+    """Return on what the acceleration depends in a mode, as the terms have it; `still` where nothing moves."""
+    return (motor.depends(numbers.motor) | heat.depends(numbers.heat) | load.depends(numbers.load)
+            | friction.depends(numbers.friction, mode.contact) | play.depends(mode.mesh, still)
+            | sensor.depends(numbers.sensor, numbers.source) | follower.depends(mode.zone, u))
+
+
+def _closed(kind: int, numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
+            coefficients: tuple[float, ...], against: tuple[float, ...], step: float) -> Motion:
+    return Motion(kind, numbers, mode, u, tau, t0, y, math.inf, coefficients, against, y, step, False, _NO_STAGES,
+                  _NO_DENSE, _NO_LONG_DENSE)
+
+
+def by_series(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
+              speed: tuple[float, ...], current: tuple[float, ...]) -> Motion:
+    """Return a motion whose speed and current are given as powers of time."""
+    return Motion(SERIES, numbers, mode, u, tau, t0, y, length, speed, current, y, 0.0, False, _NO_STAGES, _NO_DENSE,
+                  _NO_LONG_DENSE)
+
+
+def by_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
+            dense: tuple[Vector, ...], end: Vector) -> Motion:
+    """Return a motion whose dense output is given."""
+    return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, length, _NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, True,
+                  _NO_STAGES, _NO_DENSE, dense)
+
+
+def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
+                limit: float) -> Motion:
+    jac = jacobian(numbers, mode, piece_value(u, t0), piece_rate(u, t0), piece_rate(tau, t0), y[0], y[1])
+    h = min(step, limit)
+    h = min(h, period(u, tau, t0, t0 + h) / 6.0)
+    for _ in range(60):
+        y1, error, stages = rodas.step(numbers, mode, u, tau, jac, t0, y, h)
+        size = max(abs(error[0]) / (1.0 + abs(y1[0])), abs(error[1]) / (1.0 + abs(y1[1])),
+                   abs(error[2]) / (1.0 + abs(y1[2]))) / _TOLERANCE
+        if not size < 1e6:
+            size = 1e6
+        factor = min(5.0, max(0.1, 0.85 * size**-0.2)) if size > 0.0 else 5.0
+        if size <= 1.0:
+            return Motion(STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, h * factor, False,
+                          stages, _NO_DENSE, _NO_LONG_DENSE)
+        h *= factor
+        if t0 + h == t0:
+            break
+    return _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+
+
+def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
+               limit: float) -> Motion:
+    h = min(step, limit)
+    h = min(h, period(u, tau, t0, t0 + h) / 3.0)
+    for _ in range(60):
+        y1, error = dormand_prince.step(numbers, mode, u, tau, t0, y, h)
+        size = error / _FINE_TOLERANCE
+        if not size < 1e12:
+            size = 1e12
+        factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
+        if size <= 1.0:
+            following = max(step, h * factor) if h == limit else h * factor  # a step that was cut short tells little
+            return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, following,
+                          False, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
+        h *= factor
+        if t0 + h == t0:
+            break
+    return _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+
+
+def prepared(motion: Motion) -> Motion:
+    """Return the motion ready to be evaluated between the ends of a step."""
+    if motion.has_dense or not is_step(motion):
+        return motion
+    dense, long_dense = motion.dense, motion.long_dense
+    if motion.kind == STEP:
+        dense = rodas.dense_coefficients(motion.stages)
+    elif motion.kind == LONG_STEP:
+        long_dense = dormand_prince.dense(motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
+                                          motion.length)
+    return Motion(motion.kind, motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
+                  motion.length, motion.coefficients, motion.against, motion.end, motion.next_step, True,
+                  motion.stages, dense, long_dense)
+
+
+def state(motion: Motion, s: float) -> Vector:
+    """Return the state at s after the anchor; a step that is looked at in between has to be `prepared`."""
+    kind, start = motion.kind, motion.start
+    if kind == REST:
+        return start
+    if kind == FIRST_ORDER:
+        c = motion.coefficients
+        q, w = first_order.propagate(2.0 * c[0], c[2], c[7], c[8], s)
+        return _moved(motion, q, w, start[2])
+    if kind == SECOND_ORDER:
+        q, w = second_order.propagate(motion.coefficients, s)
+        return _moved(motion, q, w, start[2])
+    if kind == WITH_CURRENT:
+        w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
+        numbers, against = motion.numbers, motion.against
+        i = (numbers.shaft.J * dw + numbers.shaft.b * w + against[0] + against[1] * s) / numbers.motor.K
+        return _moved(motion, start[0] + way, w, i)
+    if kind == HELD:
+        rate, final = motion.coefficients[0], motion.coefficients[1]
+        return _moved(motion, start[0], start[1], start[2] + (start[2] - final) * math.expm1(-rate * s))
+    if kind == SERIES:
+        q = w = i = 0.0
+        for n in range(len(motion.coefficients) - 1, -1, -1):
+            w = w * s + motion.coefficients[n]
+            q = q * s + motion.coefficients[n] / (n + 1)
+        for n in range(len(motion.against) - 1, -1, -1):
+            i = i * s + motion.against[n]
+        return _moved(motion, start[0] + q * s, w, i)
+    if motion.t0 + s >= motion.t0 + motion.length:  # the end, reached as a difference of two times
+        return motion.end
+    if s == 0.0:
+        return start
+    x = s / motion.length
+    if kind == STEP:
+        return rodas.interpolate(start, motion.end, motion.dense, x)
+    if kind == LONG_STEP:
+        return dormand_prince.interpolate(start, motion.long_dense, x)
+    return start
+
+
+def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:
+    """Return the state of one body, at rest inside the play the motor's own."""
+    _, _, _, T_w, T_h, q_m, w_m = motion.start
+    mesh = motion.mode.mesh
+    if mesh == INSIDE:
+        return q, w, i, T_w, T_h, q_m, w_m
+    if mesh == RIGID:
+        return q, w, i, T_w, T_h, q, w
+    return with_motor(motion.numbers.play, mesh, (q, w, i, T_w, T_h, q_m, w_m))
+
+
+def rates(motion: Motion, s: float, y: Vector) -> Vector:
+    """Return the rates of the state at s, where it is y."""
+    kind = motion.kind
+    _, w, _, _, _, _, w_m = y
+    if kind == REST:
+        return NOWHERE
+    if kind == FIRST_ORDER or kind == SECOND_ORDER:
+        dw = second_order.acceleration(motion.coefficients, s, y[0], w)
+        return w, dw, 0.0, 0.0, 0.0, w_m, dw
+    numbers = motion.numbers
+    if kind == WITH_CURRENT:
+        w, dw = second_order.propagate(motion.coefficients, s)
+        ddw = second_order.acceleration(motion.coefficients, s, w, dw)
+        di = (numbers.shaft.J * ddw + numbers.shaft.b * dw + motion.against[1]) / numbers.motor.K
+        return w, dw, di, 0.0, 0.0, w_m, dw
+    if kind == HELD:
+        return 0.0, 0.0, motion.coefficients[0] * (motion.coefficients[1] - y[2]), 0.0, 0.0, 0.0, 0.0
+    if is_step(motion):
+        t = motion.t0 + s
+        return rates_of(numbers, motion.mode, piece_value(motion.u, t), piece_value(motion.tau, t), y)
+    return NOWHERE
+
+
+def scales(motion: Motion) -> tuple[float, float]:
+    """Return the time in which the free motion changes, and the time after which it has settled [s]."""
+    if motion.kind == REST:
+        return math.inf, 0.0
+    if motion.kind == HELD:
+        return 1.0 / motion.coefficients[0], 40.0 / motion.coefficients[0]
+    if motion.kind == SERIES or is_step(motion):  # the error control keeps it short beside what happens in it
+        return motion.length, math.inf
+    a, c = motion.coefficients[0], motion.coefficients[1]
+    rate = 2.0 * a + math.sqrt(abs(c))
+    if rate == 0.0:
+        return math.inf, 0.0
+    if a * a >= c:
+        return 1.0 / rate, 40.0 / rate
+    return 1.0 / rate, 45.0 / a if a > 0.0 else math.inf
+
+
+def periodic(u: Piece, tau: Piece) -> bool:
+    """Tell whether either of two inputs oscillates."""
+    return u.amplitude != 0.0 or tau.amplitude != 0.0
+
+
+def period(u: Piece, tau: Piece, t0: float, t1: float) -> float:
+    """Return the shortest period [s] of two inputs between two times; inf where neither oscillates."""
+    fastest = max(_frequency(u, t0, t1), _frequency(tau, t0, t1))
+    return _TURN / fastest if fastest > 0.0 else math.inf
+
+
+def _frequency(piece: Piece, t0: float, t1: float) -> float:
+    if piece.amplitude == 0.0:
+        return 0.0
+    return max(abs(piece.frequency + piece.sweep * (t0 - piece.start)),
+               abs(piece.frequency + piece.sweep * (t1 - piece.start)))
+
+
+def monotone_until(motion: Motion, s: float, s1: float) -> float:
+    """Return the end of an interval from s on, at most s1, in which the speed is monotone and inputs are simple."""
+    kind = motion.kind
+    if kind == HELD or is_step(motion) or s1 - s <= 0.0:
+        return s1
+    if kind == REST or periodic(motion.u, motion.tau):
+        if not periodic(motion.u, motion.tau) or not s1 < math.inf:
+            return s1
+        fine, settled = scales(motion)
+        width = period(motion.u, motion.tau, motion.t0 + s, motion.t0 + s1) / 12.0
+        if kind != REST and s < settled:
+            width = min(width, 0.5 * fine)
+        return s + width if s + width < s1 else s1
+    # Between the zeros of the acceleration, which are known.
+    a, c, f0, f1, _, _, _, q0, w0 = motion.coefficients
+    dw = f0 - c * q0 - 2.0 * a * w0
+    zero, spacing = second_order.first_zero(a, c, dw, f1 - c * w0 - 2.0 * a * dw)
+    if zero <= s and spacing < math.inf:
+        zero += math.floor((s - zero) / spacing) * spacing
+        if zero <= s:
+            zero += spacing
+    settled = 45.0 / a if a > 0.0 else math.inf  # the free motion is below rounding from here on
+    return zero if s < zero < min(s1, settled) else s1

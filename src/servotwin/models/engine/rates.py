@@ -1,0 +1,61 @@
+"""The rates of the state in each mode, and how they depend on it."""
+
+from __future__ import annotations
+
+from servotwin.models.engine import contacts, currents
+from servotwin.models.engine.modes import CORE, INSIDE, Mode, Vector, at_rest, in_linear_zone
+from servotwin.models.terms import heat
+from servotwin.models.terms.load import external_torque, stiffness_at
+from servotwin.models.terms.motor import inductive
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.shaft import accelerated
+from servotwin.physics import electronics, friction, motor, potentiometer
+
+
+def rates_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> Vector:
+    """Return the rate of every number of the state."""
+    numbers = warm(numbers, y)
+    w, i, w_m = y[1], y[2], y[6]
+    di = dT_w = dT_h = 0.0
+    if inductive(numbers.motor):
+        di = currents.current_rate(numbers, mode.zone, u, y[0], w_m, i)
+    else:
+        i = currents.current(numbers, mode.zone, u, y[0], w_m)
+    if heat.present(numbers.heat):
+        dT_w, dT_h = heat.warming_rates(numbers.heat, numbers.motor.R, i, y[3], y[4])
+    if mode.mesh == INSIDE:
+        dw_m = contacts.motor_acceleration(numbers, mode.motor, motor.electromagnetic_torque(i, numbers.motor.K), w_m)
+        dw = contacts.output_acceleration(numbers, mode.contact, external_torque(numbers.load, tau, y[0]), w)
+        return w, dw, di, dT_w, dT_h, w_m, dw_m
+    dw = contacts.acceleration(numbers, mode, u, tau, y)
+    return w, dw, di, dT_w, dT_h, w, dw
+
+
+def jacobian(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, q: float, w: float) -> tuple[float, ...]:
+    """Return ∂ẇ/∂(q, w, i), ∂(di/dt)/∂(q, w, i), and the rates of ẇ and di/dt with time alone, of a rigid gear."""
+    vu = electronics.proportional_voltage(1.0, numbers.follower.gain) if in_linear_zone(mode.zone) else 0.0
+    vq = -vu * potentiometer.feedback_voltage(1.0, numbers.sensor.p)
+    Eq = Ew = Ei = Eu = 0.0
+    Fq = -stiffness_at(numbers.load, q)
+    Fw = -numbers.shaft.b
+    Fi = Fu = 0.0
+    if mode.contact == CORE:
+        forward, backward = contacts.core_friction(numbers)
+        Fw -= friction.smoothed_coulomb_slope(w, forward, backward, numbers.friction.kappa)
+    if inductive(numbers.motor):  # current and torque are linear, so units give the coefficients
+        R, L, K_b = numbers.motor.R, numbers.motor.L, numbers.motor.K_b
+        Eq = motor.armature_current_rate(vq, 0.0, 0.0, R, L, K_b)
+        Eu = motor.armature_current_rate(vu, 0.0, 0.0, R, L, K_b)
+        Ew = motor.armature_current_rate(0.0, 0.0, 1.0, R, L, K_b)
+        Ei = motor.armature_current_rate(0.0, 1.0, 0.0, R, L, K_b)
+        Fi = motor.electromagnetic_torque(1.0, numbers.motor.K)
+    else:
+        per_volt = motor.electromagnetic_torque(currents.conductance(numbers, mode.zone, u), numbers.motor.K)
+        Fq += per_volt * vq
+        Fw -= per_volt * motor.back_emf(1.0, numbers.motor.K_b)
+        Fu = per_volt * vu
+    if at_rest(mode.contact):
+        return 0.0, 0.0, 0.0, 0.0, 0.0, Ei, 0.0, Eu * du
+    body = numbers.shaft
+    return (accelerated(body, Fq), accelerated(body, Fw), accelerated(body, Fi), Eq, Ew, Ei,
+            accelerated(body, Fu * du - dtau), Eu * du)

@@ -1,0 +1,130 @@
+"""Servos one after the other, each from step to step."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from servotwin.models.engine import motion
+from servotwin.models.engine.memory import (
+    Inputs,
+    Memory,
+    counted_anew,
+    due,
+    instant,
+    memory_of,
+    origin_of,
+    put_memory,
+    resumed,
+    since,
+    started,
+    time_of,
+)
+from servotwin.models.engine.modes import INSIDE, RIGID, Mode
+from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, source, step
+from servotwin.models.engine.tiles import chip_of, numbers_of
+from servotwin.models.terms import play
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.chip import present as pulsed_chip
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.sensor import wiper_at
+
+if TYPE_CHECKING:
+    from servotwin.models.engine.tiles import Floats, Indices, Lanes
+
+
+def start(lanes: Lanes, which: Indices, records: Any) -> None:
+    """Put the lanes named in `which` into records, as they start."""
+    for k in range(which.size):
+        lane, y = which[k], lanes.start
+        numbers = numbers_of(lanes, lane)
+        put_memory(records[k], started(
+            (y[0, lane], y[1, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane]),
+            INSIDE if play.present(numbers.play) else RIGID))
+
+
+def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
+          which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, records: Any,
+          status: Indices, ended: Floats) -> None:
+    """Let the lanes named in `which`, whose memories the records hold, go on for durations of their own [s].
+
+    `outputs` has the shape (n, 13, T), as in `run`, and gets what stands at `times` from the one numbered
+    `first_output` on.
+    """
+    for k in range(which.size):
+        lane = which[k]
+        inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
+        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_of(records[k]),
+                          durations[k], times, first_output[k], outputs[k])
+        status[k] = how
+        ended[k] = time_of(memory)
+        if how == COMPLETED:
+            put_memory(records[k], memory)
+
+
+def _inputs(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
+    first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
+    own = lanes.edge_count[lane]
+    edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
+    period = 0.0 if own >= 0 else chip_of(lanes, lane).frame_period
+    return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane])
+
+
+def settle(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
+           which: Indices, records: Any, modes: Indices) -> None:
+    """Fill `modes`, shape (4, n), with the modes of lanes as they stand, under their present inputs."""
+    for k in range(which.size):
+        lane = which[k]
+        inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
+        mode = mode_of(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_of(records[k]))
+        modes[0, k], modes[1, k], modes[2, k], modes[3, k] = mode.zone, mode.contact, mode.mesh, mode.motor
+
+
+def mode_of(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> Mode:
+    """Return the mode of a servo as it stands, under its present inputs."""
+    memory = resumed(pulsed_chip(chip), inputs, memory, False)
+    origin, point = origin_of(memory), memory.point
+    u = source(numbers, memory.chip) if pulsed_chip(chip) else since(memory.u, origin)
+    if point.anchor_time < math.inf and (not pulsed_chip(chip) or u.value == memory.u.value):
+        return point.mode
+    return anchored(numbers, u, since(memory.tau, origin), point.time, point).mode
+
+
+def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, times: Floats,
+        done: int, outputs: Floats) -> tuple[Memory, int]:
+    """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
+
+    What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (13, n): angle, speed,
+    contact, drive, error, and what only few servos have: current, temperatures of winding and housing, angle and speed
+    of the motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there.
+    """
+    pulsed = pulsed_chip(chip)
+    memory = resumed(pulsed, inputs, memory, False)
+    until = instant(pulsed, inputs, memory, memory.point.time + duration)
+    origin = origin_of(memory)
+    m = motion.nothing(numbers, memory.u, memory.tau)
+    idle = 0
+    while memory.point.time < until:
+        if due(memory):
+            memory = counted_anew(memory)
+            until = instant(pulsed, inputs, memory, until - (origin_of(memory) - origin))
+            origin = origin_of(memory)
+        t, wiper = memory.point.time, memory.point.wiper
+        after = step(numbers, chip, inputs, memory, m, until)
+        if after.status != COMPLETED:
+            return memory, after.status
+        memory, m = after.memory, after.motion
+        idle = idle + 1 if memory.point.time == t else 0
+        if idle > MOST_IDLE:
+            return memory, CHATTER
+        while done < times.size and (times[done] - origin < memory.point.time or memory.point.time >= until):
+            m = motion.prepared(m)
+            y = motion.state(m, min(times[done] - origin, until) - m.t0)
+            outputs[0, done], outputs[1, done], outputs[2, done] = y[0], y[1], m.mode.contact
+            outputs[3, done], outputs[4, done] = memory.chip.drive, memory.chip.error
+            for k in range(5):
+                outputs[5 + k, done] = y[2 + k]
+            outputs[10, done] = wiper_at(numbers.sensor, wiper, y[0])
+            outputs[11, done], outputs[12, done] = m.mode.mesh, m.mode.motor
+            done += 1
+    return memory, COMPLETED

@@ -1,0 +1,173 @@
+"""The one step: a servo goes on from event to event, to the next one or to a given time.
+
+Runs of one servo, lanes of many and servos on a bus all are loops over it. The state is kept at the *anchor*, where
+the present motion began, and everything is evaluated from there. So the result depends neither on the output times
+nor on how a run is split.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from servotwin.models.engine import currents, events, guards, motion
+from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, edge_of, in_force, origin_of, since
+from servotwin.models.engine.modes import Vector
+from servotwin.models.engine.motion import Motion
+from servotwin.models.terms import bridge, frame
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.chip import present as chip_present
+from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.friction import smoothed
+from servotwin.models.terms.load import swings
+from servotwin.models.terms.motor import inductive
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.sensor import sensed_voltage, wiper_at
+from servotwin.physics.pieces import Piece, piece_rate, piece_value
+
+MOST_IDLE = 200  # events without time going on
+_MOST_OSCILLATIONS = 1e7  # within one motion
+
+# How a step ends; the members of simulation.Status carry the same numbers.
+COMPLETED, DIVERGED, STEP_TOO_SMALL, CHATTER, TOO_FAST, CROWDED = range(6)
+
+
+class Stepped(NamedTuple):
+    """What a step leaves: the memory, the motion on which it went, the event that ended it (−1: none), a status."""
+
+    memory: Memory
+    motion: Motion
+    event: int
+    status: int
+
+
+def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion, until: float) -> Stepped:
+    """Go on to the next event, or to `until` at the latest, by the times of the memory [s].
+
+    `m` is the motion of the step before, or `motion.nothing`.
+    """
+    frames, beat, point, now, u, u_end, tau, tau_end = memory
+    origin, t = frames * beat, point.time
+    new = point.anchor_time == math.inf
+    if t >= tau_end:
+        tau, tau_end = in_force(inputs.torque, origin, t, inputs.constant_torque)
+        new = True
+    if chip_present(chip):
+        if frame.next_switch(now) <= t:
+            now = frame.switched(now, t)
+        edge = edge_of(inputs, memory, now.number)
+        if edge <= t:
+            now = measured(numbers, chip, inputs, now, point, pulse_width(inputs, memory))
+            if now.number == frame.CROWDED:
+                return Stepped(memory, m, -1, CROWDED)
+            edge = edge_of(inputs, memory, now.number)
+        u_end = min(frame.next_switch(now), edge)
+        if new or u.value != now.drive * numbers.source.V:
+            u, new = source(numbers, now), True
+    elif t >= u_end:
+        u, u_end = in_force(inputs.command, origin, t, 0.0)
+        new = True
+    local_u, local_tau = (since(u, origin), since(tau, origin)) if origin != 0.0 else (u, tau)
+    if new:
+        point = anchored(numbers, local_u, local_tau, t, point)
+        m = motion.nothing(numbers, local_u, local_tau)
+    point, m, event, status = onward(numbers, point, local_u, local_tau, m, min(u_end, tau_end), until)
+    return Stepped(Memory(frames, beat, point, now, u, u_end, tau, tau_end), m, event, status)
+
+
+def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, limit: float,
+           until: float) -> tuple[Point, Motion, int, int]:
+    """Go on, under inputs that stay until `limit` [s], to the next event or to `until`.
+
+    `m` is the motion so far, which is taken up again if it is still the right one. Return the point, the motion, the
+    event (−1: none) and a status.
+    """
+    if motion.is_step(m) or m.t0 != point.anchor_time or m.mode != point.mode:
+        m = motion.begin(numbers, point.mode, u, tau, point.anchor_time, point.anchor, point.step,
+                         limit - point.anchor_time)
+    if m.kind == motion.IMPOSSIBLE:
+        return point, m, -1, STEP_TOO_SMALL
+    point, event, status = follow(m, point, min(limit, until))
+    return point, m, event, status
+
+
+def pulse_width(inputs: Inputs, memory: Memory) -> float:
+    """Return the width [s] of the pulse that begins now."""
+    origin, t = origin_of(memory), memory.point.time
+    piece, _ = in_force(inputs.command, origin, t + SAME * memory.beat, 0.0)
+    return piece_value(since(piece, origin), t)
+
+
+def anchored(numbers: Numbers, u: Piece, tau: Piece, time: float, point: Point) -> Point:
+    """Return a point whose motion begins now, under inputs that are new."""
+    y, v = point.y, piece_value(u, time)
+    zone = currents.zone_of(warm(numbers, y), v, piece_rate(u, time), y[0], y[6], y[2])
+    mode = guards.settled(numbers, zone, v, piece_value(tau, time), y, point.mode.mesh, in_one_piece(numbers, u))
+    return Point(time, y, mode, time, y, point.step, point.wiper)
+
+
+def in_one_piece(numbers: Numbers, u: Piece) -> bool:
+    """Tell whether a smoothed friction is integrated throughout: where no part of it would be linear."""
+    return smoothed(numbers.friction) and (inductive(numbers.motor) or swings(numbers.load) or u.sweep != 0.0)
+
+
+def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
+    """Follow a motion to its first event, its end or the horizon [s]; return also the event (−1: none) and a status."""
+    t0, integrated = m.t0, motion.is_step(m)
+    step_end = t0 + m.length
+    if abs(step_end - horizon) <= 4e-16 * (abs(t0) + abs(horizon)):
+        step_end = horizon
+    end = min(horizon, step_end)
+    if m.kind == motion.SECOND_ORDER or m.kind == motion.WITH_CURRENT:
+        fine, settled = motion.scales(m)
+        if min(end - t0, settled) > _MOST_OSCILLATIONS * fine:
+            return point, -1, TOO_FAST
+    if integrated and (point.time > t0 or end < step_end):
+        m = motion.prepared(m)
+    v = piece_value(m.u, point.time)
+    kinds = guards.guards(m.numbers, m.mode, v, in_one_piece(m.numbers, m.u))
+    if integrated:  # looked at as a whole, however a run is split
+        s, kind = events.first_event(m, kinds, 0.0, m.length)
+        kind = kind if s <= end - t0 else -1
+    else:
+        s, kind = events.first_event(m, kinds, point.time - t0, end - t0)
+    if kind < 0:
+        y = motion.state(m, end - t0)
+        wiper = wiper_at(m.numbers.sensor, point.wiper, y[0])
+        if integrated and end == step_end:
+            return Point(end, y, m.mode, end, y, m.next_step, wiper), -1, status_of(y)
+        return Point(end, y, m.mode, t0, point.anchor, point.step, wiper), -1, status_of(y)
+    t = min(max(t0 + s, point.time), end)
+    before = motion.state(motion.prepared(m), s)
+    wiper = wiper_at(m.numbers.sensor, point.wiper, before[0])
+    after, y = guards.cross(m.numbers, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), before)
+    return Point(t, y, after, t, y, point.step, wiper), kind, status_of(y)
+
+
+def status_of(y: Vector) -> int:
+    """Tell whether a state is finite, as a code."""
+    total = y[0] + y[1] + y[2] + y[3] + y[4] + y[5] + y[6]
+    return COMPLETED if math.isfinite(total) else DIVERGED
+
+
+def source(numbers: Numbers, now: Frame) -> Piece:
+    """Return the voltage behind the bridge, the input of a numbers with a bridge."""
+    return Piece(0.0, now.drive * numbers.source.V, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def voltages(numbers: Numbers, u: float, y: Vector) -> tuple[float, float]:
+    """Return the voltages at the motor's terminals and of the bus [V], for the voltage u behind the bridge."""
+    numbers = warm(numbers, y)
+    w, i = y[6], y[2]
+    zone = currents.zone_of(numbers, u, 0.0, y[0], w, i)
+    if not inductive(numbers.motor):
+        i = currents.current(numbers, zone, u, y[0], w)
+    V_bus = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)
+    return bridge.terminal_voltage(numbers.bridge, numbers.source, numbers.motor, u, w, i, V_bus), V_bus
+
+
+def measured(numbers: Numbers, chip: Chip, inputs: Inputs, now: Frame, point: Point, t_in: float) -> Frame:
+    """Return the frame state after the edge of a pulse of the width t_in that meets the servo at a point."""
+    v_m, V_bus = voltages(numbers, now.drive * numbers.source.V, point.y)
+    v_o = sensed_voltage(numbers.sensor, inputs.curve, point.wiper)
+    return frame.edge(chip, now, point.time, t_in, v_o, v_m, V_bus, inputs.seed)

@@ -1,0 +1,268 @@
+"""Tiles: what pulse servos that run side by side are, remember and work with, 128 lanes of each number in a row.
+
+Times count from now, within a frame, so that float32 keeps their digits; clocks are float64.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from servotwin.models.engine import arcs
+from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.records import TILE, reader, rows_of, tile_of, writer
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.numbers import Numbers
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Indices = NDArray[np.int64]
+    Smalls = NDArray[np.int8]
+
+FEW = 2  # lanes that are not worth going together
+
+
+class Meter(NamedTuple):
+    """What the chip meets when it measures while a current flows."""
+
+    V: float
+    R_b: float
+    K_b: float
+    R: float
+    V_br: float
+    coast: float
+    D_drive: float
+    R_drive: float
+    D_off: float
+    R_off: float
+    p: float
+    b_o: float
+
+
+class Servo(NamedTuple):
+    """What a servo remembers between two windows; times count from now [s]."""
+
+    q: float
+    w: float
+    drive: float
+    left: float  # of the drive
+    silence: float  # until the drive ends for want of pulses
+    error: float  # of the latest decision
+    width: float  # of the pulse
+    due: float  # until the next decision; inf: none waits
+    sign: float
+    duration: float
+    decided: float  # its error
+    later_due: float  # of a second one that waits
+    later_sign: float
+    later_duration: float
+    later_decided: float
+
+
+class Clock(NamedTuple):
+    """Where a lane is in time [s]."""
+
+    period: float
+    edge: float  # when its frame began, since its start
+    since: float  # the time since then
+    length: float  # of the frame; at its end the next pulse rises, when time goes on
+    remaining: float  # of the call
+    owed: float  # of a call that the general way has to finish
+    piece_end: float  # when the command's piece is over or its value changes
+    output: float  # the next one
+
+
+class Count(NamedTuple):
+    """Whole numbers of a lane."""
+
+    number: int  # of the next frame
+    first_draw: int  # of noise, that of frame 0
+    seed: int
+    piece: int
+    last_piece: int
+    output: int
+    first_edge: int
+    edges: int  # −1: they come regularly
+    which: int  # a list of lanes, written without branches: a wrong guess costs more than an entry
+
+
+class Plan(NamedTuple):
+    """What is worked out for one window."""
+
+    window: float
+    at_edge: float  # 1: a pulse rises at its beginning
+    decides: float  # 1: the decision lies in it
+    last: float  # 1: with it the call is over
+    draw: float
+    v_m: float
+    V_bus: float
+    lost: float  # 1: for the general way
+    end1: float  # of the drive left over, of the rest before the decision, of the drive after it
+    end2: float
+    end3: float
+    time1: float
+    time2: float
+    time3: float
+    time4: float
+    drive1: float
+    drive3: float
+    time: float  # of a phase
+    power: float
+    ends: float
+    q1: float  # angle and speed at the start of each phase
+    w1: float
+    q2: float
+    w2: float
+    q3: float
+    w3: float
+    q4: float
+    w4: float
+    edge_speed: float  # of a arc
+    pull_there: float
+    rate: float
+    per_rate: float
+    pull: float
+    way_time: float
+    way_angle: float
+    q_before: float  # what was so before the window
+    w_before: float
+    left_before: float
+    silence_before: float
+    error_before: float
+    due_before: float
+    sign_before: float
+    duration_before: float
+    decided_before: float
+
+
+class Times(NamedTuple):
+    """The clock before a window [s]."""
+
+    now: float  # since the start
+    since: float
+    remaining: float
+
+
+def tile_type(real: str) -> np.dtype[Any]:
+    """Return the type of a tile whose servos have numbers of this type."""
+    return tile_of({"arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real), "meter": rows_of(Meter, real),
+                    "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
+                    "count": rows_of(Count, np.int64)})
+
+
+def plan_type(real: str) -> np.dtype[Any]:
+    """Return the type of the room that a window is worked out in."""
+    return tile_of({"of": rows_of(Plan, real), "clock": rows_of(Times, np.float64)})
+
+
+chip_at = reader("chip_at", Chip)
+numbers_at = reader("numbers_at", Numbers)
+put_chip = writer("put_chip", Chip)
+arc_numbers_at = reader("arc_numbers_at", ArcNumbers)
+put_arc_numbers = writer("put_arc_numbers", ArcNumbers)
+put_servo = writer("put_servo", Servo)
+put_clock = writer("put_clock", Clock)
+put_count = writer("put_count", Count)
+meter_at = reader("meter_at", Meter)
+put_meter = writer("put_meter", Meter)
+
+
+class Lanes(NamedTuple):
+    """What comes in, for all lanes of a chunk; each array has a column, an entry or a place in a tile for each lane."""
+
+    numbers: Any  # tiles of Numbers
+    chips: Any  # tiles of Chip
+    start: Floats  # (7, B), numbers of the state at t = 0
+    torque: Floats
+    seeds: Indices
+    pieces: Floats  # (n, 7)
+    piece_first: Indices
+    piece_count: Indices
+    edges: Floats
+    edge_first: Indices
+    edge_count: Indices
+
+
+class Outputs(NamedTuple):
+    """What goes out: (B, T) each, or (0, 0) where it is not wanted."""
+
+    angle: Floats
+    speed: Floats
+    contact: Smalls
+    drive: Smalls
+    error: Floats
+
+
+def numbers_of(lanes: Lanes, lane: int) -> Numbers:
+    """Return the numbers of a lane."""
+    return numbers_at(lanes.numbers[lane // TILE], lane % TILE)
+
+
+def chip_of(lanes: Lanes, lane: int) -> Chip:
+    """Return the chip of a lane."""
+    return chip_at(lanes.chips[lane // TILE], lane % TILE)
+
+
+def set_numbers(lanes: Lanes, first: int, size: int, tile: Any) -> None:
+    """Put what servos are into a tile, from the lane `first` on."""
+    for j in range(size):
+        put_arc_numbers(tile.arc, j, arcs.arc_numbers(numbers_of(lanes, first + j), lanes.torque[first + j]))
+    for j in range(size):
+        chip = chip_of(lanes, first + j)
+        put_chip(tile.chip, j, chip)
+        tile.clock.period[j] = chip.frame_period
+    for j in range(size):
+        numbers = numbers_of(lanes, first + j)
+        path, motor, source, sensor = numbers.bridge, numbers.motor, numbers.source, numbers.sensor
+        put_meter(tile.meter, j, Meter(
+            source.V, source.R_b, motor.K_b, motor.R, path.V_br, path.coast, path.D_drive, path.R_drive, path.D_off,
+            path.R_off, sensor.p, sensor.b_o))
+
+
+def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -> None:
+    """Put lanes as they start into a tile, from the column `first` on."""
+    set_numbers(lanes, first, size, tile)
+    for j in range(size):
+        q, w = lanes.start[0, first + j], lanes.start[1, first + j]
+        put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
+                                       0.0))
+    for j in range(size):
+        own = lanes.edge_count[first + j]
+        late = lanes.edges[lanes.edge_first[first + j]] if own > 0 else math.inf if own == 0 else 0.0
+        put_clock(tile.clock, j, Clock(tile.clock.period[j], 0.0, 0.0, late, 0.0, 0.0, -math.inf, first_output))
+        begin, count = lanes.piece_first[first + j], lanes.piece_count[first + j]
+        put_count(tile.count, j, Count(0, 0, lanes.seeds[first + j], begin, begin + count - 1, 0,
+                                       lanes.edge_first[first + j], own, 0))
+
+
+def driven_numbers_at(rows: Any, j: int) -> ArcNumbers:
+    """Return a shaft for drives alone: the numbers between drives are replaced, so that choosing costs nothing."""
+    x = arc_numbers_at(rows, j)
+    return ArcNumbers(
+        x.rate_drive, x.rate_drive, x.rate_free, x.per_rate_drive, x.per_rate_drive, x.per_rate_free, x.push,
+        x.drag_drive, x.drag_drive, x.speed, x.gap_drive, x.gap_drive, x.friction_forward, x.friction_backward,
+        x.against, x.start_forward, x.start_backward, 0.0, x.lower, x.upper, x.inertia, x.pull, x.hold_forward,
+        x.hold_backward)
+
+
+def idle_numbers_at(rows: Any, j: int) -> ArcNumbers:
+    """Return a shaft for the time between drives alone."""
+    x = arc_numbers_at(rows, j)
+    return ArcNumbers(
+        x.rate_off, x.rate_off, x.rate_free, x.per_rate_off, x.per_rate_off, x.per_rate_free, 0.0, x.drag_off,
+        x.drag_off, 0.0, x.gap_off, x.gap_off, x.friction_forward, x.friction_backward, x.against, x.start_off,
+        x.start_off, x.start_off, x.lower, x.upper, x.inertia, x.pull, x.hold_forward, x.hold_backward)
+
+
+def plain_chip_at(rows: Any, j: int) -> Chip:
+    """Return a chip without noise, coupling and RC stretcher."""
+    x = chip_at(rows, j)
+    return Chip(x.T_0, x.slope, 0.0, 0.0, 0.0, x.half_deadband, x.K, x.t_min, 0.0, x.shortest, x.longest, x.timeout,
+                0.0, 0.0)
+
+
+__all__ = ["FEW", "TILE", "Lanes", "Outputs", "Plan", "Servo", "arc_numbers_at", "chip_at", "plan_type", "tile_type"]

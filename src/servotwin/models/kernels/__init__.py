@@ -1,1 +1,0 @@
-"""The models' modes as plain functions over floats; they know `math` and nothing else."""

@@ -1,0 +1,164 @@
+"""The switched bridge: the path of the current, its drops, and the zones of the current while it drives or does not.
+
+Behind it u is s V, or 0 between drives; the zone is the direction of the current.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from servotwin.models.engine.modes import (
+    CONDUCTING,
+    CURRENT_BACKWARD,
+    CURRENT_FORWARD,
+    LIMITED_BACKWARD,
+    LIMITED_FORWARD,
+    NO_CURRENT,
+    SHORT_BACKWARD,
+    SHORT_FORWARD,
+    limited,
+    sign_of,
+)
+from servotwin.models.terms.given import Given
+from servotwin.models.terms.motor import Motor, inductive
+from servotwin.models.terms.source import Source, loaded_voltage, regulated
+from servotwin.physics.bridge import bridge_voltage, driving_voltage, motor_voltage, needed_voltage
+from servotwin.physics.motor import back_emf
+from servotwin.physics.supply import supply_current
+
+
+class Bridge(NamedTuple):
+    """Numbers of the bridge and of the brushes behind it."""
+
+    D_drive: float  # V_ce0 + V_br: no current flows where |s V − K_b w| is less
+    R_drive: float  # R_a + r_c + R_b
+    D_off: float  # the same between drives
+    R_off: float
+    V_br: float
+    coast: float  # 1: the bridge opens between drives; 0: it brakes
+
+
+NO_BRIDGE = Bridge(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def coasts(bridge: Bridge) -> bool:
+    """Tell whether the bridge opens between drives."""
+    return bridge.coast > 0.0
+
+
+def drop(bridge: Bridge, u: float) -> float:
+    """Return the voltage [V] that has to be exceeded for a current to flow, driven or between drives (u = 0)."""
+    return bridge.D_drive if u != 0.0 else bridge.D_off
+
+
+def loop(bridge: Bridge, source: Source, zone: int, u: float) -> tuple[float, float]:
+    """Return voltage [V], with its drop, and resistance [Ω] of the loop through which the current of a zone flows."""
+    sign = sign_of(zone)
+    if u == 0.0:
+        return driving_voltage(0.0, sign, bridge.D_off), bridge.R_off
+    if zone == SHORT_FORWARD or zone == SHORT_BACKWARD:
+        return driving_voltage(0.0, sign, bridge.D_drive), bridge.R_drive - source.R_b
+    R = bridge.R_drive
+    if regulated(source) and sign * u < 0.0:  # returned past a regulator
+        R -= source.R_b
+    return driving_voltage(u, sign, bridge.D_drive), R
+
+
+def zone_limits(bridge: Bridge, source: Source, by_current: bool, zone: int, u: float) -> tuple[float, float]:
+    """Return between what a zone lies: voltages that drive the current [V], or `by_current` currents [A]."""
+    D, I_max = drop(bridge, u), source.I_max
+    if zone == CONDUCTING:
+        return -math.inf, math.inf
+    if zone == NO_CURRENT:
+        return -D, D
+    # A regulator's most, in the direction of the drive: from x1 on it gives that, from x2 on the bus has broken down.
+    x1 = needed_voltage(I_max, 0.0, D, bridge.R_drive)
+    x2 = needed_voltage(I_max, 0.0, D, bridge.R_drive - source.R_b) + abs(u)
+    if by_current:
+        D, x1, x2 = 0.0, I_max, I_max
+    forward, backward = (x1 if u > 0.0 else math.inf), (x1 if u < 0.0 else math.inf)
+    if zone == CURRENT_FORWARD:
+        return D, forward
+    if zone == CURRENT_BACKWARD:
+        return -backward, -D
+    if zone == LIMITED_FORWARD:
+        return x1, x2
+    if zone == LIMITED_BACKWARD:
+        return -x2, -x1
+    return (x2, math.inf) if zone == SHORT_FORWARD else (-math.inf, -x2)
+
+
+def zone_of(bridge: Bridge, source: Source, motor: Motor, u: float, x: float, i: float) -> int:
+    """Return the zone of a current i [A], where x [V] drives it."""
+    D = drop(bridge, u)
+    if D == 0.0 and source.I_max == math.inf:
+        return CONDUCTING
+    if motor.L > 0.0 and i != 0.0:
+        forward = i > 0.0
+    elif abs(x) <= D:
+        return NO_CURRENT
+    else:
+        forward = x > 0.0
+    zone = CURRENT_FORWARD if forward else CURRENT_BACKWARD
+    step = 1 if forward else -1
+    if source.I_max == math.inf or u * step <= 0.0:
+        return zone
+    if inductive(motor):
+        if abs(i) < source.I_max:
+            return zone
+        if abs(i) > source.I_max:
+            return zone + 2 * step
+    most = needed_voltage(source.I_max, 0.0, D, bridge.R_drive)
+    zone += step if abs(x) > most else 0
+    short = needed_voltage(source.I_max, 0.0, D, bridge.R_drive - source.R_b) + abs(u)
+    return zone + (step if abs(x) > short else 0)
+
+
+def bus_voltage(bridge: Bridge, source: Source, motor: Motor, zone: int, u: float, w: float, i: float) -> float:
+    """Return what is left of the source's voltage [V] under this servo's current."""
+    if i == 0.0 or not (u != 0.0 or coasts(bridge)):
+        return source.V
+    if zone == SHORT_FORWARD or zone == SHORT_BACKWARD:
+        return 0.0
+    if limited(zone):
+        drops = sign_of(zone) * bridge.D_drive
+        return abs(needed_voltage(i, back_emf(w, motor.K_b), drops, bridge.R_drive - source.R_b))
+    return loaded_voltage(source, supply_current(i, direction(u)))
+
+
+def direction(u: float) -> float:
+    """Return how the bridge drives: −1, 0 or +1."""
+    return math.copysign(1.0, u) if u != 0.0 else 0.0
+
+
+def terminal_voltage(bridge: Bridge, source: Source, motor: Motor, u: float, w: float, i: float, V_bus: float) -> float:
+    """Return the voltage v_m [V] at the motor's terminals."""
+    open_ = coasts(bridge)
+    if motor.L == 0.0 or i == 0.0:
+        v_b = back_emf(w, motor.K_b)
+        return motor_voltage(i, v_b, motor.R, bridge.V_br, v_b if u != 0.0 or open_ else 0.0)
+    if u == 0.0 and not open_:
+        return 0.0
+    drive = direction(u) if u != 0.0 else -math.copysign(1.0, i)
+    V_ce0, r_c = drops(bridge, source, motor, u)
+    return bridge_voltage(i, V_bus, drive, V_ce0, r_c)
+
+
+def drops(bridge: Bridge, source: Source, motor: Motor, u: float) -> tuple[float, float]:
+    """Return V_ce0 [V] and r_c [Ω] of what conducts: transistors while the bridge drives, diodes while it coasts."""
+    if u == 0.0:
+        return max(bridge.D_off - bridge.V_br - source.V, 0.0), 0.0
+    return max(bridge.D_drive - bridge.V_br, 0.0), max(bridge.R_drive - motor.R - source.R_b, 0.0)
+
+
+def pack(model: Given, coast: Any) -> Bridge:
+    """Return the numbers of a model's bridge, which opens between drives where `coast` is 1."""
+    R_a, R_b = model.value("motor.armature_resistance"), model.value_or("supply.internal_resistance", 0.0)
+    r_c, V_ce0 = (model.value_or(f"supply.bridge_drop_{name}", 0.0) for name in ("resistance", "voltage"))
+    V_oc, V_br = model.value("supply.open_circuit_voltage"), model.value_or("motor.brush_drop_voltage", 0.0)
+    battery = np.all(np.isinf(model.value_or("supply.current_limit", math.inf)))  # a regulator keeps its voltage
+    return Bridge(D_drive=V_ce0 + V_br, R_drive=R_a + r_c + R_b, D_off=V_br + coast * (V_oc + V_ce0),
+                  R_off=R_a + (R_b * coast if battery else 0.0), V_br=V_br, coast=coast)

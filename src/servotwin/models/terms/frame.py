@@ -1,0 +1,114 @@
+"""What the chip does with each pulse: measure, decide, drive. All times in seconds, all of it at pulse level.
+
+A frame starts at the rising edge of its pulse. There the one-shot measures the shaft; when the longer of the two
+pulses is over, the bridge drives for as long as the stretcher says, or until the next decision.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from servotwin.models.engine.noise import gaussian
+from servotwin.models.terms.chip import Chip
+from servotwin.physics import pulse
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class Decision(NamedTuple):
+    """What a frame has decided: from `time` on, drive with `sign` for `duration`."""
+
+    time: float
+    sign: float
+    duration: float
+    error: float
+
+
+class Frame(NamedTuple):
+    """Everything that the chip remembers."""
+
+    number: int  # of the next frame, lost pulses counted
+    draws: int  # of noise so far, one a frame
+    drive: float  # −1, 0, +1: how the bridge drives now
+    drive_end: float
+    clock: float  # the drive ends here at the latest
+    error: float  # of the latest decision
+    pending: Decision
+    later: Decision  # a second one, where a frame starts before the one before has been decided
+
+
+NOTHING = Decision(math.inf, 0.0, 0.0, 0.0)
+CROWDED = -1  # as the number of a frame: more than two decisions would have to wait
+AT_START = Frame(0, 0, 0.0, math.inf, math.inf, 0.0, NOTHING, NOTHING)
+
+
+def decide(chip: Chip, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, draw: float) -> Decision:
+    """Return what the frame that starts at `time` decides; `draw` is its Gaussian draw."""
+    v_eff = pulse.effective_voltage(v_o, chip.noise * draw, v_m, V_bus - chip.V_oc, chip.beta, chip.c_s)
+    T_os = pulse.one_shot_width(v_eff, chip.slope, chip.T_0)
+    e = pulse.error_time(t_in, T_os)
+    t_on = pulse.drive_time(e, chip.K, 2.0 * chip.half_deadband, chip.t_min, chip.tau_s)
+    sign = 0.0 if t_on == 0.0 else math.copysign(1.0, e)
+    return Decision(time + pulse.decision_delay(t_in, T_os), sign, t_on, e)
+
+
+def accepted(chip: Chip, t_in: float) -> bool:
+    """Tell whether a pulse is neither too short nor too long."""
+    return chip.shortest <= t_in <= chip.longest
+
+
+def edge(chip: Chip, frame: Frame, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, seed: int) -> Frame:
+    """Return the frame state after the rising edge of a pulse of the width t_in."""
+    if not accepted(chip, t_in):
+        return Frame(frame.number + 1, frame.draws + 1, frame.drive, frame.drive_end, frame.clock, frame.error,
+                     frame.pending, frame.later)
+    draw = gaussian(seed, frame.draws) if chip.noise > 0.0 else 0.0
+    new = decide(chip, time, t_in, v_o, v_m, V_bus, draw)
+    number, pending, later = frame.number + 1, frame.pending, frame.later
+    if new.time <= pending.time:  # where another waits, it would be replaced as soon as it comes
+        pending, later = new, NOTHING
+    elif new.time <= later.time:
+        later = new
+    else:
+        number = CROWDED
+    return Frame(number, frame.draws + 1, frame.drive, frame.drive_end, time + chip.timeout, frame.error, pending,
+                 later)
+
+
+def edge_time(period: float, edges: Sequence[float] | NDArray[np.float64], k: int) -> float:
+    """Return when frame k starts: every `period`, or where that is 0 at its own edge; inf after the last."""
+    if period > 0.0:
+        return k * period
+    return edges[k] if k < len(edges) else math.inf
+
+
+def numbered(frame: Frame, number: int) -> Frame:
+    """Return the frame state before the frame of this number."""
+    return Frame(number, frame.draws, frame.drive, frame.drive_end, frame.clock, frame.error, frame.pending,
+                 frame.later)
+
+
+def next_switch(frame: Frame) -> float:
+    """Return when the bridge switches next, edges apart."""
+    if frame.drive != 0.0:
+        return min(frame.pending.time, frame.drive_end, frame.clock)
+    return frame.pending.time
+
+
+def switched(frame: Frame, time: float) -> Frame:
+    """Return the frame state after all that switches at `time`: the end of a drive, then decisions."""
+    drive, end, error = frame.drive, frame.drive_end, frame.error
+    pending, later = frame.pending, frame.later
+    if drive != 0.0 and (end <= time or frame.clock <= time):
+        drive, end = 0.0, math.inf
+    while pending.time <= time:
+        drive, end, error = pending.sign, pending.time + pending.duration, pending.error
+        if drive == 0.0 or end <= time or frame.clock <= time:
+            drive, end = 0.0, math.inf
+        pending, later = later, NOTHING
+    return Frame(frame.number, frame.draws, drive, end, frame.clock, error, pending, later)

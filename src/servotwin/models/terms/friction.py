@@ -1,0 +1,129 @@
+"""Dry friction of motor and gear: Coulomb and static friction, Stribeck, and what the torques through the gear add.
+
+The budget at the output shaft is `load_friction.gear_friction_budget`; at rest S = 1, and friction takes whatever is
+to be held, up to the budget.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from servotwin import physics
+from servotwin.models.engine.modes import CORE, at_rest
+from servotwin.models.terms.dependence import CURVED_W, STEEP_W
+from servotwin.models.terms.given import Given
+from servotwin.physics.friction import breakaway_torque, coulomb_torque
+from servotwin.physics.load_friction import gear_friction_budget, sliding_gear_friction, static_gear_friction
+
+_SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
+_SHARES = {"K_m": "motor", "K_e": "external", "K_ms": "motor_stribeck", "K_es": "external_stribeck",
+           "K_mq": "motor_quad", "K_eq": "external_quad"}
+
+
+class Friction(NamedTuple):
+    """Numbers of the dry friction, at the output shaft."""
+
+    F_forward: float  # N F_ec1
+    F_backward: float  # N F_ec2
+    breakaway: float  # F_s / F_c
+    kappa: float  # N k, slope of tanh (41); 0: true sticking
+    varies: float  # 1: sliding friction is not constant
+    w_s: float  # v_s / N; 0: static friction ends as soon as the shaft moves
+    alpha: float
+    K_m: float
+    K_e: float
+    K_ms: float
+    K_es: float
+    K_mq: float
+    K_eq: float
+
+
+NO_FRICTION = Friction(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def present(friction: Friction) -> bool:
+    """Tell whether the gear has any dry friction."""
+    return friction.F_forward > 0.0 or friction.F_backward > 0.0 or friction.varies > 0.0
+
+
+def smoothed(friction: Friction) -> bool:
+    """Tell whether the friction is the paper's tanh (41), without sticking."""
+    return friction.kappa > 0.0
+
+
+def varying(friction: Friction) -> bool:
+    """Tell whether sliding friction changes with the speed or with the torques."""
+    return friction.varies > 0.0
+
+
+def depends(friction: Friction, contact: int) -> int:
+    """Return on what the acceleration depends through the friction of a shaft in a contact."""
+    return STEEP_W if contact == CORE else CURVED_W if friction.varies > 0.0 and not at_rest(contact) else 0
+
+
+def core_speed(friction: Friction) -> float:
+    """Return the output speed [rad/s] beyond which the smoothed friction (41) is constant; 0 for true sticking."""
+    return _SATURATED_TANH / friction.kappa if friction.kappa > 0.0 else 0.0
+
+
+def coulomb(friction: Friction, forward: bool) -> float:
+    """Return the magnitude of the gear's Coulomb friction [N m]."""
+    return abs(coulomb_torque(1.0 if forward else -1.0, friction.F_forward, friction.F_backward))
+
+
+def sliding_friction(friction: Friction, forward: bool, w: float, tau_m: float, tau_e: float) -> float:
+    """Return the magnitude of the gear's friction [N m] at the speed w, for the torques of motor and load in +q."""
+    F = coulomb(friction, forward)
+    if friction.varies == 0.0:
+        return F
+    speed = w if friction.w_s > 0.0 else math.inf  # else static friction ends as soon as the shaft moves
+    return gear_friction_budget(
+        speed, tau_m, tau_e, coulomb_torque=F, breakaway_ratio=friction.breakaway, stribeck_speed=friction.w_s,
+        stribeck_exponent=friction.alpha, load_friction_motor=friction.K_m, load_friction_external=friction.K_e,
+        load_friction_motor_stribeck=friction.K_ms, load_friction_external_stribeck=friction.K_es,
+        load_friction_motor_quad=friction.K_mq, load_friction_external_quad=friction.K_eq)
+
+
+def holding_friction(friction: Friction, forward: bool, tau_m: float, tau_e: float) -> float:
+    """Return the torque [N m] up to which the gear holds against a start forward or backward."""
+    F = coulomb(friction, forward)
+    if friction.varies == 0.0:
+        return breakaway_torque(F, friction.breakaway)
+    static = static_gear_friction(
+        tau_m, tau_e, F, friction.breakaway, friction.K_ms, friction.K_es, friction.K_mq, friction.K_eq)
+    return sliding_gear_friction(tau_m, tau_e, F, friction.K_m, friction.K_e) + static
+
+
+def pack_smoothed(model: Given, reduction: float) -> Friction:
+    """Return the friction (41) of a model."""
+    return _coulomb(model, reduction)._replace(
+        kappa=physics.motor_from_output(model.value("friction.zero_crossing_slope"), reduction))
+
+
+def pack_sticking(model: Given, reduction: float) -> Friction:
+    """Return the Coulomb and static friction of a model."""
+    return _coulomb(model, reduction)._replace(breakaway=model.value_or("friction.breakaway_ratio", 1.0))
+
+
+def pack(model: Given, reduction: float) -> Friction:
+    """Return all friction of a model's gear."""
+    share, static = (model.value_or(f"friction.load_friction{name}", 0.0) for name in ("", "_stribeck"))
+    shares: dict[str, Any] = {
+        field: model.value_or(f"friction.load_friction_{name}", 0.0) for field, name in _SHARES.items()}
+    shares["K_m"], shares["K_e"] = shares["K_m"] + share, shares["K_e"] + share
+    shares["K_ms"], shares["K_es"] = shares["K_ms"] + static, shares["K_es"] + static
+    w_s = model.value_or("friction.stribeck_speed", 0.0) / reduction
+    fades = (w_s > 0.0) & (np.asarray(model.value_or("friction.breakaway_ratio", 1.0)) > 1.0)
+    varies = np.asarray(fades | np.any([np.asarray(x) != 0.0 for x in np.broadcast_arrays(*shares.values())], axis=0))
+    changes: Any = np.where(varies, 1.0, 0.0) if varies.ndim else float(varies)
+    return pack_sticking(model, reduction)._replace(
+        varies=changes, w_s=w_s, alpha=model.value_or("friction.stribeck_exponent", 1.0), **shares)
+
+
+def _coulomb(model: Given, reduction: float) -> Friction:
+    return NO_FRICTION._replace(
+        F_forward=physics.output_torque(model.value("friction.coulomb_torque_forward"), reduction),
+        F_backward=physics.output_torque(model.value("friction.coulomb_torque_backward"), reduction))

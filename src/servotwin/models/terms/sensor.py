@@ -1,0 +1,87 @@
+"""The potentiometer: gain, offset, table, steps and play."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from servotwin.models.terms.dependence import ON_Q
+from servotwin.models.terms.given import Given
+from servotwin.models.terms.source import Source
+from servotwin.physics.backlash import play
+from servotwin.physics.electronics import feedback_error
+from servotwin.physics.potentiometer import error_between, feedback_voltage, quantised
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+class Sensor(NamedTuple):
+    """Numbers of the potentiometer; its table, one for all lanes, is an input."""
+
+    p: float
+    b_o: float
+    half_slack: float  # half of the play between output and potentiometer
+    step: float  # V from one step to the next; 0: none
+
+
+NO_SENSOR = Sensor(0.0, 0.0, 0.0, 0.0)
+
+
+def slack(sensor: Sensor) -> bool:
+    """Tell whether there is play between output and potentiometer."""
+    return sensor.half_slack > 0.0
+
+
+def depends(sensor: Sensor, source: Source) -> int:
+    """Return on what the acceleration depends through the potentiometer: a bridge does not follow it."""
+    return ON_Q if sensor.p != 0.0 and source.V == 0.0 else 0
+
+
+def error_of(sensor: Sensor, u: float, q: float) -> float:
+    """Return the error v_e [V] of a servo that follows the voltage u [V]."""
+    return feedback_error(u, feedback_voltage(q, sensor.p, sensor.b_o))
+
+
+def error_rate(sensor: Sensor, du: float, w: float) -> float:
+    """Return the rate of `error_of` [V/s] at an output speed [rad/s]."""
+    return feedback_error(du, feedback_voltage(w, sensor.p))
+
+
+def sensed_voltage(sensor: Sensor, curve: Sequence[Sequence[float]] | NDArray[np.float64], q: float) -> float:
+    """Return v_o [V] of the potentiometer with its wiper at q; `curve` has angles and errors of its linearity."""
+    v_o = feedback_voltage(q, sensor.p, sensor.b_o)
+    if len(curve[0]) > 0:
+        v_o += _interpolated(curve, q)
+    if sensor.step > 0.0:
+        v_o = quantised(v_o, sensor.step)
+    return v_o
+
+
+def _interpolated(curve: Sequence[Sequence[float]] | NDArray[np.float64], q: float) -> float:
+    angles, errors = curve[0], curve[1]
+    if q <= angles[0]:
+        return errors[0]
+    for k in range(1, len(angles)):
+        if q < angles[k]:
+            return error_between(q, angles[k - 1], errors[k - 1], angles[k], errors[k])
+    return errors[len(errors) - 1]
+
+
+def wiper_at(sensor: Sensor, wiper: float, q: float) -> float:
+    """Return where a potentiometer with play stands after the shaft has gone one way to q."""
+    return play(wiper, q, 2.0 * sensor.half_slack)
+
+
+def pack(model: Given) -> Sensor:
+    """Return the numbers of a model's potentiometer, without what pulses alone show of it."""
+    return Sensor(p=model.value("potentiometer.feedback_gain"),
+                  b_o=model.value_or("potentiometer.feedback_offset", 0.0), half_slack=0.0, step=0.0)
+
+
+def pack_pulsed(model: Given) -> Sensor:
+    """Return all numbers of a model's potentiometer."""
+    return pack(model)._replace(half_slack=0.5 * model.value_or("potentiometer.backlash", 0.0),
+                                step=model.value_or("potentiometer.quantisation", 0.0))

@@ -1,0 +1,71 @@
+"""The shaft: inertia, viscous friction and acceleration, and how it slides or rests."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from servotwin import loads, physics
+from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, ON_LOWER, ON_UPPER, STUCK
+from servotwin.models.terms.given import Given
+from servotwin.physics.friction import sticks
+from servotwin.physics.shaft import shaft_acceleration
+
+
+class Shaft(NamedTuple):
+    """Numbers of motor and load as one body, and of the output side alone."""
+
+    J: float  # N² J_m + J_L
+    b: float  # N² B_m + B_L
+    J_out: float
+    b_out: float
+
+
+NO_SHAFT = Shaft(1.0, 0.0, 0.0, 0.0)
+
+
+def accelerated(shaft: Shaft, torque: float) -> float:
+    """Return ẇ [rad/s²] of motor and output as one by a torque alone."""
+    return shaft_acceleration(torque, 0.0, 0.0, 0.0, 0.0, shaft.J)
+
+
+def acceleration(shaft: Shaft, torque: float, w: float, dry: float, against: float) -> float:
+    """Return ẇ [rad/s²] of motor and output as one."""
+    return shaft_acceleration(torque, w, dry, against, shaft.b, shaft.J)
+
+
+def motor_acceleration(shaft: Shaft, torque: float, w: float, dry: float) -> float:
+    """Return ẇ [rad/s²] of the motor alone."""
+    return shaft_acceleration(torque, w, dry, 0.0, shaft.b - shaft.b_out, shaft.J - shaft.J_out)
+
+
+def output_acceleration(shaft: Shaft, w: float, dry: float, against: float) -> float:
+    """Return ẇ [rad/s²] of the output side alone."""
+    return shaft_acceleration(0.0, w, dry, against, shaft.b_out, shaft.J_out)
+
+
+def sliding(forward: bool, dry: bool) -> int:
+    """Return the contact of a shaft that moves, `dry` where there is dry friction."""
+    if not dry:
+        return FREE
+    return FORWARD if forward else BACKWARD
+
+
+def from_rest(torque: float, backward: float, forward: float, at_upper: bool, at_lower: bool, dry: bool) -> int:
+    """Return the contact of a shaft at rest under a torque [N m], which friction holds up to two bounds [N m]."""
+    if not sticks(torque, forward, backward):
+        if torque > 0.0:
+            return ON_UPPER if at_upper else sliding(True, dry)
+        return ON_LOWER if at_lower else sliding(False, dry)
+    if dry:
+        return STUCK
+    if at_upper and torque >= 0.0:
+        return ON_UPPER
+    return ON_LOWER if at_lower and torque <= 0.0 else FREE
+
+
+def pack(model: Given, load: loads.Load, load_inertia: float, reduction: float) -> Shaft:
+    """Return the numbers of a model's shaft: the motor reflected through the gear, and the load on it."""
+    return Shaft(J=physics.output_inertia(model.value("motor.rotor_inertia"), load_inertia, reduction),
+                 b=physics.output_viscous_friction(
+                     model.value("motor.motor_viscous_friction"), load.viscous_friction, reduction),
+                 J_out=load_inertia, b_out=load.viscous_friction)

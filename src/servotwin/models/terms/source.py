@@ -1,0 +1,41 @@
+"""The source behind a switched bridge: a battery with its resistance, or a regulator that gives so much at most."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from servotwin.models.terms.given import Given
+from servotwin.physics.supply import source_voltage
+
+
+class Source(NamedTuple):
+    """Numbers of the source."""
+
+    V: float  # V_oc; 0: there is no bridge, and the voltage follows the error
+    R_b: float
+    I_max: float  # most that a regulator gives; inf: a battery
+
+
+NO_SOURCE = Source(0.0, 0.0, math.inf)
+
+
+def present(source: Source) -> bool:
+    """Tell whether the motor hangs behind a switched bridge."""
+    return source.V > 0.0
+
+
+def regulated(source: Source) -> bool:
+    """Tell whether the source gives so much at most."""
+    return source.I_max < math.inf
+
+
+def loaded_voltage(source: Source, taken: float) -> float:
+    """Return what is left of the voltage [V] under a current [A]."""
+    return source_voltage(taken, source.V, source.R_b, regulated=source.I_max < math.inf)
+
+
+def pack(model: Given) -> Source:
+    """Return the numbers of a model's source."""
+    return Source(V=model.value("supply.open_circuit_voltage"), R_b=model.value_or("supply.internal_resistance", 0.0),
+                  I_max=model.value_or("supply.current_limit", math.inf))

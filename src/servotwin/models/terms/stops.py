@@ -1,0 +1,25 @@
+"""End stops: where the travel ends, and what an impact leaves of the speed."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from servotwin.models.terms.given import Given
+
+
+class Stops(NamedTuple):
+    """Numbers of the end stops."""
+
+    lower: float
+    upper: float
+    restitution: float
+
+
+NO_STOPS = Stops(-math.inf, math.inf, 0.0)
+
+
+def pack(model: Given) -> Stops:
+    """Return the numbers of a model's stops."""
+    return Stops(model.value_or("stops.lower_angle", -math.inf), model.value_or("stops.upper_angle", math.inf),
+                 model.value_or("stops.restitution", 0.0))

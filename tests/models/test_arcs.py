@@ -1,0 +1,185 @@
+"""Arcs against a fine numerical solution, and lanes side by side against one by one, plain and compiled."""
+
+import math
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from lane_cases import case, replaced
+from servotwin.models.engine import arcs, contacts, side_by_side, tiles
+from servotwin.models.engine.records import room
+from servotwin.models.terms.bridge import NO_BRIDGE
+from servotwin.models.terms.friction import NO_FRICTION
+from servotwin.models.terms.motor import Motor
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.shaft import Shaft
+from servotwin.models.terms.source import Source
+from servotwin.simulation import lane_runs
+from servotwin.simulation.lanes import FIELDS, Tables, empty_raw, run_lanes
+
+NUMBERS = Numbers(
+    motor=Motor(1.03, 1.0, 3.0, 0.0), shaft=Shaft(6e-3, 1e-3, 0.0, 0.0), source=Source(6.0, 0.0, math.inf),
+    bridge=NO_BRIDGE._replace(R_drive=3.1, R_off=3.0), friction=NO_FRICTION._replace(F_forward=0.2, F_backward=0.25))
+DEAD_ZONES = ((0.0, 0.0), (0.5, 0.1), (0.4, 7.0))
+LOADS = (0.0, -0.3, 0.6, 1.5, -3.0)
+
+
+def fine(numbers, torque, drive, q, w, end):
+    """Solve the arc's differential equation, stopping wherever the speed is zero."""
+    D, R = (numbers.bridge.D_drive, numbers.bridge.R_drive) if drive else (numbers.bridge.D_off, numbers.bridge.R_off)
+
+    def current(w):
+        x = drive * numbers.source.V - numbers.motor.K_b * w
+        return 0.0 if abs(x) <= D else (x - math.copysign(D, x)) / R
+
+    t = 0.0
+    while t < end:
+        way = np.sign(w)
+        if w == 0.0:
+            backward, forward = contacts.holding_bounds(numbers, 0.0, 0.0)
+            pull = numbers.motor.K * current(0.0) - torque
+            way = 1.0 if pull > forward else -1.0 if pull < -backward else 0.0
+        if way == 0.0:
+            break
+        friction = numbers.friction.F_forward if way > 0.0 else -numbers.friction.F_backward
+
+        def rates(_, y, friction=friction):
+            pull = numbers.motor.K * current(y[1]) - torque
+            return [y[1], (pull - numbers.shaft.b * y[1] - friction) / numbers.shaft.J]
+
+        def stands(t, y, way=way, begin=t):
+            return y[1] if t > begin else way
+
+        stands.terminal, stands.direction = True, -way
+        run = solve_ivp(rates, (t, end), [q, w], method="DOP853", rtol=1e-11, atol=1e-13, events=stands,
+                        max_step=(end - t) / 50)
+        (q, w), t = run.y[:, -1], run.t[-1]
+        w = 0.0 if run.status == 1 else w
+    return q, w
+
+
+@pytest.mark.parametrize("zones", DEAD_ZONES)
+@pytest.mark.parametrize("torque", LOADS)
+def test_arcs_against_a_fine_solution(zones, torque):
+    numbers = replaced(NUMBERS, {"bridge.D_drive": zones[0], "bridge.D_off": zones[1]})
+    for drive, w in product((-1.0, 0.0, 1.0), (0.0, 4.0, -9.0)):
+        q, speed, done = arcs.slide(arcs.arc_numbers(numbers, torque), drive, 0.3, w, 0.06)
+        assert done == 1.0
+        assert (q, speed) == pytest.approx(fine(numbers, torque, drive, 0.3, w, 0.06), abs=2e-8), (drive, w)
+
+
+@pytest.mark.parametrize("time", [1e-12, 1e-6, 1e-3, 1.0, 100.0])
+def test_a_free_shaft_has_no_cancellation(time):
+    numbers = replaced(NUMBERS, {"shaft.b": 0.0, "friction.F_forward": 0.0, "friction.F_backward": 0.0,
+                               "bridge.R_off": 1e15})
+    q, w, _ = arcs.slide(arcs.arc_numbers(numbers, -0.006), 0.0, 0.0, 0.0, time)
+    assert q == pytest.approx(0.5 * time * time, rel=1e-9)  # a winding of 1e15 ohm hardly brakes
+    assert w == pytest.approx(time, rel=1e-9)
+
+
+OPEN = {"bridge.coast": 1.0, "bridge.D_off": 6.7, "bridge.R_off": 3.2}
+FEATURES = {
+    "plain": {}, "coast": OPEN, "RC stretcher": {"chip.tau_s": 0.02},
+    "couplings": {"chip.beta": 0.01, "chip.c_s": 0.02}, "noise": {"chip.noise": 1e-3},
+    "timeout": {"chip.timeout": 0.013},
+    "limits": {"chip.shortest": 1e-3, "chip.longest": 2e-3, "chip.timeout": 0.05},
+    "stops": {"stops.lower": 0.2, "stops.upper": 1.6}, "no drops": {"bridge.D_drive": 0.0, "bridge.D_off": 0.0},
+    "brush drop": {"bridge.D_off": 0.15}, "no friction": {"friction.F_forward": 0.0, "friction.F_backward": 0.0},
+    "short frames": {"chip.frame_period": 0.004},
+    "everything": OPEN | {"chip.tau_s": 0.02, "chip.beta": 0.01, "chip.c_s": 0.02, "chip.noise": 1e-3,
+                          "chip.timeout": 0.025, "chip.shortest": 0.9e-3, "stops.lower": 0.1, "stops.upper": 2.0}}
+
+
+def one_by_one(work):
+    raw = empty_raw(work)
+    lane_runs.run_one_by_one(work, lane_runs.lanes_of(work), np.arange(work.lanes), raw)
+    return raw
+
+
+@pytest.mark.parametrize("name", FEATURES)
+def test_side_by_side_against_one_by_one(name):
+    work = case(40, duration=0.7, times=np.linspace(0.0, 0.7, 39), fields=FIELDS, changes=FEATURES[name])
+    assert_same(run_lanes(work), one_by_one(work), 1e-11)
+
+
+def assert_same(raw, other, tolerance):
+    np.testing.assert_array_equal(raw.status, other.status)
+    for name in ("angle", "error", "speed"):
+        np.testing.assert_allclose(raw.fields[name], other.fields[name], rtol=0,
+                                   atol=tolerance * (100.0 if name == "speed" else 1.0))
+    for name in ("contact", "drive"):
+        assert np.mean(raw.fields[name] != other.fields[name]) < 1e-3  # at the very instant of an event either holds
+
+
+def plain(work):
+    raw = empty_raw(work)
+    lanes = lane_runs.lanes_of(work)
+    (kind,) = lane_runs.kinds_of(lanes, True, "float64", work.torque.count > 0, False)
+    with np.errstate(all="ignore"):
+        rows = room(1, tiles.tile_type("float64"))
+        side_by_side.start(lanes, work.times[0], rows)
+        lost = side_by_side.go_on(
+            lanes.pieces, lanes.edges, kind.braked, kind.which, work.duration, work.times,
+            lane_runs.outputs_of(work, raw), rows, room(1, tiles.plan_type("float64")))
+    assert lost == 0
+    return raw
+
+
+@pytest.mark.parametrize("name", [name for name in FEATURES if name not in ("stops", "everything")])
+def test_plain_source_against_compiled(name):
+    work = case(18, duration=0.12, times=np.linspace(0.0, 0.12, 7), fields=FIELDS, changes=FEATURES[name])
+    assert_same(plain(work), run_lanes(work), 1e-12)
+
+
+def test_edges_of_the_command():
+    """Late, jittered, missing, and none at all."""
+    edges = [[0.0, 0.021, 0.0385, 0.1, 0.12], [0.03, 0.05], [], [0.0]]
+    first = np.cumsum([0, *map(len, edges[:-1])])
+    own = Tables(first, np.array([len(e) for e in edges]), np.concatenate([np.asarray(e, float) for e in edges]))
+    work = replace(case(4, duration=0.3, times=np.linspace(0.0, 0.3, 61), fields=FIELDS), edges=own)
+    assert_same(run_lanes(work), one_by_one(work), 1e-11)
+
+
+def test_commands_that_are_not_constant():
+    work = case(3, duration=0.5, times=np.linspace(0.0, 0.5, 11), fields=FIELDS)
+    rows = np.array([[0.0, 1.2e-3, 1e-3, 0, 0, 0, 0], [0.2, 1.4e-3, 0, 3e-4, 9.0, 0.5, 0],
+                     [0.0, 1.5e-3, 0, 2e-4, 5.0, 0, 40.0]])
+    work = replace(work, command=Tables(np.array([0, 1, 2]), np.array([2, 1, 1]), rows))
+    assert_same(run_lanes(work), one_by_one(work), 1e-11)
+
+
+def test_lanes_know_nothing_of_each_other():
+    work = case(300, duration=0.5, times=np.linspace(0.0, 0.5, 5), fields=FIELDS)
+    whole = run_lanes(work)
+    for start, stop in ((0, 1), (7, 30), (100, 237)):
+        part = run_lanes(work.part(start, stop))
+        for name in FIELDS:
+            np.testing.assert_array_equal(part.fields[name], whole.fields[name][start:stop])
+
+
+def test_float32_follows_float64():
+    work = case(100, duration=0.5, times=np.array([0.5]), fields=FIELDS)
+    exact, single = run_lanes(work), run_lanes(replace(work, dtype="float32"))
+    assert single.fields["angle"].dtype == np.float32
+    assert np.median(np.abs(single.fields["angle"] - exact.fields["angle"])) < 2e-6
+
+
+def test_lanes_that_need_the_general_way_are_mixed_with_others():
+    spring = np.where(np.arange(12) % 3 == 0, 0.1, 0.0)
+    work = case(12, duration=0.3, times=np.array([0.1, 0.3]), fields=FIELDS, changes={"load.stiffness": spring})
+    assert_same(run_lanes(work), one_by_one(work), 1e-11)
+
+
+def test_numbers_beyond_all_bounds_end_with_a_status():
+    work = case(3, duration=0.2, times=np.array([0.0, 0.2]), fields=FIELDS)
+    start = work.start.copy()
+    start[1, 1] = math.nan
+    broken = replace(work, start=start)
+    raw = run_lanes(broken)
+    assert raw.status.tolist()[::2] == [0, 0]
+    assert raw.status[1] != 0
+    assert np.isnan(raw.fields["angle"][1, -1])
+    np.testing.assert_array_equal(raw.fields["angle"][::2], run_lanes(work).fields["angle"][::2])
