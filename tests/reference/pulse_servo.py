@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArcNumbers:
+class Shaft:
     """Motor, gear, supply and load, everything at the output shaft."""
 
     J: float

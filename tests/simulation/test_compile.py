@@ -12,10 +12,12 @@ from servotwin.models.engine.arcs import ArcNumbers
 from servotwin.models.engine.noise import gaussian
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.derive import derive
+from servotwin.simulation.lane_runs import ALL_RUNS, PENDULUM_RUNS, PLAIN_RUNS
 
 SLIDE = Recipe("slide", ("servotwin.models.engine.arcs:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
                      -1.0, 0.0, -math.inf, math.inf, 6e-3, 2.0, 0.2, 0.2)
+FLAGGED = ("_integrated", "_long_step")  # what a motion takes where no closed form holds
 SCRIPT = """
 from servotwin.simulation.compile import Recipe, kernels
 print(kernels(Recipe("noise", ("servotwin.models.engine.noise:gaussian",))).gaussian(3, 7))
@@ -98,3 +100,12 @@ def test_a_cache_that_cannot_be_written(tmp_path):
 def test_numba_comes_late(module):
     code = f"import sys, {module}; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_what_no_term_asks_for_is_left_out():
+    plain, swinging, everything = (derive(recipe) for recipe in (PLAIN_RUNS, PENDULUM_RUNS, ALL_RUNS))
+    assert not any(f"engine_motion__{name}" in plain for name in FLAGGED)
+    assert "engine_motion___long_step" in swinging
+    assert all(f"engine_motion__{name}" in everything for name in FLAGGED)
+    assert "terms_heat__warming_rates" in everything
+    assert "terms_heat__warming_rates" not in plain + swinging

@@ -1,4 +1,4 @@
-"""`simulate_bus`: several servos on one supply, coupled through its voltage."""
+"""`simulate_bus`: several servos on one supply, joined by its voltage."""
 
 from __future__ import annotations
 

@@ -26,13 +26,13 @@ SIDE_BY_SIDE = {
     for dtype in ("float64", "float32")
 }
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on", "settle"))
-_RUNS = Recipe("runs", _ENTRIES)  # everything
+ALL_RUNS = Recipe("runs", _ENTRIES)  # everything
 _RARE = ("friction.varies", "friction.kappa", "play", "heat", "sensor.half_slack", "motor.L", "source.I_max")
 _PENDULUM = "load.gravity"
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep"),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
-_SWINGING = Recipe(
+PENDULUM_RUNS = Recipe(
     "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep"),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
@@ -77,7 +77,7 @@ def run_side_by_side(work: Work, lanes: Lanes, which: Indices, braked: bool, raw
                 records_of(rows, places, lanes.start[3:5, gone]), raw, PLAIN_RUNS)
 
 
-def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = _RUNS) -> None:
+def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = ALL_RUNS) -> None:
     """Run some lanes one after the other, in float64."""
     records = np.zeros(len(which), RECORD)
     kernels(recipe).start(lanes, which, records)
@@ -147,7 +147,7 @@ def kinds_of(lanes: Lanes, pulsed: bool, dtype: str, recorded: NDArray[np.bool_]
     found: list[SideBySide | OneByOne] = [SideBySide(np.flatnonzero(side & (braked == kind)), kind)
                                           for kind in (True, False)]
     found += [OneByOne(np.flatnonzero(some & ~side), recipe) for recipe, some in (
-        (PLAIN_RUNS, ~(rare | swinging)), (_SWINGING, swinging & ~rare), (_RUNS, rare))]
+        (PLAIN_RUNS, ~(rare | swinging)), (PENDULUM_RUNS, swinging & ~rare), (ALL_RUNS, rare))]
     return [kind for kind in found if len(kind.which)]
 
 

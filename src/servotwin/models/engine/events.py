@@ -13,6 +13,7 @@ from servotwin.models.engine import currents, first_order, guards
 from servotwin.models.engine.modes import FREE, RIGID, Vector
 from servotwin.models.engine.motion import FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
 from servotwin.models.engine.rodas import not_constant
+from servotwin.models.terms import source
 from servotwin.physics.pieces import piece_rate, piece_value
 
 _BELOW = -1e-13  # a guard counts as crossed below this (V, rad, rad/s, N m): rounding is not an event
@@ -23,7 +24,7 @@ def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float
     if kinds == 0 or (motion.kind == REST and not not_constant(motion.u) and not not_constant(motion.tau)):
         return math.inf, -1
     alone = motion.mode.contact != FREE and motion.mode.mesh == RIGID
-    if motion.kind == FIRST_ORDER and motion.numbers.source.V > 0.0 and alone:
+    if motion.kind == FIRST_ORDER and source.present(motion.numbers.source) and alone:
         return _outright(motion, kinds, s0, s1)
     left, at_left = s0, state(motion, s0)
     while left < s1:

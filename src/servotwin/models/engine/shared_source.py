@@ -13,6 +13,7 @@ from typing import NamedTuple
 from servotwin.models.engine import currents
 from servotwin.models.engine.modes import NO_CURRENT, Mode, Vector, sign_of
 from servotwin.models.terms import source as source_term
+from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.source import Source
 from servotwin.physics import bridge, motor, supply
@@ -58,7 +59,7 @@ def _demand(members: Sequence[Member], states: Sequence[Vector]) -> tuple[float,
     g = h = given = 0.0
     for (numbers, mode, sign, _, _), y in zip(members, states, strict=True):
         now = warm(numbers, y)
-        if numbers.motor.L > 0.0:
+        if inductive(numbers.motor):
             given += sign * y[2]
         elif mode.zone != NO_CURRENT:
             g += motor.steady_armature_current(1.0, 0.0, now.bridge.R_drive, now.motor.K_b)
