@@ -54,22 +54,8 @@ class _Pulsed(Model):
     """What both pulse servos share: the chip, the bridge, the shaft, and how a command becomes pulses."""
 
     optional = (
-        "motor.brush_drop_voltage", "gear.output_inertia", "gear.backlash", "friction.breakaway_ratio",
-        "friction.stribeck_speed", "friction.stribeck_exponent", "friction.load_friction",
-        "friction.load_friction_stribeck", "friction.load_friction_motor", "friction.load_friction_external",
-        "friction.load_friction_motor_stribeck", "friction.load_friction_external_stribeck",
-        "friction.load_friction_motor_quad", "friction.load_friction_external_quad",
-        "electronics.frame_period", "electronics.deadband", "electronics.minimum_drive_time",
-        "electronics.stretcher_time_constant", "electronics.off_state", "electronics.one_shot_offset",
-        "electronics.back_emf_injection", "electronics.supply_coupling", "electronics.pulse_timeout",
-        "electronics.pulse_width_min", "electronics.pulse_width_max",
-        "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset",
-        "potentiometer.feedback_offset", "potentiometer.noise", "potentiometer.backlash",
-        "potentiometer.linearity_angle", "potentiometer.linearity_error", "potentiometer.quantisation",
-        "supply.internal_resistance", "supply.bridge_drop_voltage", "supply.bridge_drop_resistance",
-        "supply.current_limit", "stops.lower_angle", "stops.upper_angle", "stops.restitution",
-        "thermal.winding_capacity", "thermal.housing_capacity", "thermal.winding_to_housing",
-        "thermal.housing_to_ambient", "thermal.ambient", "thermal.magnet_coefficient",
+        "gear.output_inertia", *play.READS, *friction.READS, *chip.READS, *bridge.READS, *sensor.READS, *source.READS,
+        *stops.READS, *heat.READS, "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset",
     )
     signals = (
         "command_voltage", "command_angle", "pulse_width", "error_time", "drive", "armature_voltage",

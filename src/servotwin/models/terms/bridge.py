@@ -29,6 +29,12 @@ from servotwin.physics.bridge import bridge_voltage, driving_voltage, motor_volt
 from servotwin.physics.motor import back_emf
 from servotwin.physics.supply import supply_current
 
+READS = (
+    "motor.brush_drop_voltage", "electronics.off_state", "supply.bridge_drop_voltage",
+    "supply.bridge_drop_resistance",
+)
+"""What may be given of a pulse servo."""
+
 
 class Bridge(NamedTuple):
     """Numbers of the bridge and of the brushes behind it."""

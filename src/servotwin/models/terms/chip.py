@@ -7,6 +7,14 @@ from typing import Any, NamedTuple
 
 from servotwin.models.terms.given import Given
 
+READS = (
+    "electronics.frame_period", "electronics.deadband", "electronics.minimum_drive_time",
+    "electronics.stretcher_time_constant", "electronics.one_shot_offset", "electronics.back_emf_injection",
+    "electronics.supply_coupling", "electronics.pulse_timeout", "electronics.pulse_width_min",
+    "electronics.pulse_width_max", "potentiometer.noise",
+)
+"""What may be given of a pulse servo."""
+
 
 class Chip(NamedTuple):
     """Numbers of the frame logic."""

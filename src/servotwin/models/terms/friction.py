@@ -22,6 +22,14 @@ _SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed fric
 _SHARES = {"K_m": "motor", "K_e": "external", "K_ms": "motor_stribeck", "K_es": "external_stribeck",
            "K_mq": "motor_quad", "K_eq": "external_quad"}
 
+READS = (
+    "friction.breakaway_ratio", "friction.stribeck_speed", "friction.stribeck_exponent", "friction.load_friction",
+    "friction.load_friction_stribeck", "friction.load_friction_motor", "friction.load_friction_external",
+    "friction.load_friction_motor_stribeck", "friction.load_friction_external_stribeck",
+    "friction.load_friction_motor_quad", "friction.load_friction_external_quad",
+)
+"""What may be given of a pulse servo."""
+
 
 class Friction(NamedTuple):
     """Numbers of the dry friction, at the output shaft."""

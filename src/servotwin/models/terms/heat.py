@@ -8,6 +8,12 @@ from servotwin.models.terms.dependence import ON_HEAT
 from servotwin.models.terms.given import Given
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, copper_loss, heat_flow, warming_rate
 
+READS = (
+    "thermal.winding_capacity", "thermal.housing_capacity", "thermal.winding_to_housing",
+    "thermal.housing_to_ambient", "thermal.ambient", "thermal.magnet_coefficient",
+)
+"""What may be given of a pulse servo."""
+
 
 class Heat(NamedTuple):
     """Numbers of the two thermal masses."""

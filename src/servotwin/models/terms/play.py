@@ -15,6 +15,9 @@ from servotwin.physics.backlash import impact_speed
 
 _LAST_IMPACT = 1e-12  # rad/s: an impact of motor and output this slow is the last one of many
 
+READS = ("gear.backlash",)
+"""What may be given of a pulse servo."""
+
 
 class Play(NamedTuple):
     """Numbers of the gear's play."""

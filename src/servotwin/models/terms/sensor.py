@@ -17,6 +17,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+READS = (
+    "potentiometer.feedback_offset", "potentiometer.backlash", "potentiometer.quantisation",
+    "potentiometer.linearity_angle", "potentiometer.linearity_error",
+)
+"""What may be given of a pulse servo."""
+
 
 class Sensor(NamedTuple):
     """Numbers of the potentiometer; its table, one for all lanes, is an input."""

@@ -8,6 +8,9 @@ from typing import NamedTuple
 from servotwin.models.terms.given import Given
 from servotwin.physics.supply import source_voltage
 
+READS = ("supply.internal_resistance", "supply.current_limit")
+"""What may be given of a pulse servo."""
+
 
 class Source(NamedTuple):
     """Numbers of the source."""

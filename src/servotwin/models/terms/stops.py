@@ -7,6 +7,9 @@ from typing import NamedTuple
 
 from servotwin.models.terms.given import Given
 
+READS = ("stops.lower_angle", "stops.upper_angle", "stops.restitution")
+"""What may be given of a pulse servo."""
+
 
 class Stops(NamedTuple):
     """Numbers of the end stops."""
