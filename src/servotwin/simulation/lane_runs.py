@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
-from servotwin.models.engine.records import column, columns_of, numbers_in, room, tiles_with
+from servotwin.models.engine.records import column, columns_of, room, rows_in, tiles_with
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
@@ -141,8 +141,8 @@ def kinds_of(lanes: Lanes, pulsed: bool, dtype: str, recorded: NDArray[np.bool_]
         side = np.asarray(~(rare | swinging | recorded) & (of("load.stiffness") == 0.0) & (of("sensor.step") == 0.0)
                           & (of("motor.K_b") > 0.0))
     if dtype == "float32":  # what is not zero has to stay so
-        for x in (*numbers_in(lanes.numbers), *numbers_in(lanes.chips)):
-            side &= ((x == 0.0) | (abs(x.astype(np.float32)) > 0.0)).ravel()[:total]
+        for x in (rows_in(lanes.numbers), rows_in(lanes.chips)):
+            side &= ((x == 0.0) | (x.astype(np.float32) != 0.0)).all(axis=1).ravel()[:total]
     braked = np.asarray((of("bridge.D_off") == 0.0) & (of("bridge.D_drive") < of("source.V")))
     found: list[SideBySide | OneByOne] = [SideBySide(np.flatnonzero(side & (braked == kind)), kind)
                                           for kind in (True, False)]

@@ -41,7 +41,13 @@ def room(count: int, kind: np.dtype[Any]) -> NDArray[Any]:
 
 def rows_of(kind: type[Any], number: Any) -> np.dtype[Any]:
     """Return the type of a tile that holds named tuples of numbers, with those in it."""
-    return tile_of({name: rows_of(hint, number) if hasattr(hint, "_fields") else number
+    key: Any = kind
+    return _rows_of(key, np.dtype(number))
+
+
+@cache
+def _rows_of(kind: Any, number: Hashable) -> np.dtype[Any]:
+    return tile_of({name: _rows_of(hint, number) if hasattr(hint, "_fields") else number
                     for name, hint in fields_of(kind)})
 
 
@@ -101,10 +107,9 @@ def column(tiles: NDArray[Any], name: str, count: int) -> NDArray[Any]:
     return tiles.ravel()[:count]
 
 
-def numbers_in(tiles: NDArray[Any]) -> Iterator[NDArray[Any]]:
-    """Return the rows of every number in tiles, shape (n, TILE) each."""
-    for name in tiles.dtype.names or ():
-        yield from numbers_in(tiles[name]) if tiles[name].dtype.names else (tiles[name],)
+def rows_in(tiles: NDArray[Any]) -> NDArray[Any]:
+    """Return all numbers in tiles, shape (tiles, numbers, TILE); they are of one type."""
+    return tiles.view(np.float64).reshape(len(tiles), -1, TILE)
 
 
 def put_columns(tiles: NDArray[Any], places: Any, values: Any) -> None:

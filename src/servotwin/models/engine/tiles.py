@@ -6,6 +6,7 @@ Times count from now, within a frame, so that float32 keeps their digits; clocks
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -147,6 +148,7 @@ class Times(NamedTuple):
     remaining: float
 
 
+@cache
 def tile_type(real: str) -> np.dtype[Any]:
     """Return the type of a tile whose servos have numbers of this type."""
     return tile_of({"arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real), "meter": rows_of(Meter, real),
@@ -154,6 +156,7 @@ def tile_type(real: str) -> np.dtype[Any]:
                     "count": rows_of(Count, np.int64)})
 
 
+@cache
 def plan_type(real: str) -> np.dtype[Any]:
     """Return the type of the room that a window is worked out in."""
     return tile_of({"of": rows_of(Plan, real), "clock": rows_of(Times, np.float64)})
