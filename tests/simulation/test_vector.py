@@ -100,18 +100,29 @@ def test_the_other_models(servo, kind):
         np.testing.assert_allclose(sims[place.name], states[-1][place.name], rtol=1e-12, atol=1e-12)
 
 
-def test_twenty_ticks_are_a_frame(servo):
-    """A tick that ends on an edge, to rounding, ends before the pulse is measured, however many came before."""
-    model = st.PulseServo(servo)
-    sims = st.VectorSimulator(model, 1)
-    sims.reset(pulse_width=1500e-6)
+@pytest.mark.parametrize("load", [None, st.loads.Spring(0.1)], ids=["side by side", "one by one"])
+def test_twenty_ticks_are_a_frame(servo, load):
+    """Twenty times 1 ms is more than 20 ms by a rounding: the pulse at that edge is still the one of the next call."""
+    idle = st.PulseServo(servo.replace({"electronics.deadband": 5e-3}))  # it measures, and never drives
+    sims = st.VectorSimulator(idle, 1, load=load)
+    sims.reset(output_angle=1.0)
     errors = []
-    for k in range(400):
-        sims.advance(1e-3, pulse_width=1500e-6 + 1e-6 * (k // 20))
+    for frame in range(600):
+        for _ in range(20):
+            sims.advance(1e-3, pulse_width=1e-3 + 1e-6 * frame)
         errors.append(sims["error_time"][0])
-    decided = np.flatnonzero(np.diff(errors))
-    assert len(decided) >= 18
-    assert set(decided % 20) <= {0, 1}  # a decision falls within the first two milliseconds of a frame
+    np.testing.assert_allclose(np.diff(errors), 1e-6, rtol=0.0, atol=1e-15)
+
+
+def test_a_state_goes_on_by_the_numbers_of_another_simulator(servo):
+    """A motion that has begun does not go on under a load that is no longer the same."""
+    model, command = st.BoundedServo(servo), st.signals.constant(1800.0, unit="us")
+    light, heavy = st.Simulator(model), st.Simulator(model, st.loads.Inertia(5e-3))
+    state = light.advance(light.initial(st.signals.constant(1500.0, unit="us")), 0.05, command)
+    other = light.changed(state, parameters={"load.inertia": 5e-3})
+    np.testing.assert_allclose(heavy.advance(state, 0.1, command).values, light.advance(other, 0.1, command).values,
+                               rtol=1e-12)
+    assert heavy.advance(state, 0.1, command).values != light.advance(state, 0.1, command).values
 
 
 @pytest.mark.slow
