@@ -257,6 +257,27 @@ def test_a_bus_voltage_that_is_set_is_the_supply(servo):
     assert imposed["bus_voltage"].tolist() == [4.8, 6.0]
 
 
+@pytest.mark.parametrize("load", [None, st.loads.Spring(0.1)], ids=["side by side", "one by one"])
+@pytest.mark.parametrize("period", [0.012, 0.033])
+def test_frames_change_their_length_while_memory_goes_on(servo, load, period):
+    changes = {"electronics.frame_period": period}
+    model, command = st.PulseServo(servo), st.signals.constant(1800.0, unit="us")
+    sim, sims = st.Simulator(model, load), st.VectorSimulator(model, 2, load=load)
+    state = sim.advance(sim.initial(st.signals.constant(1500.0, unit="us")), 0.113, command)
+    sims.reset(pulse_width=1500e-6)
+    sims.advance(0.113, pulse_width=1800e-6)
+    sims.set(parameters=changes, lanes=[1])
+    for state_of, lane in ((state, 0), (sim.changed(state, parameters=changes), 1)):
+        end = sim.advance(state_of, 0.113 + 5 * 0.04, command)
+        if lane == 0:
+            for _ in range(5):
+                sims.advance(0.04)
+        assert sims["output_angle"][lane] == pytest.approx(end["output_angle"], abs=1e-12)
+        assert sims["error_time"][lane] == pytest.approx(sim.observe(end, "error_time", command), abs=1e-12)
+    assert sims.time.tolist() == pytest.approx([0.313, 0.313], abs=1e-12)
+    assert sims["error_time"][0] != sims["error_time"][1]
+
+
 @pytest.mark.parametrize("more", [{}, {"gear.backlash": 0.01, "gear.output_inertia": 1e-3}], ids=["plain", "play"])
 def test_numbers_change_while_memory_goes_on(servo, more):
     changes = {"electronics.deadband": 20e-6, "load.torque": 0.2, "electronics.stretcher_gain": 90.0}
@@ -376,7 +397,9 @@ def test_a_lane_that_fails_harms_no_other(servo):
     assert sims.status.tolist()[::2] == [0, 0]
     assert sims.status[1] == st.Status.TOO_FAST.code
     assert [failure.lane for failure in sims.failures] == [1]
-    assert np.isnan(sims["output_angle"][1])
+    for signal in ("output_angle", "output_speed", "armature_current", "load_torque", "feedback_voltage"):
+        assert np.isnan(sims[signal][1])
+        assert np.isfinite(sims[signal][[0, 2]]).all()
     assert sims.time.tolist() == pytest.approx([0.1, 0.0, 0.1])
     np.testing.assert_array_equal(sims["output_angle"][[0, 2]], sound["output_angle"][[0, 2]])
     sims.set(parameters={"load.spring.stiffness": 0.1})

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.memory import BEAT, FIRST_STEP, Memory
+from servotwin.models.engine.memory import BEAT, FIRST_STEP, SAME, Memory
 from servotwin.models.engine.records import TILE, record_of
 
 Floats = NDArray[np.float64]
@@ -53,16 +53,20 @@ def records_of(tiles: NDArray[Any], places: Indices, temperatures: Floats) -> ND
     return records
 
 
-def put_records(tiles: NDArray[Any], places: Indices, records: NDArray[Any]) -> None:
-    """Put what lanes remember back into tiles; their frames are regular."""
+def put_records(tiles: NDArray[Any], places: Indices, records: NDArray[Any], period: Floats) -> None:
+    """Put what lanes remember back into tiles; their frames are regular, of these periods from now on [s]."""
     point, chip = records["point"], records["chip"]
     now, beat = point["time"], records["beat"]
-    to_next = np.maximum((chip["number"] - records["frames"]) * beat - now, 0.0)
+    time = records["frames"] * beat + now
+    same = beat == period
+    number = np.where(same, chip["number"], np.ceil(time / period - SAME).astype(np.int64))
+    to_next = np.where(same, (chip["number"] - records["frames"]) * beat - now, number * period - time)
+    to_next = np.maximum(to_next, 0.0)
     values: dict[str, dict[str, Any]] = {
         "servo": {"q": point["y"][:, 0], "w": point["y"][:, 1], "drive": chip["drive"], "error": chip["error"],
                   "left": np.where(chip["drive"] != 0.0, chip["drive_end"] - now, 0.0), "silence": chip["clock"] - now},
-        "clock": {"edge": (chip["number"] - 1) * beat, "since": beat - to_next, "length": beat, "period": beat},
-        "count": {"number": chip["number"], "first_draw": chip["draws"] - chip["number"]}}
+        "clock": {"edge": (number - 1) * period, "since": period - to_next, "length": period, "period": period},
+        "count": {"number": number, "first_draw": chip["draws"] - number}}
     for decision, before in (("pending", ""), ("later", "later_")):
         waits = chip[decision]
         values["servo"] |= {f"{before}due": waits["time"] - now, f"{before}sign": waits["sign"],

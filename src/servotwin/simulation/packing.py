@@ -202,13 +202,13 @@ class Chunk:
         if not self.lanes.initial:
             return  # it starts between the stops, and the motor in the middle of its play
         start = self.start
-        flat = mapped(_flat, self.numbers)
+        numbers = mapped(flat, self.numbers)
         with np.errstate(invalid="ignore"):
-            inside = ((start[0] >= flat.stops.lower) & (start[0] <= flat.stops.upper) & (flat.play.half == 0.0)
-                      & (flat.heat.C_w == 0.0))
+            inside = ((start[0] >= numbers.stops.lower) & (start[0] <= numbers.stops.upper) & (numbers.play.half == 0.0)
+                      & (numbers.heat.C_w == 0.0))
         if inside.all():
             return
-        spread = mapped(lambda x: np.broadcast_to(x, self.which.shape), flat)
+        spread = mapped(lambda x: np.broadcast_to(x, self.which.shape), numbers)
         for k in np.flatnonzero(~inside).tolist():
             one = mapped(partial(_number, k), spread)
             try:
@@ -229,7 +229,7 @@ class Chunk:
             return 0.0
         own = self.commands.edge_count[self.commands.of[self.which]]
         with np.errstate(over="ignore"):
-            return np.where(own < 0, duration / np.asarray(_flat(self.chip.frame_period), dtype=np.float64), own)
+            return np.where(own < 0, duration / np.asarray(flat(self.chip.frame_period), dtype=np.float64), own)
 
     def work(self, asked: Asked, fields: tuple[str, ...]) -> Work:
         """Return what the kernels need."""
@@ -241,9 +241,9 @@ class Chunk:
             first, count, rows = recorded_torque(*self._of_loads).tables()
             recorded = np.array([bool(load.recorded) for load in self._of_loads[0]])[self._of_loads[1]]
             torque = Tables(first, np.where(recorded, count, 0), rows)
-        return Work(law=LAWS[type(self.model)], numbers=mapped(_flat, numbers),
-                    chip=None if chip is None else mapped(_flat, chip), command=command, torque=torque,
-                    constant_torque=_flat(self.load.torque), edges=self.commands.frame_edges(self.which),
+        return Work(law=LAWS[type(self.model)], numbers=mapped(flat, numbers),
+                    chip=None if chip is None else mapped(flat, chip), command=command, torque=torque,
+                    constant_torque=flat(self.load.torque), edges=self.commands.frame_edges(self.which),
                     start=self.start, seeds=self.lanes.seeds[self.which], duration=asked.duration,
                     times=asked.times, fields=fields, dtype=asked.dtype, curve=self.model.curve())
 
@@ -293,6 +293,6 @@ def _number(k: int, column: Array) -> float:
     return float(column[k])
 
 
-def _flat(value: Any) -> Any:
+def flat(value: Any) -> Any:
     """Return a column as an array (n,), and a number as it is."""
     return np.ascontiguousarray(value[:, 0]) if isinstance(value, np.ndarray) and value.ndim else value

@@ -186,7 +186,9 @@ class VectorSimulator:
         if name not in self._numbers.model.available:
             raise UnknownNameError(f"signal of {type(self._numbers.model).__name__}", name,
                                    ("time", *self._numbers.model.available))
-        return self._numbers.observe(name, self._store.samples(), self._command, self._torque)
+        values = self._numbers.observe(name, self._store.samples(), self._command, self._torque)
+        values[self._store.status != 0] = math.nan
+        return values
 
     @property
     def impulse_work(self) -> Array:
@@ -236,7 +238,7 @@ class VectorSimulator:
             numbers = self._numbers.changed(which, parameters or {}, inertia, bus)
             memory = self._store.records()
             self._numbers = numbers
-            self._store.renew(numbers, memory, self._torque)
+            self._store.renew(numbers, which, memory, self._torque)
             self._translate = Translator(numbers)
         if angle is not None or speed is not None:
             self._store.impose(which, angle, speed)

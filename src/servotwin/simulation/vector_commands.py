@@ -12,7 +12,7 @@ from servotwin.errors import CommandError, InputError
 from servotwin.models import BoundedServo
 from servotwin.models.base import PULSE_RANGE
 from servotwin.models.columns import LanePieces, LaneSignal
-from servotwin.simulation.packing import Chunk
+from servotwin.simulation.packing import Chunk, flat
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -61,7 +61,7 @@ class Translator:
         if type(given) is float:
             good = scale.low < given < scale.high
         else:
-            if isinstance(given, np.ma.MaskedArray):
+            if np.ma.is_masked(given):
                 raise InputError(name, got="a masked array", allowed="numbers, none of them masked")
             try:
                 given = np.asarray(given, dtype=np.float64)
@@ -88,7 +88,7 @@ class Translator:
             rows = np.zeros((1, 7))
             pieces = cast("LanePieces", chunk.model.command(
                 cast("Any", _signal(name, rows, chunk.which, math.nan, math.nan))))
-            gain[chunk.which], offset[chunk.which] = _flat(pieces.gain), _flat(pieces.offset)
+            gain[chunk.which], offset[chunk.which] = flat(pieces.gain), flat(pieces.offset)
             own_low, own_high = _sure(name, chunk.model, gain[chunk.which], offset[chunk.which])
             low, high = max(low, own_low), min(high, own_high)
         if np.ptp(gain) == 0.0 and np.ptp(offset) == 0.0:
@@ -135,7 +135,3 @@ def _sure(name: str, model: Model, gain: Array, offset: Array) -> tuple[float, f
 def _signal(name: str, rows: Array, lanes: Any, low: Any, high: Any) -> LaneSignal:
     first = np.arange(len(lanes)) if len(rows) > 1 or len(lanes) == 1 else np.zeros(len(lanes), np.int64)
     return LaneSignal(_KINDS[name], LanePieces(rows, first, np.ones_like(first), low=low, high=high), None, None, lanes)
-
-
-def _flat(x: Any) -> Any:
-    return x[:, 0] if isinstance(x, np.ndarray) and x.ndim else x

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, LoadError
 from servotwin.loads import Load
 from servotwin.models.columns import LanePieces
-from servotwin.models.engine.memory import Memory, started
+from servotwin.models.engine.memory import put_memory, started
 from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.records import columns_of, put_columns, tiles_with
 from servotwin.models.engine.tiles import Lanes as Columns
@@ -22,12 +22,10 @@ from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
+from servotwin.simulation.lane_memory import RECORD
 from servotwin.simulation.lanes import Tables
-from servotwin.simulation.packing import Asked, Chunk, Commands, groups
+from servotwin.simulation.packing import Asked, Chunk, Commands, flat, groups
 from servotwin.simulation.start import start_vector
-
-if TYPE_CHECKING:
-    pass
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -65,9 +63,10 @@ class LaneNumbers:
         self.curve = np.array(inputs.model.curve(), np.float64).reshape(2, -1)
         self.neutral = np.empty(self.count)
         self.columns, self.torque = self._packed()
+        self.frame_period = self.columns.chips["frame_period"].ravel()[:self.count]
         self.load_total = np.empty(self.count)
         for chunk in self.chunks:
-            self.load_total[chunk.which] = _flat(chunk.load.total_inertia)
+            self.load_total[chunk.which] = flat(chunk.load.total_inertia)
         self._impose()
 
     def _packed(self) -> tuple[Columns, Tables]:
@@ -176,9 +175,9 @@ class LaneNumbers:
         InputError
             If an angle is beyond a stop; names the lane.
         """
-        from servotwin.simulation.lane_memory import RECORD
-
-        records = np.zeros(len(which), RECORD)
+        rest = np.zeros(1, RECORD)
+        put_memory(rest[0], started((0.0,) * 7, RIGID))
+        records = np.repeat(rest, len(which))
         place = np.full(self.count, -1)
         place[which] = np.arange(len(which))
         for chunk in self.chunks:
@@ -193,7 +192,6 @@ class LaneNumbers:
             if angle is not None:
                 self.check_angles(angle[place[own]], own)
             play = self.numbers.play.half[own] > 0.0
-            _fill(records, place[own], started((0.0,) * 7, RIGID))
             point = records["point"]
             for name in ("y", "anchor"):
                 point[name][place[own]] = y[:, :, 0].T
@@ -273,16 +271,3 @@ def _constant(values: Array) -> LanePieces:
     return LanePieces(rows, index, np.ones_like(index))
 
 
-def _fill(records: NDArray[Any], places: Indices, memory: Memory) -> None:
-    """Put the same memory into some records."""
-    def put(into: Any, values: Any) -> None:
-        for name, value in values._asdict().items():
-            if hasattr(value, "_fields"):
-                put(into[name], value)
-            else:
-                into[name][places] = value
-    put(records, memory)
-
-
-def _flat(x: Any) -> Any:
-    return x[:, 0] if isinstance(x, np.ndarray) and x.ndim else x

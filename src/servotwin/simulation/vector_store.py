@@ -68,13 +68,13 @@ class Store:
         np.add(self._base, torque, out=self._total)
         self._loads_change = True
 
-    def renew(self, numbers: LaneNumbers, memory: NDArray[Any], torque: Array) -> None:
-        """Take other numbers; memories go on."""
+    def renew(self, numbers: LaneNumbers, which: Indices, memory: NDArray[Any], torque: Array) -> None:
+        """Take other numbers of some lanes; memories go on."""
         self._build(numbers)
         self.hang(torque)
         play = numbers.numbers.play.half > 0.0
         point = memory["point"]
-        point["anchor_time"] = math.inf
+        point["anchor_time"][which] = math.inf
         mesh = point["mode"]["mesh"]
         point["mode"]["mesh"] = np.where(play, np.where(mesh == RIGID, INSIDE, mesh), RIGID)
         point["y"][~play, 5:7] = point["y"][~play, 0:2]
@@ -163,7 +163,7 @@ class Store:
                 self._columns.pieces[:, 1] = command
                 part = records_of(some.rows, places, self._columns.start[3:5, some.which[places]])
                 self._one_by_one(PLAIN_RUNS, some.which[places], durations, part)
-                put_records(some.rows, places, part)
+                put_records(some.rows, places, part, self._numbers.frame_period[some.which[places]])
 
     def _one_by_one(self, recipe: Any, which: Indices, duration: float | Array, records: NDArray[Any]) -> None:
         """Let some lanes go on one by one; their memories are changed in place."""
@@ -245,9 +245,7 @@ class _Tiles:
         self.rows["clock"]["piece_end"] = math.inf
 
     def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
-        records["beat"] = np.where(records["chip"]["number"] > 0, records["beat"],
-                                   numbers.columns.chips["frame_period"].ravel()[self.which[places]])
-        put_records(self.rows, places, records)
+        put_records(self.rows, places, records, numbers.frame_period[self.which[places]])
 
     def forget(self, places: Indices) -> None:
         """Let the general way finish the calls of these lanes."""

@@ -48,7 +48,7 @@ class Memory(NamedTuple):
     beat: float  # s, of such a frame
     point: Point
     chip: Frame
-    u: Piece  # what the numbers follows, by the time since the start
+    u: Piece  # what the servo follows, by the time since the start
     u_end: float
     tau: Piece  # torque of the load that depends on time alone
     tau_end: float

@@ -124,14 +124,6 @@ def _hang(which: Indices, torques: Floats, tile: Any) -> None:
         numbers.start_off[j] = load.start_off
 
 
-def renew(lanes: Lanes, tile_rows: Any) -> None:
-    """Put what all lanes are into their tiles; what they remember stays."""
-    total = lanes.torque.size
-    for k in range(len(tile_rows)):
-        first = k * tiles.TILE
-        tiles.set_numbers(lanes, first, min(tiles.TILE, total - first), tile_rows[k])
-
-
 def _wanted(size: int, tile: Any, plan: Any, before: Any) -> int:
     """Return how many lanes have outputs in this window."""
     wanted = 0

@@ -151,7 +151,7 @@ def status_of(y: Vector) -> int:
 
 
 def source(numbers: Numbers, now: Frame) -> Piece:
-    """Return the voltage behind the bridge, the input of a numbers with a bridge."""
+    """Return the voltage behind the bridge, the input of a servo that has one."""
     return Piece(0.0, now.drive * numbers.source.V, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
