@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from servotwin.models.terms.bridge import Bridge
+from servotwin.models.terms.bridge import Bridge, Off
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.friction import NO_FRICTION
 from servotwin.models.terms.load import NO_LOAD
@@ -32,7 +32,8 @@ def case(lanes, *, duration, times, fields=("angle",), dtype="float64", seed=0, 
         friction=NO_FRICTION._replace(F_forward=between(0.05, 0.25), F_backward=between(0.05, 0.25),
                                       breakaway=between(1.0, 1.5)),
         load=NO_LOAD._replace(coulomb=between(0.0, 0.02)), source=Source(V=6.0, R_b=0.05, I_max=math.inf),
-        bridge=Bridge(D_drive=between(0.2, 0.4), R_drive=R + 0.1, D_off=0.0, R_off=R, V_br=0.0, coast=0.0),
+        bridge=Bridge(D_drive=between(0.2, 0.4), R_drive=R + 0.1, off=Off(0.0, R, 0.0), silence=Off(0.0, R, 0.0),
+                      V_br=0.0),
         sensor=Sensor(p=p, b_o=0.6, half_slack=0.0, step=0.0))
     chip = NO_CHIP._replace(
         T_0=-0.163e-3, slope=1.36e-3, half_deadband=between(2e-6, 5e-6), K=between(40.0, 120.0),
@@ -52,8 +53,8 @@ def case(lanes, *, duration, times, fields=("angle",), dtype="float64", seed=0, 
 def replaced(numbers, changes):
     """Return numbers with others in some terms, by dotted name."""
     for name, value in changes.items():
-        room, field = name.split(".")
-        numbers = numbers._replace(**{room: getattr(numbers, room)._replace(**{field: value})})
+        field, _, rest = name.partition(".")
+        numbers = numbers._replace(**{field: replaced(getattr(numbers, field), {rest: value}) if rest else value})
     return numbers
 
 

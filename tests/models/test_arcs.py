@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from lane_cases import case, replaced
 from servotwin.models.engine import arcs, contacts, side_by_side, tiles
 from servotwin.models.engine.records import room
-from servotwin.models.terms.bridge import NO_BRIDGE
+from servotwin.models.terms.bridge import NO_BRIDGE, Off
 from servotwin.models.terms.friction import NO_FRICTION
 from servotwin.models.terms.motor import Motor
 from servotwin.models.terms.numbers import Numbers
@@ -22,14 +22,15 @@ from servotwin.simulation.lanes import FIELDS, Tables, empty_raw, run_lanes
 
 NUMBERS = Numbers(
     motor=Motor(1.03, 1.0, 3.0, 0.0), shaft=Shaft(6e-3, 1e-3, 0.0, 0.0), source=Source(6.0, 0.0, math.inf),
-    bridge=NO_BRIDGE._replace(R_drive=3.1, R_off=3.0), friction=NO_FRICTION._replace(F_forward=0.2, F_backward=0.25))
+    bridge=NO_BRIDGE._replace(R_drive=3.1, off=Off(0.0, 3.0, 0.0)),
+    friction=NO_FRICTION._replace(F_forward=0.2, F_backward=0.25))
 DEAD_ZONES = ((0.0, 0.0), (0.5, 0.1), (0.4, 7.0))
 LOADS = (0.0, -0.3, 0.6, 1.5, -3.0)
 
 
 def fine(numbers, torque, drive, q, w, end):
     """Solve the arc's differential equation, stopping wherever the speed is zero."""
-    D, R = (numbers.bridge.D_drive, numbers.bridge.R_drive) if drive else (numbers.bridge.D_off, numbers.bridge.R_off)
+    D, R = (numbers.bridge.D_drive, numbers.bridge.R_drive) if drive else numbers.bridge.off[:2]
 
     def current(w):
         x = drive * numbers.source.V - numbers.motor.K_b * w
@@ -64,7 +65,7 @@ def fine(numbers, torque, drive, q, w, end):
 @pytest.mark.parametrize("zones", DEAD_ZONES)
 @pytest.mark.parametrize("torque", LOADS)
 def test_arcs_against_a_fine_solution(zones, torque):
-    numbers = replaced(NUMBERS, {"bridge.D_drive": zones[0], "bridge.D_off": zones[1]})
+    numbers = replaced(NUMBERS, {"bridge.D_drive": zones[0], "bridge.off.D": zones[1]})
     for drive, w in product((-1.0, 0.0, 1.0), (0.0, 4.0, -9.0)):
         q, speed, done = arcs.slide(arcs.arc_numbers(numbers, torque), drive, 0.3, w, 0.06)
         assert done == 1.0
@@ -74,20 +75,20 @@ def test_arcs_against_a_fine_solution(zones, torque):
 @pytest.mark.parametrize("time", [1e-12, 1e-6, 1e-3, 1.0, 100.0])
 def test_a_free_shaft_has_no_cancellation(time):
     numbers = replaced(NUMBERS, {"shaft.b": 0.0, "friction.F_forward": 0.0, "friction.F_backward": 0.0,
-                               "bridge.R_off": 1e15})
+                               "bridge.off.R": 1e15})
     q, w, _ = arcs.slide(arcs.arc_numbers(numbers, -0.006), 0.0, 0.0, 0.0, time)
     assert q == pytest.approx(0.5 * time * time, rel=1e-9)  # a winding of 1e15 ohm hardly brakes
     assert w == pytest.approx(time, rel=1e-9)
 
 
-OPEN = {"bridge.coast": 1.0, "bridge.D_off": 6.7, "bridge.R_off": 3.2}
+OPEN = {"bridge.off.coast": 1.0, "bridge.silence.coast": 1.0, "bridge.off.D": 6.7, "bridge.off.R": 3.2}
 FEATURES = {
     "plain": {}, "coast": OPEN, "RC stretcher": {"chip.tau_s": 0.02},
     "couplings": {"chip.beta": 0.01, "chip.c_s": 0.02}, "noise": {"chip.noise": 1e-3},
     "timeout": {"chip.timeout": 0.013},
     "limits": {"chip.shortest": 1e-3, "chip.longest": 2e-3, "chip.timeout": 0.05},
-    "stops": {"stops.lower": 0.2, "stops.upper": 1.6}, "no drops": {"bridge.D_drive": 0.0, "bridge.D_off": 0.0},
-    "brush drop": {"bridge.D_off": 0.15}, "no friction": {"friction.F_forward": 0.0, "friction.F_backward": 0.0},
+    "stops": {"stops.lower": 0.2, "stops.upper": 1.6}, "no drops": {"bridge.D_drive": 0.0, "bridge.off.D": 0.0},
+    "brush drop": {"bridge.off.D": 0.15}, "no friction": {"friction.F_forward": 0.0, "friction.F_backward": 0.0},
     "short frames": {"chip.frame_period": 0.004},
     "everything": OPEN | {"chip.tau_s": 0.02, "chip.beta": 0.01, "chip.c_s": 0.02, "chip.noise": 1e-3,
                           "chip.timeout": 0.025, "chip.shortest": 0.9e-3, "stops.lower": 0.1, "stops.upper": 2.0}}

@@ -25,7 +25,7 @@ NAMES = {
                 "load_friction_external_quad",
     "electronics": "bridge_gain comparator_gain voltage_to_pulse_gain pulse_to_voltage_gain command_offset "
                    "command_pulse_offset voltage_deadband frame_period deadband stretcher_gain minimum_drive_time "
-                   "stretcher_time_constant off_state one_shot_offset one_shot_slope back_emf_injection "
+                   "stretcher_time_constant off_state silence_state one_shot_offset one_shot_slope back_emf_injection "
                    "supply_coupling pulse_timeout pulse_width_min pulse_width_max",
     "potentiometer": "feedback_gain feedback_offset backlash noise linearity_angle linearity_error quantisation",
     "supply": "open_circuit_voltage internal_resistance bridge_drop_voltage bridge_drop_resistance current_limit",
@@ -125,14 +125,16 @@ def test_the_message_is_the_one_that_was_promised():
         "motor.armature_resistance: got -3.0, allowed: a positive number [ohm]"
 
 
+@pytest.mark.parametrize("name", ["off_state", "silence_state"])
 @pytest.mark.parametrize("word", ["brake", "coast"])
-def test_off_state(word):
-    assert GROUPS["electronics"](off_state=word).off_state == word
+def test_off_state(name, word):
+    assert getattr(GROUPS["electronics"](**{name: word}), name) == word
 
 
 @pytest.mark.parametrize("word", ["Brake", "", 1, True, ["brake"], math.nan])
 def test_off_state_refuses(word):
-    assert "brake or coast" in refused("electronics", "off_state", word)
+    for name in ("off_state", "silence_state"):
+        assert "brake or coast" in refused("electronics", name, word)
 
 
 @pytest.mark.parametrize(("group", "values", "named"), [

@@ -57,7 +57,7 @@ def test_every_field_survives(tmp_path):
                       for name, f in kind.__dataclass_fields__.items() if isinstance(f.metadata.get("rule"), str)
                       and f.metadata["rule"] != "table" and not name.startswith("load_friction_")}
               for group, kind in GROUPS.items()}
-    values["electronics"] |= {"off_state": "coast", "pulse_width_min": 0.25}
+    values["electronics"] |= {"off_state": "coast", "silence_state": "brake", "pulse_width_min": 0.25}
     values["potentiometer"] |= {"linearity_angle": (-1.0, 0.1, 2.0), "linearity_error": (0.0, 0.1 + 0.2, -1e-300)}
     values["supply"]["bridge_drop_voltage"] = 0.1
     values["stops"]["lower_angle"] = -1.0

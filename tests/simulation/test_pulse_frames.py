@@ -133,7 +133,7 @@ def test_three_decisions_cannot_wait():
 def test_a_decision_that_comes_first_replaces_the_one_that_waits():
     waits = Decision(5.0, 1.0, 1.0, 1e-3)
     chip = servo().chip()
-    before = Frame(3, 3, 0.0, math.inf, math.inf, 0.0, waits, frame.NOTHING)
+    before = Frame(3, 3, 0.0, math.inf, math.inf, 0, 0.0, waits, frame.NOTHING)
     now = frame.edge(chip, before, 2.0, 1.2e-3, 0.0, 0.0, 0.0, 0)
     assert now.pending.time == pytest.approx(2.0012)
     assert now.later == frame.NOTHING
@@ -141,7 +141,7 @@ def test_a_decision_that_comes_first_replaces_the_one_that_waits():
 
 
 def test_at_one_instant_a_drive_ends_before_a_decision_starts_one():
-    now = Frame(1, 1, 1.0, 1.0, math.inf, 0.0, Decision(1.0, -1.0, 0.5, -2e-4), frame.NOTHING)
+    now = Frame(1, 1, 1.0, 1.0, math.inf, 0, 0.0, Decision(1.0, -1.0, 0.5, -2e-4), frame.NOTHING)
     after = frame.switched(now, 1.0)
     assert (after.drive, after.drive_end, after.error) == (-1.0, 1.5, -2e-4)
     assert frame.switched(AT_START, 0.0) == AT_START

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from servotwin import physics
 from servotwin.models.engine import currents
 from servotwin.models.terms import bridge as bridge_term
+from servotwin.models.terms.bridge import Bridge, Off
 from servotwin.models.terms.source import Source
 from servotwin.physics.laws import array_form
 
@@ -60,7 +61,9 @@ def circuit_of(model: Model, plant: Numbers, samples: Samples, drive: Pieces) ->
 
 def _behind_bridge(plant: Numbers, samples: Samples) -> Circuit:
     s = samples.drive
-    coasts = plant.bridge.coast > 0.0
+    if np.any(bridge_term.heeds_silence(plant.bridge)):
+        plant = plant._replace(bridge=_silent_where(plant.bridge, samples.silent))
+    coasts = plant.bridge.off.coast > 0.0
     shared = getattr(samples, "bus", None)
     if shared is not None:
         plant = on_bus(plant, shared)
@@ -89,9 +92,17 @@ def _at_limit(plant: Numbers, i: Array) -> Array:
 def on_bus(plant: Numbers, bus: Array) -> Numbers:
     """Return the plant of a servo on a bus whose voltage is known; that of its source is then left out."""
     bridge, source = plant.bridge, plant.source
-    coasts = np.asarray(bridge.coast) > 0.0
-    R_off: Any = bridge.R_off - np.where(coasts & np.isinf(source.I_max), source.R_b, 0.0)
-    D_off: Any = np.where(coasts, bridge.D_off - source.V + bus, bridge.D_off)
+    coasts = np.asarray(bridge.off.coast) > 0.0
+    R: Any = bridge.off.R - np.where(coasts & np.isinf(source.I_max), source.R_b, 0.0)
+    D: Any = np.where(coasts, bridge.off.D - source.V + bus, bridge.off.D)
     V: Any = bus
-    return plant._replace(bridge=bridge._replace(D_off=D_off, R_off=R_off, R_drive=bridge.R_drive - source.R_b),
+    off = Off(D, R, bridge.off.coast)
+    return plant._replace(bridge=bridge._replace(off=off, silence=off, R_drive=bridge.R_drive - source.R_b),
                           source=Source(V, 0.0, math.inf))
+
+
+def _silent_where(bridge: Bridge, silent: Array) -> Bridge:
+    """Return the bridge as it is off at each time: between drives, or while no pulses come."""
+    D, R, coast = (np.where(silent > 0, x, y) for x, y in zip(bridge.silence, bridge.off, strict=True))
+    off: Any = Off(cast("Any", D), cast("Any", R), cast("Any", coast))
+    return bridge._replace(off=off, silence=off)

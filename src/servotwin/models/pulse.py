@@ -14,6 +14,7 @@ from servotwin.errors import InputError
 from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.terms import bridge, chip, friction, heat, play, sensor, source, stops
+from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.units import is_finite
@@ -36,6 +37,11 @@ def _edges_first(timeout: Any, period: Any) -> Any:
     frames = np.maximum(np.round(timeout / period), 1.0)
     longer = np.where(abs(timeout - frames * period) <= 1e-9 * period, timeout * (1.0 + 1e-11), timeout)
     return longer if longer.ndim else float(longer)
+
+
+def _opens(state: Any) -> Any:
+    """Return 1 where a bridge opens, 0 where it brakes."""
+    return np.where(state == "coast", 1.0, 0.0) if isinstance(state, np.ndarray) else float(state == "coast")
 
 
 _REQUIRES = (
@@ -93,15 +99,16 @@ class _Pulsed(Model):
         """T_f of a command that does not bring its own [s]; 20 ms unless the servo gives it."""
         return self.value_or("electronics.frame_period", 0.02)
 
-    def _coasts(self) -> Any:
-        """Return 1 where the bridge opens between drives, 0 where it brakes."""
+    def _bridge(self) -> Bridge:
+        """Return the numbers of the bridge; without pulses it is off as between drives unless the servo says more."""
         off: Any = self.servo.get("electronics.off_state")
-        return np.where(off == "coast", 1.0, 0.0) if isinstance(off, np.ndarray) else float(off == "coast")
+        silence: Any = self.servo.get("electronics.silence_state")
+        return bridge.pack(self, _opens(off), _opens(off if silence is None else silence))
 
     def _numbers(self, load: Load, inductance: float) -> Numbers:
         N = self.value("gear.gear_reduction")
         return self.body(load, N, inductance)._replace(
-            bridge=bridge.pack(self, self._coasts()), source=source.pack(self), friction=friction.pack(self, N),
+            bridge=self._bridge(), source=source.pack(self), friction=friction.pack(self, N),
             play=play.pack(self, self.load_inertia(load)), stops=stops.pack(self), sensor=sensor.pack_pulsed(self),
             heat=heat.pack(self))
 
@@ -155,7 +162,7 @@ class _Pulsed(Model):
         T_f = self.frame_period if frame_period is None else frame_period
         if not (is_finite(T_f) and T_f > 0.0):
             raise InputError("frame_period", got=T_f, allowed="a positive number [s]")
-        path, supply = bridge.pack(self, self._coasts()), source.pack(self)
+        path, supply = self._bridge(), source.pack(self)
         stalled = physics.bridge_current(supply.V, 0.0, path.D_drive, path.R_drive)
         gain = physics.averaged_bridge_gain(
             self.value("motor.armature_resistance") * min(float(stalled), supply.I_max), 0.0,

@@ -31,6 +31,8 @@ class Samples:
         Mode.
     drive, error : ndarray
         Of a pulse servo: how the bridge drives (−1, 0, +1), and the latest error decided on [s].
+    silent : ndarray
+        Of a pulse servo: 1 before the first pulse, and when none has come for as long as its chip waits.
     bus : ndarray, optional
         Voltage of a bus that several servos share [V]; None for a servo that has its source for itself.
     """
@@ -50,12 +52,14 @@ class Samples:
     motor: Whole
     drive: Array
     error: Array
+    silent: Array
     bus: Array | None = None
 
     @classmethod
     def make(cls, time: Array, states: Array, wiper: Array, mode: Array, drive: Array, error: Array,
-             bus: Array | None = None) -> Samples:
+             silent: Array, bus: Array | None = None) -> Samples:
         """Build from arrays of states, shape (7, n), and of modes, shape (4, n)."""
         q, w, i, T_w, T_h, q_m, w_m = states
         zone, contact, mesh, motor = mode.astype(np.int64)
-        return cls(time, q, w, i, T_w, T_h, q_m, w_m, wiper, zone, contact, mesh, motor, drive, error, bus)
+        return cls(time, q, w, i, T_w, T_h, q_m, w_m, wiper, zone, contact, mesh, motor, drive, error, silent,
+                   bus)

@@ -267,6 +267,8 @@ class Electronics(Group):
     minimum_drive_time: float | None = parameter("t_min", "time", NOT_NEGATIVE, "shortest drive")
     stretcher_time_constant: float | None = parameter("tau_s", "time", POSITIVE, "of an RC stretcher; absent: linear")
     off_state: str | None = choice(("brake", "coast"), "what the bridge does between drives")
+    silence_state: str | None = choice(
+        ("brake", "coast"), "what it does before the first pulse and after pulse_timeout; absent: as off_state")
     one_shot_offset: float | None = parameter("T_0", "time", ANY, "width of the one-shot at feedback voltage 0")
     one_shot_slope: float | None = parameter(
         "1/s_r", "time per voltage", POSITIVE, "one-shot width per feedback voltage")

@@ -16,7 +16,7 @@ from servotwin.models.engine import shared_source
 from servotwin.models.engine.modes import Mode
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
-from servotwin.models.terms.bridge import coasts
+from servotwin.models.terms.bridge import coasts, silent
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.physics.pieces import Piece
@@ -324,10 +324,13 @@ class _BusVoltage:
             if not np.isfinite(y[0]):  # after the run has ended
                 return math.nan
             drive = float(s.drive[k])
-            if drive == 0.0 and not (coasts(plan.numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
+            numbers = plan.numbers
+            if s.silent[k] > 0.0:
+                numbers = numbers._replace(bridge=silent(numbers.bridge))
+            if drive == 0.0 and not (coasts(numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
                 continue
             mode = Mode(int(s.zone[k]), int(s.contact[k]), int(s.mesh[k]), int(s.motor[k]))
-            stiff = shared_source.on_stiff_source(plan.numbers, drive == 0.0)
+            stiff = shared_source.on_stiff_source(numbers, drive == 0.0)
             members.append(shared_source.member_of(stiff, mode, drive, Piece(), y))
             states.append(y)
         return shared_source.zoned(self.source, members, states, self.source.V)[2]

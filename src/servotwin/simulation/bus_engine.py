@@ -16,16 +16,18 @@ from servotwin.models.engine.modes import Vector
 from servotwin.models.engine.motion import Motion
 from servotwin.models.engine.step import MOST_IDLE
 from servotwin.models.terms import frame
-from servotwin.models.terms.bridge import coasts, terminal_voltage
+from servotwin.models.terms.bridge import coasts, heeds_silence, terminal_voltage
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.motor import inductive
-from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.numbers import warm
 from servotwin.models.terms.sensor import sensed_voltage, wiper_at
 from servotwin.physics.pieces import Piece, piece_value
 from servotwin.simulation.bus_group import Connected, Group
 from servotwin.simulation.engine import Event, Plan, Record, Segment, event_name, failure, keep_switch
 from servotwin.simulation.status import Status
+
+Told = tuple[float, bool, Piece]  # drive, silence and torque
 
 
 @dataclass
@@ -39,21 +41,32 @@ class Unit:
     frame: Frame = frame.AT_START
     tau: Piece = field(default_factory=Piece)
     tau_end: float = -math.inf
-    inputs: tuple[float, Piece] | None = None  # drive and torque of the present motion
+    inputs: Told | None = None  # of the present motion
     motion: Motion | None = None
     arrival: tuple[Point, int] | None = None  # when left alone: its next point, and the event there (−1: none)
-    stiff: dict[bool, Numbers] = field(default_factory=dict)  # its numbers on a given bus voltage, driven or returning
 
     switch: float = -math.inf  # when drive or load change next, as far as is known [s]
     limit: float = -math.inf  # when its chip or its load do something next [s]
 
     def __post_init__(self) -> None:
-        for returning in (False, True):
-            self.stiff[returning] = shared_source.on_stiff_source(self.plan.numbers, returning)
+        self.heeds_silence = heeds_silence(self.plan.numbers.bridge)
+        self._listen()
+
+    def _listen(self) -> None:
+        """Take the numbers as they are with pulses or without: alone, and on a given bus voltage."""
+        self.numbers = step.at_pulses(self.plan.numbers, self.frame)
+        self.stiff = {returning: shared_source.on_stiff_source(self.numbers, returning) for returning in (False, True)}
+
+    def hear(self, now: Frame, time: float) -> None:
+        """Take another state of the chip, from `time` [s] on."""
+        before, self.frame = self.frame, now
+        keep_switch(self.record, before, now, time, self.point.y[0], self.heeds_silence)
+        if self.heeds_silence and now.silent != before.silent:
+            self._listen()
 
     def plan_ahead(self) -> None:
         """Find out when chip and load do something next."""
-        self.switch = min(frame.next_switch(self.frame), self.tau_end)
+        self.switch = min(frame.next_switch(self.frame, self.heeds_silence), self.tau_end)
         self.limit = min(self.switch, self.edge)
 
     @property
@@ -65,7 +78,7 @@ class Unit:
     def connected(self) -> bool:
         """Whether the motor is connected to the bus, or may become so by itself."""
         y = self.point.y
-        return self.frame.drive != 0.0 or (coasts(self.plan.numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0))
+        return self.frame.drive != 0.0 or (coasts(self.numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0))
 
     def at(self, time: float) -> Point:
         """Return where it stands at `time` [s], on its present motion."""
@@ -81,19 +94,20 @@ class Unit:
         """Go on the present motion to a point, where an event may be."""
         if self.motion is not None and point.time > self.point.time:
             self.record.segments.append(
-                Segment(self.point.time, point.time, self.motion, self.frame.error, self.point.wiper, self.frame.drive))
+                Segment(self.point.time, point.time, self.motion, self.frame.error, self.point.wiper, self.frame.drive,
+                        self.frame.silent))
         if kind >= 0:
             self.record.events.append(Event(point.time, event_name(kind, point.mode), point.y[0]))
             self.motion = None
         self.point, self.arrival = point, None
 
-    def told(self) -> tuple[float, Piece]:
-        """Return by what its motion is determined besides its state: drive and torque."""
-        return self.frame.drive, self.tau
+    def told(self) -> Told:
+        """Return by what its motion is determined besides its state."""
+        return self.frame.drive, self.heeds_silence and self.frame.silent > 0, self.tau
 
     def alone(self, until: float) -> None:
         """Find out what it does next when no other motor is connected to the bus."""
-        numbers, time = self.plan.numbers, self.point.time
+        numbers, time = self.numbers, self.point.time
         new, self.inputs = self.told() != self.inputs, self.told()
         u = step.source(numbers, self.frame)
         m = motion.nothing(numbers, u, self.tau) if new or self.motion is None else self.motion
@@ -159,8 +173,7 @@ class Bus:
         for unit in due:
             if unit.switch <= time:
                 unit.move(unit.at(time))
-                before, unit.frame = unit.frame, frame.switched(unit.frame, time)
-                keep_switch(unit.record, before, unit.frame, time, unit.point.y[0])
+                unit.hear(frame.switched(unit.frame, time), time)
                 if unit.tau_end <= time:
                     unit.tau, unit.tau_end = unit.plan.torque.at(time)
                 unit.plan_ahead()
@@ -176,20 +189,23 @@ class Bus:
             unit.record.events.append(Event(time, "pulse refused", here.y[0]))
         v_m, V_bus = self._voltages(unit, here.y, time)
         v_o = sensed_voltage(plan.numbers.sensor, plan.curve, here.wiper)
-        unit.frame = frame.edge(chip, unit.frame, time, t_in, v_o, v_m, V_bus, plan.seed)
+        now = frame.edge(chip, unit.frame, time, t_in, v_o, v_m, V_bus, plan.seed)
+        if unit.heeds_silence and now.silent != unit.frame.silent:
+            unit.move(here)
+        unit.hear(now, time)
         if unit.frame.number == frame.CROWDED:
             raise failure(Status.CROWDED, time)
 
     def _voltages(self, unit: Unit, y: Vector, time: float) -> tuple[float, float]:
         """Return the voltages at the unit's motor and of the bus [V]."""
-        numbers, drive = unit.plan.numbers, unit.frame.drive
+        numbers, drive = unit.numbers, unit.frame.drive
         connected = [other for other in self.units if other.connected]
         if not [other for other in connected if other is not unit]:
             return step.voltages(numbers, drive * numbers.source.V, y)
         if len(connected) == 1:
             other = connected[0]
-            u = other.frame.drive * other.plan.numbers.source.V
-            V_bus = step.voltages(other.plan.numbers, u, other.at(time).y)[1]
+            u = other.frame.drive * other.numbers.source.V
+            V_bus = step.voltages(other.numbers, u, other.at(time).y)[1]
         else:
             V_bus = self._group.voltage_of([_connection(other, time) for other in connected])
         stiff = warm(unit.stiff[False], y)

@@ -27,6 +27,7 @@ from servotwin.models.engine.modes import (
 from servotwin.models.engine.motion import Motion
 from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
 from servotwin.models.terms import frame
+from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.numbers import Numbers
@@ -135,7 +136,8 @@ class Segment:
     """A stretch of one motion between two times [s], and what holds with it.
 
     `error` is the latest that the chip has decided on [s], `wiper` the angle of the potentiometer at the start [rad],
-    `drive` how a bridge drives: −1, 0 or +1, `origin` the instant from which the times of the motion count [s].
+    `drive` how a bridge drives: −1, 0 or +1, `silent` whether pulses stay away from it, 1 or 0, `origin` the instant
+    from which the times of the motion count [s].
     """
 
     start: float
@@ -144,6 +146,7 @@ class Segment:
     error: float
     wiper: float
     drive: float
+    silent: int = 0
     origin: float = 0.0
 
     @property
@@ -189,7 +192,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
         if idle > MOST_IDLE:
             raise failure(Status.CHATTER, time_of(before))
         if record is not None:
-            _keep(record, inputs, chip, before, memory, m, event)
+            _keep(record, inputs, chip, heeds_silence(numbers.bridge), before, memory, m, event)
     return State(until, state.places, memory, numbers, state.changes)
 
 
@@ -198,28 +201,32 @@ def failure(status: Status, time: float) -> SimulationError:
     return SimulationError(status.name, time, status.message)
 
 
-def _keep(record: Record, inputs: Inputs, chip: Chip, before: Memory, memory: Memory, m: Motion, event: int) -> None:
+def _keep(record: Record, inputs: Inputs, chip: Chip, heeds: bool, before: Memory, memory: Memory, m: Motion,
+          event: int) -> None:
     """Add a step to a record: its chip's doings, its motion, its event."""
     origin, point, angle = origin_of(memory), memory.point, before.point.y[0]
     start, now = origin + before.point.time, origin + point.time
     if memory.chip is not before.chip:
-        keep_switch(record, before.chip, memory.chip, start, angle)
+        keep_switch(record, before.chip, memory.chip, start, angle, heeds)
         bounded = chip.shortest > 0.0 or chip.longest < math.inf
         if (bounded and memory.chip.number > before.chip.number
                 and not frame.accepted(chip, pulse_width(inputs, before))):
             record.events.append(Event(start, "pulse refused", angle))
     if now > start or not record.segments:
-        record.segments.append(Segment(start, now, m, memory.chip.error, before.point.wiper, memory.chip.drive, origin))
+        record.segments.append(Segment(start, now, m, memory.chip.error, before.point.wiper, memory.chip.drive,
+                                       memory.chip.silent, origin))
     if record.tell is not None:
         record.tell(now)
     if event >= 0:
         record.events.append(Event(now, event_name(event, point.mode), point.y[0]))
 
 
-def keep_switch(record: Record, before: Frame, after: Frame, time: float, angle: float) -> None:
-    """Add to a record that a drive has begun or ended at `time` [s], where the shaft is at `angle` [rad]."""
+def keep_switch(record: Record, before: Frame, after: Frame, time: float, angle: float, heeds: bool) -> None:
+    """Add to a record that the bridge has switched at `time` [s], where the shaft is at `angle` [rad]."""
     if after.drive != before.drive:
         record.events.append(Event(time, _DRIVES[int(after.drive)], angle))
+    if heeds and after.silent != before.silent:
+        record.events.append(Event(time, "silence begins" if after.silent else "silence ends", angle))
 
 
 _DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}

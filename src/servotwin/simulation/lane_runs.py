@@ -139,11 +139,11 @@ def kinds_of(lanes: Lanes, pulsed: bool, dtype: str, recorded: NDArray[np.bool_]
         side = np.zeros(total, np.bool_)
     else:
         side = np.asarray(~(rare | swinging | recorded) & (of("load.stiffness") == 0.0) & (of("sensor.step") == 0.0)
-                          & (of("motor.K_b") > 0.0))
+                          & (of("motor.K_b") > 0.0) & (of("bridge.silence.coast") == of("bridge.off.coast")))
     if dtype == "float32":  # what is not zero has to stay so
         for x in (rows_in(lanes.numbers), rows_in(lanes.chips)):
             side &= ((x == 0.0) | (x.astype(np.float32) != 0.0)).all(axis=1).ravel()[:total]
-    braked = np.asarray((of("bridge.D_off") == 0.0) & (of("bridge.D_drive") < of("source.V")))
+    braked = np.asarray((of("bridge.off.D") == 0.0) & (of("bridge.D_drive") < of("source.V")))
     found: list[SideBySide | OneByOne] = [SideBySide(np.flatnonzero(side & (braked == kind)), kind)
                                           for kind in (True, False)]
     found += [OneByOne(np.flatnonzero(some & ~side), recipe) for recipe, some in (

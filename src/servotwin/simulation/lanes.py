@@ -19,8 +19,8 @@ Record = TypeVar("Record", bound=tuple[object, ...])
 
 FIELDS = ("angle", "speed", "contact", "drive", "error")
 MORE_FIELDS = ("current", "winding", "housing", "motor_angle", "motor_speed", "wiper", "mesh",
-               "motor")  # of servos that run one by one
-SMALL_FIELDS = ("contact", "drive", "mesh", "motor")  # fields that are kept as int8
+               "motor", "silent")  # of servos that run one by one
+SMALL_FIELDS = ("contact", "drive", "mesh", "motor", "silent")  # fields that are kept as int8
 
 
 @dataclass(frozen=True)

@@ -168,7 +168,7 @@ class Simulator:
         y, chip = np.array(state.memory.point.y)[:, None], state.memory.chip
         mode = np.array(mode_of(plan.numbers, plan.chip, plan.inputs, state.memory))[:, None]
         samples = Samples.make(np.array([state.time]), y, np.array([state.memory.point.wiper]), mode,
-                               np.array([chip.drive]), np.array([chip.error]))
+                               np.array([chip.drive]), np.array([chip.error]), np.array([chip.silent]))
         return float(own.model.output(name, samples, plan.command, load)[0])
 
     def changed(self, state: State, *, parameters: Mapping[str, Any] | None = None,

@@ -37,7 +37,7 @@ class Trajectory:
         t = np.asarray(time, dtype=np.float64)
         if not self.segments:
             nothing = np.full(t.size, math.nan)
-            return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((4, t.size)), *np.zeros((2, t.size)))
+            return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((4, t.size)), *np.zeros((3, t.size)))
         index = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
         return self._states(t, index)
 
@@ -59,7 +59,7 @@ class Trajectory:
     def _states(self, t: Array, index: NDArray[np.intp], ages: Array | None = None) -> Samples:
         """Return the states at times by the motions of segments; `ages` are t − anchor without what t rounds away."""
         y = np.full((7, t.size), math.nan)
-        mode, wiper, drive, error = np.zeros((4, t.size)), *np.zeros((3, t.size))
+        mode, wiper, drive, error, silent = np.zeros((4, t.size)), *np.zeros((4, t.size))
         order = np.argsort(index, kind="stable")
         used, first = np.unique(index[order], return_index=True)
         groups = np.split(order, first[1:]) if t.size else []
@@ -71,9 +71,9 @@ class Trajectory:
             s = t[where] - segment.anchor if ages is None else ages[where]
             y[:, where] = _states(segment.motion, s)
             mode[:, where] = np.array(segment.motion.mode)[:, None]
-            drive[where], error[where] = segment.drive, segment.error
+            drive[where], error[where], silent[where] = segment.drive, segment.error, segment.silent
             wiper[where] = play(segment.wiper, y[0, where], 2.0 * segment.motion.numbers.sensor.half_slack)
-        return Samples.make(t, y, wiper, mode, drive, error, None if self.bus is None else self.bus(t))
+        return Samples.make(t, y, wiper, mode, drive, error, silent, None if self.bus is None else self.bus(t))
 
     def intervals(self, index: int) -> Array:
         """Return the ends of short intervals of one segment, in each of which all signals are smooth and gentle.

@@ -101,10 +101,11 @@ class LaneNumbers:
         shaft.J[hung] += (J_L + own - shaft.J_out)[hung]
         shaft.J_out[hung] = (J_L + own)[hung]
         fed = ~np.isnan(V)
-        coasts = fed & (bridge.coast > 0.0)
-        battery = coasts & np.isinf(source.I_max)
-        bridge.D_off[coasts] += (V - source.V)[coasts]
-        bridge.R_off[battery] -= source.R_b[battery]
+        for off in (bridge.off, bridge.silence):
+            coasts = fed & (off.coast > 0.0)
+            battery = coasts & np.isinf(source.I_max)
+            off.D[coasts] += (V - source.V)[coasts]
+            off.R[battery] -= source.R_b[battery]
         bridge.R_drive[fed] -= source.R_b[fed]
         source.V[fed], source.R_b[fed], source.I_max[fed] = V[fed], 0.0, math.inf
         self.numbers: Any = columns

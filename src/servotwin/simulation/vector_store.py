@@ -174,7 +174,7 @@ class Store:
         def go(part: slice) -> None:
             some = which[part]
             go_on(self._columns, *self._inputs, some, durations[part], _NONE, np.zeros(len(some), np.int64),
-                  np.zeros((len(some), 13, 0)), records[part], status[part], ended[part])
+                  np.zeros((len(some), 14, 0)), records[part], status[part], ended[part])
 
         workers = min(self._threads, len(which))
         if workers == 1:
@@ -205,7 +205,7 @@ class Store:
         return SimpleNamespace(
             time=self.time, angle=q, speed=w, current=i, winding=T_w, housing=T_h, motor_angle=q_m, motor_speed=w_m,
             wiper=point["wiper"], zone=modes[0], contact=modes[1], mesh=modes[2], motor=modes[3], drive=chip["drive"],
-            error=chip["error"])
+            error=chip["error"], silent=chip["silent"])
 
     def impose(self, which: Indices, angle: Array | None, speed: Array | None) -> None:
         """Set angles [rad] and speeds [rad/s] of the output; book the work of the impulses."""

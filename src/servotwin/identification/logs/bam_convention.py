@@ -38,7 +38,7 @@ class BamConvention:
     Friction feels pulses and not their mean, and they break it where their mean does not. Beside an integration of
     BAM's law with its published parameters of the XL330, a pendulum lifted at k_P = 100 differs by 44, 11 and 2 mrad
     rms at frames of 5, 1 and 0.2 ms with M6, and by 7, 2 and 0.5 mrad with M1. A shaft without torque coasts in BAM; a
-    pulse servo does then what `electronics.off_state` says.
+    pulse servo does then what `electronics.silence_state`, or else `electronics.off_state`, says.
 
     Examples
     --------

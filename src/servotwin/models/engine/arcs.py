@@ -74,20 +74,20 @@ def arc_numbers(numbers: Numbers, torque: float) -> ArcNumbers:
     own, path, V = numbers.shaft, numbers.bridge, numbers.source.V
     emf = motor.back_emf(1.0, numbers.motor.K_b)
     rate_drive = accelerated(own, own.b + _torque(numbers, emf, path.R_drive))
-    rate_off = accelerated(own, own.b + _torque(numbers, emf, path.R_off))
+    rate_off = accelerated(own, own.b + _torque(numbers, emf, path.off.R))
     rate_free = accelerated(own, own.b)
     forward = accelerated(own, coulomb(numbers.friction, True) + numbers.load.coulomb)
     backward = accelerated(own, coulomb(numbers.friction, False) + numbers.load.coulomb)
     push = _torque(numbers, bridge.driving_voltage(V, 0.0, 0.0), path.R_drive)
     drag = _torque(numbers, bridge.driving_voltage(0.0, -1.0, path.D_drive), path.R_drive)
-    drag_off = _torque(numbers, bridge.driving_voltage(0.0, -1.0, path.D_off), path.R_off)
+    drag_off = _torque(numbers, bridge.driving_voltage(0.0, -1.0, path.off.D), path.off.R)
     pull = max(_torque(numbers, bridge.driving_voltage(V, 1.0, path.D_drive), path.R_drive), 0.0)
     hold_backward, hold_forward = holding_bounds(numbers, 0.0, 0.0)
     load = loading(own.J, pull, hold_forward, hold_backward, torque)
     return ArcNumbers(
         rate_drive, rate_off, rate_free, _inverse(rate_drive), _inverse(rate_off), _inverse(rate_free),
         accelerated(own, push), accelerated(own, drag), accelerated(own, drag_off), V / emf, path.D_drive / emf,
-        path.D_off / emf, forward, backward, load.against, load.start_forward, load.start_backward, load.start_off,
+        path.off.D / emf, forward, backward, load.against, load.start_forward, load.start_backward, load.start_off,
         numbers.stops.lower, numbers.stops.upper, own.J, pull, hold_forward, hold_backward)
 
 

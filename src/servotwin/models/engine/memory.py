@@ -131,7 +131,11 @@ def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memo
     tau, tau_end = in_force(inputs.torque, origin, time, inputs.constant_torque)
     if changed or u != memory.u or tau != memory.tau:
         memory = forgotten(memory)
-    return Memory(memory.frames, beat, memory.point, frame.numbered(memory.chip, number), u, u_end, tau, tau_end)
+    silent = memory.chip.silent
+    if memory.point.anchor_time == math.inf:  # a servo that did not heed silence may do so now
+        silent = 1 if memory.chip.clock <= time else 0
+    return Memory(memory.frames, beat, memory.point, frame.numbered(memory.chip, number, silent), u, u_end, tau,
+                  tau_end)
 
 
 def with_play(memory: Memory, play: bool) -> Memory:
@@ -158,7 +162,7 @@ def shifted(memory: Memory, frames: int, beat: float, shift: float) -> Memory:
     """Return a memory whose times count from an instant that is later by `shift` [s]."""
     p, c = memory.point, memory.chip
     point = Point(p.time - shift, p.y, p.mode, p.anchor_time - shift, p.anchor, p.step, p.wiper)
-    chip = Frame(c.number, c.draws, c.drive, c.drive_end - shift, c.clock - shift, c.error,
+    chip = Frame(c.number, c.draws, c.drive, c.drive_end - shift, c.clock - shift, c.silent, c.error,
                  _later(c.pending, shift), _later(c.later, shift))
     return Memory(frames, beat, point, chip, memory.u, memory.u_end - shift, memory.tau, memory.tau_end - shift)
 

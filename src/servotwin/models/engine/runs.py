@@ -21,7 +21,7 @@ from servotwin.models.engine.memory import (
     time_of,
 )
 from servotwin.models.engine.modes import INSIDE, RIGID, Mode
-from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, source, step
+from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms import play
 from servotwin.models.terms.chip import Chip
@@ -48,7 +48,7 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
           status: Indices, ended: Floats) -> None:
     """Let the lanes named in `which`, whose memories the records hold, go on for durations of their own [s].
 
-    `outputs` has the shape (n, 13, T), as in `run`, and gets what stands at `times` from the one numbered
+    `outputs` has the shape (n, 14, T), as in `run`, and gets what stands at `times` from the one numbered
     `first_output` on.
     """
     for k in range(which.size):
@@ -87,6 +87,7 @@ def mode_of(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> Mod
     u = source(numbers, memory.chip) if pulsed_chip(chip) else since(memory.u, origin)
     if point.anchor_time < math.inf and (not pulsed_chip(chip) or u.value == memory.u.value):
         return point.mode
+    numbers = at_pulses(numbers, memory.chip) if pulsed_chip(chip) else numbers
     return anchored(numbers, u, since(memory.tau, origin), point.time, point).mode
 
 
@@ -94,9 +95,10 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
         done: int, outputs: Floats) -> tuple[Memory, int]:
     """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
 
-    What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (13, n): angle, speed,
+    What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (14, n): angle, speed,
     contact, drive, error, and what only few servos have: current, temperatures of winding and housing, angle and speed
-    of the motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there.
+    of the motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there,
+    silence of the chip.
     """
     pulsed = pulsed_chip(chip)
     memory = resumed(pulsed, inputs, memory, False)
@@ -125,6 +127,6 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
             for k in range(5):
                 outputs[5 + k, done] = y[2 + k]
             outputs[10, done] = wiper_at(numbers.sensor, wiper, y[0])
-            outputs[11, done], outputs[12, done] = m.mode.mesh, m.mode.motor
+            outputs[11, done], outputs[12, done], outputs[13, done] = m.mode.mesh, m.mode.motor, memory.chip.silent
             done += 1
     return memory, COMPLETED

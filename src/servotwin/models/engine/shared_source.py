@@ -38,9 +38,9 @@ class Member(NamedTuple):
 def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
     """Return a servo whose bus voltage is given: driven, or returning current through its diodes."""
     bridge, R_b, regulated = numbers.bridge, numbers.source.R_b, source_term.regulated(numbers.source)
-    R_drive = bridge.R_off - R_b if returning and not regulated else bridge.R_drive - R_b
+    R_drive = bridge.off.R - R_b if returning and not regulated else bridge.R_drive - R_b
     if returning and regulated:
-        R_drive = bridge.R_off
+        R_drive = bridge.off.R
     D = max(bridge.D_drive, 1e-300) if returning else bridge.D_drive  # a diode without drop still has a direction
     return numbers._replace(bridge=bridge._replace(R_drive=R_drive, D_drive=D),
                             source=numbers.source._replace(R_b=0.0, I_max=math.inf))

@@ -53,16 +53,18 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
         tau, tau_end = in_force(inputs.torque, origin, t, inputs.constant_torque)
         new = True
     if chip_present(chip):
-        if frame.next_switch(now) <= t:
+        heeds, silent = bridge.heeds_silence(numbers.bridge), now.silent
+        if frame.next_switch(now, heeds) <= t:
             now = frame.switched(now, t)
         edge = edge_of(inputs, memory, now.number)
         if edge <= t:
-            now = measured(numbers, chip, inputs, now, point, pulse_width(inputs, memory))
+            now = measured(at_pulses(numbers, now), chip, inputs, now, point, pulse_width(inputs, memory))
             if now.number == frame.CROWDED:
                 return Stepped(memory, m, -1, CROWDED)
             edge = edge_of(inputs, memory, now.number)
-        u_end = min(frame.next_switch(now), edge)
-        if new or u.value != now.drive * numbers.source.V:
+        u_end = min(frame.next_switch(now, heeds), edge)
+        numbers = at_pulses(numbers, now)
+        if new or u.value != now.drive * numbers.source.V or (heeds and silent != now.silent):
             u, new = source(numbers, now), True
     elif t >= u_end:
         u, u_end = in_force(inputs.command, origin, t, 0.0)
@@ -148,6 +150,14 @@ def status_of(y: Vector) -> int:
     """Tell whether a state is finite, as a code."""
     total = y[0] + y[1] + y[2] + y[3] + y[4] + y[5] + y[6]
     return COMPLETED if math.isfinite(total) else DIVERGED
+
+
+def at_pulses(numbers: Numbers, now: Frame) -> Numbers:
+    """Return the numbers with the bridge as it is now: while no pulses come it may be off in another way."""
+    if now.silent == 0 or not bridge.heeds_silence(numbers.bridge):
+        return numbers
+    return Numbers(numbers.motor, bridge.silent(numbers.bridge), numbers.source, numbers.follower, numbers.shaft,
+                   numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
 
 
 def source(numbers: Numbers, now: Frame) -> Piece:

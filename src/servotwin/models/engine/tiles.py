@@ -222,8 +222,8 @@ def set_numbers(lanes: Lanes, first: int, size: int, tile: Any) -> None:
         numbers = numbers_of(lanes, first + j)
         path, motor, source, sensor = numbers.bridge, numbers.motor, numbers.source, numbers.sensor
         put_meter(tile.meter, j, Meter(
-            source.V, source.R_b, motor.K_b, motor.R, path.V_br, path.coast, path.D_drive, path.R_drive, path.D_off,
-            path.R_off, sensor.p, sensor.b_o))
+            source.V, source.R_b, motor.K_b, motor.R, path.V_br, path.off.coast, path.D_drive, path.R_drive, path.off.D,
+            path.off.R, sensor.p, sensor.b_o))
 
 
 def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -> None:
@@ -231,7 +231,7 @@ def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -
     set_numbers(lanes, first, size, tile)
     for j in range(size):
         q, w = lanes.start[0, first + j], lanes.start[1, first + j]
-        put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
+        put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, -math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
                                        0.0))
     for j in range(size):
         own = lanes.edge_count[first + j]

@@ -30,10 +30,18 @@ from servotwin.physics.motor import back_emf
 from servotwin.physics.supply import supply_current
 
 READS = (
-    "motor.brush_drop_voltage", "electronics.off_state", "supply.bridge_drop_voltage",
+    "motor.brush_drop_voltage", "electronics.off_state", "electronics.silence_state", "supply.bridge_drop_voltage",
     "supply.bridge_drop_resistance",
 )
 """What may be given of a pulse servo."""
+
+
+class Off(NamedTuple):
+    """A bridge that does not drive: braked or open."""
+
+    D: float  # no current flows where |K_b w| is less [V]
+    R: float
+    coast: float  # 1: it is open; 0: it brakes
 
 
 class Bridge(NamedTuple):
@@ -41,30 +49,39 @@ class Bridge(NamedTuple):
 
     D_drive: float  # V_ce0 + V_br: no current flows where |s V − K_b w| is less
     R_drive: float  # R_a + r_c + R_b
-    D_off: float  # the same between drives
-    R_off: float
+    off: Off  # as it is between drives
+    silence: Off  # as it is while no pulses come
     V_br: float
-    coast: float  # 1: the bridge opens between drives; 0: it brakes
 
 
-NO_BRIDGE = Bridge(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_BRIDGE = Bridge(0.0, 0.0, Off(0.0, 0.0, 0.0), Off(0.0, 0.0, 0.0), 0.0)
 
 
 def coasts(bridge: Bridge) -> bool:
-    """Tell whether the bridge opens between drives."""
-    return bridge.coast > 0.0
+    """Tell whether the bridge is open where it does not drive."""
+    return bridge.off.coast > 0.0
+
+
+def heeds_silence(bridge: Bridge) -> bool:
+    """Tell whether the bridge is off in another way while no pulses come."""
+    return bridge.silence.coast != bridge.off.coast
+
+
+def silent(bridge: Bridge) -> Bridge:
+    """Return the bridge as it is while no pulses come."""
+    return Bridge(bridge.D_drive, bridge.R_drive, bridge.silence, bridge.silence, bridge.V_br)
 
 
 def drop(bridge: Bridge, u: float) -> float:
     """Return the voltage [V] that has to be exceeded for a current to flow, driven or between drives (u = 0)."""
-    return bridge.D_drive if u != 0.0 else bridge.D_off
+    return bridge.D_drive if u != 0.0 else bridge.off.D
 
 
 def loop(bridge: Bridge, source: Source, zone: int, u: float) -> tuple[float, float]:
     """Return voltage [V], with its drop, and resistance [Ω] of the loop through which the current of a zone flows."""
     sign = sign_of(zone)
     if u == 0.0:
-        return driving_voltage(0.0, sign, bridge.D_off), bridge.R_off
+        return driving_voltage(0.0, sign, bridge.off.D), bridge.off.R
     if zone == SHORT_FORWARD or zone == SHORT_BACKWARD:
         return driving_voltage(0.0, sign, bridge.D_drive), bridge.R_drive - source.R_b
     R = bridge.R_drive
@@ -156,15 +173,16 @@ def terminal_voltage(bridge: Bridge, source: Source, motor: Motor, u: float, w: 
 def drops(bridge: Bridge, source: Source, motor: Motor, u: float) -> tuple[float, float]:
     """Return V_ce0 [V] and r_c [Ω] of what conducts: transistors while the bridge drives, diodes while it coasts."""
     if u == 0.0:
-        return max(bridge.D_off - bridge.V_br - source.V, 0.0), 0.0
+        return max(bridge.off.D - bridge.V_br - source.V, 0.0), 0.0
     return max(bridge.D_drive - bridge.V_br, 0.0), max(bridge.R_drive - motor.R - source.R_b, 0.0)
 
 
-def pack(model: Given, coast: Any) -> Bridge:
-    """Return the numbers of a model's bridge, which opens between drives where `coast` is 1."""
+def pack(model: Given, coast: Any, silent_coast: Any) -> Bridge:
+    """Return the numbers of a model's bridge, which opens between drives, and without pulses, where these are 1."""
     R_a, R_b = model.value("motor.armature_resistance"), model.value_or("supply.internal_resistance", 0.0)
     r_c, V_ce0 = (model.value_or(f"supply.bridge_drop_{name}", 0.0) for name in ("resistance", "voltage"))
     V_oc, V_br = model.value("supply.open_circuit_voltage"), model.value_or("motor.brush_drop_voltage", 0.0)
     battery = np.all(np.isinf(model.value_or("supply.current_limit", math.inf)))  # a regulator keeps its voltage
-    return Bridge(D_drive=V_ce0 + V_br, R_drive=R_a + r_c + R_b, D_off=V_br + coast * (V_oc + V_ce0),
-                  R_off=R_a + (R_b * coast if battery else 0.0), V_br=V_br, coast=coast)
+    off, silence = (Off(V_br + opens * (V_oc + V_ce0), R_a + (R_b * opens if battery else 0.0), opens)
+                    for opens in (coast, silent_coast))
+    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, silence, V_br)

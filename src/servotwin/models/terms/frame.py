@@ -37,6 +37,7 @@ class Frame(NamedTuple):
     drive: float  # −1, 0, +1: how the bridge drives now
     drive_end: float
     clock: float  # the drive ends here at the latest
+    silent: int  # 1: no pulse has been taken yet, or none for as long as the chip waits
     error: float  # of the latest decision
     pending: Decision
     later: Decision  # a second one, where a frame starts before the one before has been decided
@@ -44,7 +45,7 @@ class Frame(NamedTuple):
 
 NOTHING = Decision(math.inf, 0.0, 0.0, 0.0)
 CROWDED = -1  # as the number of a frame: more than two decisions would have to wait
-AT_START = Frame(0, 0, 0.0, math.inf, math.inf, 0.0, NOTHING, NOTHING)
+AT_START = Frame(0, 0, 0.0, math.inf, -math.inf, 1, 0.0, NOTHING, NOTHING)
 
 
 def decide(chip: Chip, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, draw: float) -> Decision:
@@ -65,8 +66,8 @@ def accepted(chip: Chip, t_in: float) -> bool:
 def edge(chip: Chip, frame: Frame, time: float, t_in: float, v_o: float, v_m: float, V_bus: float, seed: int) -> Frame:
     """Return the frame state after the rising edge of a pulse of the width t_in."""
     if not accepted(chip, t_in):
-        return Frame(frame.number + 1, frame.draws + 1, frame.drive, frame.drive_end, frame.clock, frame.error,
-                     frame.pending, frame.later)
+        return Frame(frame.number + 1, frame.draws + 1, frame.drive, frame.drive_end, frame.clock, frame.silent,
+                     frame.error, frame.pending, frame.later)
     draw = gaussian(seed, frame.draws) if chip.noise > 0.0 else 0.0
     new = decide(chip, time, t_in, v_o, v_m, V_bus, draw)
     number, pending, later = frame.number + 1, frame.pending, frame.later
@@ -76,8 +77,8 @@ def edge(chip: Chip, frame: Frame, time: float, t_in: float, v_o: float, v_m: fl
         later = new
     else:
         number = CROWDED
-    return Frame(number, frame.draws + 1, frame.drive, frame.drive_end, time + chip.timeout, frame.error, pending,
-                 later)
+    return Frame(number, frame.draws + 1, frame.drive, frame.drive_end, time + chip.timeout, 0, frame.error,
+                 pending, later)
 
 
 def edge_time(period: float, edges: Sequence[float] | NDArray[np.float64], k: int) -> float:
@@ -87,16 +88,18 @@ def edge_time(period: float, edges: Sequence[float] | NDArray[np.float64], k: in
     return edges[k] if k < len(edges) else math.inf
 
 
-def numbered(frame: Frame, number: int) -> Frame:
-    """Return the frame state before the frame of this number."""
-    return Frame(number, frame.draws, frame.drive, frame.drive_end, frame.clock, frame.error, frame.pending,
+def numbered(frame: Frame, number: int, silent: int) -> Frame:
+    """Return the frame state before the frame of this number, silent or not."""
+    return Frame(number, frame.draws, frame.drive, frame.drive_end, frame.clock, silent, frame.error, frame.pending,
                  frame.later)
 
 
-def next_switch(frame: Frame) -> float:
-    """Return when the bridge switches next, edges apart."""
+def next_switch(frame: Frame, heeds_silence: bool) -> float:
+    """Return when the bridge switches next, edges apart; `heeds_silence` where it does so as pulses stay away."""
     if frame.drive != 0.0:
         return min(frame.pending.time, frame.drive_end, frame.clock)
+    if heeds_silence and frame.silent == 0:
+        return min(frame.pending.time, frame.clock)
     return frame.pending.time
 
 
@@ -111,4 +114,5 @@ def switched(frame: Frame, time: float) -> Frame:
         if drive == 0.0 or end <= time or frame.clock <= time:
             drive, end = 0.0, math.inf
         pending, later = later, NOTHING
-    return Frame(frame.number, frame.draws, drive, end, frame.clock, error, pending, later)
+    return Frame(frame.number, frame.draws, drive, end, frame.clock, 1 if frame.clock <= time else 0, error, pending,
+                 later)

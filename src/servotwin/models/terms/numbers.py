@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from servotwin.models.engine.modes import Vector
-from servotwin.models.terms.bridge import NO_BRIDGE, Bridge
+from servotwin.models.terms.bridge import NO_BRIDGE, Bridge, Off
 from servotwin.models.terms.follower import NO_FOLLOWER, Follower
 from servotwin.models.terms.friction import NO_FRICTION, Friction
 from servotwin.models.terms.heat import NO_HEAT, Heat
@@ -41,12 +41,14 @@ NEUTRAL = Numbers()
 def at_temperature(numbers: Numbers, T_w: float, T_h: float) -> Numbers:
     """Return the numbers with a winding and a housing of these temperatures [K]: copper and magnets follow them."""
     cold, bridge = numbers.motor, numbers.bridge
+    off, silence = bridge.off, bridge.silence
     R = winding_resistance(T_w, cold.R)
     more = R - cold.R
     field = magnet_factor(T_h, numbers.heat.magnet)
     return Numbers(
         Motor(cold.K * field, cold.K_b * field, R, cold.L),
-        Bridge(bridge.D_drive, bridge.R_drive + more, bridge.D_off, bridge.R_off + more, bridge.V_br, bridge.coast),
+        Bridge(bridge.D_drive, bridge.R_drive + more, Off(off.D, off.R + more, off.coast),
+               Off(silence.D, silence.R + more, silence.coast), bridge.V_br),
         numbers.source, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play,
         numbers.sensor, numbers.heat)
 
