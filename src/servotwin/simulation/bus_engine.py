@@ -54,7 +54,7 @@ class Unit:
 
     def _listen(self) -> None:
         """Take the numbers as they are with pulses or without: alone, and on a given bus voltage."""
-        self.numbers = step.at_pulses(self.plan.numbers, self.frame)
+        self.numbers = step.at_pulses(self.plan.numbers, self.frame) if self.heeds_silence else self.plan.numbers
         self.stiff = {returning: shared_source.on_stiff_source(self.numbers, returning) for returning in (False, True)}
 
     def hear(self, now: Frame, time: float) -> None:
@@ -110,10 +110,11 @@ class Unit:
         numbers, time = self.numbers, self.point.time
         new, self.inputs = self.told() != self.inputs, self.told()
         u = step.source(numbers, self.frame)
-        m = motion.nothing(numbers, u, self.tau) if new or self.motion is None else self.motion
+        m = motion.nothing(numbers, u, self.tau) if self.motion is None else self.motion
         if new:
             self.point = step.anchored(numbers, u, self.tau, time, self.point)
-        point, self.motion, kind, status = step.onward(numbers, self.point, u, self.tau, m, self.limit, until)
+        point, self.motion, kind, status = step.onward(numbers, self.point, u, self.tau, m, new, self.limit,
+                                                        until)
         if status != step.COMPLETED:
             raise failure(Status.of_code(status), time)
         self.arrival = (point, kind)

@@ -5,7 +5,6 @@ It drives the kernels and keeps what they leave behind: states to go on from, se
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -82,6 +81,17 @@ class Plan:
         return self.chip.frame_period > 0.0
 
     @cached_property
+    def refuses(self) -> bool:
+        """Whether some pulse may be shorter or longer than the chip takes."""
+        shortest, longest = self.command.extremes
+        return not (self.chip.shortest <= shortest and longest <= self.chip.longest)
+
+    @cached_property
+    def heeds_silence(self) -> bool:
+        """Whether its bridge is off in another way while no pulses come."""
+        return heeds_silence(self.numbers.bridge)
+
+    @cached_property
     def inputs(self) -> Inputs:
         """What the servo is told, as a step reads it."""
         period = self.chip.frame_period if self.edges is None else 0.0
@@ -131,8 +141,7 @@ class State:
         raise KeyError(f"{name!r} is no state; there are: {', '.join(self.names)}")
 
 
-@dataclass(frozen=True)
-class Segment:
+class Segment(NamedTuple):
     """A stretch of one motion between two times [s], and what holds with it.
 
     `error` is the latest that the chip has decided on [s], `wiper` the angle of the potentiometer at the start [rad],
@@ -192,7 +201,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
         if idle > MOST_IDLE:
             raise failure(Status.CHATTER, time_of(before))
         if record is not None:
-            _keep(record, inputs, chip, heeds_silence(numbers.bridge), before, memory, m, event)
+            _keep(record, plan, before, memory, m, event)
     return State(until, state.places, memory, numbers, state.changes)
 
 
@@ -201,16 +210,14 @@ def failure(status: Status, time: float) -> SimulationError:
     return SimulationError(status.name, time, status.message)
 
 
-def _keep(record: Record, inputs: Inputs, chip: Chip, heeds: bool, before: Memory, memory: Memory, m: Motion,
-          event: int) -> None:
+def _keep(record: Record, plan: Plan, before: Memory, memory: Memory, m: Motion, event: int) -> None:
     """Add a step to a record: its chip's doings, its motion, its event."""
     origin, point, angle = origin_of(memory), memory.point, before.point.y[0]
     start, now = origin + before.point.time, origin + point.time
     if memory.chip is not before.chip:
-        keep_switch(record, before.chip, memory.chip, start, angle, heeds)
-        bounded = chip.shortest > 0.0 or chip.longest < math.inf
-        if (bounded and memory.chip.number > before.chip.number
-                and not frame.accepted(chip, pulse_width(inputs, before))):
+        keep_switch(record, before.chip, memory.chip, start, angle, plan.heeds_silence)
+        if (plan.refuses and memory.chip.number > before.chip.number
+                and not frame.accepted(plan.chip, pulse_width(plan.inputs, before))):
             record.events.append(Event(start, "pulse refused", angle))
     if now > start or not record.segments:
         record.segments.append(Segment(start, now, m, memory.chip.error, before.point.wiper, memory.chip.drive,

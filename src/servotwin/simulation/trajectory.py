@@ -43,7 +43,7 @@ class Trajectory:
 
     def since(self, start: float) -> Trajectory:
         """Return what is left of it from a time [s] on."""
-        return replace(self, segments=tuple(replace(segment, start=max(segment.start, start))
+        return replace(self, segments=tuple(segment._replace(start=max(segment.start, start))
                                             for segment in self.segments if segment.end > start))
 
     def inside(self, index: int, time: Array) -> Samples:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from servotwin.models.engine import contacts, currents
 from servotwin.models.engine.modes import CONDUCTING, Mode, constant_current, in_linear_zone
 from servotwin.models.terms import follower
+from servotwin.models.terms.load import springy
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import accelerated, acceleration
 from servotwin.physics import electronics, motor, potentiometer, shaft
@@ -17,28 +18,35 @@ def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau:
     `u` is (value, slope, amplitude, frequency, phase) of the command at the start of the motion, `tau` (value,
     slope) of the external torque; see `second_order`.
     """
-    per_volt = motor.electromagnetic_torque(currents.conductance(numbers, mode.zone, u[0]), numbers.motor.K)
-    damping = numbers.shaft.b + per_volt * motor.back_emf(1.0, numbers.motor.K_b)
-    stiffness = shaft.spring_torque(1.0, numbers.load.stiffness)
-    torque = -shaft.spring_torque(0.0, numbers.load.stiffness, numbers.load.rest_angle) - contacts.friction_torque(
-        numbers, mode.contact, w, 0.0, 0.0) - tau[0]
+    stiffness = pull = 0.0
+    if springy(numbers.load):
+        stiffness = shaft.spring_torque(1.0, numbers.load.stiffness)
+        pull = shaft.spring_torque(0.0, numbers.load.stiffness, numbers.load.rest_angle)
+    torque = -pull - contacts.friction_torque(numbers, mode.contact, w, 0.0, 0.0) - tau[0]
     rate = -tau[1]
-    sinusoid = 0.0
-    if in_linear_zone(mode.zone):
+    sinusoid = per_volt = 0.0
+    if constant_current(mode.zone):
+        torque += motor.electromagnetic_torque(currents.current(numbers, mode.zone, u[0], q, w), numbers.motor.K)
+    elif mode.zone >= CONDUCTING:
+        v, R = currents.loop(numbers, mode.zone, u[0])
+        per_volt = currents.torque_per_volt(numbers, R)
+        torque += per_volt * v
+    elif in_linear_zone(mode.zone):
+        per_volt = currents.torque_per_volt(numbers, numbers.motor.R)
         gain = per_volt * follower.voltage_slope(numbers.follower, 1.0)
         stiffness -= gain * electronics.feedback_error(0.0, potentiometer.feedback_voltage(1.0, numbers.sensor.p))
         torque += per_volt * currents.voltage(numbers, mode.zone, u[0], 0.0)
         rate += gain * electronics.feedback_error(u[1], 0.0)
         sinusoid = gain * electronics.feedback_error(u[2], 0.0)
-    elif constant_current(mode.zone):
-        torque += motor.electromagnetic_torque(currents.current(numbers, mode.zone, u[0], q, w), numbers.motor.K)
-    elif mode.zone >= CONDUCTING:
-        torque += per_volt * currents.loop(numbers, mode.zone, u[0])[0]
     else:
+        per_volt = currents.torque_per_volt(numbers, numbers.motor.R)
         torque += per_volt * follower.voltage(numbers.follower, mode.zone, 0.0)
-    return (0.5 * accelerated(numbers.shaft, damping), accelerated(numbers.shaft, stiffness),
-            accelerated(numbers.shaft, torque), accelerated(numbers.shaft, rate),
-            accelerated(numbers.shaft, sinusoid), u[3], u[4], q, w)
+    damping = numbers.shaft.b + per_volt * motor.back_emf(1.0, numbers.motor.K_b)
+    own = numbers.shaft
+    a, f0 = 0.5 * accelerated(own, damping), accelerated(own, torque)
+    if stiffness == 0.0 and rate == 0.0 and sinusoid == 0.0:
+        return a, 0.0, f0, 0.0, 0.0, u[3], u[4], q, w
+    return a, accelerated(own, stiffness), f0, accelerated(own, rate), accelerated(own, sinusoid), u[3], u[4], q, w
 
 
 def speed_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], against: tuple[float, ...],

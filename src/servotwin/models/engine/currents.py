@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from servotwin.models.engine.modes import CONDUCTING, NO_CURRENT, Vector, constant_current, in_linear_zone, sign_of
 from servotwin.models.terms import bridge, follower, source
 from servotwin.models.terms.motor import inductive
@@ -55,6 +57,13 @@ def loop(numbers: Numbers, zone: int, u: float) -> tuple[float, float]:
     return bridge.loop(numbers.bridge, numbers.source, zone, u)
 
 
+def resistance(numbers: Numbers, zone: int, u: float) -> float:
+    """Return the resistance of the motor's circuit in a zone [Ω]; inf where the current stays."""
+    if constant_current(zone):
+        return math.inf
+    return loop(numbers, zone, u)[1] if zone >= CONDUCTING else numbers.motor.R
+
+
 def voltage(numbers: Numbers, zone: int, u: float, q: float) -> float:
     """Return the armature voltage [V] of a zone without bridge."""
     return follower.voltage(numbers.follower, zone, error_of(numbers.sensor, u, q))
@@ -84,21 +93,17 @@ def current_rate(numbers: Numbers, zone: int, u: float, q: float, w: float, i: f
     return motor.armature_current_rate(v, i, w, R, numbers.motor.L, numbers.motor.K_b)
 
 
-def conductance(numbers: Numbers, zone: int, u: float) -> float:
-    """Return by how much the current changes per volt in this zone [S]."""
-    if zone < CONDUCTING:
-        return motor.steady_armature_current(1.0, 0.0, numbers.motor.R, numbers.motor.K_b)
-    if constant_current(zone):
-        return 0.0
-    _, R = loop(numbers, zone, u)
-    return motor.steady_armature_current(1.0, 0.0, R, numbers.motor.K_b)
+def torque_per_volt(numbers: Numbers, R: float) -> float:
+    """Return by how much the motor's torque changes per volt [N m/V] in a loop of R [Ω]."""
+    return motor.electromagnetic_torque(motor.steady_armature_current(1.0, 0.0, R, numbers.motor.K_b), numbers.motor.K)
 
 
 def current_slope(numbers: Numbers, zone: int, du: float) -> float:
     """Return di/dt [A/s] at a standstill of a current without inertia, where the command changes by du [V/s]."""
     if not in_linear_zone(zone):
         return 0.0
-    return conductance(numbers, zone, 0.0) * follower.voltage_slope(numbers.follower, du)
+    own = numbers.motor
+    return motor.steady_armature_current(follower.voltage_slope(numbers.follower, du), 0.0, own.R, own.K_b)
 
 
 def drive_torque(numbers: Numbers, zone: int, u: float, y: Vector) -> float:

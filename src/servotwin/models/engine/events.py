@@ -10,19 +10,23 @@ from __future__ import annotations
 import math
 
 from servotwin.models.engine import currents, first_order, guards
-from servotwin.models.engine.modes import FREE, RIGID, Vector
+from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Vector
 from servotwin.models.engine.motion import FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
 from servotwin.models.engine.rodas import not_constant
 from servotwin.models.terms import source
+from servotwin.physics.motor import back_emf
 from servotwin.physics.pieces import piece_rate, piece_value
 
 _BELOW = -1e-13  # a guard counts as crossed below this (V, rad, rad/s, N m): rounding is not an event
 
 
-def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int]:
-    """Return the time since the anchor and the kind of the first event in (s0, s1]; (inf, -1) where none is."""
+def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int, Vector]:
+    """Return the time since the anchor and the kind of the first event in (s0, s1], inf and −1 where none is.
+
+    The third is the state at s1, where there is no event.
+    """
     if kinds == 0 or (motion.kind == REST and not not_constant(motion.u) and not not_constant(motion.tau)):
-        return math.inf, -1
+        return math.inf, -1, state(motion, s1)
     alone = motion.mode.contact != FREE and motion.mode.mesh == RIGID
     if motion.kind == FIRST_ORDER and source.present(motion.numbers.source) and alone:
         return _outright(motion, kinds, s0, s1)
@@ -34,23 +38,24 @@ def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float
         at_right = state(motion, right)
         first, found = _first_of(motion, kinds, left, at_left, right, at_right)
         if found >= 0:
-            return first, found
+            return first, found, at_right
         left, at_left = right, at_right
-    return math.inf, -1
+    return math.inf, -1, at_left
 
 
-def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int]:
+def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int, Vector]:
     """Return the same behind a bridge, where zones end at a speed: outright for these, by search for a stop."""
-    numbers, c = motion.numbers, motion.coefficients
+    numbers, c, u = motion.numbers, motion.coefficients, motion.u.value
     rate, f, w0 = 2.0 * c[0], c[2], c[8]
-    before, after = state(motion, s0), state(motion, s1)
+    after = state(motion, s1)
+    low, high = currents.zone_limits(numbers, motion.mode.zone, u)
+    w, x = after[1], u - back_emf(after[1], numbers.motor.K_b)
     first, found = math.inf, -1
-    for kind in range(guards.SPEED, guards.ZONE_DOWN + 1):
-        if not kinds >> kind & 1:
+    for kind, left, limit in ((guards.SPEED, w if motion.mode.contact == FORWARD else -w, 0.0),
+                              (guards.ZONE_UP, high - x, high), (guards.ZONE_DOWN, x - low, low)):
+        if not kinds >> kind & 1 or left >= _BELOW:  # monotone: what holds at the end has held
             continue
-        if _guard(motion, kind, s1, after)[0] >= _BELOW:  # monotone: what holds at the end has held
-            continue
-        s = first_order.time_to(rate, f, w0, _boundary_speed(motion, kind))
+        s = first_order.time_to(rate, f, w0, 0.0 if kind == guards.SPEED else (u - limit) / numbers.motor.K_b)
         s = s1 if s > s1 else s0 if s < s0 else s
         if s < first:
             first, found = s, kind
@@ -59,19 +64,10 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
     if stops != 0:
         q = after[0] if end == s1 else state(motion, end)[0]
         if q > numbers.stops.upper or q < numbers.stops.lower:
-            s, kind = _first_of(motion, stops, s0, before, end, state(motion, end))
+            s, kind = _first_of(motion, stops, s0, state(motion, s0), end, state(motion, end))
             if kind >= 0 and s < first:
-                return s, kind
-    return first, found
-
-
-def _boundary_speed(motion: Motion, kind: int) -> float:
-    """Return the speed [rad/s] at which sliding, or a zone behind a bridge, ends."""
-    if kind == guards.SPEED:
-        return 0.0
-    u = motion.u.value
-    low, high = currents.zone_limits(motion.numbers, motion.mode.zone, u)
-    return (u - (high if kind == guards.ZONE_UP else low)) / motion.numbers.motor.K_b
+                return s, kind, after
+    return first, found, after
 
 
 def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b: Vector) -> tuple[float, int]:

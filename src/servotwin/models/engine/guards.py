@@ -34,6 +34,10 @@ from servotwin.physics import motor
 SPEED, CORE_FORWARD, CORE_BACKWARD, ZONE_UP, ZONE_DOWN, UPPER, LOWER, RELEASE_FORWARD, RELEASE_BACKWARD = range(9)
 MEET_FORWARD, MEET_BACKWARD, PART, PART_OUTPUT, PART_MOTOR = range(9, 14)
 MOTOR_SPEED, MOTOR_RELEASE_FORWARD, MOTOR_RELEASE_BACKWARD = range(14, 17)
+_CORE = 1 << CORE_FORWARD | 1 << CORE_BACKWARD
+_RELEASE = 1 << RELEASE_FORWARD | 1 << RELEASE_BACKWARD
+_MEET = 1 << MEET_FORWARD | 1 << MEET_BACKWARD
+_MOTOR_RELEASE = 1 << MOTOR_RELEASE_FORWARD | 1 << MOTOR_RELEASE_BACKWARD
 EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper stop", "lower stop",
                "release forward", "release backward", "gear meets", "gear meets", "gear parts", "gear parts",
                "gear parts", "motor speed zero", "motor release", "motor release")
@@ -50,9 +54,9 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
     kinds = 0
     if shaft == CORE:
         if not smooth:
-            kinds |= 1 << CORE_FORWARD | 1 << CORE_BACKWARD
+            kinds |= _CORE
     elif shaft == STUCK:
-        kinds |= 1 << RELEASE_FORWARD | 1 << RELEASE_BACKWARD
+        kinds |= _RELEASE
     elif shaft == ON_UPPER:
         kinds |= 1 << RELEASE_BACKWARD
     elif shaft == ON_LOWER:
@@ -69,9 +73,9 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
     if numbers.stops.lower > -math.inf and (shaft == FREE or shaft == BACKWARD or shaft == CORE):
         kinds |= 1 << LOWER
     if mode.mesh == INSIDE:
-        kinds |= 1 << MEET_FORWARD | 1 << MEET_BACKWARD
+        kinds |= _MEET
         if mode.motor == STUCK:
-            kinds |= 1 << MOTOR_RELEASE_FORWARD | 1 << MOTOR_RELEASE_BACKWARD
+            kinds |= _MOTOR_RELEASE
         elif mode.motor != FREE:
             kinds |= 1 << MOTOR_SPEED
     elif play.present(numbers.play):

@@ -50,7 +50,7 @@ def jacobian(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, q: 
         Ei = motor.armature_current_rate(0.0, 1.0, 0.0, R, L, K_b)
         Fi = motor.electromagnetic_torque(1.0, numbers.motor.K)
     else:
-        per_volt = motor.electromagnetic_torque(currents.conductance(numbers, mode.zone, u), numbers.motor.K)
+        per_volt = currents.torque_per_volt(numbers, currents.resistance(numbers, mode.zone, u))
         Fq += per_volt * vq
         Fw -= per_volt * motor.back_emf(1.0, numbers.motor.K_b)
         Fu = per_volt * vu

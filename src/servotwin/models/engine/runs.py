@@ -24,6 +24,7 @@ from servotwin.models.engine.modes import INSIDE, RIGID, Mode
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms import play
+from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers
@@ -87,7 +88,8 @@ def mode_of(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> Mod
     u = source(numbers, memory.chip) if pulsed_chip(chip) else since(memory.u, origin)
     if point.anchor_time < math.inf and (not pulsed_chip(chip) or u.value == memory.u.value):
         return point.mode
-    numbers = at_pulses(numbers, memory.chip) if pulsed_chip(chip) else numbers
+    if heeds_silence(numbers.bridge):
+        numbers = at_pulses(numbers, memory.chip)
     return anchored(numbers, u, since(memory.tau, origin), point.time, point).mode
 
 
@@ -112,10 +114,10 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
             until = instant(pulsed, inputs, memory, until - (origin_of(memory) - origin))
             origin = origin_of(memory)
         t, wiper = memory.point.time, memory.point.wiper
-        after = step(numbers, chip, inputs, memory, m, until)
-        if after.status != COMPLETED:
-            return memory, after.status
-        memory, m = after.memory, after.motion
+        after, m, _, status = step(numbers, chip, inputs, memory, m, until)
+        if status != COMPLETED:
+            return memory, status
+        memory = after
         idle = idle + 1 if memory.point.time == t else 0
         if idle > MOST_IDLE:
             return memory, CHATTER

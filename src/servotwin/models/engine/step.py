@@ -8,11 +8,10 @@ nor on how a run is split.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from servotwin.models.engine import currents, events, guards, motion
 from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, edge_of, in_force, origin_of, since
-from servotwin.models.engine.modes import Vector
+from servotwin.models.engine.modes import CORE, Vector
 from servotwin.models.engine.motion import Motion
 from servotwin.models.terms import bridge, frame
 from servotwin.models.terms.chip import Chip
@@ -32,19 +31,12 @@ _MOST_OSCILLATIONS = 1e7  # within one motion
 COMPLETED, DIVERGED, STEP_TOO_SMALL, CHATTER, TOO_FAST, CROWDED = range(6)
 
 
-class Stepped(NamedTuple):
-    """What a step leaves: the memory, the motion on which it went, the event that ended it (−1: none), a status."""
-
-    memory: Memory
-    motion: Motion
-    event: int
-    status: int
-
-
-def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion, until: float) -> Stepped:
+def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion,
+         until: float) -> tuple[Memory, Motion, int, int]:
     """Go on to the next event, or to `until` at the latest, by the times of the memory [s].
 
-    `m` is the motion of the step before, or `motion.nothing`.
+    `m` is the motion of the step before, or `motion.nothing`. Return the memory, the motion on which it went, the
+    event that ended it (−1: none), and a status.
     """
     frames, beat, point, now, u, u_end, tau, tau_end = memory
     origin, t = frames * beat, point.time
@@ -58,13 +50,16 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
             now = frame.switched(now, t)
         edge = edge_of(inputs, memory, now.number)
         if edge <= t:
-            now = measured(at_pulses(numbers, now), chip, inputs, now, point, pulse_width(inputs, memory))
+            met = at_pulses(numbers, now) if heeds else numbers
+            now = measured(met, chip, inputs, now, point, pulse_width(inputs, memory))
             if now.number == frame.CROWDED:
-                return Stepped(memory, m, -1, CROWDED)
+                return memory, m, -1, CROWDED
             edge = edge_of(inputs, memory, now.number)
         u_end = min(frame.next_switch(now, heeds), edge)
-        numbers = at_pulses(numbers, now)
-        if new or u.value != now.drive * numbers.source.V or (heeds and silent != now.silent):
+        if heeds:
+            numbers = at_pulses(numbers, now)
+            new = new or silent != now.silent
+        if new or u.value != now.drive * numbers.source.V:
             u, new = source(numbers, now), True
     elif t >= u_end:
         u, u_end = in_force(inputs.command, origin, t, 0.0)
@@ -72,19 +67,18 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
     local_u, local_tau = (since(u, origin), since(tau, origin)) if origin != 0.0 else (u, tau)
     if new:
         point = anchored(numbers, local_u, local_tau, t, point)
-        m = motion.nothing(numbers, local_u, local_tau)
-    point, m, event, status = onward(numbers, point, local_u, local_tau, m, min(u_end, tau_end), until)
-    return Stepped(Memory(frames, beat, point, now, u, u_end, tau, tau_end), m, event, status)
+    point, m, event, status = onward(numbers, point, local_u, local_tau, m, new, min(u_end, tau_end), until)
+    return Memory(frames, beat, point, now, u, u_end, tau, tau_end), m, event, status
 
 
-def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, limit: float,
+def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new: bool, limit: float,
            until: float) -> tuple[Point, Motion, int, int]:
     """Go on, under inputs that stay until `limit` [s], to the next event or to `until`.
 
-    `m` is the motion so far, which is taken up again if it is still the right one. Return the point, the motion, the
-    event (−1: none) and a status.
+    `m` is the motion so far, which is taken up again if it is still the right one and the inputs are not `new`. Return
+    the point, the motion, the event (−1: none) and a status.
     """
-    if motion.is_step(m) or m.t0 != point.anchor_time or m.mode != point.mode:
+    if new or motion.is_step(m) or m.t0 != point.anchor_time or m.mode != point.mode:
         m = motion.begin(numbers, point.mode, u, tau, point.anchor_time, point.anchor, point.step,
                          limit - point.anchor_time)
     if m.kind == motion.IMPOSSIBLE:
@@ -127,22 +121,22 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
     if integrated and (point.time > t0 or end < step_end):
         m = motion.prepared(m)
     v = piece_value(m.u, point.time)
-    kinds = guards.guards(m.numbers, m.mode, v, in_one_piece(m.numbers, m.u))
+    kinds = guards.guards(m.numbers, m.mode, v, m.mode.contact == CORE and in_one_piece(m.numbers, m.u))
     if integrated:  # looked at as a whole, however a run is split
-        s, kind = events.first_event(m, kinds, 0.0, m.length)
-        kind = kind if s <= end - t0 else -1
+        s, kind, y = events.first_event(m, kinds, 0.0, m.length)
+        if kind < 0 or s > end - t0:
+            kind, y = -1, motion.state(m, end - t0)
     else:
-        s, kind = events.first_event(m, kinds, point.time - t0, end - t0)
+        s, kind, y = events.first_event(m, kinds, point.time - t0, end - t0)
     if kind < 0:
-        y = motion.state(m, end - t0)
         wiper = wiper_at(m.numbers.sensor, point.wiper, y[0])
         if integrated and end == step_end:
             return Point(end, y, m.mode, end, y, m.next_step, wiper), -1, status_of(y)
         return Point(end, y, m.mode, t0, point.anchor, point.step, wiper), -1, status_of(y)
     t = min(max(t0 + s, point.time), end)
-    before = motion.state(motion.prepared(m), s)
-    wiper = wiper_at(m.numbers.sensor, point.wiper, before[0])
-    after, y = guards.cross(m.numbers, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), before)
+    y = motion.state(motion.prepared(m), s)
+    wiper = wiper_at(m.numbers.sensor, point.wiper, y[0])
+    after, y = guards.cross(m.numbers, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), y)
     return Point(t, y, after, t, y, point.step, wiper), kind, status_of(y)
 
 
@@ -154,7 +148,7 @@ def status_of(y: Vector) -> int:
 
 def at_pulses(numbers: Numbers, now: Frame) -> Numbers:
     """Return the numbers with the bridge as it is now: while no pulses come it may be off in another way."""
-    if now.silent == 0 or not bridge.heeds_silence(numbers.bridge):
+    if now.silent == 0:
         return numbers
     return Numbers(numbers.motor, bridge.silent(numbers.bridge), numbers.source, numbers.follower, numbers.shaft,
                    numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)

@@ -92,11 +92,14 @@ def loop(bridge: Bridge, source: Source, zone: int, u: float) -> tuple[float, fl
 
 def zone_limits(bridge: Bridge, source: Source, by_current: bool, zone: int, u: float) -> tuple[float, float]:
     """Return between what a zone lies: voltages that drive the current [V], or `by_current` currents [A]."""
-    D, I_max = drop(bridge, u), source.I_max
     if zone == CONDUCTING:
         return -math.inf, math.inf
+    D, I_max = drop(bridge, u), source.I_max
     if zone == NO_CURRENT:
         return -D, D
+    if I_max == math.inf:
+        edge = 0.0 if by_current else D
+        return (edge, math.inf) if zone == CURRENT_FORWARD else (-math.inf, -edge)
     # A regulator's most, in the direction of the drive: from x1 on it gives that, from x2 on the bus has broken down.
     x1 = needed_voltage(I_max, 0.0, D, bridge.R_drive)
     x2 = needed_voltage(I_max, 0.0, D, bridge.R_drive - source.R_b) + abs(u)

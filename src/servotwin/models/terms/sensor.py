@@ -78,7 +78,7 @@ def _interpolated(curve: Sequence[Sequence[float]] | NDArray[np.float64], q: flo
 
 def wiper_at(sensor: Sensor, wiper: float, q: float) -> float:
     """Return where a potentiometer with play stands after the shaft has gone one way to q."""
-    return play(wiper, q, 2.0 * sensor.half_slack)
+    return play(wiper, q, 2.0 * sensor.half_slack) if sensor.half_slack > 0.0 else q
 
 
 def pack(model: Given) -> Sensor:
