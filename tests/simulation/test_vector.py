@@ -257,6 +257,41 @@ def test_a_bus_voltage_that_is_set_is_the_supply(servo):
     assert imposed["bus_voltage"].tolist() == [4.8, 6.0]
 
 
+def test_a_bus_voltage_limits_a_servo_of_mean_voltage(servo):
+    bounded = st.PulseServo(servo.replace({"supply.bridge_drop_voltage": 0.3})).averaged()
+    imposed = st.VectorSimulator(bounded, 3)
+    imposed.set(bus_voltage=[4.8, 0.2], lanes=[0, 2])  # the second is below the drop of the bridge
+    given = st.VectorSimulator(bounded, 2, parameters={"supply.open_circuit_voltage": [4.8, 6.0]})
+    for sims in (imposed, given):
+        sims.reset(command_angle=0.3)
+        sims.advance(0.1, command_angle=1.3)
+    np.testing.assert_allclose(imposed["output_angle"][:2], given["output_angle"], rtol=0.0, atol=1e-12)
+    assert imposed["output_angle"][2] == pytest.approx(0.3)
+    assert not imposed.status.any()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_imposed_in_place_is_what_a_new_start_would_take(servo, name):
+    """Inertias and voltages of some lanes at every tick, as another simulator would; a parameter builds all anew."""
+    changes, load = CASES[name]
+    model, rng = model_of(servo, changes), np.random.default_rng(5)
+    in_place, anew = (st.VectorSimulator(model, 4, load=load, seed=3) for _ in range(2))
+    for sims in (in_place, anew):
+        sims.reset(pulse_width=1500e-6)
+    for k in range(12):
+        lanes = rng.permutation(4)[:3]
+        inertia, bus = rng.uniform(5e-4, 4e-3, 3), rng.choice([0.1, 5.0, 5.7, 7.0], 3)
+        for sims in (in_place, anew):
+            sims.set(load_inertia=inertia, lanes=lanes)
+            if k % 3 == 0:
+                sims.set(bus_voltage=bus, lanes=lanes)
+        anew.set(parameters={"motor.rotor_inertia": servo.motor.rotor_inertia})
+        for sims in (in_place, anew):
+            sims.advance(0.017, pulse_width=1800e-6 if k % 2 else 1300e-6)
+        for signal in ("output_angle", "output_speed", "armature_current", "bus_voltage"):
+            np.testing.assert_allclose(in_place[signal], anew[signal], rtol=1e-12, atol=1e-12, err_msg=f"{signal} {k}")
+
+
 @pytest.mark.parametrize("load", [None, st.loads.Spring(0.1)], ids=["side by side", "one by one"])
 @pytest.mark.parametrize("period", [0.012, 0.033])
 def test_frames_change_their_length_while_memory_goes_on(servo, load, period):

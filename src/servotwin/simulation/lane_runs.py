@@ -21,7 +21,7 @@ Indices = NDArray[np.int64]
 
 SIDE_BY_SIDE = {
     dtype: Recipe(f"side_by_side_{dtype}", tuple(
-        f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance")),
+        f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit")),
         vector=True, single=dtype == "float32")
     for dtype in ("float64", "float32")
 }

@@ -234,12 +234,16 @@ class VectorSimulator:
             _check_lanes("bus_voltage", bus, which, bus > 0.0, "a positive voltage")
         if angle is not None:
             self._numbers.check_angles(angle, which)
-        if parameters or inertia is not None or bus is not None:
-            numbers = self._numbers.changed(which, parameters or {}, inertia, bus)
-            memory = self._store.records()
-            self._numbers = numbers
-            self._store.renew(numbers, which, memory, self._torque)
-            self._translate = Translator(numbers)
+        if parameters:
+            self._numbers = self._numbers.changed(which, parameters)
+            self._store.renew(self._numbers, which, self._torque)
+            self._translate = Translator(self._numbers)
+        if inertia is not None:
+            self._numbers.hang(which, inertia)
+        if bus is not None:
+            self._numbers.feed(which, bus)
+        if inertia is not None or bus is not None:
+            self._store.refit(which, bus is not None, self._torque)
         if angle is not None or speed is not None:
             self._store.impose(which, angle, speed)
 

@@ -16,7 +16,7 @@ from servotwin.loads import Load
 from servotwin.models.columns import LanePieces
 from servotwin.models.engine.memory import put_memory, started
 from servotwin.models.engine.modes import INSIDE, RIGID
-from servotwin.models.engine.records import columns_of, put_columns, tiles_with
+from servotwin.models.engine.records import TILE, columns_of, mapped, put_columns, tiles_with
 from servotwin.models.engine.tiles import Lanes as Columns
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
@@ -56,7 +56,7 @@ class LaneNumbers:
     def __init__(self, inputs: Lanes, imposed: Imposed | None = None) -> None:
         self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
         nothing = np.full(self.count, math.nan)
-        self.imposed = imposed or Imposed(nothing, nothing.copy())
+        self.imposed = Imposed(nothing, nothing.copy())
         commands = Commands(inputs)
         self.chunks = [Chunk(inputs, commands, which) for which in groups(inputs, commands)]
         self.pulsed = LAWS[type(inputs.model)] == "pulse"
@@ -64,10 +64,16 @@ class LaneNumbers:
         self.neutral = np.empty(self.count)
         self.columns, self.torque = self._packed()
         self.frame_period = self.columns.chips["frame_period"].ravel()[:self.count]
-        self.load_total = np.empty(self.count)
+        self.load_total, self._V_oc = np.empty((2, self.count))
         for chunk in self.chunks:
             self.load_total[chunk.which] = flat(chunk.load.total_inertia)
-        self._impose()
+            self._V_oc[chunk.which] = flat(chunk.model.value("supply.open_circuit_voltage"))
+        self.numbers: Any = columns_of(Numbers, self.columns.numbers, slice(self.count))
+        self._given = mapped(np.copy, self.numbers)
+        if imposed is not None:
+            for put, values in ((self.hang, imposed.load_inertia), (self.feed, imposed.bus_voltage)):
+                which = np.flatnonzero(~np.isnan(values))
+                put(which, values[which])
 
     def _packed(self) -> tuple[Columns, Tables]:
         B = self.count
@@ -91,29 +97,37 @@ class LaneNumbers:
                           np.zeros(0), none, none - 1)
         return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
 
-    def _impose(self) -> None:
-        """Put what another simulator decides in the place of what load and supply would."""
-        J_L, V = self.imposed
-        columns: Any = columns_of(Numbers, self.columns.numbers, slice(self.count))
-        shaft, bridge, source = columns.shaft, columns.bridge, columns.source
-        own = shaft.J_out - self.load_total
-        hung = ~np.isnan(J_L)
-        shaft.J[hung] += (J_L + own - shaft.J_out)[hung]
-        shaft.J_out[hung] = (J_L + own)[hung]
-        fed = ~np.isnan(V)
-        for off in (bridge.off, bridge.silence):
-            coasts = fed & (off.coast > 0.0)
-            battery = coasts & np.isinf(source.I_max)
-            off.D[coasts] += (V - source.V)[coasts]
-            off.R[battery] -= source.R_b[battery]
-        bridge.R_drive[fed] -= source.R_b[fed]
-        source.V[fed], source.R_b[fed], source.I_max[fed] = V[fed], 0.0, math.inf
-        self.numbers: Any = columns
-        self.columns = self.columns._replace(numbers=tiles_with(Numbers, columns, self.count))
+    def hang(self, which: Indices, J_L: Array) -> None:
+        """Put inertias [kg m²] in the place of those of some lanes' loads."""
+        self.imposed.load_inertia[which] = J_L
+        given = self._given.shaft
+        own = given.J_out[which] - self.load_total[which]
+        self._put("shaft", which, J=given.J[which] + (J_L + own - given.J_out[which]), J_out=J_L + own)
 
-    def changed(self, which: Indices, parameters: Mapping[str, Any], inertia: Array | None,
-                bus: Array | None) -> LaneNumbers:
-        """Return these lanes with other numbers in some of them.
+    def feed(self, which: Indices, V: Array) -> None:
+        """Put voltages [V] in the place of what some lanes' supplies would leave."""
+        self.imposed.bus_voltage[which] = V
+        V_oc = self._V_oc[which]
+        if not self.pulsed:
+            self._put("follower", which, V_max=np.maximum(self._given.follower.V_max[which] + V - V_oc, 0.0))
+            return
+        bridge, source = (mapped(lambda x: x[which], part) for part in (self._given.bridge, self._given.source))
+        for name, off in (("off", bridge.off), ("silence", bridge.silence)):
+            opens, battery = off.coast > 0.0, np.isinf(source.I_max)
+            self._put(f"bridge.{name}", which, D=off.D + np.where(opens, V - V_oc, 0.0),
+                      R=off.R - np.where(opens & battery, source.R_b, 0.0))
+        self._put("bridge", which, R_drive=bridge.R_drive - source.R_b)
+        self._put("source", which, V=V, R_b=np.zeros_like(V), I_max=np.full_like(V, math.inf))
+
+    def _put(self, room: str, which: Indices, **columns: Array) -> None:
+        own, packed = self.numbers, self.columns.numbers
+        for part in room.split("."):
+            own, packed = getattr(own, part), packed[part]
+        for name, values in columns.items():
+            getattr(own, name)[which] = packed[name][which // TILE, which % TILE] = values
+
+    def changed(self, which: Indices, parameters: Mapping[str, Any]) -> LaneNumbers:
+        """Return these lanes with other parameters in some of them.
 
         Raises
         ------
@@ -121,19 +135,13 @@ class LaneNumbers:
             Or one of its kinds, as `simulate_many` has them; names the lane.
         """
         inputs = self.inputs
-        if parameters:
-            if not isinstance(parameters, Mapping):
-                raise InputError("parameters", got=parameters, allowed="a mapping of names to numbers or arrays (SI)")
-            merged = {name: self._merged(name, value, which) for name, value in parameters.items()}
-            known = {**inputs.numbers, **inputs.words}
-            loads = [inputs.loads[k] for k in inputs.load_of.tolist()]
-            inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
-        J_L, V = self.imposed.load_inertia.copy(), self.imposed.bus_voltage.copy()
-        if inertia is not None:
-            J_L[which] = inertia
-        if bus is not None:
-            V[which] = bus
-        return LaneNumbers(inputs, Imposed(J_L, V))
+        if not isinstance(parameters, Mapping):
+            raise InputError("parameters", got=parameters, allowed="a mapping of names to numbers or arrays (SI)")
+        merged = {name: self._merged(name, value, which) for name, value in parameters.items()}
+        known = {**inputs.numbers, **inputs.words}
+        loads = [inputs.loads[k] for k in inputs.load_of.tolist()]
+        inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
+        return LaneNumbers(inputs, self.imposed)
 
     def _merged(self, name: str, value: Any, which: Indices) -> Any:
         """Return a parameter of all lanes, of which some have new values."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +13,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
 from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, INSIDE, RIGID, STUCK
-from servotwin.models.engine.records import TILE, columns_of, room
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.engine.records import TILE, room
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
@@ -55,21 +55,45 @@ class Store:
         self._base = columns.torque.copy()
         self._total[:] = self._base
         self._columns = columns._replace(torque=self._total)
-        kinds = lane_runs.kinds_of(columns, numbers.pulsed, self._dtype, numbers.torque.count > 0,
-                                   bool(numbers.curve.size))
+        self._kinds = self._kinds_now()
         self._sets: list[_Tiles | _Records] = [
             _Tiles(kind, self._dtype, some_of(self._columns, kind.which), self._threads)
-            if isinstance(kind, SideBySide) else _Records(kind) for kind in kinds]
+            if isinstance(kind, SideBySide) else _Records(kind) for kind in self._kinds]
+        self._set_of, self._place = np.empty((2, numbers.count), np.int64)
+        for k, some in enumerate(self._sets):
+            self._set_of[some.which], self._place[some.which] = k, np.arange(len(some.which))
         self._inputs = (numbers.curve, numbers.torque.rows, numbers.torque.first, numbers.torque.count)
         self._loads_change = True
+
+    def _kinds_now(self) -> list[SideBySide | OneByOne]:
+        numbers = self._numbers
+        return lane_runs.kinds_of(numbers.columns, numbers.pulsed, self._dtype, numbers.torque.count > 0,
+                                  bool(numbers.curve.size))
+
+    def _parts(self, which: Indices) -> Iterator[tuple[_Tiles | _Records, Indices, Indices]]:
+        """Return the sets that hold some lanes, where in the set they are, and where in `which`."""
+        set_of, place = self._set_of[which], self._place[which]
+        for k, some in enumerate(self._sets):
+            of = np.flatnonzero(set_of == k)
+            if len(of):
+                yield some, place[of], of
 
     def hang(self, torque: Array) -> None:
         """Hang external torques beside the loads [N m]."""
         np.add(self._base, torque, out=self._total)
         self._loads_change = True
 
-    def renew(self, numbers: LaneNumbers, which: Indices, memory: NDArray[Any], torque: Array) -> None:
+    def refit(self, which: Indices, fed: bool, torque: Array) -> None:
+        """Take what another simulator has imposed on some lanes, `fed` where it is a voltage; memories go on."""
+        if fed and not _same(self._kinds_now(), self._kinds):
+            self.renew(self._numbers, which, torque)
+            return
+        for some, places, of in self._parts(which):
+            some.refit(self._columns, which[of], places)
+
+    def renew(self, numbers: LaneNumbers, which: Indices, torque: Array) -> None:
         """Take other numbers of some lanes; memories go on."""
+        memory = self.records()
         self._build(numbers)
         self.hang(torque)
         play = numbers.numbers.play.half > 0.0
@@ -93,12 +117,8 @@ class Store:
         self._put(which, records)
 
     def _put(self, which: Indices, records: NDArray[Any]) -> None:
-        place = np.full(len(self.status), -1)
-        place[which] = np.arange(len(which))
-        for some in self._sets:
-            own = np.flatnonzero(place[some.which] >= 0)
-            if len(own):
-                some.put(own, records[place[some.which[own]]], self._numbers)
+        for some, places, of in self._parts(which):
+            some.put(places, records[of], self._numbers)
 
     def records(self) -> NDArray[Any]:
         """Return the memories of all lanes."""
@@ -209,26 +229,27 @@ class Store:
 
     def impose(self, which: Indices, angle: Array | None, speed: Array | None) -> None:
         """Set angles [rad] and speeds [rad/s] of the output; book the work of the impulses."""
-        records = self.records()[which]
-        own = columns_of(Numbers, self._columns.numbers, which)
-        point, y = records["point"], records["point"]["y"]
-        play, half, slack = own.play.half > 0.0, own.play.half, own.sensor.half_slack
+        now = self._numbers.numbers
         if angle is not None:
-            y[:, 0] = np.clip(angle, own.stops.lower, own.stops.upper)
-            y[:, 5] = np.where(play, np.clip(y[:, 5], y[:, 0] - half, y[:, 0] + half), y[:, 0])
-            point["wiper"] = np.clip(point["wiper"], y[:, 0] - slack, y[:, 0] + slack)
-        if speed is not None:
-            J = np.where(play, own.shaft.J_out, own.shaft.J)
-            with np.errstate(over="ignore", invalid="ignore"):
-                self.work[which] += 0.5 * J * (speed**2 - y[:, 1]**2)
-            y[:, 1] = speed
-            y[:, 6] = np.where(play, y[:, 6], speed)
-        point["anchor_time"], point["anchor"] = math.inf, y
-        point["mode"]["mesh"] = np.where(play, INSIDE, RIGID)
-        self._put(which, records)
+            angle = np.clip(angle, now.stops.lower[which], now.stops.upper[which])
+        J = np.where(now.play.half > 0.0, now.shaft.J_out, now.shaft.J)[which] if speed is not None else None
+        for some, places, of in self._parts(which):
+            lanes = which[of]
+            if speed is not None and J is not None:
+                with np.errstate(over="ignore", invalid="ignore"):
+                    self.work[lanes] += 0.5 * J[of] * (speed[of]**2 - some.shaft("output_speed")[places]**2)
+            some.impose(places, None if angle is None else angle[of], None if speed is None else speed[of],
+                        now.play.half[lanes], now.sensor.half_slack[lanes])
 
 
 _NONE = np.zeros(0)
+
+
+def _same(some: list[SideBySide | OneByOne], others: list[SideBySide | OneByOne]) -> bool:
+    """Tell whether lanes run in the same way."""
+    return len(some) == len(others) and all(
+        type(a) is type(b) and a[1:] == b[1:] and np.array_equal(a.which, b.which)
+        for a, b in zip(some, others, strict=True))
 
 
 class _Tiles:
@@ -240,12 +261,22 @@ class _Tiles:
         self.workers = max(1, min(threads, len(self.rows) // _WORTH))
         self.plans = [room(1, tiles.plan_type(dtype)) for _ in range(self.workers)]
         module = kernels(SIDE_BY_SIDE[dtype])
-        self.advance = module.advance
+        self.advance, self._refit = module.advance, module.refit
         module.start(lanes, math.inf, self.rows)
         self.rows["clock"]["piece_end"] = math.inf
 
     def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
         put_records(self.rows, places, records, numbers.frame_period[self.which[places]])
+
+    def refit(self, columns: tiles.Lanes, lanes: Indices, places: Indices) -> None:
+        """Take the numbers of lanes anew."""
+        self._refit(columns, lanes, places, self.rows)
+
+    def impose(self, places: Indices, angle: Array | None, speed: Array | None, half: Array, slack: Array) -> None:
+        """Set angles [rad] and speeds [rad/s]; none of these lanes has play."""
+        for name, values in (("q", angle), ("w", speed)):
+            if values is not None:
+                put(self.rows, "servo", name, places, values)
 
     def forget(self, places: Indices) -> None:
         """Let the general way finish the calls of these lanes."""
@@ -284,6 +315,25 @@ class _Records:
 
     def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
         self.rows[places] = records
+
+    def refit(self, columns: tiles.Lanes, lanes: Indices, places: Indices) -> None:
+        """Let motions of lanes begin anew: their numbers are read at each step."""
+        self.rows["point"]["anchor_time"][places] = math.inf
+
+    def impose(self, places: Indices, angle: Array | None, speed: Array | None, half: Array, slack: Array) -> None:
+        """Set angles [rad] and speeds [rad/s]; with play of the gear, or of the potentiometer, half of it is given."""
+        rows = self.rows[places]
+        point, y, play = rows["point"], rows["point"]["y"], half > 0.0
+        if angle is not None:
+            y[:, 0] = angle
+            y[:, 5] = np.where(play, np.clip(y[:, 5], angle - half, angle + half), angle)
+            point["wiper"] = np.clip(point["wiper"], angle - slack, angle + slack)
+        if speed is not None:
+            y[:, 1] = speed
+            y[:, 6] = np.where(play, y[:, 6], speed)
+        point["anchor_time"], point["anchor"] = math.inf, y
+        point["mode"]["mesh"] = np.where(play, INSIDE, RIGID)
+        self.rows[places] = rows
 
     def records(self, columns: tiles.Lanes) -> NDArray[Any]:
         return self.rows.copy()

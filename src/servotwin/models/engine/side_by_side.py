@@ -40,6 +40,12 @@ def start(lanes: Lanes, first_output: float, tile_rows: Any) -> None:
         tiles.start(lanes, first, min(tiles.TILE, total - first), first_output, tile_rows[k])
 
 
+def refit(lanes: Lanes, which: Indices, places: Indices, tile_rows: Any) -> None:
+    """Take the numbers of the lanes `which` anew, which stand at these places of the tiles."""
+    for k in range(which.size):
+        tiles.set_numbers(lanes, which[k], 1, tile_rows[places[k] // tiles.TILE], places[k] % tiles.TILE)
+
+
 def advance(which: Indices, braked: bool, first: int, last: int, duration: float, widths: Floats, torques: Floats,
             loads_change: bool, tile_rows: Any, plans: Any) -> int:
     """Let the lanes `which` of the tiles from `first` to before `last` go on under constant pulses [s] and torques.

@@ -210,25 +210,25 @@ def chip_of(lanes: Lanes, lane: int) -> Chip:
     return chip_at(lanes.chips[lane // TILE], lane % TILE)
 
 
-def set_numbers(lanes: Lanes, first: int, size: int, tile: Any) -> None:
-    """Put what servos are into a tile, from the lane `first` on."""
+def set_numbers(lanes: Lanes, first: int, size: int, tile: Any, place: int) -> None:
+    """Put what servos are into a tile, from the lane `first` and the place `place` on."""
     for j in range(size):
-        put_arc_numbers(tile.arc, j, arcs.arc_numbers(numbers_of(lanes, first + j), lanes.torque[first + j]))
+        put_arc_numbers(tile.arc, place + j, arcs.arc_numbers(numbers_of(lanes, first + j), lanes.torque[first + j]))
     for j in range(size):
         chip = chip_of(lanes, first + j)
-        put_chip(tile.chip, j, chip)
-        tile.clock.period[j] = chip.frame_period
+        put_chip(tile.chip, place + j, chip)
+        tile.clock.period[place + j] = chip.frame_period
     for j in range(size):
         numbers = numbers_of(lanes, first + j)
         path, motor, source, sensor = numbers.bridge, numbers.motor, numbers.source, numbers.sensor
-        put_meter(tile.meter, j, Meter(
+        put_meter(tile.meter, place + j, Meter(
             source.V, source.R_b, motor.K_b, motor.R, path.V_br, path.off.coast, path.D_drive, path.R_drive, path.off.D,
             path.off.R, sensor.p, sensor.b_o))
 
 
 def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -> None:
     """Put lanes as they start into a tile, from the column `first` on."""
-    set_numbers(lanes, first, size, tile)
+    set_numbers(lanes, first, size, tile, 0)
     for j in range(size):
         q, w = lanes.start[0, first + j], lanes.start[1, first + j]
         put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, -math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
