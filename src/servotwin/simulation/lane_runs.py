@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
-from servotwin.models.engine.records import column, columns_of, room, rows_in, tiles_with
+from servotwin.models.engine.records import columns_of, numbers_in, room, tiles_with
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
@@ -18,6 +17,7 @@ from servotwin.simulation.lane_memory import RECORD, flat, records_of
 from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
 
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 SIDE_BY_SIDE = {
     dtype: Recipe(f"side_by_side_{dtype}", tuple(
@@ -39,6 +39,7 @@ _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), ve
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes
 _TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
+_SMALLEST = 2.0**-150  # what is not more is zero in float32
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
 
 
@@ -46,7 +47,8 @@ def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw = empty_raw(work)
     lanes = lanes_of(work)
-    for kind in kinds_of(lanes, work.law == "pulse", work.dtype, work.torque.count > 0, bool(work.curve[0])):
+    for kind in kinds_of(work.numbers, work.chip or NO_CHIP, work.lanes, work.law == "pulse", work.dtype, swept(lanes),
+                         work.torque.count > 0, bool(work.curve[0])):
         if isinstance(kind, OneByOne):
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
         else:
@@ -126,50 +128,61 @@ class OneByOne(NamedTuple):
     recipe: Recipe
 
 
-def kinds_of(lanes: Lanes, pulsed: bool, dtype: str, recorded: NDArray[np.bool_],
+def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str, swept: Mask, recorded: Mask,
              curved: bool) -> list[SideBySide | OneByOne]:
-    """Return how lanes run.
+    """Return how lanes run, whose numbers are numbers or arrays (lanes,).
 
-    `recorded` is whose load is recorded over time, `curved` whether the potentiometers have a table.
+    `swept` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
+    potentiometers have a table.
     """
-    rare, swinging = has_rare_terms(lanes)
-    total = len(lanes.torque)
-    of = partial(_number, lanes)
-    if not pulsed or curved:
-        side = np.zeros(total, np.bool_)
-    else:
-        side = np.asarray(~(rare | swinging | recorded) & (of("load.stiffness") == 0.0) & (of("sensor.step") == 0.0)
-                          & (of("motor.K_b") > 0.0) & (of("bridge.silence.coast") == of("bridge.off.coast")))
+    bridge = numbers.bridge
+    rare, swinging = swept.any() and swept, _differs(numbers, _PENDULUM)
+    for name in _RARE:
+        rare = _either(rare, _differs(numbers, name))
+    side: Any = False
+    if pulsed and not curved:
+        side = (np.logical_not(_either(_either(rare, swinging), recorded.any() and recorded))
+                & (numbers.load.stiffness == 0.0) & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
+                & (bridge.silence.coast == bridge.off.coast))
     if dtype == "float32":  # what is not zero has to stay so
-        for x in (rows_in(lanes.numbers), rows_in(lanes.chips)):
-            side &= ((x == 0.0) | (x.astype(np.float32) != 0.0)).all(axis=1).ravel()[:total]
-    braked = np.asarray((of("bridge.off.D") == 0.0) & (of("bridge.D_drive") < of("source.V")))
-    found: list[SideBySide | OneByOne] = [SideBySide(np.flatnonzero(side & (braked == kind)), kind)
+        for x in (*numbers_in(numbers), *numbers_in(chip)):
+            fits = (x == 0.0) | (abs(x) > _SMALLEST)
+            side = side if fits is True else side & fits
+    braked = (bridge.off.D == 0.0) & (bridge.D_drive < numbers.source.V)
+    found: list[SideBySide | OneByOne] = [SideBySide(_where(side, np.equal(braked, kind), lanes), kind)
                                           for kind in (True, False)]
-    found += [OneByOne(np.flatnonzero(some & ~side), recipe) for recipe, some in (
-        (PLAIN_RUNS, ~(rare | swinging)), (PENDULUM_RUNS, swinging & ~rare), (ALL_RUNS, rare))]
+    found += [OneByOne(_where(some, np.logical_not(side), lanes), recipe) for recipe, some in (
+        (PLAIN_RUNS, np.logical_not(_either(rare, swinging))), (PENDULUM_RUNS, swinging & np.logical_not(rare)),
+        (ALL_RUNS, rare))]
     return [kind for kind in found if len(kind.which)]
 
 
-def has_rare_terms(lanes: Lanes) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Tell which lanes have a term that the plain run leaves out, and which have a pendulum."""
-    terms = [_differs(lanes, name) for name in _RARE]
-    if lanes.pieces[:, 6].any():
-        swept = np.concatenate([[0], np.cumsum(lanes.pieces[:, 6] != 0.0)])
-        terms.append(swept[lanes.piece_first + lanes.piece_count] > swept[lanes.piece_first])
-    return np.asarray(np.logical_or.reduce(terms)), _differs(lanes, _PENDULUM)
+def _either(a: Any, b: Any) -> Any:
+    """Return a | b, at once where one of them holds for none."""
+    return b if a is False else a if b is False else a | b
 
 
-def _differs(lanes: Lanes, name: str) -> NDArray[np.bool_]:
+def _where(a: Any, b: Any, lanes: int) -> Indices:
+    both = np.logical_and(a, b)
+    if both.ndim == 0:
+        return np.arange(lanes if both else 0)
+    return np.flatnonzero(np.broadcast_to(both, lanes))
+
+
+def swept(lanes: Lanes) -> Mask:
+    """Tell whose command has a chirp."""
+    if not lanes.pieces[:, 6].any():
+        return np.zeros(len(lanes.torque), np.bool_)
+    before = np.concatenate([[0], np.cumsum(lanes.pieces[:, 6] != 0.0)])
+    return np.asarray(before[lanes.piece_first + lanes.piece_count] > before[lanes.piece_first])
+
+
+def _differs(numbers: Numbers, name: str) -> Any:
     """Tell which lanes have a term ("heat", told by its first number), or a number of one ("motor.L")."""
     room, _, field = name.partition(".")
-    neutral = getattr(NEUTRAL, room)
+    neutral, own = getattr(NEUTRAL, room), getattr(numbers, room)
     field = field or neutral._fields[0]
-    return np.asarray(_number(lanes, f"{room}.{field}") != getattr(neutral, field))
-
-
-def _number(lanes: Lanes, name: str) -> Floats:
-    return column(lanes.numbers, name, len(lanes.torque))
+    return getattr(own, field) != getattr(neutral, field)
 
 
 def some_of(lanes: Lanes, which: Indices) -> Lanes:

@@ -69,6 +69,7 @@ class LaneNumbers:
             self.load_total[chunk.which] = flat(chunk.load.total_inertia)
             self._V_oc[chunk.which] = flat(chunk.model.value("supply.open_circuit_voltage"))
         self.numbers: Any = columns_of(Numbers, self.columns.numbers, slice(self.count))
+        self.chips = columns_of(Chip, self.columns.chips, slice(self.count))
         self._given = mapped(np.copy, self.numbers)
         if imposed is not None:
             for put, values in ((self.hang, imposed.load_inertia), (self.feed, imposed.bus_voltage)):

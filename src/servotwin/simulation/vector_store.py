@@ -67,8 +67,8 @@ class Store:
 
     def _kinds_now(self) -> list[SideBySide | OneByOne]:
         numbers = self._numbers
-        return lane_runs.kinds_of(numbers.columns, numbers.pulsed, self._dtype, numbers.torque.count > 0,
-                                  bool(numbers.curve.size))
+        return lane_runs.kinds_of(numbers.numbers, numbers.chips, numbers.count, numbers.pulsed, self._dtype,
+                                  np.zeros(numbers.count, np.bool_), numbers.torque.count > 0, bool(numbers.curve.size))
 
     def _parts(self, which: Indices) -> Iterator[tuple[_Tiles | _Records, Indices, Indices]]:
         """Return the sets that hold some lanes, where in the set they are, and where in `which`."""

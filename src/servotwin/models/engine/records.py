@@ -78,7 +78,7 @@ def mapped(change: Callable[[Any], Any], values: Any) -> Any:
 
 
 def tiles_with(kind: type[Any], values: Any, count: int) -> NDArray[Any]:
-    """Return tiles of so many lanes that hold a named tuple of numbers and columns; lanes beyond them hold zeros."""
+    """Return tiles of so many lanes that hold a named tuple of numbers and columns; lanes beyond them mean nothing."""
     tiles = room(-(-count // TILE), rows_of(kind, np.float64))
     column = np.zeros(len(tiles) * TILE)
 
@@ -86,9 +86,11 @@ def tiles_with(kind: type[Any], values: Any, count: int) -> NDArray[Any]:
         for name, x in zip(part._fields, part, strict=True):
             if hasattr(x, "_fields"):
                 put(into[name], x)
-            else:
+            elif isinstance(x, np.ndarray):
                 column[:count] = x
                 into[name] = column.reshape(-1, TILE)
+            else:
+                into[name] = x
 
     put(tiles, values)
     return tiles
@@ -100,16 +102,13 @@ def columns_of(kind: type[Kind], tiles: NDArray[Any], which: Any) -> Kind:
                   for name, hint in fields_of(kind)))
 
 
-def column(tiles: NDArray[Any], name: str, count: int) -> NDArray[Any]:
-    """Return one number of the lanes of tiles, by dotted name."""
-    for part in name.split("."):
-        tiles = tiles[part]
-    return tiles.ravel()[:count]
-
-
-def rows_in(tiles: NDArray[Any]) -> NDArray[Any]:
-    """Return all numbers in tiles, shape (tiles, numbers, TILE); they are of one type."""
-    return tiles.view(np.float64).reshape(len(tiles), -1, TILE)
+def numbers_in(values: Any) -> Iterator[Any]:
+    """Return all numbers of a named tuple and of those in it."""
+    for x in values:
+        if hasattr(x, "_fields"):
+            yield from numbers_in(x)
+        else:
+            yield x
 
 
 def put_columns(tiles: NDArray[Any], places: Any, values: Any) -> None:
