@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin.errors import MissingParameterError, ServotwinError
 from servotwin.loads import as_load
 from servotwin.models import MODELS, default_model
+from servotwin.models.engine.currents import stall_current
 from servotwin.parameters import printed_flags, printed_points
 from servotwin.physics import stall_torque
 
@@ -52,8 +53,7 @@ def twin_torque(servo: Servo) -> float | None:
             plant = default_model(at).pack(as_load(None))
         except ServotwinError:
             return None
-    driving = plant.source.V - plant.bridge.D_drive if plant.source.V > 0.0 else plant.follower.V_max
-    current = min(max(driving, 0.0) / plant.bridge.R_drive, plant.source.I_max)
+    current = stall_current(plant, plant.source.V)
     return float(stall_torque(current, plant.motor.K, plant.friction.F_forward, plant.friction.K_m, plant.friction.K_e))
 
 

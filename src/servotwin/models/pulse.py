@@ -11,8 +11,10 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.errors import InputError
+from servotwin.loads import as_load
 from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
 from servotwin.models.bounded import BoundedServo
+from servotwin.models.engine.currents import stall_current
 from servotwin.models.terms import bridge, chip, friction, heat, play, sensor, source, stops
 from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.chip import Chip
@@ -162,10 +164,9 @@ class _Pulsed(Model):
         T_f = self.frame_period if frame_period is None else frame_period
         if not (is_finite(T_f) and T_f > 0.0):
             raise InputError("frame_period", got=T_f, allowed="a positive number [s]")
-        path, supply = self._bridge(), source.pack(self)
-        stalled = physics.bridge_current(supply.V, 0.0, path.D_drive, path.R_drive)
+        plant = self.pack(as_load(None))
         gain = physics.averaged_bridge_gain(
-            self.value("motor.armature_resistance") * min(float(stalled), supply.I_max), 0.0,
+            self.value("motor.armature_resistance") * stall_current(plant, plant.source.V), 0.0,
             self.value("electronics.stretcher_gain"), T_f, self.value("electronics.one_shot_slope"))
         return float(gain)
 

@@ -10,6 +10,7 @@ from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import error_of, error_rate
 from servotwin.physics import motor
+from servotwin.physics.bridge import bridge_current
 
 
 def by_current(numbers: Numbers, zone: int) -> bool:
@@ -110,3 +111,11 @@ def drive_torque(numbers: Numbers, zone: int, u: float, y: Vector) -> float:
     """Return the motor's torque N k_a i [N m]."""
     i = y[2] if inductive(numbers.motor) else current(numbers, zone, u, y[0], y[6])
     return motor.electromagnetic_torque(i, numbers.motor.K)
+
+
+def stall_current(numbers: Numbers, V: float) -> float:
+    """Return the current [A] of full drive forward at a standstill, from a source of V [V]."""
+    if source.present(numbers.source):
+        i = bridge_current(V, 0.0, numbers.bridge.D_drive, numbers.bridge.R_drive)
+        return min(i, numbers.source.I_max)
+    return motor.steady_armature_current(numbers.follower.V_max, 0.0, numbers.motor.R, numbers.motor.K_b)

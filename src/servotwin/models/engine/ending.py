@@ -8,14 +8,16 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from servotwin.models.engine import contacts
+from servotwin.models.engine import contacts, currents
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms import frame, heat
-from servotwin.models.terms import source as source_term
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.numbers import Numbers, at_temperature
+from servotwin.physics.electronics import control_voltage_from_pulse
+from servotwin.physics.motor import electromagnetic_torque
 from servotwin.physics.pieces import Piece, piece_value
+from servotwin.physics.potentiometer import angle_from_voltage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,18 +83,12 @@ def told(pulsed: bool, numbers: Numbers, chip: Chip, command: NDArray[np.float64
     p, b_o = numbers.sensor.p, numbers.sensor.b_o
     if not pulsed:
         voltage = piece_value(piece_before(command, duration, False), duration)
-        return (voltage - b_o) / p, numbers.follower.half_deadband / p
+        return angle_from_voltage(voltage, p, b_o), angle_from_voltage(numbers.follower.half_deadband, p)
     k = last_frame(period, edges, duration)
     width = width_at(command, frame.edge_time(period, edges, k) if k >= 0 else duration)
-    return ((width - chip.T_0) / chip.slope - b_o) / p, chip.half_deadband / (chip.slope * p)
-
-
-def standstill_torque(numbers: Numbers, source: float) -> float:
-    """Return the torque [N m] of full drive at a standstill, from a source of so many volts; friction apart."""
-    if source_term.present(numbers.source):
-        bridge = numbers.bridge
-        return numbers.motor.K * min(max(source - bridge.D_drive, 0.0) / bridge.R_drive, numbers.source.I_max)
-    return numbers.motor.K * numbers.follower.V_max / numbers.motor.R
+    voltage, slack = (control_voltage_from_pulse(width, chip.slope, chip.T_0),
+                      control_voltage_from_pulse(chip.half_deadband, chip.slope))
+    return angle_from_voltage(voltage, p, b_o), angle_from_voltage(slack, p)
 
 
 def starts(numbers: Numbers, forward: bool, torque: float, tau: float, q: float) -> bool:
@@ -123,7 +119,7 @@ def marks(pulsed: bool, numbers: Numbers, chip: Chip, command: NDArray[np.float6
         found += ON_STOP
     if heat.present(numbers.heat):
         numbers = at_temperature(numbers, T_w, T_h)
-    torque = standstill_torque(numbers, source)
+    torque = electromagnetic_torque(currents.stall_current(numbers, source), numbers.motor.K)
     if refused or not torque < math.inf:
         return found
     forward = target > q
