@@ -150,8 +150,9 @@ def at_pulses(numbers: Numbers, now: Frame) -> Numbers:
     """Return the numbers with the bridge as it is now: while no pulses come it may be off in another way."""
     if now.silent == 0:
         return numbers
-    return Numbers(numbers.motor, bridge.silent(numbers.bridge), numbers.source, numbers.follower, numbers.shaft,
-                   numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+    return Numbers(
+        numbers.motor, bridge.off_now(numbers.bridge, now.silent), numbers.source, numbers.follower, numbers.shaft,
+        numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
 
 
 def source(numbers: Numbers, now: Frame) -> Piece:
@@ -164,8 +165,7 @@ def voltages(numbers: Numbers, u: float, y: Vector) -> tuple[float, float]:
     numbers = warm(numbers, y)
     w, i = y[6], y[2]
     zone = currents.zone_of(numbers, u, 0.0, y[0], w, i)
-    if not inductive(numbers.motor):
-        i = currents.current(numbers, zone, u, y[0], w)
+    i = currents.flowing(numbers, zone, u, y[0], w, i)
     V_bus = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)
     return bridge.terminal_voltage(numbers.bridge, numbers.source, numbers.motor, u, w, i, V_bus), V_bus
 
