@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import fields
-from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
-from servotwin.loads import Load
-from servotwin.models.columns import LanePieces
 from servotwin.models.engine.memory import put_memory, started
 from servotwin.models.engine.modes import INSIDE, RIGID
+from servotwin.models.engine.observe import on_bus
 from servotwin.models.engine.records import columns_of, put_columns, tiles_with
 from servotwin.models.engine.tiles import Lanes as Columns
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.models.terms.shaft import Shaft
+from servotwin.physics.laws import array_form
 from servotwin.simulation import lane_runs
 from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
 from servotwin.simulation.lane_memory import RECORD
@@ -29,6 +28,7 @@ from servotwin.simulation.start import start_vector
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+_on_bus = array_form(on_bus, __name__)
 _SLACK = 1e-9  # rad: another simulator's stop may give way so much
 
 
@@ -45,8 +45,12 @@ class LaneNumbers:
     Attributes
     ----------
     columns : models.engine.tiles.Lanes
+    available : tuple of str
+        Names of the signals, `time` apart.
     numbers : Numbers
         Of arrays (lanes,).
+    reduction : ndarray, shape (lanes,)
+        N of each gear.
     torque : Tables
         Recorded torque over time; a lane without one has no row.
     curve : ndarray, shape (2, n)
@@ -55,6 +59,7 @@ class LaneNumbers:
 
     def __init__(self, inputs: Lanes, imposed: Imposed | None = None) -> None:
         self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
+        self.available = inputs.model.available
         nothing = np.full(self.count, math.nan)
         self.imposed = imposed or Imposed(nothing, nothing.copy())
         commands = Commands(inputs)
@@ -64,9 +69,10 @@ class LaneNumbers:
         self.neutral = np.empty(self.count)
         self.columns, self.torque = self._packed()
         self.frame_period = self.columns.chips["frame_period"].ravel()[:self.count]
-        self.load_total = np.empty(self.count)
+        self.load_total, self.reduction = np.empty(self.count), np.empty(self.count)
         for chunk in self.chunks:
             self.load_total[chunk.which] = flat(chunk.load.total_inertia)
+            self.reduction[chunk.which] = flat(chunk.model.value("gear.gear_reduction"))
         self._impose()
 
     def _packed(self) -> tuple[Columns, Tables]:
@@ -94,22 +100,15 @@ class LaneNumbers:
     def _impose(self) -> None:
         """Put what another simulator decides in the place of what load and supply would."""
         J_L, V = self.imposed
-        columns: Any = columns_of(Numbers, self.columns.numbers, slice(self.count))
-        shaft, bridge, source = columns.shaft, columns.bridge, columns.source
-        own = shaft.J_out - self.load_total
-        hung = ~np.isnan(J_L)
-        shaft.J[hung] += (J_L + own - shaft.J_out)[hung]
-        shaft.J_out[hung] = (J_L + own)[hung]
-        fed = ~np.isnan(V)
-        for off in (bridge.off, bridge.silence):
-            coasts = fed & (off.coast > 0.0)
-            battery = coasts & np.isinf(source.I_max)
-            off.D[coasts] += (V - source.V)[coasts]
-            off.R[battery] -= source.R_b[battery]
-        bridge.R_drive[fed] -= source.R_b[fed]
-        source.V[fed], source.R_b[fed], source.I_max[fed] = V[fed], 0.0, math.inf
-        self.numbers: Any = columns
-        self.columns = self.columns._replace(numbers=tiles_with(Numbers, columns, self.count))
+        numbers = self.columns.numbers
+        hung, fed = np.flatnonzero(~np.isnan(J_L)), np.flatnonzero(~np.isnan(V))
+        if hung.size:
+            shaft: Any = columns_of(Shaft, numbers["shaft"], hung)
+            J_out = J_L[hung] + (shaft.J_out - self.load_total[hung])
+            put_columns(numbers["shaft"], hung, shaft._replace(J=shaft.J + (J_out - shaft.J_out), J_out=J_out))
+        if fed.size:
+            put_columns(numbers, fed, _on_bus(columns_of(Numbers, numbers, fed), V[fed]))
+        self.numbers: Any = columns_of(Numbers, numbers, slice(self.count))
 
     def changed(self, which: Indices, parameters: Mapping[str, Any], inertia: Array | None,
                 bus: Array | None) -> LaneNumbers:
@@ -223,52 +222,9 @@ class LaneNumbers:
 
     # --- what shows ---------------------------------------------------------------------------------------------------
 
-    def observe(self, name: str, samples: SimpleNamespace, command: Array, torque: Array) -> Array:
-        """Return a signal of all lanes that are in the states of `samples`, with fields of shape (lanes,)."""
+    def commanded(self, name: str, command: Array) -> Array:
+        """Return `command_voltage`, `command_angle` or `pulse_width` of all lanes, told as the engine follows it."""
         found = np.empty(self.count)
         for chunk in self.chunks:
-            which = chunk.which
-            own = SimpleNamespace(**{field: values[which, None] for field, values in vars(samples).items()
-                                     if values is not None})
-            own.time = np.zeros(1)
-            if np.isnan(self.imposed.bus_voltage[which]).all():
-                own.bus = None
-            else:
-                V = self.imposed.bus_voltage[which, None]
-                own.bus = np.where(np.isnan(V), self.numbers.source.V[which, None], V)
-            drive, load = _constant(command[which]), self._load(chunk, samples.time[which], torque)
-            values = chunk.model.output(name, cast("Any", own), cast("Any", drive), load)
-            found[which] = np.broadcast_to(values, (len(which), 1))[:, 0]
+            found[chunk.which] = chunk.model.command_signal(name, command[chunk.which, None])[:, 0]
         return found
-
-    def _load(self, chunk: Chunk, time: Array, torque: Array) -> Load:
-        """Return the loads of lanes with all that acts on them now."""
-        which, load = chunk.which, chunk.load
-        changed = object.__new__(Load)
-        for field in fields(load):
-            object.__setattr__(changed, field.name, getattr(load, field.name))
-        J_L = self.imposed.load_inertia[which]
-        if not np.isnan(J_L).all():
-            more = np.where(np.isnan(J_L), 0.0, J_L - self.load_total[which])
-            object.__setattr__(changed, "inertia", load.inertia + more[:, None])
-        own = self.columns.torque[which] + torque[which] + self._recorded(which, time)
-        changed.__dict__["torque_pieces"] = _constant(own)
-        return changed
-
-    def _recorded(self, which: Indices, time: Array) -> Array:
-        first, count, rows = self.torque.first[which], self.torque.count[which], self.torque.rows
-        found = np.zeros(len(which))
-        for k in np.flatnonzero(count).tolist():
-            table = rows[first[k]:first[k] + count[k]]
-            row = table[max(int(np.searchsorted(table[:, 0], time[k], side="right")) - 1, 0)]
-            found[k] = row[1] + row[2] * (time[k] - row[0])
-        return found
-
-
-def _constant(values: Array) -> LanePieces:
-    rows = np.zeros((len(values), 7))
-    rows[:, 1] = values
-    index = np.arange(len(values))
-    return LanePieces(rows, index, np.ones_like(index))
-
-

@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import itertools
 import math
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
-from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, INSIDE, RIGID, STUCK
+from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.records import TILE, columns_of, room
+from servotwin.models.engine.sights import Observed
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
-from servotwin.simulation.lane_runs import PLAIN_RUNS, SIDE_BY_SIDE, OneByOne, SideBySide, some_of
+from servotwin.simulation.lane_runs import (
+    LOOK_ONE_BY_ONE,
+    LOOK_SIDE_BY_SIDE,
+    PLAIN_RUNS,
+    SIDE_BY_SIDE,
+    OneByOne,
+    SideBySide,
+    some_of,
+)
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_memory import VectorMemory
@@ -189,23 +197,14 @@ class Store:
 
     # --- what shows, and what is imposed ------------------------------------------------------------------------------
 
-    def samples(self) -> SimpleNamespace:
-        """Return the states of all lanes as outputs read them, fields of shape (lanes,)."""
-        records = self.records()
-        modes = np.zeros((4, len(records)), np.int64)
+    def look(self, command: Array) -> Array:
+        """Return what shows of all lanes under their commands, a row of `sights.Observed` for each."""
+        self._columns.pieces[:, 1] = command
+        seen = np.empty((len(self.status), len(Observed._fields)))
         for some in self._sets:
-            if isinstance(some, _Tiles):
-                modes[1, some.which] = some.contacts()
-            else:
-                kernels(some.recipe).settle(self._columns, *self._inputs, some.which, records[some.which],
-                                            found := np.zeros((4, len(some.which)), np.int64))
-                modes[:, some.which] = found
-        point, chip = records["point"], records["chip"]
-        q, w, i, T_w, T_h, q_m, w_m = point["y"].T
-        return SimpleNamespace(
-            time=self.time, angle=q, speed=w, current=i, winding=T_w, housing=T_h, motor_angle=q_m, motor_speed=w_m,
-            wiper=point["wiper"], zone=modes[0], contact=modes[1], mesh=modes[2], motor=modes[3], drive=chip["drive"],
-            error=chip["error"], silent=chip["silent"])
+            some.look(self._columns, self._inputs, seen)
+        seen[self.status != 0] = math.nan
+        return seen
 
     def impose(self, which: Indices, angle: Array | None, speed: Array | None) -> None:
         """Set angles [rad] and speeds [rad/s] of the output; book the work of the impulses."""
@@ -262,17 +261,8 @@ class _Tiles:
         edge, since = (flat(self.rows, "clock", name)[:len(self.which)] for name in ("edge", "since"))
         return np.asarray(edge + since)
 
-    def contacts(self) -> Indices:
-        """Return in which contact each shaft is."""
-        n = len(self.which)
-        shaft, servo = ({name: flat(self.rows, group, name)[:n] for name in names} for group, names in (
-            ("arc", ("friction_forward", "friction_backward", "start_forward", "start_backward", "start_off")),
-            ("servo", ("w", "drive"))))
-        start = np.select([servo["drive"] > 0.0, servo["drive"] < 0.0],
-                          [shaft["start_forward"], shaft["start_backward"]], shaft["start_off"])
-        way = np.where(servo["w"] != 0.0, servo["w"], start)
-        smooth = (shaft["friction_forward"] == 0.0) & (shaft["friction_backward"] == 0.0)
-        return np.asarray(np.select([smooth, way == 0.0, way > 0.0], [FREE, STUCK, FORWARD], BACKWARD))
+    def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
+        kernels(LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
 
 
 class _Records:
@@ -294,3 +284,6 @@ class _Records:
     @property
     def time(self) -> Array:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
+
+    def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
+        kernels(LOOK_ONE_BY_ONE).one_by_one(columns, *inputs, self.which, self.rows, seen)

@@ -54,7 +54,7 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
     """
     for k in range(which.size):
         lane = which[k]
-        inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
+        inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
         memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_of(records[k]),
                           durations[k], times, first_output[k], outputs[k])
         status[k] = how
@@ -63,7 +63,8 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
             put_memory(records[k], memory)
 
 
-def _inputs(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
+def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
+    """Return what a lane is told, and what hangs on its shaft with a recorded torque."""
     first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
     own = lanes.edge_count[lane]
     edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
@@ -71,22 +72,17 @@ def _inputs(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
     return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane])
 
 
-def settle(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
-           which: Indices, records: Any, modes: Indices) -> None:
-    """Fill `modes`, shape (4, n), with the modes of lanes as they stand, under their present inputs."""
-    for k in range(which.size):
-        lane = which[k]
-        inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        mode = mode_of(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_of(records[k]))
-        modes[0, k], modes[1, k], modes[2, k], modes[3, k] = mode.zone, mode.contact, mode.mesh, mode.motor
-
-
 def mode_of(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> Mode:
     """Return the mode of a servo as it stands, under its present inputs."""
-    memory = resumed(pulsed_chip(chip), inputs, memory, False)
+    pulsed = pulsed_chip(chip)
+    return mode_now(numbers, pulsed, resumed(pulsed, inputs, memory, False))
+
+
+def mode_now(numbers: Numbers, pulsed: bool, memory: Memory) -> Mode:
+    """Return the mode of a servo whose memory is ready to go on."""
     origin, point = origin_of(memory), memory.point
-    u = source(numbers, memory.chip) if pulsed_chip(chip) else since(memory.u, origin)
-    if point.anchor_time < math.inf and (not pulsed_chip(chip) or u.value == memory.u.value):
+    u = source(numbers, memory.chip) if pulsed else since(memory.u, origin)
+    if point.anchor_time < math.inf and (not pulsed or u.value == memory.u.value):
         return point.mode
     if heeds_silence(numbers.bridge):
         numbers = at_pulses(numbers, memory.chip)
