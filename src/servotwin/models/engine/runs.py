@@ -11,11 +11,13 @@ from servotwin.models.engine.memory import (
     Memory,
     counted_anew,
     due,
+    in_force,
     instant,
     memory_of,
     origin_of,
     put_memory,
     resumed,
+    silent_now,
     since,
     started,
     time_of,
@@ -24,11 +26,11 @@ from servotwin.models.engine.modes import INSIDE, RIGID, Mode
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms import play
-from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
+from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
@@ -74,19 +76,26 @@ def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
 
 def mode_of(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> Mode:
     """Return the mode of a servo as it stands, under its present inputs."""
-    pulsed = pulsed_chip(chip)
-    return mode_now(numbers, pulsed, resumed(pulsed, inputs, memory, False))
+    u, tau = told(numbers, pulsed_chip(chip), inputs, memory)
+    return mode_under(at_pulses(numbers, silent_now(memory)), u, tau, memory)
 
 
-def mode_now(numbers: Numbers, pulsed: bool, memory: Memory) -> Mode:
-    """Return the mode of a servo whose memory is ready to go on."""
+def told(numbers: Numbers, pulsed: bool, inputs: Inputs, memory: Memory) -> tuple[Piece, Piece]:
+    """Return what a servo follows as it stands, and the torque of its load that depends on time alone."""
+    origin, time = origin_of(memory), memory.point.time
+    tau, _ = in_force(inputs.torque, origin, time, inputs.constant_torque)
+    if pulsed:
+        return source(numbers, memory.chip), tau
+    u, _ = in_force(inputs.command, origin, time, 0.0)
+    return u, tau
+
+
+def mode_under(numbers: Numbers, u: Piece, tau: Piece, memory: Memory) -> Mode:
+    """Return the mode of a servo whose numbers are those with pulses or without, as it is now."""
     origin, point = origin_of(memory), memory.point
-    u = source(numbers, memory.chip) if pulsed else since(memory.u, origin)
-    if point.anchor_time < math.inf and (not pulsed or u.value == memory.u.value):
+    if point.anchor_time < math.inf and u == memory.u and tau == memory.tau:
         return point.mode
-    if heeds_silence(numbers.bridge):
-        numbers = at_pulses(numbers, memory.chip)
-    return anchored(numbers, u, since(memory.tau, origin), point.time, point).mode
+    return anchored(numbers, since(u, origin), since(tau, origin), point.time, point).mode
 
 
 def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, times: Floats,

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine import contacts, currents
-from servotwin.models.engine.memory import memory_of, origin_of, resumed, since
+from servotwin.models.engine.memory import memory_of, silent_now, time_of
 from servotwin.models.engine.modes import RIGID, Mode, Vector
 from servotwin.models.engine.observe import electrical, torques
 from servotwin.models.engine.records import TILE
-from servotwin.models.engine.runs import inputs_of, mode_now
+from servotwin.models.engine.runs import inputs_of, mode_under, told
 from servotwin.models.engine.step import at_pulses
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms.chip import present as pulsed_chip
@@ -47,14 +47,13 @@ def one_by_one(lanes: Lanes, curve: Floats, torque_rows: Floats, torque_first: I
         lane = which[k]
         numbers, chip = numbers_of(lanes, lane), chip_of(lanes, lane)
         inputs = inputs_of(lanes, curve, torque_rows[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        pulsed = pulsed_chip(chip)
-        memory = resumed(pulsed, inputs, memory_of(records[k]), False)
-        point, now, origin = memory.point, memory.chip, origin_of(memory)
-        u = now.drive * numbers.source.V if pulsed else piece_value(since(memory.u, origin), point.time)
-        tau = piece_value(since(memory.tau, origin), point.time)
-        mode = mode_now(numbers, pulsed, memory)
-        put(seen, lane, observed(warm(at_pulses(numbers, now), point.y), curve, mode, u, tau, point.y, point.wiper,
-                                 now.drive, now.error))
+        memory = memory_of(records[k])
+        point, now, time = memory.point, memory.chip, time_of(memory)
+        u, tau = told(numbers, pulsed_chip(chip), inputs, memory)
+        numbers = at_pulses(numbers, silent_now(memory))
+        mode = mode_under(numbers, u, tau, memory)
+        put(seen, lane, observed(warm(numbers, point.y), curve, mode, piece_value(u, time), piece_value(tau, time),
+                                 point.y, point.wiper, now.drive, now.error))
 
 
 def side_by_side(lanes: Lanes, curve: Floats, which: Indices, tiles: Any, seen: Floats) -> None:
