@@ -8,6 +8,8 @@ import pytest
 import servotwin as st
 from conftest import EVERYTHING
 from servotwin.errors import CommandError, InputError, ServotwinError, UnknownNameError
+from servotwin.models.engine.memory import memory_of, time_of
+from servotwin.simulation.engine import State
 
 WIDTHS = (1100e-6, 1900e-6, 1500e-6)  # s, one after the other
 CASES = {  # what leads to each way in which lanes run
@@ -22,6 +24,9 @@ CASES = {  # what leads to each way in which lanes run
     "pendulum": ({}, st.loads.Pendulum(mass=0.1, length=0.1)),
     "recorded": ({}, st.loads.Recorded([0.0, 0.2, 10.0], [0.0, 0.1, -0.1])),
     "play": ({"gear.backlash": 0.02, "gear.output_inertia": 1e-3}, None),
+    "limp in another way": ({"electronics.silence_state": "coast", "electronics.pulse_timeout": 0.013}, None),
+    "dry load": ({"supply.internal_resistance": 0.3}, st.loads.Inertia(1e-3) + st.loads.Coulomb(0.1)),
+    "everything": (EVERYTHING, st.loads.Recorded([0.0, 0.2, 10.0], [0.0, 0.1, -0.1])),
 }
 
 
@@ -67,6 +72,29 @@ def test_it_is_many_simulators(servo, name):
         expected = [sim.observe(states[-1], signal, last[lane], external_torque=torques[-1])
                     for lane, (sim, states) in enumerate(alone)]
         np.testing.assert_allclose(sims[signal], expected, rtol=1e-9, atol=1e-10, err_msg=signal)
+
+
+@pytest.mark.parametrize(("kind", "dtype"), [(st.PulseServo, "float64"), (st.PulseServo, "float32"),
+                                             (st.PulseServoInductive, "float64"), (st.BoundedServo, "float64")])
+@pytest.mark.parametrize("name", CASES)
+def test_every_signal_is_that_of_a_simulator_that_stands_there(servo, name, kind, dtype):
+    changes, load = CASES[name]
+    model = model_of(servo, changes, kind)
+    sim = st.Simulator(model, load)
+    sims = st.VectorSimulator(model, 5, load=load, dtype=dtype)
+    sims.reset(output_angle=[1.2, 1.9, 1.5, 1.5, 1.5])  # two rest on a stop where there are some
+    widths, torques = np.array([1.0e-3, 2.0e-3, 1.2e-3, 1.8e-3, 1.5e-3]), np.array([0.1, -0.1, 0.0, 0.02, 0.0])
+    for duration in (0.0, 0.011, 0.013, 1e-4, 0.031, 0.2):
+        sims.advance(duration, pulse_width=widths, external_torque=torques)
+        seen = {signal: sims[signal] for signal in model.available}
+        for lane, record in enumerate(sims.save().records):
+            memory = memory_of(record)
+            state = State(time_of(memory), model.states, memory)
+            command = st.signals.constant(1e6 * widths[lane], unit="us")
+            for signal, values in seen.items():
+                expected = sim.observe(state, signal, command, external_torque=torques[lane])
+                assert values[lane] == pytest.approx(expected, rel=1e-12, abs=1e-12), (signal, lane, duration)
+        widths = np.roll(widths, 1)
 
 
 @pytest.mark.slow
@@ -285,11 +313,45 @@ def test_what_is_imposed_in_place_is_what_a_new_start_would_take(servo, name):
             sims.set(load_inertia=inertia, lanes=lanes)
             if k % 3 == 0:
                 sims.set(bus_voltage=bus, lanes=lanes)
-        anew.set(parameters={"motor.rotor_inertia": servo.motor.rotor_inertia})
+        anew.set(parameters={"motor.rotor_inertia": servo.motor.rotor_inertia}, lanes=lanes)
         for sims in (in_place, anew):
             sims.advance(0.017, pulse_width=1800e-6 if k % 2 else 1300e-6)
         for signal in ("output_angle", "output_speed", "armature_current", "bus_voltage"):
             np.testing.assert_allclose(in_place[signal], anew[signal], rtol=1e-12, atol=1e-12, err_msg=f"{signal} {k}")
+
+
+def test_a_bus_voltage_that_is_set_is_that_of_its_lane_alone(servo):
+    model = st.PulseServo(servo.replace({"supply.internal_resistance": 0.5, "electronics.off_state": "coast"}))
+    partly, free, fed = (st.VectorSimulator(model, 2) for _ in range(3))
+    partly.set(bus_voltage=4.8, lanes=[0])
+    fed.set(bus_voltage=4.8)
+    for sims in (partly, free, fed):
+        sims.reset(pulse_width=1500e-6)
+        sims.advance(0.05, pulse_width=1800e-6)
+    for signal in model.available:
+        np.testing.assert_array_equal(partly[signal], [fed[signal][0], free[signal][1]], err_msg=signal)
+    assert partly["bus_voltage"][0] == 4.8
+
+
+ACTS = {
+    "time goes on": lambda s, memory: s.advance(1e-3),
+    "another command, no time": lambda s, memory: s.advance(0.0, pulse_width=1.2e-3),
+    "reset": lambda s, memory: s.reset(),
+    "a speed that is set": lambda s, memory: s.set(output_speed=-3.0),
+    "another number": lambda s, memory: s.set(parameters={"motor.armature_resistance": 9.0}),
+    "restored": lambda s, memory: s.restore(memory),
+}
+
+
+@pytest.mark.parametrize("act", ACTS)
+def test_what_is_seen_is_seen_anew_after(servo, act):
+    sims = st.VectorSimulator(st.BoundedServo(servo), 1)
+    memory = sims.save()
+    sims.advance(0.02, pulse_width=1.8e-3)
+    before = sims["armature_current"]
+    assert sims["armature_current"] == before
+    ACTS[act](sims, memory)
+    assert sims["armature_current"] != before
 
 
 @pytest.mark.parametrize("load", [None, st.loads.Spring(0.1)], ids=["side by side", "one by one"])

@@ -267,6 +267,8 @@ def _where(condition: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any
 
 
 def _merged(condition: Any, yes: Any, no: Any) -> Any:
+    if yes is no:  # as both branches found it
+        return yes
     if isinstance(yes, tuple):
         return _made(yes, [_merged(condition, a, b) for a, b in zip(yes, no, strict=True)])
     return np.where(condition, yes, no)

@@ -16,7 +16,7 @@ from servotwin.models.engine import shared_source
 from servotwin.models.engine.modes import Mode
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
-from servotwin.models.terms.bridge import coasts, silent
+from servotwin.models.terms.bridge import coasts, off_now
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.physics.pieces import Piece
@@ -326,7 +326,7 @@ class _BusVoltage:
             drive = float(s.drive[k])
             numbers = plan.numbers
             if s.silent[k] > 0.0:
-                numbers = numbers._replace(bridge=silent(numbers.bridge))
+                numbers = numbers._replace(bridge=off_now(numbers.bridge, 1))
             if drive == 0.0 and not (coasts(numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
                 continue
             mode = Mode(int(s.zone[k]), int(s.contact[k]), int(s.mesh[k]), int(s.motor[k]))

@@ -54,7 +54,7 @@ class Unit:
 
     def _listen(self) -> None:
         """Take the numbers as they are with pulses or without: alone, and on a given bus voltage."""
-        self.numbers = step.at_pulses(self.plan.numbers, self.frame) if self.heeds_silence else self.plan.numbers
+        self.numbers = step.at_pulses(self.plan.numbers, self.frame.silent) if self.heeds_silence else self.plan.numbers
         self.stiff = {returning: shared_source.on_stiff_source(self.numbers, returning) for returning in (False, True)}
 
     def hear(self, now: Frame, time: float) -> None:

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin import physics
-from servotwin.models.circuit import circuit_of
 from servotwin.models.engine import motion
-from servotwin.models.outputs import torques_of, warm_plant
+from servotwin.models.outputs import electrical_of, torques_of, warm_plant
 from servotwin.physics import motor, shaft
 
 if TYPE_CHECKING:
@@ -67,16 +66,15 @@ def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -
     """Return the energy balance of a whole run."""
     def powers(samples: Samples) -> NDArray[np.float64]:
         plant = warm_plant(model, samples, load)
-        circuit = circuit_of(model, plant, samples, drive)
+        circuit = electrical_of(plant, samples, drive)
         i, w, w_m = circuit.armature_current, samples.speed, samples.motor_speed
         torques = torques_of(model, samples, drive, load)
-        own_viscous = (plant.shaft.b - load.viscous_friction) * w_m
-        to_load = (load.viscous_friction * w + torques.load_friction + torques.external) * w
-        own = plant.motor
-        heat = physics.copper_loss(i, own.R)
-        return np.array([circuit.supply_power, heat, circuit.bridge_power, circuit.brush_power,
-                         physics.back_emf(w_m, own.K_b) * i - physics.electromagnetic_torque(i, own.K) * w_m,
-                         (own_viscous + torques.servo_friction) * w_m, to_load])
+        own_viscous = (plant.shaft.b - plant.shaft.b_out) * w_m
+        to_load = (plant.shaft.b_out * w + torques.load_friction + torques.external) * w
+        converted = physics.back_emf(w_m, plant.motor.K_b) * i - torques.motor * w_m
+        return np.array(np.broadcast_arrays(
+            circuit.supply_power, physics.copper_loss(i, plant.motor.R), circuit.bridge_power, circuit.brush_power,
+            converted, (own_viscous + torques.servo_friction) * w_m, to_load))
 
     supply, winding, bridge, brush, conversion, friction, to_load = trajectory.integral(powers).tolist()
     stored, stops = _kinetic(model.plant(load), trajectory)

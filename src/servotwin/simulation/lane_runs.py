@@ -25,7 +25,7 @@ SIDE_BY_SIDE = {
         vector=True, single=dtype == "float32")
     for dtype in ("float64", "float32")
 }
-_ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on", "settle"))
+_ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
 ALL_RUNS = Recipe("runs", _ENTRIES)  # everything
 _RARE = ("friction.varies", "friction.kappa", "play", "heat", "sensor.half_slack", "motor.L", "source.I_max")
 _PENDULUM = "load.gravity"
@@ -35,6 +35,9 @@ PLAIN_RUNS = Recipe(
 PENDULUM_RUNS = Recipe(
     "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep"),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
+LOOK_SIDE_BY_SIDE = Recipe(
+    "look_side_by_side", ("servotwin.models.engine.sights:side_by_side",), absent=(*_RARE, _PENDULUM, "load.stiffness"))
+LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",))
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
 _SHARED = ("pieces", "edges")  # by all lanes

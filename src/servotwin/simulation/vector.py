@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin import physics
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.models.base import PULSE_RANGE, Model
+from servotwin.models.base import KINDS, PULSE_RANGE, Model
+from servotwin.models.engine.sights import Observed
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.lane_inputs import lanes_of, pick
 from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _BYTES = 4000  # of a lane, and of what is made of it now and then
+_COLUMNS = {name: k for k, name in enumerate(Observed._fields)}
+_AT_MOTOR = {"motor_angle": physics.motor_from_output, "motor_speed": physics.motor_from_output,
+             "motor_torque": lambda torque, reduction: torque / reduction}
 _LONGEST = 1e5  # s: nothing stops a kernel, and millions of frames take seconds
 
 
@@ -97,6 +102,7 @@ class VectorSimulator:
         self._translate = Translator(self._numbers)
         self._command = self._numbers.neutral.copy()  # as the engine follows it: pulse width [s], control voltage [V]
         self._torque = np.zeros(count)
+        self._seen: Array | None = None  # what shows, until anything changes
         self.reset()
 
     def __len__(self) -> int:
@@ -144,6 +150,7 @@ class VectorSimulator:
             raise InputError("advance(duration)", got=duration,
                              allowed=f"a number of seconds, from 0 to {_LONGEST:.0e} in one call")
         self._numbers.check_recorded(lambda: self.time, float(duration))
+        self._seen = None
         torque = self._torque_of(external_torque) if external_torque is not None else None
         self._take_command(pulse_width, command_angle, command_voltage)
         if torque is not None and not np.array_equal(torque, self._torque):
@@ -166,7 +173,7 @@ class VectorSimulator:
         lanes : array of bool, shape (lanes,), or of int, optional
             Which; all unless given.
         """
-        which = pick(lanes, len(self))
+        which, self._seen = pick(lanes, len(self)), None
         angle = None if output_angle is None else numbers_of("output_angle", output_angle, which)
         command = self._command.copy()
         found = self._translate.command(pulse_width, command_angle, command_voltage, which)
@@ -183,12 +190,18 @@ class VectorSimulator:
             return self.time
         if name in SHAFT:
             return self._store.shaft(name)
-        if name not in self._numbers.model.available:
-            raise UnknownNameError(f"signal of {type(self._numbers.model).__name__}", name,
-                                   ("time", *self._numbers.model.available))
-        values = self._numbers.observe(name, self._store.samples(), self._command, self._torque)
-        values[self._store.status != 0] = math.nan
-        return values
+        numbers = self._numbers
+        if name not in numbers.available:
+            raise UnknownNameError(f"signal of {type(numbers.model).__name__}", name, ("time", *numbers.available))
+        if name in KINDS:
+            values = numbers.commanded(name, self._command)
+            values[self._store.status != 0] = math.nan
+            return values
+        if self._seen is None:
+            self._seen = self._store.look(self._command)
+        values = self._seen[:, _COLUMNS[name]]
+        at_motor = _AT_MOTOR.get(name)
+        return values.copy() if at_motor is None else np.asarray(at_motor(values, numbers.reduction))
 
     @property
     def impulse_work(self) -> Array:
@@ -220,7 +233,7 @@ class VectorSimulator:
         InputError
             On bad input, before anything changes; names lane and argument.
         """
-        which = pick(lanes, len(self))
+        which, self._seen = pick(lanes, len(self)), None
         if torque_enable is not None:
             raise InputError(f"torque_enable of {type(self._numbers.model).__name__}", got=torque_enable,
                              allowed="nothing: an analog servo has no such switch")
@@ -269,6 +282,7 @@ class VectorSimulator:
         if memory.model != kind or len(memory.records) != len(self):
             raise InputError("restore(memory)", got=f"{len(memory.records)} lanes of {memory.model}",
                              allowed=f"{len(self)} lanes of {kind}")
+        self._seen = None
         self._command, self._torque = memory.command.copy(), memory.torque.copy()
         self._store.restore(memory, self._torque)
 

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import fields
-from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
-from servotwin.loads import Load
-from servotwin.models.columns import LanePieces
 from servotwin.models.engine.memory import put_memory, started
 from servotwin.models.engine.modes import INSIDE, RIGID
-from servotwin.models.engine.records import TILE, columns_of, mapped, put_columns, tiles_with
+from servotwin.models.engine.observe import on_bus
+from servotwin.models.engine.records import columns_of, put_columns, tiles_with
 from servotwin.models.engine.tiles import Lanes as Columns
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.models.terms.shaft import Shaft
+from servotwin.physics.laws import array_form
 from servotwin.simulation import lane_runs
 from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
 from servotwin.simulation.lane_memory import RECORD
@@ -29,6 +28,7 @@ from servotwin.simulation.start import start_vector
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+_on_bus = array_form(on_bus, __name__)
 _SLACK = 1e-9  # rad: another simulator's stop may give way so much
 
 
@@ -45,8 +45,10 @@ class LaneNumbers:
     Attributes
     ----------
     columns : models.engine.tiles.Lanes
-    numbers : Numbers
-        Of arrays (lanes,).
+    available : tuple of str
+        Names of the signals, `time` apart.
+    reduction : ndarray, shape (lanes,)
+        N of each gear.
     torque : Tables
         Recorded torque over time; a lane without one has no row.
     curve : ndarray, shape (2, n)
@@ -55,6 +57,7 @@ class LaneNumbers:
 
     def __init__(self, inputs: Lanes, imposed: Imposed | None = None) -> None:
         self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
+        self.available = inputs.model.available
         nothing = np.full(self.count, math.nan)
         self.imposed = Imposed(nothing, nothing.copy())
         commands = Commands(inputs)
@@ -64,13 +67,12 @@ class LaneNumbers:
         self.neutral = np.empty(self.count)
         self.columns, self.torque = self._packed()
         self.frame_period = self.columns.chips["frame_period"].ravel()[:self.count]
-        self.load_total, self._V_oc = np.empty((2, self.count))
+        self.load_total, self.reduction, self._V_oc = np.empty((3, self.count))
         for chunk in self.chunks:
             self.load_total[chunk.which] = flat(chunk.load.total_inertia)
+            self.reduction[chunk.which] = flat(chunk.model.value("gear.gear_reduction"))
             self._V_oc[chunk.which] = flat(chunk.model.value("supply.open_circuit_voltage"))
-        self.numbers: Any = columns_of(Numbers, self.columns.numbers, slice(self.count))
-        self.chips = columns_of(Chip, self.columns.chips, slice(self.count))
-        self._given = mapped(np.copy, self.numbers)
+        self._given = self.columns.numbers.copy()
         if imposed is not None:
             for put, values in ((self.hang, imposed.load_inertia), (self.feed, imposed.bus_voltage)):
                 which = np.flatnonzero(~np.isnan(values))
@@ -98,34 +100,32 @@ class LaneNumbers:
                           np.zeros(0), none, none - 1)
         return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
 
+    def now(self, room: str, which: Indices | None = None) -> Any:
+        """Return a record of numbers of some lanes, or of all, as they are now, each an array."""
+        return columns_of(type(getattr(NEUTRAL, room)), self.columns.numbers[room],
+                          slice(self.count) if which is None else which)
+
     def hang(self, which: Indices, J_L: Array) -> None:
         """Put inertias [kg m²] in the place of those of some lanes' loads."""
         self.imposed.load_inertia[which] = J_L
-        given = self._given.shaft
-        own = given.J_out[which] - self.load_total[which]
-        self._put("shaft", which, J=given.J[which] + (J_L + own - given.J_out[which]), J_out=J_L + own)
+        given: Any = columns_of(Shaft, self._given["shaft"], which)
+        J_out = J_L + (given.J_out - self.load_total[which])
+        put_columns(self.columns.numbers["shaft"], which,
+                    given._replace(J=given.J + (J_out - given.J_out), J_out=J_out))
+
 
     def feed(self, which: Indices, V: Array) -> None:
         """Put voltages [V] in the place of what some lanes' supplies would leave."""
         self.imposed.bus_voltage[which] = V
-        V_oc = self._V_oc[which]
-        if not self.pulsed:
-            self._put("follower", which, V_max=np.maximum(self._given.follower.V_max[which] + V - V_oc, 0.0))
-            return
-        bridge, source = (mapped(lambda x: x[which], part) for part in (self._given.bridge, self._given.source))
-        for name, off in (("off", bridge.off), ("silence", bridge.silence)):
-            opens, battery = off.coast > 0.0, np.isinf(source.I_max)
-            self._put(f"bridge.{name}", which, D=off.D + np.where(opens, V - V_oc, 0.0),
-                      R=off.R - np.where(opens & battery, source.R_b, 0.0))
-        self._put("bridge", which, R_drive=bridge.R_drive - source.R_b)
-        self._put("source", which, V=V, R_b=np.zeros_like(V), I_max=np.full_like(V, math.inf))
-
-    def _put(self, room: str, which: Indices, **columns: Array) -> None:
-        own, packed = self.numbers, self.columns.numbers
-        for part in room.split("."):
-            own, packed = getattr(own, part), packed[part]
-        for name, values in columns.items():
-            getattr(own, name)[which] = packed[name][which // TILE, which % TILE] = values
+        given: Any = {room: columns_of(type(getattr(NEUTRAL, room)), self._given[room], which)
+                      for room in ("bridge", "source", "follower")}
+        if self.pulsed:
+            given |= _on_bus(NEUTRAL._replace(**given), V)._asdict()
+        else:
+            own = given["follower"]
+            given["follower"] = own._replace(V_max=np.maximum(own.V_max + V - self._V_oc[which], 0.0))
+        for room in ("bridge", "source", "follower"):
+            put_columns(self.columns.numbers[room], which, given[room])
 
     def changed(self, which: Indices, parameters: Mapping[str, Any]) -> LaneNumbers:
         """Return these lanes with other parameters in some of them.
@@ -201,7 +201,7 @@ class LaneNumbers:
                 y[k] = values
             if angle is not None:
                 self.check_angles(angle[place[own]], own)
-            play = self.numbers.play.half[own] > 0.0
+            play = self.now("play", own).half > 0.0
             point = records["point"]
             for name in ("y", "anchor"):
                 point[name][place[own]] = y[:, :, 0].T
@@ -211,7 +211,7 @@ class LaneNumbers:
 
     def check_angles(self, angle: Array, which: Indices) -> None:
         """Raise InputError if an angle [rad] is beyond a stop; names the lane."""
-        lower, upper = self.numbers.stops.lower[which], self.numbers.stops.upper[which]
+        lower, upper, _ = self.now("stops", which)
         good = (angle >= lower - _SLACK) & (angle <= upper + _SLACK)
         if not good.all():
             k = int(np.argmin(good))
@@ -232,52 +232,9 @@ class LaneNumbers:
 
     # --- what shows ---------------------------------------------------------------------------------------------------
 
-    def observe(self, name: str, samples: SimpleNamespace, command: Array, torque: Array) -> Array:
-        """Return a signal of all lanes that are in the states of `samples`, with fields of shape (lanes,)."""
+    def commanded(self, name: str, command: Array) -> Array:
+        """Return `command_voltage`, `command_angle` or `pulse_width` of all lanes, told as the engine follows it."""
         found = np.empty(self.count)
         for chunk in self.chunks:
-            which = chunk.which
-            own = SimpleNamespace(**{field: values[which, None] for field, values in vars(samples).items()
-                                     if values is not None})
-            own.time = np.zeros(1)
-            if np.isnan(self.imposed.bus_voltage[which]).all():
-                own.bus = None
-            else:
-                V = self.imposed.bus_voltage[which, None]
-                own.bus = np.where(np.isnan(V), self.numbers.source.V[which, None], V)
-            drive, load = _constant(command[which]), self._load(chunk, samples.time[which], torque)
-            values = chunk.model.output(name, cast("Any", own), cast("Any", drive), load)
-            found[which] = np.broadcast_to(values, (len(which), 1))[:, 0]
+            found[chunk.which] = chunk.model.command_signal(name, command[chunk.which, None])[:, 0]
         return found
-
-    def _load(self, chunk: Chunk, time: Array, torque: Array) -> Load:
-        """Return the loads of lanes with all that acts on them now."""
-        which, load = chunk.which, chunk.load
-        changed = object.__new__(Load)
-        for field in fields(load):
-            object.__setattr__(changed, field.name, getattr(load, field.name))
-        J_L = self.imposed.load_inertia[which]
-        if not np.isnan(J_L).all():
-            more = np.where(np.isnan(J_L), 0.0, J_L - self.load_total[which])
-            object.__setattr__(changed, "inertia", load.inertia + more[:, None])
-        own = self.columns.torque[which] + torque[which] + self._recorded(which, time)
-        changed.__dict__["torque_pieces"] = _constant(own)
-        return changed
-
-    def _recorded(self, which: Indices, time: Array) -> Array:
-        first, count, rows = self.torque.first[which], self.torque.count[which], self.torque.rows
-        found = np.zeros(len(which))
-        for k in np.flatnonzero(count).tolist():
-            table = rows[first[k]:first[k] + count[k]]
-            row = table[max(int(np.searchsorted(table[:, 0], time[k], side="right")) - 1, 0)]
-            found[k] = row[1] + row[2] * (time[k] - row[0])
-        return found
-
-
-def _constant(values: Array) -> LanePieces:
-    rows = np.zeros((len(values), 7))
-    rows[:, 1] = values
-    index = np.arange(len(values))
-    return LanePieces(rows, index, np.ones_like(index))
-
-

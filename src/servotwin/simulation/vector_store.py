@@ -5,19 +5,29 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
-from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, INSIDE, RIGID, STUCK
-from servotwin.models.engine.records import TILE, room
+from servotwin.models.engine.modes import INSIDE, RIGID
+from servotwin.models.engine.records import TILE, columns_of, room
+from servotwin.models.engine.sights import Observed
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
-from servotwin.simulation.lane_runs import PLAIN_RUNS, SIDE_BY_SIDE, OneByOne, SideBySide, some_of
+from servotwin.simulation.lane_runs import (
+    LOOK_ONE_BY_ONE,
+    LOOK_SIDE_BY_SIDE,
+    PLAIN_RUNS,
+    SIDE_BY_SIDE,
+    OneByOne,
+    SideBySide,
+    some_of,
+)
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_memory import VectorMemory
@@ -66,9 +76,10 @@ class Store:
         self._loads_change = True
 
     def _kinds_now(self) -> list[SideBySide | OneByOne]:
-        numbers = self._numbers
-        return lane_runs.kinds_of(numbers.numbers, numbers.chips, numbers.count, numbers.pulsed, self._dtype,
-                                  np.zeros(numbers.count, np.bool_), numbers.torque.count > 0, bool(numbers.curve.size))
+        numbers, lanes = self._numbers, slice(self._numbers.count)
+        own = columns_of(Numbers, numbers.columns.numbers, lanes), columns_of(Chip, numbers.columns.chips, lanes)
+        return lane_runs.kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
+                                  numbers.torque.count > 0, bool(numbers.curve.size))
 
     def _parts(self, which: Indices) -> Iterator[tuple[_Tiles | _Records, Indices, Indices]]:
         """Return the sets that hold some lanes, where in the set they are, and where in `which`."""
@@ -96,7 +107,7 @@ class Store:
         memory = self.records()
         self._build(numbers)
         self.hang(torque)
-        play = numbers.numbers.play.half > 0.0
+        play = numbers.now("play").half > 0.0
         point = memory["point"]
         point["anchor_time"][which] = math.inf
         mesh = point["mode"]["mesh"]
@@ -209,37 +220,29 @@ class Store:
 
     # --- what shows, and what is imposed ------------------------------------------------------------------------------
 
-    def samples(self) -> SimpleNamespace:
-        """Return the states of all lanes as outputs read them, fields of shape (lanes,)."""
-        records = self.records()
-        modes = np.zeros((4, len(records)), np.int64)
+    def look(self, command: Array) -> Array:
+        """Return what shows of all lanes under their commands, a row of `sights.Observed` for each."""
+        self._columns.pieces[:, 1] = command
+        seen = np.empty((len(self.status), len(Observed._fields)))
         for some in self._sets:
-            if isinstance(some, _Tiles):
-                modes[1, some.which] = some.contacts()
-            else:
-                kernels(some.recipe).settle(self._columns, *self._inputs, some.which, records[some.which],
-                                            found := np.zeros((4, len(some.which)), np.int64))
-                modes[:, some.which] = found
-        point, chip = records["point"], records["chip"]
-        q, w, i, T_w, T_h, q_m, w_m = point["y"].T
-        return SimpleNamespace(
-            time=self.time, angle=q, speed=w, current=i, winding=T_w, housing=T_h, motor_angle=q_m, motor_speed=w_m,
-            wiper=point["wiper"], zone=modes[0], contact=modes[1], mesh=modes[2], motor=modes[3], drive=chip["drive"],
-            error=chip["error"], silent=chip["silent"])
+            some.look(self._columns, self._inputs, seen)
+        seen[self.status != 0] = math.nan
+        return seen
 
     def impose(self, which: Indices, angle: Array | None, speed: Array | None) -> None:
         """Set angles [rad] and speeds [rad/s] of the output; book the work of the impulses."""
-        now = self._numbers.numbers
         if angle is not None:
-            angle = np.clip(angle, now.stops.lower[which], now.stops.upper[which])
-        J = np.where(now.play.half > 0.0, now.shaft.J_out, now.shaft.J)[which] if speed is not None else None
+            lower, upper, _ = self._numbers.now("stops", which)
+            angle = np.clip(angle, lower, upper)
+        if speed is not None:
+            J, _, J_out, _ = self._numbers.now("shaft", which)
+            J = np.where(self._numbers.now("play", which).half > 0.0, J_out, J)
         for some, places, of in self._parts(which):
-            lanes = which[of]
-            if speed is not None and J is not None:
+            if speed is not None:
                 with np.errstate(over="ignore", invalid="ignore"):
-                    self.work[lanes] += 0.5 * J[of] * (speed[of]**2 - some.shaft("output_speed")[places]**2)
+                    self.work[which[of]] += 0.5 * J[of] * (speed[of]**2 - some.shaft("output_speed")[places]**2)
             some.impose(places, None if angle is None else angle[of], None if speed is None else speed[of],
-                        now.play.half[lanes], now.sensor.half_slack[lanes])
+                        self._numbers)
 
 
 _NONE = np.zeros(0)
@@ -272,7 +275,7 @@ class _Tiles:
         """Take the numbers of lanes anew."""
         self._refit(columns, lanes, places, self.rows)
 
-    def impose(self, places: Indices, angle: Array | None, speed: Array | None, half: Array, slack: Array) -> None:
+    def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
         """Set angles [rad] and speeds [rad/s]; none of these lanes has play."""
         for name, values in (("q", angle), ("w", speed)):
             if values is not None:
@@ -293,17 +296,8 @@ class _Tiles:
         edge, since = (flat(self.rows, "clock", name)[:len(self.which)] for name in ("edge", "since"))
         return np.asarray(edge + since)
 
-    def contacts(self) -> Indices:
-        """Return in which contact each shaft is."""
-        n = len(self.which)
-        shaft, servo = ({name: flat(self.rows, group, name)[:n] for name in names} for group, names in (
-            ("arc", ("friction_forward", "friction_backward", "start_forward", "start_backward", "start_off")),
-            ("servo", ("w", "drive"))))
-        start = np.select([servo["drive"] > 0.0, servo["drive"] < 0.0],
-                          [shaft["start_forward"], shaft["start_backward"]], shaft["start_off"])
-        way = np.where(servo["w"] != 0.0, servo["w"], start)
-        smooth = (shaft["friction_forward"] == 0.0) & (shaft["friction_backward"] == 0.0)
-        return np.asarray(np.select([smooth, way == 0.0, way > 0.0], [FREE, STUCK, FORWARD], BACKWARD))
+    def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
+        kernels(LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
 
 
 class _Records:
@@ -320,11 +314,13 @@ class _Records:
         """Let motions of lanes begin anew: their numbers are read at each step."""
         self.rows["point"]["anchor_time"][places] = math.inf
 
-    def impose(self, places: Indices, angle: Array | None, speed: Array | None, half: Array, slack: Array) -> None:
-        """Set angles [rad] and speeds [rad/s]; with play of the gear, or of the potentiometer, half of it is given."""
-        rows = self.rows[places]
+    def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
+        """Set angles [rad] and speeds [rad/s] of the output; motor and potentiometer go along as far as their play."""
+        rows, lanes = self.rows[places], self.which[places]
+        half = numbers.now("play", lanes).half
         point, y, play = rows["point"], rows["point"]["y"], half > 0.0
         if angle is not None:
+            slack = numbers.now("sensor", lanes).half_slack
             y[:, 0] = angle
             y[:, 5] = np.where(play, np.clip(y[:, 5], angle - half, angle + half), angle)
             point["wiper"] = np.clip(point["wiper"], angle - slack, angle + slack)
@@ -344,3 +340,6 @@ class _Records:
     @property
     def time(self) -> Array:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
+
+    def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
+        kernels(LOOK_ONE_BY_ONE).one_by_one(columns, *inputs, self.which, self.rows, seen)

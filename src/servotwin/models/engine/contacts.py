@@ -21,7 +21,7 @@ from servotwin.models.engine.modes import (
     at_rest,
 )
 from servotwin.models.terms import friction, play, shaft, source
-from servotwin.models.terms.friction import holding_friction, sliding_friction
+from servotwin.models.terms.friction import Friction, holding_friction, sliding_friction
 from servotwin.models.terms.load import dry as has_dry_load
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.numbers import Numbers
@@ -54,19 +54,23 @@ def holding_bounds(numbers: Numbers, tau_m: float, tau_e: float) -> tuple[float,
 
 def friction_torque(numbers: Numbers, contact: int, w: float, tau_m: float, tau_e: float) -> float:
     """Return the friction [N m] against +q of motor and output moving as one, the load's own included."""
+    return joint_friction(numbers.friction, numbers.load.coulomb, contact, w, tau_m, tau_e)
+
+
+def joint_friction(own: Friction, dry: float, contact: int, w: float, tau_m: float, tau_e: float) -> float:
+    """Return the friction [N m] against +q of a gear and of a load with so much dry friction [N m]."""
     if contact == FORWARD:
-        return sliding_friction(numbers.friction, True, w, tau_m, tau_e) + numbers.load.coulomb
+        return sliding_friction(own, True, w, tau_m, tau_e) + dry
     if contact == BACKWARD:
-        return -sliding_friction(numbers.friction, False, w, tau_m, tau_e) - numbers.load.coulomb
+        return -sliding_friction(own, False, w, tau_m, tau_e) - dry
     if contact == CORE:
-        forward, backward = core_friction(numbers)
-        return smoothed_coulomb_torque(w, forward, backward, numbers.friction.kappa)
+        forward, backward = core_friction(own, dry)
+        return smoothed_coulomb_torque(w, forward, backward, own.kappa)
     return 0.0
 
 
-def core_friction(numbers: Numbers) -> tuple[float, float]:
-    """Return the magnitudes [N m] forward and backward of a smoothed friction, the load's own included."""
-    own, dry = numbers.friction, numbers.load.coulomb
+def core_friction(own: Friction, dry: float) -> tuple[float, float]:
+    """Return the magnitudes [N m] forward and backward of a smoothed friction, that of a load included."""
     return own.F_forward + dry, own.F_backward + dry
 
 

@@ -83,6 +83,11 @@ def current(numbers: Numbers, zone: int, u: float, q: float, w: float) -> float:
     return motor.steady_armature_current(v, w, R, numbers.motor.K_b)
 
 
+def flowing(numbers: Numbers, zone: int, u: float, q: float, w: float, i: float) -> float:
+    """Return the armature current [A]: the state i where it has inertia."""
+    return i if inductive(numbers.motor) else current(numbers, zone, u, q, w)
+
+
 def current_rate(numbers: Numbers, zone: int, u: float, q: float, w: float, i: float) -> float:
     """Return di/dt [A/s] of a current with inertia."""
     if zone < CONDUCTING:
@@ -109,8 +114,7 @@ def current_slope(numbers: Numbers, zone: int, du: float) -> float:
 
 def drive_torque(numbers: Numbers, zone: int, u: float, y: Vector) -> float:
     """Return the motor's torque N k_a i [N m]."""
-    i = y[2] if inductive(numbers.motor) else current(numbers, zone, u, y[0], y[6])
-    return motor.electromagnetic_torque(i, numbers.motor.K)
+    return motor.electromagnetic_torque(flowing(numbers, zone, u, y[0], y[6], y[2]), numbers.motor.K)
 
 
 def stall_current(numbers: Numbers, V: float) -> float:

@@ -131,11 +131,15 @@ def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memo
     tau, tau_end = in_force(inputs.torque, origin, time, inputs.constant_torque)
     if changed or u != memory.u or tau != memory.tau:
         memory = forgotten(memory)
-    silent = memory.chip.silent
-    if memory.point.anchor_time == math.inf:  # a servo that did not heed silence may do so now
-        silent = 1 if memory.chip.clock <= time else 0
-    return Memory(memory.frames, beat, memory.point, frame.numbered(memory.chip, number, silent), u, u_end, tau,
-                  tau_end)
+    return Memory(memory.frames, beat, memory.point, frame.numbered(memory.chip, number, silent_now(memory)), u, u_end,
+                  tau, tau_end)
+
+
+def silent_now(memory: Memory) -> int:
+    """Tell whether no pulses come, 1 or 0, before a servo goes on; one that did not heed that may do so now."""
+    if memory.point.anchor_time == math.inf:
+        return 1 if memory.chip.clock <= memory.point.time else 0
+    return memory.chip.silent
 
 
 def with_play(memory: Memory, play: bool) -> Memory:

@@ -40,7 +40,7 @@ def jacobian(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, q: 
     Fw = -numbers.shaft.b
     Fi = Fu = 0.0
     if mode.contact == CORE:
-        forward, backward = contacts.core_friction(numbers)
+        forward, backward = contacts.core_friction(numbers.friction, numbers.load.coulomb)
         Fw -= friction.smoothed_coulomb_slope(w, forward, backward, numbers.friction.kappa)
     if inductive(numbers.motor):  # current and torque are linear, so units give the coefficients
         R, L, K_b = numbers.motor.R, numbers.motor.L, numbers.motor.K_b

@@ -97,9 +97,12 @@ def tiles_with(kind: type[Any], values: Any, count: int) -> NDArray[Any]:
 
 
 def columns_of(kind: type[Kind], tiles: NDArray[Any], which: Any) -> Kind:
-    """Return the numbers of some lanes of tiles, as a named tuple of arrays."""
-    return kind(*(columns_of(hint, tiles[name], which) if hasattr(hint, "_fields") else tiles[name].ravel()[which]
-                  for name, hint in fields_of(kind)))
+    """Return the numbers of some lanes of tiles, by their numbers or as a slice, as a named tuple of arrays."""
+    if isinstance(which, slice):
+        return kind(*(columns_of(hint, tiles[name], which) if hasattr(hint, "_fields") else tiles[name].ravel()[which]
+                      for name, hint in fields_of(kind)))
+    return kind(*(columns_of(hint, tiles[name], which) if hasattr(hint, "_fields")
+                  else tiles[name][which // TILE, which % TILE] for name, hint in fields_of(kind)))
 
 
 def numbers_in(values: Any) -> Iterator[Any]:

@@ -11,11 +11,13 @@ from servotwin.models.engine.memory import (
     Memory,
     counted_anew,
     due,
+    in_force,
     instant,
     memory_of,
     origin_of,
     put_memory,
     resumed,
+    silent_now,
     since,
     started,
     time_of,
@@ -24,11 +26,11 @@ from servotwin.models.engine.modes import INSIDE, RIGID, Mode
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms import play
-from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
+from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
@@ -54,7 +56,7 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
     """
     for k in range(which.size):
         lane = which[k]
-        inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
+        inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
         memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_of(records[k]),
                           durations[k], times, first_output[k], outputs[k])
         status[k] = how
@@ -63,7 +65,8 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
             put_memory(records[k], memory)
 
 
-def _inputs(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
+def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
+    """Return what a lane is told, and what hangs on its shaft with a recorded torque."""
     first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
     own = lanes.edge_count[lane]
     edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
@@ -71,26 +74,28 @@ def _inputs(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
     return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane])
 
 
-def settle(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
-           which: Indices, records: Any, modes: Indices) -> None:
-    """Fill `modes`, shape (4, n), with the modes of lanes as they stand, under their present inputs."""
-    for k in range(which.size):
-        lane = which[k]
-        inputs = _inputs(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        mode = mode_of(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_of(records[k]))
-        modes[0, k], modes[1, k], modes[2, k], modes[3, k] = mode.zone, mode.contact, mode.mesh, mode.motor
-
-
 def mode_of(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> Mode:
     """Return the mode of a servo as it stands, under its present inputs."""
-    memory = resumed(pulsed_chip(chip), inputs, memory, False)
+    u, tau = told(numbers, pulsed_chip(chip), inputs, memory)
+    return mode_under(at_pulses(numbers, silent_now(memory)), u, tau, memory)
+
+
+def told(numbers: Numbers, pulsed: bool, inputs: Inputs, memory: Memory) -> tuple[Piece, Piece]:
+    """Return what a servo follows as it stands, and the torque of its load that depends on time alone."""
+    origin, time = origin_of(memory), memory.point.time
+    tau, _ = in_force(inputs.torque, origin, time, inputs.constant_torque)
+    if pulsed:
+        return source(numbers, memory.chip), tau
+    u, _ = in_force(inputs.command, origin, time, 0.0)
+    return u, tau
+
+
+def mode_under(numbers: Numbers, u: Piece, tau: Piece, memory: Memory) -> Mode:
+    """Return the mode of a servo whose numbers are those with pulses or without, as it is now."""
     origin, point = origin_of(memory), memory.point
-    u = source(numbers, memory.chip) if pulsed_chip(chip) else since(memory.u, origin)
-    if point.anchor_time < math.inf and (not pulsed_chip(chip) or u.value == memory.u.value):
+    if point.anchor_time < math.inf and u == memory.u and tau == memory.tau:
         return point.mode
-    if heeds_silence(numbers.bridge):
-        numbers = at_pulses(numbers, memory.chip)
-    return anchored(numbers, u, since(memory.tau, origin), point.time, point).mode
+    return anchored(numbers, since(u, origin), since(tau, origin), point.time, point).mode
 
 
 def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, times: Floats,

@@ -50,14 +50,14 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
             now = frame.switched(now, t)
         edge = edge_of(inputs, memory, now.number)
         if edge <= t:
-            met = at_pulses(numbers, now) if heeds else numbers
+            met = at_pulses(numbers, now.silent) if heeds else numbers
             now = measured(met, chip, inputs, now, point, pulse_width(inputs, memory))
             if now.number == frame.CROWDED:
                 return memory, m, -1, CROWDED
             edge = edge_of(inputs, memory, now.number)
         u_end = min(frame.next_switch(now, heeds), edge)
         if heeds:
-            numbers = at_pulses(numbers, now)
+            numbers = at_pulses(numbers, now.silent)
             new = new or silent != now.silent
         if new or u.value != now.drive * numbers.source.V:
             u, new = source(numbers, now), True
@@ -146,12 +146,13 @@ def status_of(y: Vector) -> int:
     return COMPLETED if math.isfinite(total) else DIVERGED
 
 
-def at_pulses(numbers: Numbers, now: Frame) -> Numbers:
-    """Return the numbers with the bridge as it is now: while no pulses come it may be off in another way."""
-    if now.silent == 0:
+def at_pulses(numbers: Numbers, silent: int) -> Numbers:
+    """Return the numbers with the bridge as it is now: while no pulses come (1) it may be off in another way."""
+    if silent == 0:
         return numbers
-    return Numbers(numbers.motor, bridge.silent(numbers.bridge), numbers.source, numbers.follower, numbers.shaft,
-                   numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+    return Numbers(
+        numbers.motor, bridge.off_now(numbers.bridge, silent), numbers.source, numbers.follower, numbers.shaft,
+        numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
 
 
 def source(numbers: Numbers, now: Frame) -> Piece:
@@ -164,8 +165,7 @@ def voltages(numbers: Numbers, u: float, y: Vector) -> tuple[float, float]:
     numbers = warm(numbers, y)
     w, i = y[6], y[2]
     zone = currents.zone_of(numbers, u, 0.0, y[0], w, i)
-    if not inductive(numbers.motor):
-        i = currents.current(numbers, zone, u, y[0], w)
+    i = currents.flowing(numbers, zone, u, y[0], w, i)
     V_bus = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)
     return bridge.terminal_voltage(numbers.bridge, numbers.source, numbers.motor, u, w, i, V_bus), V_bus
 

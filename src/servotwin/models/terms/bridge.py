@@ -67,9 +67,10 @@ def heeds_silence(bridge: Bridge) -> bool:
     return bridge.silence.coast != bridge.off.coast
 
 
-def silent(bridge: Bridge) -> Bridge:
-    """Return the bridge as it is while no pulses come."""
-    return Bridge(bridge.D_drive, bridge.R_drive, bridge.silence, bridge.silence, bridge.V_br)
+def off_now(bridge: Bridge, silent: int) -> Bridge:
+    """Return the bridge as it is off now: between drives, or (1) while no pulses come."""
+    off = bridge.silence if silent != 0 else bridge.off
+    return Bridge(bridge.D_drive, bridge.R_drive, off, off, bridge.V_br)
 
 
 def drop(bridge: Bridge, u: float) -> float:

@@ -1,0 +1,136 @@
+"""What shows of a servo as it stands: its electrical side, and the torques at its output shaft.
+
+The numbers are those of this instant: at the temperatures of winding and housing, and with the bridge as it is off now.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from servotwin.models.engine import currents
+from servotwin.models.engine.contacts import joint_friction
+from servotwin.models.engine.modes import INSIDE, Mode, at_rest
+from servotwin.models.terms import bridge, shaft, source
+from servotwin.models.terms.bridge import Bridge, Off
+from servotwin.models.terms.friction import NO_FRICTION, Friction, holding_friction
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.source import Source
+from servotwin.physics.bridge import bridge_loss, brush_loss
+from servotwin.physics.load_friction import torque_on_gear
+from servotwin.physics.motor import electromagnetic_torque
+from servotwin.physics.shaft import load_torque
+from servotwin.physics.supply import supply_current
+
+_NO_VOLTAGE = 5e-324  # V: a bus without any is still connected
+_EDGE = 1e-6  # of a limit: what float32 rounds
+
+
+class Electrical(NamedTuple):
+    """Voltages [V], currents [A] and powers [W]; of bus and supply nan where the voltage follows the error."""
+
+    armature_voltage: float
+    armature_current: float
+    bus_voltage: float
+    supply_current: float
+    supply_power: float
+    bridge_power: float
+    brush_power: float
+
+
+class Torques(NamedTuple):
+    """The torques at the output shaft [N m], friction against +q, and its acceleration [rad/s²]."""
+
+    motor: float
+    servo_friction: float
+    load_friction: float
+    external: float
+    acceleration: float
+    load: float  # that it gets, its inertia included
+
+
+def electrical(numbers: Numbers, u: float, q: float, w: float, i: float) -> Electrical:
+    """Return what happens electrically where the motor turns with w [rad/s]; i [A] counts where it has inertia.
+
+    u [V] is what the servo follows, or ±V_oc or 0 behind a bridge.
+    """
+    i = _within_limit(numbers.source, i)
+    zone = currents.zone_of(numbers, u, 0.0, q, w, i)
+    i = currents.flowing(numbers, zone, u, q, w, i)
+    if not source.present(numbers.source):
+        v = currents.voltage(numbers, zone, u, q)
+        return Electrical(v, i, math.nan, math.nan, v * i, 0.0, 0.0)
+    path, supply, motor = numbers.bridge, numbers.source, numbers.motor
+    V_bus = bridge.bus_voltage(path, supply, motor, zone, u, w, i)
+    v = bridge.terminal_voltage(path, supply, motor, u, w, i, V_bus)
+    at_brushes = brush_loss(i, path.V_br)
+    if u == 0.0 and not bridge.coasts(path):  # a motor that is braked is not on the bus
+        return Electrical(v, i, V_bus, 0.0, 0.0, 0.0, at_brushes)
+    drawn = supply_current(i, bridge.direction(u))
+    V_ce0, r_c = bridge.drops(path, supply, motor, u)
+    return Electrical(v, i, V_bus, drawn, V_bus * drawn, bridge_loss(i, V_ce0, r_c), at_brushes)
+
+
+def armature_current(numbers: Numbers, u: float, q: float, w: float, i: float) -> float:
+    """Return the armature current [A] alone."""
+    i = _within_limit(numbers.source, i)
+    return currents.flowing(numbers, currents.zone_of(numbers, u, 0.0, q, w, i), u, q, w, i)
+
+
+def _within_limit(supply: Source, i: float) -> float:
+    """Return a current, at the limit of a regulator but for rounding just there."""
+    if source.regulated(supply) and abs(abs(i) - supply.I_max) <= _EDGE * supply.I_max:
+        return math.copysign(supply.I_max, i)
+    return i
+
+
+def torques(numbers: Numbers, mode: Mode, w: float, w_motor: float, i: float, external: float) -> Torques:
+    """Return all torques at the output shaft under a current [A] and an external torque against +q [N m]."""
+    own, dry, acceleration = numbers.shaft, numbers.load.coulomb, 0.0
+    tau = electromagnetic_torque(i, numbers.motor.K)
+    if mode.mesh == INSIDE:
+        servo, _ = _friction(numbers.friction, 0.0, mode.motor, w_motor, tau, 0.0, tau)
+        _, of_load = _friction(NO_FRICTION, dry, mode.contact, w, 0.0, -external, -external)
+        if not at_rest(mode.contact):
+            acceleration = shaft.output_acceleration(own, w, of_load, external)
+    else:
+        on_gear = torque_on_gear(external, w, own.b_out)
+        servo, of_load = _friction(numbers.friction, dry, mode.contact, w, tau, on_gear, tau - external)
+        if not at_rest(mode.contact):
+            acceleration = shaft.acceleration(own, tau, w, servo + of_load, external)
+    return Torques(tau, servo, of_load, external, acceleration,
+                   load_torque(acceleration, w, of_load, external, own.b_out, own.J_out))
+
+
+def _friction(gear: Friction, dry: float, contact: int, w: float, tau_m: float, tau_e: float,
+              net: float) -> tuple[float, float]:
+    """Return the friction of gear and load [N m], against +q, where `net` is what they have to hold at rest.
+
+    At rest friction takes what it has to hold, shared by servo and load in proportion to what each can hold (the
+    sharing is assumed: statics does not tell); what remains then is carried by a stop.
+    """
+    if at_rest(contact):
+        low = holding_friction(gear, False, tau_m, tau_e) + dry
+        high = holding_friction(gear, True, tau_m, tau_e) + dry
+        held = min(max(net, -low), high)
+        limit = high if held > 0.0 else low
+        share = dry / limit if limit > 0.0 else 0.0
+        return held * (1.0 - share), held * share
+    own = joint_friction(gear, 0.0, contact, w, tau_m, tau_e)
+    return own, joint_friction(gear, dry, contact, w, tau_m, tau_e) - own
+
+
+def on_bus(numbers: Numbers, V_bus: float) -> Numbers:
+    """Return a servo on a bus whose voltage is known; that of its source is then left out."""
+    path, supply = numbers.bridge, numbers.source
+    path = Bridge(path.D_drive, path.R_drive - supply.R_b, _off_on_bus(path.off, supply, V_bus),
+                  _off_on_bus(path.silence, supply, V_bus), path.V_br)
+    return Numbers(
+        numbers.motor, path, Source(max(V_bus, _NO_VOLTAGE), 0.0, math.inf), numbers.follower, numbers.shaft,
+        numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+
+
+def _off_on_bus(off: Off, supply: Source, V_bus: float) -> Off:
+    if off.coast == 0.0:
+        return off
+    return Off(off.D - supply.V + V_bus, off.R if source.regulated(supply) else off.R - supply.R_b, off.coast)
