@@ -246,9 +246,9 @@ def _once(given: Any) -> tuple[tuple[Any, ...], Indices]:
     items = list(given) if isinstance(given, Sequence) else [given]
     if items and all(item is items[0] for item in items):
         return (items[0],), np.zeros(len(items), dtype=np.int64)
-    if len(set(map(id, items))) == len(items):  # each is another
-        return tuple(items), np.arange(len(items))
     ids = np.fromiter(map(id, items), dtype=np.uint64, count=len(items))
+    if np.diff(np.sort(ids)).all():  # each is another
+        return tuple(items), np.arange(len(items))
     _, where, index = np.unique(ids, return_index=True, return_inverse=True)
     place = np.empty_like(where)
     place[np.argsort(where)] = np.arange(len(where))  # in the order of the lanes, not of addresses

@@ -178,3 +178,13 @@ def acceleration(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) 
     torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, q)
     dry = friction_torque(numbers, mode.contact, w, torque, torque_on_gear(against, w, numbers.shaft.b_out))
     return shaft.acceleration(numbers.shaft, torque, w, dry, against)
+
+
+def accelerations(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:
+    """Return ẇ [rad/s²] of the output side and of the motor, which inside the play are two bodies."""
+    if mode.mesh != INSIDE:
+        dw = acceleration(numbers, mode, u, tau, y)
+        return dw, dw
+    torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y[0])
+    return (output_acceleration(numbers, mode.contact, against, y[1]),
+            motor_acceleration(numbers, mode.motor, torque, y[6]))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from servotwin.models.engine import contacts, currents
-from servotwin.models.engine.modes import CORE, INSIDE, Mode, Vector, at_rest, in_linear_zone
+from servotwin.models.engine.modes import CORE, Mode, Vector, at_rest, in_linear_zone
 from servotwin.models.terms import heat
-from servotwin.models.terms.load import external_torque, stiffness_at
+from servotwin.models.terms.load import stiffness_at
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.shaft import accelerated
@@ -15,7 +15,7 @@ from servotwin.physics import electronics, friction, motor, potentiometer
 def rates_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> Vector:
     """Return the rate of every number of the state."""
     numbers = warm(numbers, y)
-    w, i, w_m = y[1], y[2], y[6]
+    i, w_m = y[2], y[6]
     di = dT_w = dT_h = 0.0
     if inductive(numbers.motor):
         di = currents.current_rate(numbers, mode.zone, u, y[0], w_m, i)
@@ -23,12 +23,8 @@ def rates_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> V
         i = currents.current(numbers, mode.zone, u, y[0], w_m)
     if heat.present(numbers.heat):
         dT_w, dT_h = heat.warming_rates(numbers.heat, numbers.motor.R, i, y[3], y[4])
-    if mode.mesh == INSIDE:
-        dw_m = contacts.motor_acceleration(numbers, mode.motor, motor.electromagnetic_torque(i, numbers.motor.K), w_m)
-        dw = contacts.output_acceleration(numbers, mode.contact, external_torque(numbers.load, tau, y[0]), w)
-        return w, dw, di, dT_w, dT_h, w_m, dw_m
-    dw = contacts.acceleration(numbers, mode, u, tau, y)
-    return w, dw, di, dT_w, dT_h, w, dw
+    dw, dw_m = contacts.accelerations(numbers, mode, u, tau, y)
+    return y[1], dw, di, dT_w, dT_h, w_m, dw_m
 
 
 def jacobian(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, q: float, w: float) -> tuple[float, ...]:
