@@ -194,14 +194,11 @@ class VectorSimulator:
         if name not in numbers.available:
             raise UnknownNameError(f"signal of {type(numbers.model).__name__}", name, ("time", *numbers.available))
         if name in KINDS:
-            values = numbers.commanded(name, self._command)
-            values[self._store.status != 0] = math.nan
-            return values
+            return np.where(self._store.status != 0, math.nan, numbers.commanded(name, self._command))
         if self._seen is None:
             self._seen = self._store.look(self._command)
         values = self._seen[:, _COLUMNS[name]]
-        at_motor = _AT_MOTOR.get(name)
-        return values.copy() if at_motor is None else np.asarray(at_motor(values, numbers.reduction))
+        return np.asarray(_AT_MOTOR[name](values, numbers.reduction)) if name in _AT_MOTOR else values.copy()
 
     @property
     def impulse_work(self) -> Array:

@@ -19,15 +19,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
-from servotwin.simulation.lane_runs import (
-    LOOK_ONE_BY_ONE,
-    LOOK_SIDE_BY_SIDE,
-    PLAIN_RUNS,
-    SIDE_BY_SIDE,
-    OneByOne,
-    SideBySide,
-    some_of,
-)
+from servotwin.simulation.lane_runs import PLAIN_RUNS, SIDE_BY_SIDE, OneByOne, SideBySide, some_of
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_memory import VectorMemory
@@ -297,7 +289,7 @@ class _Tiles:
         return np.asarray(edge + since)
 
     def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
-        kernels(LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
+        kernels(lane_runs.LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
 
 
 class _Records:
@@ -342,4 +334,4 @@ class _Records:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
     def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
-        kernels(LOOK_ONE_BY_ONE).one_by_one(columns, *inputs, self.which, self.rows, seen)
+        kernels(lane_runs.LOOK_ONE_BY_ONE).one_by_one(columns, *inputs, self.which, self.rows, seen)
