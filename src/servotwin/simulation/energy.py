@@ -9,8 +9,8 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.engine import motion
+from servotwin.models.engine.observe import stored_energy
 from servotwin.models.outputs import electrical_of, torques_of, warm_plant
-from servotwin.physics import motor, shaft
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -67,14 +67,12 @@ def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -
     def powers(samples: Samples) -> NDArray[np.float64]:
         plant = warm_plant(model, samples, load)
         circuit = electrical_of(plant, samples, drive)
-        i, w, w_m = circuit.armature_current, samples.speed, samples.motor_speed
+        i, w_m = circuit.armature_current, samples.motor_speed
         torques = torques_of(model, samples, drive, load)
-        own_viscous = (plant.shaft.b - plant.shaft.b_out) * w_m
-        to_load = (plant.shaft.b_out * w + torques.load_friction + torques.external) * w
         converted = physics.back_emf(w_m, plant.motor.K_b) * i - torques.motor * w_m
         return np.array(np.broadcast_arrays(
             circuit.supply_power, physics.copper_loss(i, plant.motor.R), circuit.bridge_power, circuit.brush_power,
-            converted, (own_viscous + torques.servo_friction) * w_m, to_load))
+            converted, torques.gear_loss, torques.load_power))
 
     supply, winding, bridge, brush, conversion, friction, to_load = trajectory.integral(powers).tolist()
     stored, stops = _kinetic(model.plant(load), trajectory)
@@ -91,10 +89,7 @@ def _kinetic(plant: Numbers, trajectory: Trajectory) -> tuple[float, float]:
 
     def stored(k: int, at: float) -> float:
         m = motion.prepared(segments[k].motion)
-        _, w, i, _, _, _, w_m = motion.state(m, at - segments[k].anchor)
-        J, J_out = plant.shaft.J, plant.shaft.J_out
-        kinetic = shaft.kinetic_energy(w, J_out) + shaft.kinetic_energy(w_m, J - J_out)
-        return kinetic + motor.magnetic_energy(i, plant.motor.L)
+        return stored_energy(plant, motion.state(m, at - segments[k].anchor))
 
     for k in range(1, len(segments)):
         if segments[k].anchor == segments[k].start:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from servotwin import physics
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.base import KINDS, PULSE_RANGE, Model
-from servotwin.models.engine.sights import Observed
+from servotwin.models.engine.observe import Observed
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.lane_inputs import lanes_of, pick
 from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
 from servotwin.models.engine.modes import INSIDE, RIGID
+from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.records import TILE, columns_of, room
-from servotwin.models.engine.sights import Observed
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_runs
@@ -213,7 +213,7 @@ class Store:
     # --- what shows, and what is imposed ------------------------------------------------------------------------------
 
     def look(self, command: Array) -> Array:
-        """Return what shows of all lanes under their commands, a row of `sights.Observed` for each."""
+        """Return what shows of all lanes under their commands, a row of `observe.Observed` for each."""
         self._columns.pieces[:, 1] = command
         seen = np.empty((len(self.status), len(Observed._fields)))
         for some in self._sets:

@@ -6,21 +6,29 @@ The numbers are those of this instant: at the temperatures of winding and housin
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.models.engine import currents
 from servotwin.models.engine.contacts import joint_friction
-from servotwin.models.engine.modes import INSIDE, Mode, at_rest
+from servotwin.models.engine.modes import INSIDE, Mode, Vector, at_rest
 from servotwin.models.terms import bridge, shaft, source
 from servotwin.models.terms.bridge import Bridge, Off
 from servotwin.models.terms.friction import NO_FRICTION, Friction, holding_friction
+from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.sensor import sensed_voltage
 from servotwin.models.terms.source import Source
 from servotwin.physics.bridge import bridge_loss, brush_loss
 from servotwin.physics.load_friction import torque_on_gear
-from servotwin.physics.motor import electromagnetic_torque
-from servotwin.physics.shaft import load_torque
+from servotwin.physics.motor import electromagnetic_torque, magnetic_energy
+from servotwin.physics.shaft import kinetic_energy, load_torque
 from servotwin.physics.supply import supply_current
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
+    from numpy.typing import NDArray
 
 _NO_VOLTAGE = 5e-324  # V: a bus without any is still connected
 _EDGE = 1e-6  # of a limit: what float32 rounds
@@ -39,7 +47,7 @@ class Electrical(NamedTuple):
 
 
 class Torques(NamedTuple):
-    """The torques at the output shaft [N m], friction against +q, and its acceleration [rad/s²]."""
+    """The torques at the output shaft [N m], friction against +q, its acceleration [rad/s²], and what they take."""
 
     motor: float
     servo_friction: float
@@ -47,6 +55,26 @@ class Torques(NamedTuple):
     external: float
     acceleration: float
     load: float  # that it gets, its inertia included
+    gear_loss: float  # power that friction in motor and gear takes [W]
+    load_power: float  # that damping, friction and external torque of the load take [W]
+
+
+class Observed(NamedTuple):
+    """Output signals of a servo by their names (SI), those of the motor as they are at the output shaft."""
+
+    armature_voltage: float
+    armature_current: float
+    bus_voltage: float
+    supply_current: float
+    motor_torque: float
+    load_torque: float
+    motor_angle: float
+    motor_speed: float
+    feedback_voltage: float
+    error_time: float
+    drive: float
+    winding_temperature: float
+    housing_temperature: float
 
 
 def electrical(numbers: Numbers, u: float, q: float, w: float, i: float) -> Electrical:
@@ -99,7 +127,15 @@ def torques(numbers: Numbers, mode: Mode, w: float, w_motor: float, i: float, ex
         if not at_rest(mode.contact):
             acceleration = shaft.acceleration(own, tau, w, servo + of_load, external)
     return Torques(tau, servo, of_load, external, acceleration,
-                   load_torque(acceleration, w, of_load, external, own.b_out, own.J_out))
+                   load_torque(acceleration, w, of_load, external, own.b_out, own.J_out),
+                   ((own.b - own.b_out) * w_motor + servo) * w_motor, (own.b_out * w + of_load + external) * w)
+
+
+def stored_energy(numbers: Numbers, y: Vector) -> float:
+    """Return the energy [J] in moving masses and in the magnetic field."""
+    own, (_, w, i, _, _, _, w_motor) = numbers.shaft, y
+    return (kinetic_energy(w, own.J_out) + kinetic_energy(w_motor, own.J - own.J_out)
+            + magnetic_energy(i, numbers.motor.L))
 
 
 def _friction(gear: Friction, dry: float, contact: int, w: float, tau_m: float, tau_e: float,
@@ -118,6 +154,18 @@ def _friction(gear: Friction, dry: float, contact: int, w: float, tau_m: float, 
         return held * (1.0 - share), held * share
     own = joint_friction(gear, 0.0, contact, w, tau_m, tau_e)
     return own, joint_friction(gear, dry, contact, w, tau_m, tau_e) - own
+
+
+def observed(numbers: Numbers, curve: Sequence[Sequence[float]] | NDArray[np.float64], mode: Mode, u: float, tau: float,
+             y: Vector, wiper: float, drive: float, error: float) -> Observed:
+    """Return all signals of a servo, whose numbers are those of this instant."""
+    q, w, i, T_w, T_h, q_motor, w_motor = y
+    circuit = electrical(numbers, u, q, w_motor, i)
+    against = external_torque(numbers.load, tau, q)
+    shaft = torques(numbers, mode, w, w_motor, circuit.armature_current, against)
+    return Observed(circuit.armature_voltage, circuit.armature_current, circuit.bus_voltage, circuit.supply_current,
+                    shaft.motor, shaft.load, q_motor, w_motor, sensed_voltage(numbers.sensor, curve, wiper), error,
+                    drive, T_w, T_h)
 
 
 def on_bus(numbers: Numbers, V_bus: float) -> Numbers:

@@ -2,42 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import contacts, currents
 from servotwin.models.engine.memory import memory_of, silent_now, time_of
-from servotwin.models.engine.modes import RIGID, Mode, Vector
-from servotwin.models.engine.observe import electrical, torques
+from servotwin.models.engine.modes import RIGID
+from servotwin.models.engine.observe import Observed, observed
 from servotwin.models.engine.records import TILE
 from servotwin.models.engine.runs import inputs_of, mode_under, told
 from servotwin.models.engine.step import at_pulses
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms.chip import present as pulsed_chip
-from servotwin.models.terms.load import external_torque
-from servotwin.models.terms.numbers import Numbers, warm
-from servotwin.models.terms.sensor import sensed_voltage
+from servotwin.models.terms.numbers import warm
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
-
-
-class Observed(NamedTuple):
-    """Output signals of a servo by their names (SI), those of the motor as they are at the output shaft."""
-
-    armature_voltage: float
-    armature_current: float
-    bus_voltage: float
-    supply_current: float
-    motor_torque: float
-    load_torque: float
-    motor_angle: float
-    motor_speed: float
-    feedback_voltage: float
-    error_time: float
-    drive: float
-    winding_temperature: float
-    housing_temperature: float
 
 
 def one_by_one(lanes: Lanes, curve: Floats, torque_rows: Floats, torque_first: Indices, torque_count: Indices,
@@ -66,18 +46,6 @@ def side_by_side(lanes: Lanes, curve: Floats, which: Indices, tiles: Any, seen: 
         u = drive * numbers.source.V
         mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, q, w, 0.0), u, tau, y, RIGID, False)
         put(seen, lane, observed(numbers, curve, mode, u, tau, y, q, drive, error))
-
-
-def observed(numbers: Numbers, curve: Floats, mode: Mode, u: float, tau: float, y: Vector, wiper: float, drive: float,
-             error: float) -> Observed:
-    """Return all signals of a servo, whose numbers are those of this instant."""
-    q, w, i, T_w, T_h, q_motor, w_motor = y
-    circuit = electrical(numbers, u, q, w_motor, i)
-    against = external_torque(numbers.load, tau, q)
-    shaft = torques(numbers, mode, w, w_motor, circuit.armature_current, against)
-    return Observed(circuit.armature_voltage, circuit.armature_current, circuit.bus_voltage, circuit.supply_current,
-                    shaft.motor, shaft.load, q_motor, w_motor, sensed_voltage(numbers.sensor, curve, wiper), error,
-                    drive, T_w, T_h)
 
 
 def put(seen: Floats, lane: int, values: Observed) -> None:
