@@ -212,15 +212,15 @@ def failure(status: Status, time: float) -> SimulationError:
 
 def _keep(record: Record, plan: Plan, before: Memory, memory: Memory, m: Motion, event: int) -> None:
     """Add a step to a record: its chip's doings, its motion, its event."""
-    origin, point, angle = origin_of(memory), memory.point, before.point.y[0]
-    start, now = origin + before.point.time, origin + point.time
+    origin, point, was = origin_of(memory), memory.point, before.point
+    start, now, angle = origin + was.time, origin + point.time, was.y[0]
     if memory.chip is not before.chip:
         keep_switch(record, before.chip, memory.chip, start, angle, plan.heeds_silence)
         if (plan.refuses and memory.chip.number > before.chip.number
                 and not frame.accepted(plan.chip, pulse_width(plan.inputs, before))):
             record.events.append(Event(start, "pulse refused", angle))
     if now > start or not record.segments:
-        record.segments.append(Segment(start, now, m, memory.chip.error, before.point.wiper, memory.chip.drive,
+        record.segments.append(Segment(start, now, m, memory.chip.error, was.wiper, memory.chip.drive,
                                        memory.chip.silent, origin))
     if record.tell is not None:
         record.tell(now)

@@ -78,7 +78,7 @@ def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new:
     `m` is the motion so far, which is taken up again if it is still the right one and the inputs are not `new`. Return
     the point, the motion, the event (−1: none) and a status.
     """
-    if new or motion.is_step(m) or m.t0 != point.anchor_time or m.mode != point.mode:
+    if new or m.t0 != point.anchor_time or m.mode != point.mode or motion.is_step(m):
         m = motion.begin(numbers, point.mode, u, tau, point.anchor_time, point.anchor, point.step,
                          limit - point.anchor_time)
     if m.kind == motion.IMPOSSIBLE:
