@@ -84,7 +84,8 @@ def test_shares_are_relative_changes():
 
 
 def _numbers():
-    tables = ("electronics.off_state", "electronics.silence_state", "potentiometer.linearity_angle", "potentiometer.linearity_error")
+    tables = ("electronics.off_state", "electronics.silence_state", "potentiometer.linearity_angle",
+              "potentiometer.linearity_error")
     return [name for name in (*MODEL.requires, *MODEL.optional) if name not in tables]
 
 
