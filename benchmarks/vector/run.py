@@ -1,7 +1,7 @@
 """Servos that stop and go on at every tick, beside MuJoCo's own step of a hinge; and whole calls of 4096 signals.
 
-`run.py` does both parts; `run.py ticks` or `run.py calls` one of them. MuJoCo is the peer; without it ratios are left
-out.
+`run.py` does all parts; `run.py ticks`, `run.py between` or `run.py calls` one of them. MuJoCo is the peer; without it
+ratios are left out.
 """
 
 import sys
@@ -95,6 +95,25 @@ def ticks() -> None:
         print(f"{name:36} {1e6 * time:9.2f} {1e6 * time / lanes:10.4f} {ratio}")
 
 
+def between() -> None:
+    """Print what another simulator pays between two ticks: to impose numbers on all lanes, and to look at a signal."""
+    peer = mujoco_tick()
+    print(f"{'between two ticks':36} {'us':>9} {'us a lane':>10} {'mj_step over it':>16}")
+    for lanes in (6, LANES):
+        for name, model in (("plain", MODEL), ("play", st.PulseServo(MODEL.servo.replace(WORN["play"])))):
+            sims = st.VectorSimulator(model, lanes, threads=THREADS)
+            inertia, volts = np.full(lanes, 1e-3), np.full(lanes, 5.5)
+            rows: dict[str, Callable[[int], object]] = {
+                "load inertia": lambda k, s=sims, x=inertia: s.set(load_inertia=x),
+                "speed": lambda k, s=sims, x=inertia: s.set(output_speed=x),
+                "bus voltage": lambda k, s=sims, x=volts: s.set(bus_voltage=x),
+                "speed, load torque": lambda k, s=sims, x=inertia: (s.set(output_speed=x), s["load_torque"])}
+            for what, row in rows.items():
+                time = ticked(row, 100)
+                ratio = "" if peer is None else f"{peer * lanes / time:15.1f}x"
+                print(f"{f'{lanes} lanes, {name}: {what}':36} {1e6 * time:9.2f} {1e6 * time / lanes:10.4f} {ratio}")
+
+
 def calls() -> None:
     """Print what a whole call of `simulate_many` costs beside `mujoco.rollout`, which takes a lane after the other."""
     fleet = random_fleet(LANES, duration=DURATION)
@@ -122,7 +141,7 @@ def calls() -> None:
 
 
 def main() -> None:
-    parts = {"ticks": ticks, "calls": calls}
+    parts = {"ticks": ticks, "between": between, "calls": calls}
     for part in sys.argv[1:] or parts:
         if part not in parts:
             sys.exit(f"run.py: {part!r} is not one of {', '.join(parts)}")

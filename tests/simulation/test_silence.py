@@ -110,14 +110,14 @@ def test_the_first_pulse_is_measured_by_a_bridge_that_is_still_silent(off, silen
 
 @pytest.mark.parametrize(("off", "silence"), PAIRS)
 def test_two_on_a_stiff_bus_go_silent_each_for_itself(off, silence):
-    model = servo(off, silence, **{"supply.internal_resistance": 0.0})
+    model = servo(off, silence, **{"supply.internal_resistance": 0.0, "stops.lower_angle": -20.0})
     supply = st.Supply(open_circuit_voltage=model.servo.supply.open_circuit_voltage)
-    other = st.signals.step(0.2, 1.6, at=0.05, unit="rad")
-    starts = {"a": {"output_angle": 0.5}, "b": {"output_angle": 0.2}}
-    load = st.loads.Constant(0.3)
+    other = st.signals.step(0.2, 1.6, at=0.0, unit="rad")
+    starts = {"a": {"output_angle": 0.5, "output_speed": -3.0}, "b": {"output_angle": 0.2}}
+    load = st.loads.Constant(0.9)  # turns an open motor, which is on the bus then, while the other drives
     fleet = st.simulate_bus({"a": (model, TRAIN, load), "b": (model, other)}, supply=supply, duration=0.25,
                             initial=starts)
-    times = np.linspace(0.0, 0.25, 251)[1:] - 1e-4
+    times = np.append(np.linspace(0.0, 0.25, 251)[1:] - 1e-4, np.ravel(SILENCE)[1:] - 1e-9)
     for name, command, hung in (("a", TRAIN, load), ("b", other, None)):
         alone = st.simulate(model, command, duration=0.25, load=hung, initial=starts[name])
         for signal in ("output_angle", "output_speed", "armature_voltage"):

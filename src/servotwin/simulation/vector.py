@@ -250,10 +250,9 @@ class VectorSimulator:
             self._translate = Translator(self._numbers)
         if inertia is not None:
             self._numbers.hang(which, inertia)
-        if bus is not None:
-            self._numbers.feed(which, bus)
+        otherwise = bus is not None and self._numbers.feed(which, bus)
         if inertia is not None or bus is not None:
-            self._store.refit(which, bus is not None, self._torque)
+            self._store.refit(which, otherwise, self._torque)
         if angle is not None or speed is not None:
             self._store.impose(which, angle, speed)
 

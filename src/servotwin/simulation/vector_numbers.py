@@ -114,11 +114,16 @@ class LaneNumbers:
                     given._replace(J=given.J + (J_out - given.J_out), J_out=J_out))
 
 
-    def feed(self, which: Indices, V: Array) -> None:
-        """Put voltages [V] in the place of what some lanes' supplies would leave."""
+    def feed(self, which: Indices, V: Array) -> bool:
+        """Put voltages [V] in the place of what some lanes' supplies would leave.
+
+        Return whether the lanes may have to run in another way than before.
+        """
         self.imposed.bus_voltage[which] = V
         given: Any = {room: columns_of(type(getattr(NEUTRAL, room)), self._given[room], which)
                       for room in ("bridge", "source", "follower")}
+        before, drop = self.now("source", which), given["bridge"].D_drive
+        otherwise = self.pulsed and ((before.V > drop) != (V > drop)) | np.isfinite(before.I_max)
         if self.pulsed:
             given |= _on_bus(NEUTRAL._replace(**given), V)._asdict()
         else:
@@ -126,6 +131,7 @@ class LaneNumbers:
             given["follower"] = own._replace(V_max=np.maximum(own.V_max + V - self._V_oc[which], 0.0))
         for room in ("bridge", "source", "follower"):
             put_columns(self.columns.numbers[room], which, given[room])
+        return bool(np.any(otherwise))
 
     def changed(self, which: Indices, parameters: Mapping[str, Any]) -> LaneNumbers:
         """Return these lanes with other parameters in some of them.

@@ -86,9 +86,9 @@ class Store:
         np.add(self._base, torque, out=self._total)
         self._loads_change = True
 
-    def refit(self, which: Indices, fed: bool, torque: Array) -> None:
-        """Take what another simulator has imposed on some lanes, `fed` where it is a voltage; memories go on."""
-        if fed and not _same(self._kinds_now(), self._kinds):
+    def refit(self, which: Indices, otherwise: bool, torque: Array) -> None:
+        """Take what another simulator has imposed on some lanes, which may run `otherwise` then; memories go on."""
+        if otherwise and not _same(self._kinds_now(), self._kinds):
             self.renew(self._numbers, which, torque)
             return
         for some, places, of in self._parts(which):
