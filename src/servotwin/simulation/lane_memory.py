@@ -46,7 +46,6 @@ def records_of(tiles: NDArray[Any], places: Indices, temperatures: Floats) -> ND
     chip["drive"], chip["error"] = servo["drive"], servo["error"]
     chip["drive_end"] = np.where(servo["drive"] != 0.0, now + servo["left"], math.inf)
     chip["clock"] = now + servo["silence"]
-    chip["silent"] = servo["silence"] <= 0.0
     for decision, before in (("pending", ""), ("later", "later_")):
         chip[decision]["time"] = now + servo[f"{before}due"]
         chip[decision]["sign"], chip[decision]["duration"] = servo[f"{before}sign"], servo[f"{before}duration"]
