@@ -20,6 +20,8 @@ EXTREMES = {  # what changes, and relative to what is turned over, how well it h
     "reduction of 1e9": ({"gear.gear_reduction": 1e9}, None, 1e-11),
     "stiff spring": ({}, st.loads.Spring(1e6), 1e-11),
     "light load": ({}, st.loads.Inertia(1e-30), 1e-11),
+    "grease on both sides": ({"motor.motor_viscous_friction": 1e-6},
+                             st.loads.Viscous(0.03) + st.loads.Coulomb(0.05) + st.loads.Inertia(2e-3), 1e-11),
 }
 
 
