@@ -18,7 +18,8 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
 from servotwin.simulation import lane_runs
-from servotwin.simulation.lanes import FIELDS, Tables, empty_raw, run_lanes
+from servotwin.simulation.lane_runs import run as run_lanes
+from servotwin.simulation.lanes import FIELDS, Tables, empty_raw
 
 NUMBERS = Numbers(
     motor=Motor(1.03, 1.0, 3.0, 0.0), shaft=Shaft(6e-3, 1e-3, 0.0, 0.0), source=Source(6.0, 0.0, math.inf),

@@ -15,7 +15,7 @@ from servotwin import loads, signals
 from servotwin.simulation import files, many
 from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.lane_loads import LOAD_NAMES, with_numbers
-from servotwin.simulation.lanes import run_lanes
+from servotwin.simulation.lane_runs import run as run_lanes
 from servotwin.simulation.packing import Commands
 from servotwin.simulation.sweep import read_columns
 

@@ -6,7 +6,7 @@ Everything broadcasts: over n times, and over lanes and times (B, T) where numbe
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from servotwin.physics.laws import array_form
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
-    from servotwin.models.base import Model
     from servotwin.models.engine.observe import Electrical, Torques
     from servotwin.models.samples import Samples
     from servotwin.models.terms.numbers import Numbers
@@ -33,15 +32,35 @@ _electrical, _armature_current, _torques, _on_bus, _off_now, _at_temperature = (
         observe.electrical, observe.armature_current, observe.torques, observe.on_bus, off_now, at_temperature))
 
 
+class Shown(Protocol):
+    """What a signal asks of a model."""
+
+    @property
+    def requires(self) -> tuple[str, ...]:
+        """Names of the parameters that it cannot do without."""
+
+    def value(self, name: str) -> float:
+        """Return a parameter, a number or a column of lanes."""
+
+    def plant(self, load: Load) -> Numbers:
+        """Return the numbers of servo and load."""
+
+    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return angles and errors of the potentiometer's table."""
+
+    def command_signal(self, name: str, drive: Array) -> Array:
+        """Return the command as a voltage, an angle or a pulse width."""
+
+
 class Output(NamedTuple):
     """Unit, meaning and computation of a signal."""
 
     unit: str
     meaning: str
-    compute: Callable[[Model, Samples, Pieces, Load], Array]
+    compute: Callable[[Shown, Samples, Pieces, Load], Array]
 
 
-def warm_plant(model: Model, samples: Samples, load: Load) -> Numbers:
+def warm_plant(model: Shown, samples: Samples, load: Load) -> Numbers:
     """Return the plant at the temperatures of the samples."""
     plant = model.plant(load)
     if not np.any(plant.heat.C_w > 0.0):
@@ -68,7 +87,7 @@ def _circuit(plant: Numbers, samples: Samples, drive: Pieces) -> tuple[Numbers, 
     return plant, samples.drive * plant.source.V, 0.0, w, i
 
 
-def torques_of(model: Model, samples: Samples, drive: Pieces, load: Load) -> Torques:
+def torques_of(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Torques:
     """Return all torques that act at the output shaft; each array broadcasts to shape (n,)."""
     plant, w = warm_plant(model, samples, load), samples.speed
     i = _armature_current(*_circuit(plant, samples, drive))
@@ -80,34 +99,34 @@ def torques_of(model: Model, samples: Samples, drive: Pieces, load: Load) -> Tor
     return cast("Torques", _torques(plant, mode, w, samples.motor_speed, i, external))
 
 
-def _load_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+def _load_torque(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
     return cast("Array", torques_of(model, samples, drive, load).load)
 
 
-def _reduction(model: Model) -> float:
+def _reduction(model: Shown) -> float:
     return model.value("gear.gear_reduction") if "gear.gear_reduction" in model.requires else 1.0
 
 
-def _electrical_signal(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
-    def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+def _electrical_signal(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
+    def compute(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
         plant, u, q, w, i = _circuit(warm_plant(model, samples, load), samples, drive)
         values = getattr(_electrical(plant, u, q, w, i), name)
         return np.broadcast_to(values, np.broadcast_shapes(np.shape(values), np.shape(w)))
     return compute
 
 
-def _current(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+def _current(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
     current: Array = _armature_current(*_circuit(warm_plant(model, samples, load), samples, drive))
     return current
 
 
-def _motor_torque(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+def _motor_torque(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
     plant = warm_plant(model, samples, load)
     k_a = plant.motor.K / _reduction(model)
     return np.asarray(physics.electromagnetic_torque(_armature_current(*_circuit(plant, samples, drive)), k_a))
 
 
-def _feedback(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+def _feedback(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
     sensor, (angles, errors) = model.plant(load).sensor, model.curve()
     if not angles and not np.any(sensor.step) and not np.any(sensor.half_slack):
         return np.asarray(physics.feedback_voltage(samples.angle, sensor.p, sensor.b_o))
@@ -116,17 +135,17 @@ def _feedback(model: Model, samples: Samples, drive: Pieces, load: Load) -> Arra
         samples.wiper, sensor.p, sensor.b_o, angles or (0.0,), errors or (0.0,), count))
 
 
-def _of_motor(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
+def _of_motor(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
     """Angle or speed of the motor: that of the output but inside the play of a gear."""
-    def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+    def compute(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
         play = np.any(model.plant(load).play.half)
         values: Array = getattr(samples, f"motor_{name}" if play else name)
         return np.asarray(physics.motor_from_output(values, _reduction(model)))
     return compute
 
 
-def _commanded(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
-    def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+def _commanded(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
+    def compute(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
         return model.command_signal(name, drive(samples.time))
     return compute
 
@@ -136,8 +155,8 @@ FIELDS = {"output_angle": "angle", "output_speed": "speed", "error_time": "error
           "winding_temperature": "winding", "housing_temperature": "housing"}
 
 
-def _sampled(name: str) -> Callable[[Model, Samples, Pieces, Load], Array]:
-    def compute(model: Model, samples: Samples, drive: Pieces, load: Load) -> Array:
+def _sampled(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
+    def compute(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
         values: Array = getattr(samples, FIELDS[name])
         return values
     return compute

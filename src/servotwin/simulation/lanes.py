@@ -177,10 +177,3 @@ def empty_raw(work: Work) -> Raw:
     return Raw({name: np.zeros(shape, kind) for name, kind in kinds.items()}, np.zeros(work.lanes, np.int8),
                np.full(work.lanes, work.duration), np.ascontiguousarray(work.start[[0, 1, 3, 4]].T),
                np.full(work.lanes, np.nan), np.zeros(work.lanes, np.int8))
-
-
-def run_lanes(work: Work) -> Raw:
-    """Run the lanes one after the other, without threads of its own and without the interpreter's lock."""
-    from servotwin.simulation.lane_runs import run
-
-    return run(work)
