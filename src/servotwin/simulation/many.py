@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.simulation.batch import Batch, Failure
 from servotwin.simulation.lane_inputs import Lanes, lanes_of
-from servotwin.simulation.lane_runs import run
+from servotwin.simulation.lane_runs import run as run_lanes
 from servotwin.simulation.lanes import Raw, Work
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.packing import Asked, Chunk, Commands, groups
@@ -313,7 +313,7 @@ def _run(packs: list[_Pack], asked: Asked,
     try:
         while True:
             while len(flying) < 2 * workers_of(executor) and (following := next(waiting, None)) is not None:
-                flying.append((following[0], executor.submit(run, following[1])))
+                flying.append((following[0], executor.submit(run_lanes, following[1])))
             if not flying:
                 return
             piece, future = flying.popleft()
