@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import numpy as np
 import pytest
@@ -166,7 +167,8 @@ def test_an_interrupt_says_how_to_go_on(child_environment, tmp_path):
     # Both at 130 samples a lane, so that the chunks are alike; the first makes sure that everything is compiled.
     words = [sys.executable, "-m", "servotwin", "sweep", SERVO, *STEP, *VARY]
     subprocess.run([*words, "--lanes", "10"], env=child_environment, cwd=tmp_path, check=True, capture_output=True)
-    with subprocess.Popen([*words, "--lanes", "2000000", "--out", "study"], stdout=subprocess.PIPE,
+    heeded = partial(signal.signal, signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore them
+    with subprocess.Popen([*words, "--lanes", "2000000", "--out", "study"], stdout=subprocess.PIPE, preexec_fn=heeded,
                           stderr=subprocess.PIPE, text=True, env=child_environment, cwd=tmp_path) as child:
         for _ in range(600):
             if (tmp_path / "study" / "lanes-00001.csv").exists():
