@@ -160,6 +160,11 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     return [kind for kind in found if len(kind.which)]
 
 
+def goes_together(numbers: Numbers, pulsed: bool) -> bool:
+    """Tell whether all lanes take about as long, for none has a term that would let it run on its own."""
+    return pulsed and not any(np.any(_differs(numbers, name)) for name in (*_RARE, _PENDULUM))
+
+
 def _either(a: Any, b: Any) -> Any:
     """Return a | b, at once where one of them holds for none."""
     return b if a is False else a if b is False else a | b

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.simulation.batch import Batch, Failure
 from servotwin.simulation.lane_inputs import Lanes, lanes_of
+from servotwin.simulation.lane_runs import goes_together
 from servotwin.simulation.lane_runs import run as run_lanes
 from servotwin.simulation.lanes import Raw, Work
 from servotwin.simulation.oddities import warn_of
@@ -291,15 +292,16 @@ def _packs(lanes: Lanes, commands: Commands, asked: Asked, chunk: int | None, wo
         whole.check(asked.duration)
         fields = whole.fields(asked)
         frames = float(np.max(whole.frames(asked.duration)))
-        size = chunk or _chunk_size(len(group), len(asked.times) * len(fields), frames, workers)
+        parts = workers if goes_together(whole.numbers, whole.chip is not None) else 2 * workers
+        size = chunk or _chunk_size(len(group), len(asked.times) * len(fields), frames, parts)
         most = max(size, _MOST_LANES)
         found += [_Pack(whole.part(k, k + most), fields, size) for k in range(0, len(group), most)]
     return found
 
 
-def _chunk_size(lanes: int, numbers_per_lane: int, frames_per_lane: float, workers: int) -> int:
-    """Return how many lanes go to a worker at once: some chunks for each, none too large for memory or too long."""
-    for_all = math.ceil(lanes / (2 * workers))
+def _chunk_size(lanes: int, numbers_per_lane: int, frames_per_lane: float, parts: int) -> int:
+    """Return how many lanes go to a worker at once: in so many parts, none too large for memory or too long."""
+    for_all = math.ceil(lanes / parts)
     in_memory = max(1, int(_CHUNK_BYTES / (8 * numbers_per_lane)))
     in_time = max(1, int(_CHUNK_FRAMES / max(frames_per_lane, 1.0)))
     return min(max(for_all, _LEAST_LANES), in_memory, in_time, _MOST_LANES)
