@@ -44,7 +44,7 @@ def _kernels(recipe: Recipe) -> ModuleType:
     key = key_of(*_sources(), surroundings(recipe), version("numba"), version("llvmlite"))
     path, known = stored(f"servotwin_{recipe.name}_{key}", lambda: derive(recipe))
     if not known:
-        sys.stderr.write("servotwin: compiling the kernels for this machine, once (15 to 30 s)\n")
+        sys.stderr.write("servotwin: compiling the kernels for this machine, once (15 to 35 s)\n")
         sys.stderr.flush()
     import_module("numba")
     return loaded(path)
