@@ -299,6 +299,23 @@ def test_a_bus_voltage_limits_a_servo_of_mean_voltage(servo):
 
 
 @pytest.mark.parametrize("name", CASES)
+def test_a_memory_under_other_numbers_goes_on_from_where_it_stood(servo, name):
+    """A motion that had begun with another inertia is not taken up again: the shaft would jump."""
+    changes, load = CASES[name]
+    sims = st.VectorSimulator(model_of(servo, changes), 2, load=load)
+    sims.reset(pulse_width=1200e-6)
+    sims.advance(0.0537, pulse_width=1900e-6)
+    memory, angle, speed = sims.save(), sims["output_angle"], sims["output_speed"]
+    other = st.VectorSimulator(model_of(servo, changes), 2, load=load)
+    for one in (sims, other):
+        one.set(load_inertia=0.5, lanes=[1])
+        one.restore(memory)
+        one.advance(1e-6)
+        assert np.abs(one["output_angle"] - angle).max() < 1e-4
+        assert np.abs(one["output_speed"] - speed)[1] < 0.02
+
+
+@pytest.mark.parametrize("name", CASES)
 def test_what_is_imposed_in_place_is_what_a_new_start_would_take(servo, name):
     """Inertias and voltages of some lanes at every tick, as another simulator would; a parameter builds all anew."""
     changes, load = CASES[name]

@@ -262,10 +262,13 @@ class VectorSimulator:
         """Return all that the lanes remember, as it is now; picklable."""
         store = self._store
         return VectorMemory(type(self._numbers.model).__name__, store.records(), self._command.copy(),
-                            self._torque.copy(), store.status.copy(), store.ended.copy(), store.work.copy())
+                            self._torque.copy(), store.status.copy(), store.ended.copy(), store.work.copy(),
+                            self._numbers.columns.numbers.copy())
 
     def restore(self, memory: VectorMemory) -> None:
         """Go back to what was saved, here or in another simulator of this model with as many lanes.
+
+        Parameters, inertias and bus voltages that were set belong to the simulator: they stay as they are.
 
         Raises
         ------

@@ -27,6 +27,9 @@ class VectorMemory:
         Code of its `Status`, and when it failed [s].
     work : ndarray, shape (lanes,)
         Of the speeds that were set [J].
+    numbers : ndarray
+        Tiles of `models.terms.numbers.Numbers`: what the lanes were. They are not restored; a lane that has others by
+        then goes on from where it stood.
     """
 
     model: str
@@ -36,3 +39,4 @@ class VectorMemory:
     status: NDArray[np.int8]
     ended: Array
     work: Array
+    numbers: NDArray[Any]

@@ -113,7 +113,6 @@ class LaneNumbers:
         put_columns(self.columns.numbers["shaft"], which,
                     given._replace(J=given.J + (J_out - given.J_out), J_out=J_out))
 
-
     def feed(self, which: Indices, V: Array) -> bool:
         """Put voltages [V] in the place of what some lanes' supplies would leave.
 

@@ -99,19 +99,27 @@ class Store:
         memory = self.records()
         self._build(numbers)
         self.hang(torque)
-        play = numbers.now("play").half > 0.0
-        point = memory["point"]
-        point["anchor_time"][which] = math.inf
-        mesh = point["mode"]["mesh"]
-        point["mode"]["mesh"] = np.where(play, np.where(mesh == RIGID, INSIDE, mesh), RIGID)
-        point["y"][~play, 5:7] = point["y"][~play, 0:2]
-        self._put(np.arange(numbers.count), memory)
+        self._go_on_from(memory, which)
 
     def restore(self, memory: VectorMemory, torque: Array) -> None:
         """Go back to what was saved."""
         self.status, self.ended, self.work = memory.status.copy(), memory.ended.copy(), memory.work.copy()
         self.hang(torque)
-        self._put(np.arange(len(self.status)), memory.records)
+        count = len(self.status)
+        before, now = (x.view(np.float64).reshape(len(x), -1, TILE)
+                       for x in (memory.numbers, self._numbers.columns.numbers))
+        others = np.flatnonzero((before != now).any(axis=1).ravel()[:count])
+        self._go_on_from(memory.records.copy(), others)
+
+    def _go_on_from(self, memory: NDArray[Any], others: Indices) -> None:
+        """Take the memories of all lanes, of which some have other numbers than when they were made."""
+        play = self._numbers.now("play").half > 0.0
+        point = memory["point"]
+        point["anchor_time"][others] = math.inf
+        mesh = point["mode"]["mesh"]
+        point["mode"]["mesh"] = np.where(play, np.where(mesh == RIGID, INSIDE, mesh), RIGID)
+        point["y"][~play, 5:7] = point["y"][~play, 0:2]
+        self._put(np.arange(len(self.status)), memory)
 
     def start(self, which: Indices, records: NDArray[Any]) -> None:
         """Put lanes where they start; their noise goes on."""
