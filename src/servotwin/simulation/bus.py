@@ -21,9 +21,8 @@ from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.physics.pieces import Piece
 from servotwin.signals import Signal
-from servotwin.simulation import files, frames
-from servotwin.simulation.bus_engine import Bus, Unit
-from servotwin.simulation.bus_group import Group
+from servotwin.simulation import bus_run, files, frames
+from servotwin.simulation.bus_rows import events_of, segments_of
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
 from servotwin.simulation.oddities import warn_of
@@ -238,34 +237,28 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
     times = times_asked(duration, output_step, output_times)
     given = _checked(servos, supply, initial)
-    sims, units = {}, []
+    sims, plans, states = {}, [], []
     for k, (name, (model, command, load)) in enumerate(given.items()):
         sim = Simulator(_on_supply(model, supply), load, int(seed) + k)
         sim.load.check_span(0.0, duration)
-        state = sim.initial(command, (initial or {}).get(name))
-        plan = sim.plan(command)
+        states.append(sim.initial(command, (initial or {}).get(name)))
+        plans.append(sim.plan(command))
         sims[name] = sim
-        units.append(Unit(plan, plan.chip, state.memory.point))
     for name, (_, command, _) in given.items():
         warn_of(sims[name].model.servo, [command], duration)
     source = _source(supply)
-    status, ended, cause = Status.COMPLETED, duration, Status.COMPLETED.message
-    try:
-        Bus(units, Group(source)).run(float(duration))
-    except SimulationError as error:
-        status, ended = Status[error.status], error.time
-        cause = status.message
-    except ArithmeticError:  # numbers beyond what a float holds
-        status, ended = Status.DIVERGED, max(unit.point.time for unit in units)
-        cause = status.message
-    alone = {name: Trajectory(tuple(unit.record.segments)) for name, unit in zip(given, units, strict=True)}
-    bus = _BusVoltage(source, [unit.plan for unit in units], list(alone.values()))
+    rows = bus_run.run(plans, states, source, duration)
+    status = Status.of_code(rows.status)
+    ended = duration if status.ok else rows.ended
+    motions, events = segments_of(plans, rows), events_of(plans, rows)
+    alone = [Trajectory(own) for own in motions]
+    bus = _BusVoltage(source, plans, alone)
     results = {
         name: Result(model=sims[name].model, command=command, load=sims[name].load, drive=sims[name].drive(command),
-                     time=times, trajectory=Trajectory(alone[name].segments, bus), events=tuple(unit.record.events),
-                     status=status, ended=ended, cause=cause)
-        for unit, (name, (_, command, _)) in zip(units, given.items(), strict=True)}
-    return Fleet(times, results, status, ended, cause, bus)
+                     time=times, trajectory=Trajectory(own, bus), events=happened, status=status, ended=ended,
+                     cause=status.message)
+        for (name, (_, command, _)), own, happened in zip(given.items(), motions, events, strict=True)}
+    return Fleet(times, results, status, ended, status.message, bus)
 
 
 def _checked(servos: Mapping[str, Sequence[Any]], supply: Supply,
@@ -333,4 +326,4 @@ class _BusVoltage:
             stiff = shared_source.on_stiff_source(numbers, drive == 0.0)
             members.append(shared_source.member_of(stiff, mode, drive, Piece(), y))
             states.append(y)
-        return shared_source.zoned(self.source, members, states, self.source.V)[2]
+        return shared_source.put_in_zones(self.source, members, states, self.source.V)[1]

@@ -25,7 +25,7 @@ _SHORTEST = 1e-307  # s: what is over in less has no time of its own
 class Trajectory:
     """Segments without gaps, in order; after the last one the state is not known (nan)."""
 
-    segments: tuple[Segment, ...]
+    segments: Sequence[Segment]
     bus: Callable[[Array], Array] | None = None  # voltage of a shared bus [V] at times [s]
 
     @cached_property

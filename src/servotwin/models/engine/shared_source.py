@@ -7,12 +7,12 @@ a coasting bridge against the sign of its current. Its numbers are then those of
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 from servotwin.models.engine import currents
 from servotwin.models.engine.modes import NO_CURRENT, Mode, Vector, sign_of
 from servotwin.models.terms import source as source_term
+from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.source import Source
@@ -37,13 +37,15 @@ class Member(NamedTuple):
 
 def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
     """Return a servo whose bus voltage is given: driven, or returning current through its diodes."""
-    bridge, R_b, regulated = numbers.bridge, numbers.source.R_b, source_term.regulated(numbers.source)
-    R_drive = bridge.off.R - R_b if returning and not regulated else bridge.R_drive - R_b
-    if returning and regulated:
-        R_drive = bridge.off.R
-    D = max(bridge.D_drive, 1e-300) if returning else bridge.D_drive  # a diode without drop still has a direction
-    return numbers._replace(bridge=bridge._replace(R_drive=R_drive, D_drive=D),
-                            source=numbers.source._replace(R_b=0.0, I_max=math.inf))
+    path, source = numbers.bridge, numbers.source
+    R = path.R_drive - source.R_b
+    if returning:
+        R = path.off.R if source_term.regulated(source) else path.off.R - source.R_b
+    D = max(path.D_drive, 1e-300) if returning else path.D_drive  # a diode without drop still has a direction
+    return Numbers(
+        numbers.motor, Bridge(D, R, path.off, path.silence, path.V_br), Source(source.V, 0.0, math.inf),
+        numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor,
+        numbers.heat)
 
 
 def member_of(stiff: Numbers, mode: Mode, drive: float, tau: Piece, y: Vector) -> Member:
@@ -54,21 +56,22 @@ def member_of(stiff: Numbers, mode: Mode, drive: float, tau: Piece, y: Vector) -
     return Member(stiff, mode, sign, tau, drive == 0.0)
 
 
-def _demand(members: Sequence[Member], states: Sequence[Vector]) -> tuple[float, float, float]:
+def _demand(members: list[Member], states: list[Vector]) -> tuple[float, float, float]:
     """Return g, h and I_B of the current Σ s i = g V − h + I_B that the members take at the bus voltage V."""
     g = h = given = 0.0
-    for (numbers, mode, sign, _, _), y in zip(members, states, strict=True):
-        now = warm(numbers, y)
-        if inductive(numbers.motor):
-            given += sign * y[2]
-        elif mode.zone != NO_CURRENT:
+    for j in range(len(members)):
+        member, y = members[j], states[j]
+        if inductive(member.numbers.motor):
+            given += member.sign * y[2]
+        elif member.mode.zone != NO_CURRENT:
+            now = warm(member.numbers, y)
             g += motor.steady_armature_current(1.0, 0.0, now.bridge.R_drive, now.motor.K_b)
-            v = bridge.driving_voltage(0.0, sign_of(mode.zone), now.bridge.D_drive)
-            h -= sign * motor.steady_armature_current(v, y[6], now.bridge.R_drive, now.motor.K_b)
+            v = bridge.driving_voltage(0.0, sign_of(member.mode.zone), now.bridge.D_drive)
+            h -= member.sign * motor.steady_armature_current(v, y[6], now.bridge.R_drive, now.motor.K_b)
     return g, h, given
 
 
-def bus_voltage(source: Source, state: int, members: Sequence[Member], states: Sequence[Vector]) -> float:
+def bus_voltage(source: Source, state: int, members: list[Member], states: list[Vector]) -> float:
     """Return V_bus [V] for a state of the source."""
     if state == BROKEN_DOWN:
         return 0.0
@@ -81,23 +84,24 @@ def bus_voltage(source: Source, state: int, members: Sequence[Member], states: S
     if g > 0.0:
         return (source.I_max + h - given) / g
     above = below = 0.0  # the currents have inertia: their sum has to stay
-    for (numbers, mode, sign, _, _), y in zip(members, states, strict=True):
-        if mode.zone != NO_CURRENT:
-            now = warm(numbers, y)
-            v = bridge.driving_voltage(0.0, sign_of(mode.zone), now.bridge.D_drive)
+    for j in range(len(members)):
+        member, y = members[j], states[j]
+        if member.mode.zone != NO_CURRENT:
+            now = warm(member.numbers, y)
+            v = bridge.driving_voltage(0.0, sign_of(member.mode.zone), now.bridge.D_drive)
             R, L, K_b = now.bridge.R_drive, now.motor.L, now.motor.K_b
-            above -= sign * motor.armature_current_rate(v, y[2], y[6], R, L, K_b)
+            above -= member.sign * motor.armature_current_rate(v, y[2], y[6], R, L, K_b)
             below += motor.armature_current_rate(1.0, 0.0, 0.0, R, L, K_b)
     return above / below
 
 
-def drawn(source: Source, V_bus: float, members: Sequence[Member], states: Sequence[Vector]) -> float:
+def drawn(source: Source, V_bus: float, members: list[Member], states: list[Vector]) -> float:
     """Return the current Σ s i [A] that the source gives."""
     g, h, given = _demand(members, states)
     return g * V_bus - h + given
 
 
-def source_state(source: Source, members: Sequence[Member], states: Sequence[Vector]) -> int:
+def source_state(source: Source, members: list[Member], states: list[Vector]) -> int:
     """Return what the source does for members in these zones and states."""
     if source.I_max == math.inf:
         return FOLLOWING
@@ -130,20 +134,20 @@ def source_guards(source: Source, state: int, V_bus: float, total: float) -> tup
     return total - source.I_max, 1.0
 
 
-def zoned(source: Source, members: Sequence[Member], states: Sequence[Vector],
-          V_bus: float) -> tuple[list[Member], int, float]:
-    """Return the members in the zones of their currents, what the source does, and V_bus; from a guess of V_bus.
+def put_in_zones(source: Source, members: list[Member], states: list[Vector], V_bus: float) -> tuple[int, float]:
+    """Put the members into the zones of their currents; return what the source does, and V_bus; from a guess of V_bus.
 
     The bus sags the more of them conduct, and the fewer conduct the more it sags: a few rounds settle it.
     """
-    now, state = list(members), FOLLOWING
-    for _ in range(20 + 4 * len(now)):
-        now = [_in_zone(m, _zone(m, y, V_bus)) for m, y in zip(now, states, strict=True)]
-        state = source_state(source, now, states)
-        before, V_bus = V_bus, bus_voltage(source, state, now, states)
+    state = FOLLOWING
+    for _ in range(20 + 4 * len(members)):
+        for j in range(len(members)):
+            members[j] = in_zone(members[j], _zone(members[j], states[j], V_bus))
+        state = source_state(source, members, states)
+        before, V_bus = V_bus, bus_voltage(source, state, members, states)
         if abs(V_bus - before) <= 1e-14 * source.V:
             break
-    return now, state, V_bus
+    return state, V_bus
 
 
 def _zone(member: Member, y: Vector, V_bus: float) -> int:
@@ -151,9 +155,10 @@ def _zone(member: Member, y: Vector, V_bus: float) -> int:
         warm(member.numbers, y), behind(member, V_bus), 0.0, y[0], y[6], y[2]))
 
 
-def _in_zone(member: Member, zone: int) -> Member:
-    numbers, (_, shaft, mesh, motor), sign, tau, returns = member
-    return Member(numbers, Mode(zone, shaft, mesh, motor), sign, tau, returns)
+def in_zone(member: Member, zone: int) -> Member:
+    """Return a member in a zone."""
+    numbers, mode, sign, tau, returns = member
+    return Member(numbers, Mode(zone, mode.contact, mode.mesh, mode.motor), sign, tau, returns)
 
 
 def let_through(member: Member, zone: int) -> int:
@@ -172,4 +177,4 @@ def after(state: int, guard: int) -> int:
 
 def behind(member: Member, V_bus: float) -> float:
     """Return the voltage in a member's circuit [V]; a bus without any is still connected."""
-    return member.sign * (V_bus or 5e-324)
+    return member.sign * (V_bus if V_bus != 0.0 else 5e-324)

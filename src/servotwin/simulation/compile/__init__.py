@@ -14,9 +14,9 @@ from servotwin import physics
 from servotwin.models import engine, terms
 from servotwin.simulation.compile import derive as derive_module
 from servotwin.simulation.compile.derive import Recipe, derive, surroundings
-from servotwin.simulation.compile.storage import key_of, loaded, stored
+from servotwin.simulation.compile.storage import is_stored, key_of, loaded, stored
 
-__all__ = ["Recipe", "kernels"]
+__all__ = ["Recipe", "is_compiled", "kernels"]
 
 _lock = threading.Lock()
 
@@ -39,10 +39,20 @@ def _sources() -> tuple[str, ...]:
     return tuple(file.read_text(encoding="utf-8") for file in files)
 
 
+def is_compiled(recipe: Recipe) -> bool:
+    """Tell whether this machine has compiled a recipe before, without loading the compiler."""
+    return is_stored(_name(recipe))
+
+
+@cache
+def _name(recipe: Recipe) -> str:
+    key = key_of(*_sources(), surroundings(recipe), version("numba"), version("llvmlite"))
+    return f"servotwin_{recipe.name}_{key}"
+
+
 @cache
 def _kernels(recipe: Recipe) -> ModuleType:
-    key = key_of(*_sources(), surroundings(recipe), version("numba"), version("llvmlite"))
-    path, known = stored(f"servotwin_{recipe.name}_{key}", lambda: derive(recipe))
+    path, known = stored(_name(recipe), lambda: derive(recipe))
     if not known:
         sys.stderr.write("servotwin: compiling the kernels for this machine, once (15 to 35 s)\n")
         sys.stderr.flush()

@@ -33,6 +33,11 @@ def key_of(*texts: str) -> str:
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
 
 
+def is_stored(name: str) -> bool:
+    """Tell whether a derived module is in the cache, compiled."""
+    return any((cache_folder() / "__pycache__").glob(f"{name}.*.nbi"))
+
+
 def stored(name: str, text: Callable[[], str]) -> tuple[Path, bool]:
     """Return the file of a derived module and whether it was there already; without a cache, a temporary one.
 

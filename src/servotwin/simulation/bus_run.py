@@ -1,0 +1,184 @@
+"""Run several servos on one supply and keep what they leave behind; compiled where that is worth while."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.models.engine import bus, tape
+from servotwin.models.engine.buses import Buses, Tables
+from servotwin.models.engine.joint_motion import ROOM
+from servotwin.models.engine.memory import Memory, origin_of
+from servotwin.models.engine.records import TILE, fields_of, numbers_in, record_of, room, rows_of
+from servotwin.models.engine.step import DIVERGED
+from servotwin.models.engine.tape import Tape
+from servotwin.models.engine.tiles import Lanes
+from servotwin.models.engine.together import Shared, at_start
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.models.terms.source import Source
+from servotwin.simulation.compile import Recipe, is_compiled, kernels
+from servotwin.simulation.engine import Plan, State
+from servotwin.simulation.lane_memory import RECORD
+from servotwin.simulation.lane_runs import PLAIN_RUNS
+
+Array = NDArray[np.float64]
+
+_ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("start", "go_on", "look"))
+ALL_BUSES = Recipe("buses", _ENTRIES)
+PLAIN_BUSES = Recipe("plain_buses", _ENTRIES, absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never)
+SHARED = record_of(Shared)
+
+LOADS_FROM, COMPILES_FROM = 4_000, 120_000  # frames of servos in one process: about what it takes, in plain Python
+_INTEGRATED = 8  # a servo that does not move by plain laws takes so many times as long
+_ROWS, _NUMBERS = 4096, 1 << 17  # of a tape
+_frames_run: dict[str, float] = {}  # in plain Python, of what each recipe would do
+
+
+class Rows(NamedTuple):
+    """What a run has left behind: rows of motions, of events, and numbers of common motions; status and end [s]."""
+
+    motions: Array
+    events: Array
+    numbers: Array
+    status: int
+    ended: float
+
+
+def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration: float) -> Rows:
+    """Run servos on one source from t = 0 to `duration` [s]."""
+    recipe = PLAIN_BUSES if all(is_plain(plan.numbers) for plan in plans) else ALL_BUSES
+    work = duration * sum(1.0 / plan.chip.frame_period for plan in plans)
+    way: _Compiled | _Plainly = (_Compiled if _worth_it(recipe, work) else _Plainly)(recipe, plans, states, source)
+    written = tape_of(len(plans))
+    found: list[list[Array]] = []
+    count, status, when = 0, bus.PAUSED, 0.0
+    while status == bus.PAUSED:
+        written.used[:] = 0
+        try:
+            status, when = way.go_on(duration, written)
+        except ArithmeticError:  # numbers beyond what a float holds
+            status, when = DIVERGED, float(written.motions[:written.used[0], tape.UNTIL].max(initial=when))
+        part = [rows[:used].copy() for rows, used in zip(written[:3], written.used.tolist(), strict=True)]
+        part[0][:, tape.FIRST] += count
+        count += len(part[2])
+        found.append(part)
+    motions, events, numbers = (np.concatenate(column) for column in zip(*found, strict=True))
+    return Rows(motions, events, numbers, int(status), float(when))
+
+
+def tape_of(servos: int) -> Tape:
+    """Return a tape with room for what so many servos do."""
+    rows = max(_ROWS, 64 * servos)
+    return Tape(np.empty((rows, tape.ROW)), np.empty((rows, tape.EVENT)),
+                np.empty(max(_NUMBERS, 64 * servos * ROOM)), np.zeros(3, np.int64))
+
+
+def is_plain(numbers: Numbers) -> bool:
+    """Tell whether a servo has none of the terms that the plain form leaves out."""
+    return not any(_has(numbers, name) for name in PLAIN_BUSES.absent)
+
+
+def _has(numbers: Numbers, name: str) -> bool:
+    term, _, field = name.partition(".")
+    if term not in Numbers._fields:  # of an input
+        return False
+    neutral, own = getattr(NEUTRAL, term), getattr(numbers, term)
+    field = field or neutral._fields[0]
+    return bool(getattr(own, field) != getattr(neutral, field))
+
+
+def _worth_it(recipe: Recipe, frames: float) -> bool:
+    """Tell whether so many frames of servos, with those before, are worth compiled kernels."""
+    done = _frames_run.get(recipe.name, 0.0) + frames * (1 if recipe is PLAIN_BUSES else _INTEGRATED)
+    if done >= COMPILES_FROM or (done >= LOADS_FROM and is_compiled(recipe)):
+        done = math.inf
+    _frames_run[recipe.name] = done
+    return done == math.inf
+
+
+class _Plainly:
+    """Servos on one source that run in plain Python."""
+
+    def __init__(self, recipe: Recipe, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
+        self._source, self._shared = source, SimpleNamespace(**at_start(source)._asdict())
+        self._of = [plan.numbers for plan in plans], [plan.chip for plan in plans], [plan.inputs for plan in plans]
+        self._memories, self._joined = [state.memory for state in states], [-1 for _ in plans]
+
+    def go_on(self, until: float, written: Tape) -> tuple[int, float]:
+        """Go on to a time [s]; return a status and when."""
+        ends = [until - origin_of(memory) for memory in self._memories]
+        return bus.through(self._source, *self._of, self._memories, ends, self._joined, self._shared, written)
+
+
+class _Compiled:
+    """Servos on one source that run in compiled code."""
+
+    def __init__(self, recipe: Recipe, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
+        self._lanes, self._tables = _lanes_of(plans), _tables_of(plans)
+        which = np.arange(len(plans))
+        one = (np.array([x]) for x in source)
+        self._bus = Buses(which, np.array([0, len(plans)]), *one, _records_of([state.memory for state in states]),
+                          np.zeros(len(plans), np.int64), np.zeros(1, SHARED), np.zeros(len(plans), np.int64),
+                          np.zeros(len(plans)))
+        self._kernels: Any = kernels(recipe)
+        self._kernels.start(self._bus, np.zeros(1, np.int64))
+
+    def go_on(self, until: float, written: Tape) -> tuple[int, float]:
+        """Go on to a time [s]; return a status and when."""
+        status = self._kernels.go_on(self._lanes, self._tables, self._bus, 0, 1, 0.0, float(until), written)
+        return status, float(self._bus.ended[0])
+
+
+def _lanes_of(plans: Sequence[Plan]) -> Lanes:
+    """Return servos as the kernels read them."""
+    pieces, edges = [plan.command.rows for plan in plans], [np.array(plan.edges or (), np.float64) for plan in plans]
+    regular = np.array([plan.edges is None for plan in plans])
+    first, count = _places(pieces)
+    edge_first, edge_count = _places(edges)
+    return Lanes(_tiles_of(Numbers, [plan.numbers for plan in plans]), _tiles_of(Chip, [plan.chip for plan in plans]),
+                 np.zeros((7, len(plans))), np.array([plan.external_torque for plan in plans]),
+                 np.array([plan.seed for plan in plans]), np.concatenate(pieces), first, count, np.concatenate(edges),
+                 edge_first, np.where(regular, -1, edge_count))
+
+
+def _tables_of(plans: Sequence[Plan]) -> Tables:
+    torques, curves = [plan.torque.rows for plan in plans], [np.array(plan.curve, np.float64).T for plan in plans]
+    return Tables(np.concatenate(torques), *_places(torques),
+                  np.ascontiguousarray(np.concatenate([curve.reshape(-1, 2) for curve in curves]).T), *_places(curves))
+
+
+def _places(tables: Sequence[Array]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where each of some tables begins when they stand one after the other, and how long it is."""
+    count = np.array([len(table) for table in tables])
+    return np.cumsum(count) - count, count
+
+
+def _tiles_of(kind: type[Any], values: Sequence[Any]) -> NDArray[Any]:
+    """Return tiles that hold named tuples of numbers."""
+    tiles = room(-(-len(values) // TILE), rows_of(kind, np.float64))
+    columns = np.zeros((len(tiles) * TILE, tiles.dtype.itemsize // 8 // TILE))
+    columns[:len(values)] = [tuple(numbers_in(one)) for one in values]
+    tiles.view(np.float64).reshape(len(tiles), -1, TILE)[:] = columns.reshape(len(tiles), TILE, -1).transpose(0, 2, 1)
+    return tiles
+
+
+def _records_of(memories: Sequence[Memory]) -> NDArray[Any]:
+    """Return memories as records."""
+    records = np.zeros(len(memories), RECORD)
+    for record, memory in zip(records, memories, strict=True):
+        _put(record, memory)
+    return records
+
+
+def _put(record: Any, values: Any) -> None:
+    for (name, _), value in zip(fields_of(type(values)), values, strict=True):
+        if hasattr(value, "_fields"):
+            _put(record[name], value)
+        else:
+            record[name] = value
