@@ -13,13 +13,15 @@ import numpy as np
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model, PulseServo, PulseServoInductive
 from servotwin.models.engine import shared_source
-from servotwin.models.engine.modes import Mode
+from servotwin.models.engine.modes import Vector
+from servotwin.models.engine.records import object_of
+from servotwin.models.engine.seats import Mate
+from servotwin.models.engine.step import at_pulses
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
-from servotwin.models.terms.bridge import coasts, off_now
+from servotwin.models.terms.bridge import coasts
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
-from servotwin.physics.pieces import Piece
 from servotwin.signals import Signal
 from servotwin.simulation import bus_run, files, frames
 from servotwin.simulation.bus_rows import events_of, segments_of
@@ -311,19 +313,24 @@ class _BusVoltage:
         return np.array([self._at(samples, k) for k in range(len(time))])
 
     def _at(self, samples: Sequence[Samples], k: int) -> float:
-        members, states = [], []
-        for plan, s in zip(self.plans, samples, strict=True):
+        connected = 0
+        for j, (plan, s) in enumerate(zip(self.plans, samples, strict=True)):
             y = (s.angle[k], s.speed[k], s.current[k], s.winding[k], s.housing[k], s.motor_angle[k], s.motor_speed[k])
             if not np.isfinite(y[0]):  # after the run has ended
                 return math.nan
-            drive = float(s.drive[k])
-            numbers = plan.numbers
-            if s.silent[k] > 0.0:
-                numbers = numbers._replace(bridge=off_now(numbers.bridge, 1))
-            if drive == 0.0 and not (coasts(numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
-                continue
-            mode = Mode(int(s.zone[k]), int(s.contact[k]), int(s.mesh[k]), int(s.motor[k]))
-            stiff = shared_source.on_stiff_source(numbers, drive == 0.0)
-            members.append(shared_source.member_of(stiff, mode, drive, Piece(), y))
-            states.append(y)
-        return shared_source.put_in_zones(self.source, members, states, self.source.V)[1]
+            connected += self._connect(j, plan, y, float(s.drive[k]), int(s.silent[k]), connected)
+        return shared_source.put_in_zones(self.source, self._mates, connected, self.source.V)[1]
+
+    def _connect(self, j: int, plan: Plan, y: Vector, drive: float, silent: int, place: int) -> int:
+        """Let a servo take its place among those whose motors are connected to the bus; return 1 if it is."""
+        numbers = at_pulses(plan.numbers, silent)
+        if drive == 0.0 and not (coasts(numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
+            return 0
+        mate = self._mates[place]
+        mate.numbers = shared_source.on_stiff_source(numbers, drive == 0.0)
+        mate.sign, mate.returns, mate.y = shared_source.sign_on_bus(drive, y), int(drive == 0.0), y
+        return 1
+
+    @cached_property
+    def _mates(self) -> list[Any]:
+        return [object_of(Mate) for _ in self.plans]

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import bus, tape
+from servotwin.models.engine import bus, crew, tape
 from servotwin.models.engine.buses import Buses, Tables
-from servotwin.models.engine.joint_motion import ROOM
 from servotwin.models.engine.memory import Memory, origin_of
-from servotwin.models.engine.records import TILE, fields_of, numbers_in, record_of, room, rows_of
+from servotwin.models.engine.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
+from servotwin.models.engine.seats import ROOM, Mate, Seat, Shared, put_shared
 from servotwin.models.engine.step import DIVERGED
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import Lanes
-from servotwin.models.engine.together import Shared, at_start
+from servotwin.models.engine.together import at_start
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.models.terms.source import Source
@@ -29,10 +28,10 @@ from servotwin.simulation.lane_runs import PLAIN_RUNS
 
 Array = NDArray[np.float64]
 
-_ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("start", "go_on", "look"))
+_ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("go_on", "look"))
 ALL_BUSES = Recipe("buses", _ENTRIES)
 PLAIN_BUSES = Recipe("plain_buses", _ENTRIES, absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never)
-SHARED = record_of(Shared)
+SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 
 LOADS_FROM, COMPILES_FROM = 4_000, 120_000  # frames of servos in one process: about what it takes, in plain Python
 _INTEGRATED = 8  # a servo that does not move by plain laws takes so many times as long
@@ -106,33 +105,50 @@ class _Plainly:
     """Servos on one source that run in plain Python."""
 
     def __init__(self, recipe: Recipe, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
-        self._source, self._shared = source, SimpleNamespace(**at_start(source)._asdict())
-        self._of = [plan.numbers for plan in plans], [plan.chip for plan in plans], [plan.inputs for plan in plans]
-        self._memories, self._joined = [state.memory for state in states], [-1 for _ in plans]
+        self._inputs, self._memories = [plan.inputs for plan in plans], [state.memory for state in states]
+        self._joined, self._shared = [-1 for _ in plans], object_of(Shared)
+        put_shared(self._shared, at_start(source))
+        self._seats, self._mates = ([object_of(kind) for _ in range(n * len(plans))] for kind, n in (
+            (Seat, 1), (Mate, 2)))
+        for seat, plan in zip(self._seats, plans, strict=True):
+            crew.sit(seat, plan.numbers, plan.chip, plan.inputs.period)
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
         """Go on to a time [s]; return a status and when."""
         ends = [until - origin_of(memory) for memory in self._memories]
-        return bus.through(self._source, *self._of, self._memories, ends, self._joined, self._shared, written)
+        return bus.through(self._inputs, self._memories, ends, self._joined, self._shared, self._seats, self._mates,
+                           written)
 
 
 class _Compiled:
     """Servos on one source that run in compiled code."""
 
     def __init__(self, recipe: Recipe, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
+        count = len(plans)
         self._lanes, self._tables = _lanes_of(plans), _tables_of(plans)
-        which = np.arange(len(plans))
-        one = (np.array([x]) for x in source)
-        self._bus = Buses(which, np.array([0, len(plans)]), *one, _records_of([state.memory for state in states]),
-                          np.zeros(len(plans), np.int64), np.zeros(1, SHARED), np.zeros(len(plans), np.int64),
-                          np.zeros(len(plans)))
+        self._bus = Buses(np.arange(count), np.array([0, count]), _records_of([state.memory for state in states]),
+                          np.full(count, -1), shared_of([source]), np.zeros(count, np.int64), np.zeros(count))
+        self._room = room_of(count)
         self._kernels: Any = kernels(recipe)
-        self._kernels.start(self._bus, np.zeros(1, np.int64))
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
         """Go on to a time [s]; return a status and when."""
-        status = self._kernels.go_on(self._lanes, self._tables, self._bus, 0, 1, 0.0, float(until), written)
+        status = self._kernels.go_on(
+            self._lanes, self._tables, self._bus, 0, 1, 0.0, float(until), *self._room, written)
         return status, float(self._bus.ended[0])
+
+
+def room_of(servos: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return seats for so many servos on one bus, and room for their common motions."""
+    return np.zeros(servos, SEAT), np.zeros(2 * servos, MATE)
+
+
+def shared_of(sources: Sequence[Source]) -> NDArray[Any]:
+    """Return what servos on each of some sources remember together at their start."""
+    records = np.zeros(len(sources), SHARED)
+    for record, source in zip(records, sources, strict=True):
+        _put(record, at_start(source))
+    return records
 
 
 def _lanes_of(plans: Sequence[Plan]) -> Lanes:

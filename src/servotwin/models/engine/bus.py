@@ -9,9 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine import crew as hands
-from servotwin.models.engine import currents, shared_source, step, tape, together
-from servotwin.models.engine.crew import Crew
+from servotwin.models.engine import crew, currents, shared_source, step, tape, together
 from servotwin.models.engine.memory import (
     FRAMES,
     SAME,
@@ -27,16 +25,25 @@ from servotwin.models.engine.memory import (
     time_of,
 )
 from servotwin.models.engine.modes import Mode, Vector
+from servotwin.models.engine.seats import (
+    chip_of,
+    decided_of,
+    mode_of,
+    numbers_of,
+    piece_of,
+    point_of,
+    put_piece,
+    source_of,
+    vector_of,
+)
 from servotwin.models.engine.step import CHATTER, COMPLETED, CROWDED, MOST_IDLE, STEP_TOO_SMALL
 from servotwin.models.engine.tape import Tape
-from servotwin.models.engine.together import APART, ENDED, TOGETHER, Together
+from servotwin.models.engine.together import APART, ENDED, TOGETHER
 from servotwin.models.terms import frame
-from servotwin.models.terms.bridge import heeds_silence, terminal_voltage
-from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.bridge import terminal_voltage
 from servotwin.models.terms.motor import inductive
-from servotwin.models.terms.numbers import Numbers, warm
-from servotwin.models.terms.sensor import sensed_voltage, wiper_at
-from servotwin.models.terms.source import Source
+from servotwin.models.terms.numbers import warm
+from servotwin.models.terms.sensor import sensed_voltage
 from servotwin.physics.pieces import piece_value
 
 PAUSED = -1  # as a status: the tape is full
@@ -44,11 +51,11 @@ _SPAN = 16.0  # s: then times count anew
 _LONGEST = 1.0  # s, of a common motion: it may be one of constant speed without an end
 
 
-def through(source: Source, numbers: list[Numbers], chips: list[Chip], inputs: list[Inputs], memories: list[Memory],
-            ends: list[float], joined: list[int], shared: Any, written: Tape) -> tuple[int, float]:
+def through(inputs: list[Inputs], memories: list[Memory], ends: list[float], joined: list[int], shared: Any, seats: Any,
+            mates: Any, written: Tape) -> tuple[int, float]:
     """Go on to the ends of all servos by their clocks [s]; return a status, and when since the start.
 
-    Memories, places among those that move together, and `shared`, a record of `together.Shared`, are kept up to date.
+    The servos have their seats; memories, places among those that move together, and `shared` are kept up to date.
     """
     for j in range(len(memories)):
         ends[j] = instant(True, inputs[j], memories[j], ends[j])
@@ -61,167 +68,166 @@ def through(source: Source, numbers: list[Numbers], chips: list[Chip], inputs: l
                 memories[j], ends[j] = counted_anew(memories[j]), ends[j] - shift
                 if j == 0:
                     shared.begin, shared.end = shared.begin - shift, shared.end - shift
-        last = ends[0] <= memories[0].point.time + _SPAN
-        stops = [ends[j] if last else memories[j].point.time + _SPAN for j in range(len(memories))]
-        crew = hands.crew_of(source, numbers, chips, inputs, memories, stops)
-        for j in range(len(joined)):
-            crew.joined[j] = joined[j]
-        status, time = run(crew, shared, written)
-        when = crew.origins[0] + time
-        for j in range(len(joined)):
-            memories[j], joined[j] = hands.memory_of_unit(crew, j), crew.joined[j]
+        first = memories[0].point.time
+        last = ends[0] <= first + _SPAN
+        for j in range(len(memories)):
+            end = ends[j] if last else memories[j].point.time + _SPAN
+            crew.place(seats[j], memories[j], first, end, joined[j])
+        status, time = run(inputs, shared, seats, mates, written)
+        when = seats[0].origin + time
+        for j in range(len(memories)):
+            memories[j], joined[j] = crew.memory_now(seats[j]), seats[j].joined
     return status, when
 
 
-def run(crew: Crew, shared: Any, written: Tape) -> tuple[int, float]:
-    """Go on to the end of the run, or until the tape is full; return a status and when, by the clock of the bus [s].
-
-    `shared` is a record of `together.Shared`, brought up to date.
-    """
-    time, until, idle = crew.clocks[0], crew.ends[0], 0
-    group = _taken_up(crew, shared)
-    for j in range(len(crew.clocks)):
-        hands.plan_ahead(crew, j)
-    status = COMPLETED
+def run(inputs: list[Inputs], shared: Any, seats: Any, mates: Any, written: Tape) -> tuple[int, float]:
+    """Go on to the end of the run, or until the tape is full; return a status and when, by the clock of the bus [s]."""
+    count, idle, status = len(inputs), 0, COMPLETED
+    time, until = seats[0].clock, seats[0].end
+    _take_up(count, shared, seats, mates)
+    for j in range(count):
+        crew.plan_ahead(seats[j], crew.edge_of(seats[j], inputs[j]), until)
     while time < until:
-        if tape.is_full(written, len(crew.clocks)):
+        if tape.is_full(written, count):
             status = PAUSED
             break
-        status = _act(crew, group, written, time)
+        status = _act(inputs, shared, seats, mates, written, time, until)
+        if status == COMPLETED:
+            status = _go_on(count, shared, seats, mates, written, time, until)
         if status != COMPLETED:
             return status, time
-        group, status = _go_on(crew, shared, group, written, time)
-        if status != COMPLETED:
-            return status, time
-        following = _next_time(crew, shared, until)
+        following = _next_time(count, shared, seats, until)
         idle = idle + 1 if following == time else 0
-        if idle > MOST_IDLE * len(crew.clocks):
+        if idle > MOST_IDLE * count:
             return CHATTER, time
         time = following
-        status = _come(crew, shared, group, written, time)
+        status = _come(count, shared, seats, mates, written, time, until)
         if status != COMPLETED:
             return status, time
-    for j in range(len(crew.clocks)):
-        hands.bring(crew, j, group, time, written)
+    for j in range(count):
+        crew.bring(seats[j], j, shared, mates, time, written)
         if status == COMPLETED:
-            status = step.status_of(crew.points[j].y)
+            status = step.status_of(vector_of(seats[j].point.y))
     return status, time
 
 
-def _taken_up(crew: Crew, shared: Any) -> Together:
-    """Return the common motion that those who have joined are in, or one of nobody."""
-    units = [j for j in range(len(crew.joined)) if crew.joined[j] >= 0]
-    for j in units:
-        if crew.points[j].anchor_time == math.inf:  # it is told something else since
+def _take_up(count: int, shared: Any, seats: Any, mates: Any) -> None:
+    """Take up the common motion that those who have joined are in, if they are told the same as then."""
+    for j in range(count):
+        if seats[j].joined >= 0 and seats[j].point.anchor_time == math.inf:
             shared.phase = APART
-    if shared.phase != TOGETHER:
-        none = [j for j in units if j < 0]
-        points = [crew.points[j] for j in none]
-        return together.nobody(none, [hands.member_now(crew, 0, p) for p in points], [p.y for p in points])
-    members = [hands.member_now(crew, j, crew.points[j]) for j in units]
-    starts = [crew.points[j].anchor for j in units]
-    return together.resumed(crew.source, shared, units, members, starts, shared.begin)
+    if shared.phase == TOGETHER:
+        for j in range(count):
+            seat = seats[j]
+            if seat.joined >= 0:
+                crew.take_part(seat, j, mates[seat.joined], seat.point.anchor, seat.point.anchor)
+        together.resume(shared, mates)
 
 
-def _next_time(crew: Crew, shared: Any, until: float) -> float:
+def _next_time(count: int, shared: Any, seats: Any, until: float) -> float:
     """Return when anything happens next, by the clock of the bus [s]."""
     following = min(shared.end, until) if shared.phase == TOGETHER else until
-    for j in range(len(crew.clocks)):
-        following = min(following, crew.arrivals[j] if hands.is_known(crew.arrivals[j]) else crew.due[j])
-    return following
+    for j in range(count):
+        arrival = seats[j].arrival
+        following = min(following, arrival if crew.is_known(arrival) else seats[j].due)
+    return float(following)
 
 
-def _come(crew: Crew, shared: Any, group: Together, written: Tape, time: float) -> int:
+def _come(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float, until: float) -> int:
     """Let all clocks show a time of the bus [s], and those arrive that have got somewhere; return a status."""
-    for j in range(len(crew.clocks)):
-        if hands.is_known(crew.arrivals[j]) and crew.arrivals[j] <= time:
-            crew.clocks[j] = crew.ahead[j].time
-            hands.move(crew, j, group, crew.ahead[j], crew.events[j], written)
+    for j in range(count):
+        seat = seats[j]
+        if crew.is_known(seat.arrival) and seat.arrival <= time:
+            seat.clock = seat.ahead.time
+            crew.move(seat, j, shared, mates, point_of(seat.ahead), seat.event, written)
         else:
-            hands.set_clock(crew, j, time)
+            crew.set_clock(seat, time, until)
     if shared.phase != TOGETHER or shared.end > time:
         return COMPLETED
-    states = group.starts.copy()
-    mode = together.arrive(crew.source, shared, group, states)
-    for k in range(len(states)):
-        y, j = states[k], group.units[k]
+    mode = together.arrive(shared, mates)
+    for k in range(shared.count):
+        mate, own = mates[k], k == shared.whose
+        seat, y = seats[mate.unit], vector_of(mate.y)
         if step.status_of(y) != COMPLETED:
             return step.status_of(y)
-        p, own, t = crew.points[j], k == shared.whose, crew.clocks[j]
-        wiper = wiper_at(crew.numbers[j].sensor, p.wiper, y[0])
-        point = Point(t, y, mode if own else group.members[k].mode, t, y, p.step, wiper)
-        hands.move(crew, j, group, point, shared.kind if own else -1, written)
+        t = seat.clock
+        point = Point(t, y, mode if own else mode_of(mate.mode), t, y, seat.point.step, crew.wiper_of(seat, y[0]))
+        crew.move(seat, mate.unit, shared, mates, point, shared.kind if own else -1, written)
     return COMPLETED
 
 
 # --- what chips and loads do ------------------------------------------------------------------------------------------
 
 
-def _act(crew: Crew, group: Together, written: Tape, time: float) -> int:
+def _act(inputs: list[Inputs], shared: Any, seats: Any, mates: Any, written: Tape, time: float, until: float) -> int:
     """Do what is due at a time of the bus [s]: first switch, then measure; return a status."""
     busy = False
-    for j in range(len(crew.clocks)):
-        if crew.due[j] <= time:
+    for j in range(len(inputs)):
+        seat = seats[j]
+        if seat.due <= time:
             busy = True
-            if crew.switches[j] <= crew.clocks[j]:
-                _switch(crew, j, group, written, time)
+            if seat.switch <= seat.clock:
+                crew.bring(seat, j, shared, mates, time, written)
+                _switch(inputs[j], seat, j, written)
+                crew.plan_ahead(seat, seat.edge, until)
     if busy:
-        for j in range(len(crew.clocks)):
-            if crew.due[j] <= time and hands.edge(crew, j) <= crew.clocks[j]:
-                _measure(crew, j, group, written, time)
-                if crew.decided[j].number == frame.CROWDED:
+        for j in range(len(inputs)):
+            seat = seats[j]
+            if seat.due <= time and seat.edge <= seat.clock:
+                _measure(inputs[j], j, len(inputs), shared, seats, mates, written, time)
+                if seat.decided.number == frame.CROWDED:
                     return CROWDED
-                hands.plan_ahead(crew, j)
+                crew.plan_ahead(seat, crew.edge_of(seat, inputs[j]), until)
     return COMPLETED
 
 
-def _switch(crew: Crew, j: int, group: Together, written: Tape, time: float) -> None:
+def _switch(inputs: Inputs, seat: Any, unit: int, written: Tape) -> None:
     """Let a servo's bridge and load do what they do now."""
-    hands.bring(crew, j, group, time, written)
-    now = crew.clocks[j]
-    hands.hear(crew, j, frame.switched(crew.decided[j], now), written)
-    if crew.tau_ends[j] <= now:
-        before, inputs = crew.taus[j], crew.inputs[j]
-        crew.taus[j], crew.tau_ends[j] = in_force(inputs.torque, crew.origins[j], now, inputs.constant_torque)
-        if crew.taus[j] != before:
-            hands.forget(crew, j)
-    hands.plan_ahead(crew, j)
+    now = seat.clock
+    crew.hear(seat, unit, frame.switched(decided_of(seat.decided), now), written)
+    if seat.tau_end <= now:
+        before = piece_of(seat.tau)
+        tau, seat.tau_end = in_force(inputs.torque, seat.origin, now, inputs.constant_torque)
+        put_piece(seat.tau, tau)
+        if tau != before:
+            crew.forget(seat)
 
 
-def _measure(crew: Crew, j: int, group: Together, written: Tape, time: float) -> None:
+def _measure(inputs: Inputs, j: int, count: int, shared: Any, seats: Any, mates: Any, written: Tape,
+             time: float) -> None:
     """Let a servo's chip measure at the edge of a pulse."""
-    chip, inputs, now, origin = crew.chips[j], crew.inputs[j], crew.clocks[j], crew.origins[j]
-    piece, _ = in_force(inputs.command, origin, now + SAME * crew.beats[j], 0.0)
+    seat = seats[j]
+    chip, now, origin = chip_of(seat.chip), seat.clock, seat.origin
+    piece, _ = in_force(inputs.command, origin, now + SAME * seat.beat, 0.0)
     t_in = piece_value(since(piece, origin), now)
-    here = hands.at_clock(crew, j, group, time)
+    here = crew.point_now(seat, shared, mates, time)
     if not frame.accepted(chip, t_in):
         tape.write_event(written, j, origin + now, tape.REFUSED, Mode(0, 0, 0, 0), here.y[0])
     v_m, V_bus = 0.0, chip.V_oc
     if chip.beta != 0.0 or chip.c_s != 0.0:
-        v_m, V_bus = _voltages(crew, j, group, here.y, time)
-    v_o = sensed_voltage(crew.numbers[j].sensor, inputs.curve, here.wiper)
-    before = crew.decided[j]
-    after = frame.edge(chip, before, now, t_in, v_o, v_m, V_bus, inputs.seed)
-    if after.silent != before.silent and heeds_silence(crew.numbers[j].bridge):
-        hands.bring(crew, j, group, time, written)
-    hands.hear(crew, j, after, written)
+        v_m, V_bus = _voltages(j, count, shared, seats, mates, here.y, time)
+    v_o = sensed_voltage(numbers_of(seat.numbers).sensor, inputs.curve, here.wiper)
+    after = frame.edge(chip, decided_of(seat.decided), now, t_in, v_o, v_m, V_bus, inputs.seed)
+    if after.silent != seat.decided.silent and crew.heeds_silence(seat):
+        crew.bring(seat, j, shared, mates, time, written)
+    crew.hear(seat, j, after, written)
 
 
-def _voltages(crew: Crew, j: int, group: Together, y: Vector, time: float) -> tuple[float, float]:
+def _voltages(j: int, count: int, shared: Any, seats: Any, mates: Any, y: Vector, time: float) -> tuple[float, float]:
     """Return the voltages at a servo's motor and of the bus [V]."""
-    own, drive = hands.numbers_now(crew, j), crew.decided[j].drive
-    connected = [k for k in range(len(crew.clocks)) if hands.is_connected(crew, k)]
-    if len(connected) == 0 or (len(connected) == 1 and connected[0] == j):
+    own, drive, others, last = crew.numbers_now(seats[j]), seats[j].decided.drive, 0, -1
+    for k in range(count):
+        if k != j and crew.is_connected(seats[k]):
+            others, last = others + 1, k
+    if others == 0:
         return step.voltages(own, drive * own.source.V, y)
-    if len(connected) == 1:
-        k = connected[0]
-        numbers = hands.numbers_now(crew, k)
-        u = crew.decided[k].drive * numbers.source.V
-        V_bus = step.voltages(numbers, u, hands.at_clock(crew, k, group, time).y)[1]
+    if others == 1 and not crew.is_connected(seats[j]):
+        seat = seats[last]
+        numbers = crew.numbers_now(seat)
+        there = crew.point_now(seat, shared, mates, time)
+        V_bus = step.voltages(numbers, seat.decided.drive * numbers.source.V, there.y)[1]
     else:
-        points = [hands.at_clock(crew, k, group, time) for k in connected]
-        members = [hands.member_now(crew, connected[n], points[n]) for n in range(len(connected))]
-        V_bus = shared_source.put_in_zones(crew.source, members, [p.y for p in points], crew.source.V)[1]
+        V_bus = bus_voltage(count, shared, seats, mates, time)
     stiff = warm(shared_source.on_stiff_source(own, False), y)
     u = drive * V_bus
     zone = currents.zone_of(stiff, u, 0.0, y[0], y[6], y[2])
@@ -229,54 +235,77 @@ def _voltages(crew: Crew, j: int, group: Together, y: Vector, time: float) -> tu
     return terminal_voltage(stiff.bridge, stiff.source, stiff.motor, u, y[6], i, V_bus), V_bus
 
 
+def bus_voltage(count: int, shared: Any, seats: Any, mates: Any, time: float) -> float:
+    """Return V_bus [V] under the currents of all servos as they stand now; mates after the first `count` are used."""
+    source, connected = source_of(shared.source), 0
+    others = mates[count:]  # those that move together stay as they are
+    for k in range(count):
+        seat = seats[k]
+        if crew.is_connected(seat):
+            y = crew.point_now(seat, shared, mates, time).y
+            crew.take_part(seat, k, others[connected], y, y)
+            connected += 1
+    return shared_source.put_in_zones(source, others, connected, source.V)[1]
+
+
 # --- motions ----------------------------------------------------------------------------------------------------------
 
 
-def _go_on(crew: Crew, shared: Any, group: Together, written: Tape, time: float) -> tuple[Together, int]:
-    """Take up motions where there are none, or no longer the right ones; return the common one, and a status."""
-    status, kept, before = COMPLETED, True, False
-    units = [j for j in range(len(crew.clocks)) if hands.is_connected(crew, j)]
-    if len(units) < 2:
-        units = [j for j in units if j < 0]
-    place = 0
-    for j in range(len(crew.clocks)):
-        member = place < len(units) and units[place] == j
-        place += 1 if member else 0
-        kept = kept and member == (crew.joined[j] >= 0) and not (member and crew.points[j].anchor_time == math.inf)
-        before = before or crew.joined[j] >= 0
-    if (len(units) > 0 or before) and not (kept and shared.phase == TOGETHER):
-        group = _regroup(crew, shared, group, units, kept and shared.phase == ENDED, written, time)
-        if len(units) > 0 and group.length < 0.0:
-            return group, STEP_TOO_SMALL
-    for j in range(len(crew.clocks)):
-        if crew.joined[j] < 0 and not hands.is_known(crew.arrivals[j]):
-            how = hands.alone(crew, j)
+def _go_on(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float, until: float) -> int:
+    """Take up motions where there are none, or no longer the right ones; return a status."""
+    status, kept, before, connected = COMPLETED, True, False, 0
+    for j in range(count):
+        connected += 1 if crew.is_connected(seats[j]) else 0
+    for j in range(count):
+        seat = seats[j]
+        member = connected > 1 and crew.is_connected(seat)
+        kept = kept and member == (seat.joined >= 0) and not (member and seat.point.anchor_time == math.inf)
+        before = before or seat.joined >= 0
+    if (connected > 1 or before) and not (kept and shared.phase == TOGETHER):
+        same = kept and shared.phase == ENDED
+        _leave(count, shared, seats, mates, same, written, time)
+        if connected > 1:
+            _join(count, shared, seats, mates, same, written, time)
+            if shared.length < 0.0:
+                return STEP_TOO_SMALL
+    for j in range(count):
+        if seats[j].joined < 0 and not crew.is_known(seats[j].arrival):
+            how = crew.alone(seats[j], until)
             status = how if how != COMPLETED else status
-    return group, status
+    return status
 
 
-def _regroup(crew: Crew, shared: Any, group: Together, units: list[int], same: bool, written: Tape,
-             time: float) -> Together:
-    """Let those who have joined leave, and others or the same move together from now on."""
-    for j in range(len(crew.clocks)):
-        if crew.joined[j] >= 0:
-            hands.bring(crew, j, group, time, written)
-            crew.joined[j] = -1
+def _leave(count: int, shared: Any, seats: Any, mates: Any, same: bool, written: Tape, time: float) -> None:
+    """Let those who have joined leave; the `same` are about to join again."""
+    for j in range(count):
+        seat = seats[j]
+        if seat.joined >= 0:
+            crew.bring(seat, j, shared, mates, time, written)
+            seat.joined = -1
             if not same:
-                hands.forget(crew, j)
+                crew.forget(seat)
     shared.phase = APART
-    if len(units) == 0:
-        return group
-    limit = time + _LONGEST
-    for j in units:
-        hands.bring(crew, j, group, time, written)
-        limit = min(limit, crew.switches[j] - crew.late[j])
-    members = [hands.member_now(crew, j, crew.points[j]) for j in units]
-    states = [crew.points[j].y for j in units]
-    group = together.begin(crew.source, shared, units, members, states, time, max(limit, time), same)
-    for k in range(len(units)):
-        j, y = units[k], states[k]
-        p, t = crew.points[j], crew.clocks[j]
-        crew.points[j] = Point(t, y, group.members[k].mode, t, y, p.step, p.wiper)
-        crew.joined[j], crew.arrivals[j] = k, math.nan
-    return group
+
+
+def _join(count: int, shared: Any, seats: Any, mates: Any, same: bool, written: Tape, time: float) -> None:
+    """Let all who are connected move together from now on."""
+    limit, members = time + _LONGEST, 0
+    for j in range(count):
+        seat = seats[j]
+        if crew.is_connected(seat):
+            crew.bring(seat, j, shared, mates, time, written)
+            limit = min(limit, seat.switch - seat.late)
+            crew.take_part(seat, j, mates[members], seat.point.y, seat.point.y)
+            members += 1
+    shared.count = members
+    together.begin(shared, mates, time, max(limit, time), same)
+    for k in range(members):
+        mate = mates[k]
+        seat = seats[mate.unit]
+        point, mode, t = seat.point, mate.mode, seat.clock
+        point.time, point.anchor_time = t, t
+        point.mode.zone, point.mode.contact, point.mode.mesh, point.mode.motor = (
+            mode.zone, mode.contact, mode.mesh, mode.motor)
+        for n in range(len(mate.start)):
+            point.anchor[n] = point.y[n]
+        seat.joined, seat.arrival = k, math.nan

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import bus, runs, step, together
-from servotwin.models.engine import crew as hands
+from servotwin.models.engine import bus, crew, runs, step
 from servotwin.models.engine.memory import (
     Inputs,
     Memory,
@@ -22,9 +21,7 @@ from servotwin.models.engine.sights import put
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import chip_of, numbers_of
-from servotwin.models.terms import frame
 from servotwin.models.terms.numbers import warm
-from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
@@ -51,9 +48,6 @@ class Buses(NamedTuple):
 
     which: Indices
     first: Indices
-    V: Floats
-    R_b: Floats
-    I_max: Floats
     records: Any
     joined: Indices
     shared: Any
@@ -61,48 +55,48 @@ class Buses(NamedTuple):
     ended: Floats
 
 
-def start(buses: Buses, of: Indices) -> None:
-    """Let the buses `of` begin anew: nobody moves together."""
-    for n in range(of.size):
-        k = of[n]
-        together.put_shared(buses.shared[k], together.at_start(_source(buses, k)))
-        for j in range(buses.first[k], buses.first[k + 1]):
-            buses.joined[j] = -1
-
-
-def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, duration: float, until: float,
-          written: Tape) -> int:
+def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, duration: float, until: float, seats: Any,
+          mates: Any, written: Tape) -> int:
     """Let the buses from `begin` to before `end` go on for a duration, or to a time since their start [s].
 
-    `until` is inf where the duration counts. A lane with a status is not on its bus. Return the status of the last bus:
-    where it is `bus.PAUSED` the tape is full.
+    `until` is inf where the duration counts. A lane with a status is not on its bus. Seats there have to be for every
+    servo of a bus, and twice as many mates. Return the status of the last bus: where it is `bus.PAUSED` the tape is
+    full.
     """
     status = COMPLETED
     for k in range(begin, end):
         places = _alive(buses, k)
-        if len(places) == 0:
-            continue
-        memories = [memory_of(buses.records[j]) for j in places]
-        ends = [m.point.time + duration if until == math.inf else until - origin_of(m) for m in memories]
-        status = _go_on(lanes, tables, buses, k, places, memories, ends, written)
+        if len(places) > 0:
+            status = _go_on(lanes, tables, buses, k, places, duration, until, seats, mates, written)
     return status
 
 
-def _go_on(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int], memories: list[Memory],
-           ends: list[float], written: Tape) -> int:
-    """Let a bus go on to the ends of its servos by their clocks [s]; return a status."""
-    which = [buses.which[j] for j in places]
-    inputs, joined = [inputs_of(lanes, tables, lane) for lane in which], [buses.joined[j] for j in places]
-    numbers, chips = [numbers_of(lanes, lane) for lane in which], [chip_of(lanes, lane) for lane in which]
-    status, when = bus.through(_source(buses, k), numbers, chips, inputs, memories, ends, joined, buses.shared[k],
-                               written)
+def _go_on(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int], duration: float, until: float,
+           seats: Any, mates: Any, written: Tape) -> int:
+    memories = _seated(lanes, buses, places, seats)
+    ends = [m.point.time + duration if until == math.inf else until - origin_of(m) for m in memories]
+    inputs, joined = [inputs_of(lanes, tables, buses.which[j]) for j in places], [buses.joined[j] for j in places]
+    status, when = bus.through(inputs, memories, ends, joined, buses.shared[k], seats, mates, written)
     for n in range(len(places)):
         j = places[n]
         put_memory(buses.records[j], memories[n])
-        buses.joined[j] = joined[n]
+        buses.joined[j], buses.ended[j] = joined[n], when
         if status != COMPLETED and status != bus.PAUSED:
-            buses.status[j], buses.ended[j] = status, when
+            buses.status[j] = status
     return status
+
+
+def _alive(buses: Buses, k: int) -> list[int]:
+    return [j for j in range(buses.first[k], buses.first[k + 1]) if buses.status[j] == COMPLETED]
+
+
+def _seated(lanes: Lanes, buses: Buses, places: list[int], seats: Any) -> list[Memory]:
+    """Give lanes their seats, and return what they remember."""
+    for n in range(len(places)):
+        lane = buses.which[places[n]]
+        period = 0.0 if lanes.edge_count[lane] >= 0 else chip_of(lanes, lane).frame_period
+        crew.sit(seats[n], numbers_of(lanes, lane), chip_of(lanes, lane), period)
+    return [memory_of(buses.records[j]) for j in places]
 
 
 def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
@@ -112,40 +106,30 @@ def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
     return runs.inputs_of(lanes, curve, tables.torques[first:first + tables.torque_count[lane]], lane)
 
 
-def look(lanes: Lanes, tables: Tables, buses: Buses, seen: Floats) -> None:
+def look(lanes: Lanes, tables: Tables, buses: Buses, seats: Any, mates: Any, seen: Floats) -> None:
     """Look at all lanes as they stand; `seen` has a row of signals for each lane there is."""
     for k in range(len(buses.shared)):
         places = _alive(buses, k)
         if len(places) > 0:
-            _look(lanes, tables, buses, k, places, seen)
+            _look(lanes, tables, buses, k, places, seats, mates, seen)
 
 
-def _look(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int], seen: Floats) -> None:
-    which = [buses.which[j] for j in places]
-    memories = [memory_of(buses.records[j]) for j in places]
-    inputs = [inputs_of(lanes, tables, lane) for lane in which]
-    crew = hands.crew_of(_source(buses, k), [numbers_of(lanes, lane) for lane in which],
-                         [chip_of(lanes, lane) for lane in which], inputs, memories, [m.point.time for m in memories])
-    for n in range(len(which)):
-        crew.decided[n] = frame.numbered(memories[n].chip, memories[n].chip.number, silent_now(memories[n]))
-    V = hands.bus_voltage(crew)
-    for n in range(len(which)):
-        memory, now = memories[n], crew.decided[n]
-        point, time = memory.point, memory.point.time
-        numbers = on_bus(hands.numbers_now(crew, n), V)
-        u = now.drive * numbers.source.V
-        piece, _ = in_force(inputs[n].torque, origin_of(memory), time, inputs[n].constant_torque)
-        tau = since(piece, origin_of(memory))
-        mode = point.mode
+def _look(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int], seats: Any, mates: Any,
+          seen: Floats) -> None:
+    memories = _seated(lanes, buses, places, seats)
+    for n in range(len(places)):
+        memory = memories[n]
+        crew.place(seats[n], memory, memory.point.time, memory.point.time, -1)
+        seats[n].decided.silent = silent_now(memory)
+    V = bus.bus_voltage(len(places), buses.shared[k], seats, mates, 0.0)
+    for n in range(len(places)):
+        memory, lane = memories[n], buses.which[places[n]]
+        inputs, point, time, origin = inputs_of(lanes, tables, lane), memory.point, memory.point.time, origin_of(memory)
+        numbers = on_bus(crew.numbers_now(seats[n]), V)
+        u = memory.chip.drive * numbers.source.V
+        piece, _ = in_force(inputs.torque, origin, time, inputs.constant_torque)
+        tau, mode = since(piece, origin), point.mode
         if point.anchor_time == math.inf or piece != memory.tau:
             mode = step.anchored(numbers, Piece(0.0, u, 0.0, 0.0, 0.0, 0.0, 0.0), tau, time, point).mode
-        put(seen, which[n], observed(warm(numbers, point.y), inputs[n].curve, mode, u, piece_value(tau, time), point.y,
-                                     point.wiper, now.drive, now.error))
-
-
-def _alive(buses: Buses, k: int) -> list[int]:
-    return [j for j in range(buses.first[k], buses.first[k + 1]) if buses.status[j] == COMPLETED]
-
-
-def _source(buses: Buses, k: int) -> Source:
-    return Source(buses.V[k], buses.R_b[k], buses.I_max[k])
+        put(seen, lane, observed(warm(numbers, point.y), inputs.curve, mode, u, piece_value(tau, time), point.y,
+                                 point.wiper, memory.chip.drive, memory.chip.error))

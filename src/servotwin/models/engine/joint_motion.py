@@ -1,55 +1,48 @@
-"""How servos on one source move together: all linear, as power series exact to rounding; else by one explicit step."""
+"""How servos on one source move together: all linear, as power series exact to rounding; else by one explicit step.
+
+The functions take the first `count` records of `seats.Mate`, whose motions begin at their `start`.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from servotwin.models.engine import contacts, dormand_prince
 from servotwin.models.engine.dormand_prince import STAGES
 from servotwin.models.engine.modes import INSIDE, NO_CURRENT, NOWHERE, Vector, at_rest, sign_of
 from servotwin.models.engine.rates import rates_of
-from servotwin.models.engine.shared_source import (
-    BROKEN_DOWN,
-    FOLLOWING,
-    KEEPING,
-    LIMITED,
-    Member,
-    behind,
-    bus_voltage,
-)
-from servotwin.models.terms import heat
-from servotwin.models.terms.friction import varying
-from servotwin.models.terms.load import springy, swings
-from servotwin.models.terms.motor import inductive
+from servotwin.models.engine.seats import ROOM, mode_of, numbers_of, piece_of, put_vector, vector_of
+from servotwin.models.engine.shared_source import BROKEN_DOWN, FOLLOWING, KEEPING, LIMITED, behind, bus_voltage
 from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import piece_value
 
-ROOM = 42  # coefficients of a series at most
 _LONGEST = 1.5  # of a series, in times of its fastest rate
 _TOLERANCE = 1e-12  # error of one step, relative to 1 + |state|
-
-Dense = tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector]
-NO_DENSE: Dense = (NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+_SIZE = 7  # of a state
 
 
-def is_linear(member: Member) -> bool:
-    """Tell whether a member moves by linear laws."""
-    return (not heat.present(member.numbers.heat) and not swings(member.numbers.load) and member.mode.mesh != INSIDE
-            and (not varying(member.numbers.friction) or at_rest(member.mode.contact)))
+def are_linear(mates: Any, count: int) -> bool:
+    """Tell whether all mates move by linear laws."""
+    for k in range(count):
+        mate = mates[k]
+        if mate.numbers.heat.C_w > 0.0 or mate.numbers.load.gravity != 0.0 or mate.mode.mesh == INSIDE or (
+                mate.numbers.friction.varies > 0.0 and not at_rest(mate.mode.contact)):
+            return False
+    return True
 
 
-def fastest_rate(members: list[Member]) -> float:
-    """Return the fastest rate [1/s] of linear members."""
+def fastest_rate(mates: Any, count: int) -> float:
+    """Return the fastest rate [1/s] of linear mates."""
     rate = 0.0
-    for j in range(len(members)):
-        numbers, zone = members[j].numbers, members[j].mode.zone
+    for k in range(count):
+        numbers = numbers_of(mates[k].numbers)
         own, body, R = numbers.motor, numbers.shaft, numbers.bridge.R_drive
         one = body.b / body.J
-        if springy(numbers.load):
+        if numbers.load.stiffness > 0.0:
             one += math.sqrt(numbers.load.stiffness / body.J)
-        if zone != NO_CURRENT:
-            if inductive(own):
+        if mates[k].mode.zone != NO_CURRENT:
+            if own.L > 0.0:
                 one += R / own.L + math.sqrt(own.K * own.K_b / (own.L * body.J))
             else:
                 one += own.K * own.K_b / (R * body.J)
@@ -57,14 +50,14 @@ def fastest_rate(members: list[Member]) -> float:
     return rate
 
 
-def longest_series(members: list[Member]) -> float:
+def longest_series(mates: Any, count: int) -> float:
     """Return how long a series holds [s]."""
-    rate = fastest_rate(members)
+    rate = fastest_rate(mates, count)
     return _LONGEST / rate if rate > 0.0 else math.inf
 
 
 class Linear(NamedTuple):
-    """The law of a linear member: L di/dt = s V − K_b w − drop − R i, J dw/dt = K i − b w − torques."""
+    """The law of a linear mate: L di/dt = s V − K_b w − drop − R i, J dw/dt = K i − b w − torques."""
 
     sign: float
     K: float
@@ -83,45 +76,42 @@ class Linear(NamedTuple):
     start: float  # its angle
 
 
-def series(source: Source, state: int, members: list[Member], states: list[Vector], time: float, length: float,
-           speed: list[float], current: list[float]) -> int:
-    """Work out the motion of linear members from `time` on, for at most `length` [s]; return how many terms it has.
+def series(source: Source, state: int, mates: Any, count: int, time: float, length: float) -> int:
+    """Work out the motion of linear mates from `time` on, for at most `length` [s]; return how many terms it has.
 
-    The coefficients of each member's speed and current in powers of time have `ROOM` places in the lists.
+    Its coefficients are those of speed and current in powers of time.
     """
-    laws = [_linear(members[j], states[j], time) for j in range(len(members))]
+    laws = [_linear(mates[k], time) for k in range(count)]
     plain = True
-    for j in range(len(laws)):
-        law, y = laws[j], states[j]
+    for k in range(count):
+        law, mate = laws[k], mates[k]
         plain = plain and law.L == 0.0 and law.stiffness == 0.0 and law.slope == 0.0
-        speed[j * ROOM] = y[1] if law.moves > 0.0 else 0.0
-        current[j * ROOM] = y[2]
+        mate.speed[0] = mate.start[1] if law.moves > 0.0 else 0.0
+        mate.current[0] = mate.start[2]
     if plain:
-        return _plain_series(source, state, laws, length, speed, current)
-    return _general_series(source, state, laws, length, speed, current)
+        return _plain_series(source, state, laws, length, mates)
+    return _general_series(source, state, laws, length, mates)
 
 
-def _general_series(source: Source, state: int, laws: list[Linear], length: float, speed: list[float],
-                    current: list[float]) -> int:
+def _general_series(source: Source, state: int, laws: list[Linear], length: float, mates: Any) -> int:
     terms, power = 1, length
     while terms < ROOM - 1:
         n = terms - 1
-        V_n = _series_voltage(source, state, laws, speed, current, n)
+        V_n = _series_voltage(source, state, laws, mates, n)
         size = 0.0
-        for j in range(len(laws)):
-            t, at = laws[j], j * ROOM + n
-            w = speed[at]
+        for k in range(len(laws)):
+            t, mate = laws[k], mates[k]
+            w, i = mate.speed[n], mate.current[n]
             loop = t.sign * V_n - t.K_b * w - (t.drop if n == 0 else 0.0)
             if t.L == 0.0:
-                current[at] = loop * t.conductance
-                current[at + 1] = 0.0
-            else:
-                current[at + 1] = t.conducts * (loop - t.R * current[at]) / (t.L * (n + 1))
+                i = loop * t.conductance
+                mate.current[n] = i
+            after = t.conducts * (loop - t.R * i) / (t.L * (n + 1)) if t.L > 0.0 else 0.0
             against = t.against if n == 0 else t.slope if n == 1 else 0.0
-            angle = t.start if n == 0 else speed[at - 1] / n
-            dw = t.moves * (t.K * current[at] - t.b * w - against - t.stiffness * angle)
-            speed[at + 1] = dw / (t.J * (n + 1))
-            size = max(size, abs(speed[at + 1]), abs(current[at] if t.L == 0.0 else current[at + 1]))
+            angle = t.start if n == 0 else mate.speed[n - 1] / n
+            dw = t.moves * (t.K * i - t.b * w - against - t.stiffness * angle) / (t.J * (n + 1))
+            mate.current[n + 1], mate.speed[n + 1] = after, dw
+            size = max(size, abs(dw), abs(after if t.L > 0.0 else i))
         terms += 1
         if n > 2 and size * power < 1e-18:
             break
@@ -129,25 +119,24 @@ def _general_series(source: Source, state: int, laws: list[Linear], length: floa
     return terms
 
 
-def _plain_series(source: Source, state: int, laws: list[Linear], length: float, speed: list[float],
-                  current: list[float]) -> int:
-    """Work out the same for members without inductance, spring and ramp of torque, of which there are most."""
+def _plain_series(source: Source, state: int, laws: list[Linear], length: float, mates: Any) -> int:
+    """Work out the same for mates without inductance, spring and ramp of torque, of which there are most."""
     below, per_volt, given = _meeting(source, state, laws)
     first, terms, power = 1.0, 1, length
     while terms < ROOM - 1:
         n = terms - 1
         h = 0.0
-        for j in range(len(laws)):
-            t = laws[j]
-            h += t.sign * (first * t.drop + t.K_b * speed[j * ROOM + n]) * t.conductance
+        for k in range(len(laws)):
+            t = laws[k]
+            h += t.sign * (first * t.drop + t.K_b * mates[k].speed[n]) * t.conductance
         V = (first * given + per_volt * h) / below
         size = 0.0
-        for j in range(len(laws)):
-            t, at = laws[j], j * ROOM + n
-            w = speed[at]
+        for k in range(len(laws)):
+            t, mate = laws[k], mates[k]
+            w = mate.speed[n]
             i = (t.sign * V - t.K_b * w - first * t.drop) * t.conductance
             w = t.moves * (t.K * i - t.b * w - first * t.against) / (t.J * terms)
-            current[at], current[at + 1], speed[at + 1] = i, 0.0, w
+            mate.current[n], mate.current[terms], mate.speed[terms] = i, 0.0, w
             size = max(size, abs(w), abs(i))
         first = 0.0
         terms += 1
@@ -160,8 +149,8 @@ def _plain_series(source: Source, state: int, laws: list[Linear], length: float,
 def _meeting(source: Source, state: int, laws: list[Linear]) -> tuple[float, float, float]:
     """Return what V_bus = (given + per_volt h) / below is made of, where h are the currents that back-EMFs drive."""
     g = 0.0
-    for j in range(len(laws)):
-        g += laws[j].conductance
+    for k in range(len(laws)):
+        g += laws[k].conductance
     if state == LIMITED:
         return g, 1.0, source.I_max
     if state == KEEPING:
@@ -171,19 +160,18 @@ def _meeting(source: Source, state: int, laws: list[Linear]) -> tuple[float, flo
     return 1.0 + source.R_b * g, source.R_b, source.V
 
 
-def _linear(member: Member, y: Vector, time: float) -> Linear:
-    numbers, mode, tau = member.numbers, member.mode, member.tau
+def _linear(mate: Any, time: float) -> Linear:
+    numbers, mode, tau, y = numbers_of(mate.numbers), mode_of(mate.mode), piece_of(mate.tau), mate.start
     friction = contacts.friction_torque(numbers, mode.contact, y[1], 0.0, 0.0)
     against = piece_value(tau, time) - numbers.load.stiffness * numbers.load.rest_angle + friction
     conducts = 0.0 if mode.zone == NO_CURRENT else 1.0
     own, R = numbers.motor, numbers.bridge.R_drive
-    return Linear(member.sign, own.K, own.K_b, R, own.L, numbers.shaft.J, numbers.shaft.b, numbers.load.stiffness,
+    return Linear(mate.sign, own.K, own.K_b, R, own.L, numbers.shaft.J, numbers.shaft.b, numbers.load.stiffness,
                   sign_of(mode.zone) * numbers.bridge.D_drive, conducts / R, conducts,
                   0.0 if at_rest(mode.contact) else 1.0, against, tau.slope, y[0])
 
 
-def _series_voltage(source: Source, state: int, laws: list[Linear], speed: list[float], current: list[float],
-                    n: int) -> float:
+def _series_voltage(source: Source, state: int, laws: list[Linear], mates: Any, n: int) -> float:
     """Return the n-th coefficient of V_bus."""
     if state == BROKEN_DOWN:
         return 0.0
@@ -191,8 +179,8 @@ def _series_voltage(source: Source, state: int, laws: list[Linear], speed: list[
     if state == KEEPING:
         return first * source.V
     g = h = given = above = below = 0.0
-    for j in range(len(laws)):
-        t, w, i = laws[j], speed[j * ROOM + n], current[j * ROOM + n]
+    for k in range(len(laws)):
+        t, w, i = laws[k], mates[k].speed[n], mates[k].current[n]
         back = first * t.drop + t.K_b * w
         if t.L == 0.0:
             g += t.conductance
@@ -206,77 +194,72 @@ def _series_voltage(source: Source, state: int, laws: list[Linear], speed: list[
     return (first * source.I_max + h - given) / g if g > 0.0 else above / below
 
 
-def series_value(coefficients: list[float], first: int, terms: int, s: float) -> float:
-    """Return what a power series is at s [s]."""
-    x = 0.0
-    for n in range(terms - 1, -1, -1):
-        x = x * s + coefficients[first + n]
-    return x
-
-
-def series_integral(coefficients: list[float], first: int, terms: int, s: float) -> float:
-    """Return the integral of a power series from 0 to s [s]."""
-    x = 0.0
-    for n in range(terms - 1, -1, -1):
-        x = x * s + coefficients[first + n] / (n + 1)
-    return x * s
-
-
-def turns(coefficients: list[float], first: int, terms: int, length: float) -> bool:
+def turns(coefficients: Any, terms: int, length: float) -> bool:
     """Tell whether a power series falls at one end and rises at the other."""
     slope = 0.0
     for n in range(terms - 1, 0, -1):
-        slope = slope * length + n * coefficients[first + n]
-    return slope * coefficients[first + 1] < 0.0
+        slope = slope * length + n * coefficients[n]
+    return bool(slope * coefficients[1] < 0.0)
 
 
 class Step(NamedTuple):
-    """A step of all members: its length and the next to try [s]; the length is below 0 where none is short enough."""
+    """A step of all mates: its length and the next to try [s]; the length is below 0 where none is short enough."""
 
     length: float
     following: float
 
 
-def joint_rates(source: Source, state: int, members: list[Member], time: float, states: list[Vector],
-                rates: list[Vector]) -> None:
-    """Work out the rates of all members."""
-    V = bus_voltage(source, state, members, states)
-    for j in range(len(members)):
-        member = members[j]
-        rates[j] = rates_of(member.numbers, member.mode, behind(member, V), piece_value(member.tau, time), states[j])
-
-
-def joint_step(source: Source, state: int, members: list[Member], states: list[Vector], time: float, step: float,
-               dense: list[Dense], ends: list[Vector]) -> Step:
-    """Work out one accepted step of at most `step` [s]: dense outputs and ends of all members."""
-    count, h, factor = len(members), step, 1.0
+def joint_step(source: Source, state: int, mates: Any, count: int, time: float, step: float) -> Step:
+    """Work out one accepted step of at most `step` [s]: dense outputs and ends of all mates."""
     stages = [[NOWHERE for _ in range(16)] for _ in range(count)]
-    at, rates = [NOWHERE for _ in range(count)], [NOWHERE for _ in range(count)]
+    h, factor = step, 1.0
     for _ in range(60):
         size = 0.0
         for k in range(STAGES):
-            _stage(source, state, members, states, time, h, k, stages, at, rates)
+            _stage(source, state, mates, time, h, k, stages)
         for j in range(count):
-            ends[j] = dormand_prince.moved(states[j], stages[j], STAGES, h)
-            error = dormand_prince.error_of(states[j], ends[j], stages[j], h)
+            start = vector_of(mates[j].start)
+            end = dormand_prince.moved(start, stages[j], STAGES, h)
+            put_vector(mates[j].end, end)
+            error = dormand_prince.error_of(start, end, stages[j], h)
             size = max(size, error if error == error else math.inf)
         size = min(size / _TOLERANCE, 1e12)
         factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
         if size <= 1.0:
             for k in range(STAGES, 16):
-                _stage(source, state, members, states, time, h, k, stages, at, rates)
+                _stage(source, state, mates, time, h, k, stages)
             for j in range(count):
-                dense[j] = dormand_prince.dense_of(states[j], ends[j], stages[j], h)
+                _put_dense(mates[j], stages[j], h)
             return Step(h, h * factor)
         h *= factor
     return Step(-1.0, step)
 
 
-def _stage(source: Source, state: int, members: list[Member], states: list[Vector], time: float, h: float, k: int,
-           stages: list[list[Vector]], at: list[Vector], rates: list[Vector]) -> None:
-    """Work out the rates of all members in one stage of a step."""
-    for j in range(len(members)):
-        at[j] = dormand_prince.moved(states[j], stages[j], k, h)
-    joint_rates(source, state, members, time + dormand_prince.FRACTIONS[k] * h, at, rates)
-    for j in range(len(members)):
-        stages[j][k] = rates[j]
+def _stage(source: Source, state: int, mates: Any, time: float, h: float, k: int,
+           stages: list[list[Vector]]) -> None:
+    """Work out the rates of all mates in one stage of a step."""
+    for j in range(len(stages)):
+        put_vector(mates[j].y, dormand_prince.moved(vector_of(mates[j].start), stages[j], k, h))
+    V, t = bus_voltage(source, state, mates, len(stages)), time + dormand_prince.FRACTIONS[k] * h
+    for j in range(len(stages)):
+        mate = mates[j]
+        stages[j][k] = rates_of(numbers_of(mate.numbers), mode_of(mate.mode), behind(mate, V),
+                                piece_value(piece_of(mate.tau), t), vector_of(mate.y))
+
+
+def _put_dense(mate: Any, stages: list[Vector], h: float) -> None:
+    vectors = dormand_prince.dense_of(vector_of(mate.start), vector_of(mate.end), stages, h)
+    for k in range(_SIZE):
+        vector = vectors[k]
+        for n in range(_SIZE):
+            mate.dense[_SIZE * k + n] = vector[n]
+
+
+def between(mate: Any, x: float) -> Vector:
+    """Return the state of a mate at the fraction x of a step."""
+    d = mate.dense
+    return dormand_prince.interpolate(vector_of(mate.start), (
+        (d[0], d[1], d[2], d[3], d[4], d[5], d[6]), (d[7], d[8], d[9], d[10], d[11], d[12], d[13]),
+        (d[14], d[15], d[16], d[17], d[18], d[19], d[20]), (d[21], d[22], d[23], d[24], d[25], d[26], d[27]),
+        (d[28], d[29], d[30], d[31], d[32], d[33], d[34]), (d[35], d[36], d[37], d[38], d[39], d[40], d[41]),
+        (d[42], d[43], d[44], d[45], d[46], d[47], d[48])), x)

@@ -1,38 +1,28 @@
 """Several servos on one source: who takes part, which way the currents flow, and the bus voltage that they leave.
 
-A servo takes part while its bridge connects the motor to the bus: with the sign of the drive, or through the diodes of
-a coasting bridge against the sign of its current. Its numbers are then those of a stiff source, and u = s V_bus.
+A servo takes part, as a mate of the others, while its bridge connects the motor to the bus: with the sign of the drive,
+or through the diodes of a coasting bridge against the sign of its current. Its numbers are then those of a stiff
+source, and u = s V_bus. The functions take the first `count` records of `seats.Mate`, each as it stands at its `y`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any
 
 from servotwin.models.engine import currents
-from servotwin.models.engine.modes import NO_CURRENT, Mode, Vector, sign_of
+from servotwin.models.engine.modes import NO_CURRENT, Vector, sign_of
+from servotwin.models.engine.seats import numbers_of, vector_of
 from servotwin.models.terms import source as source_term
 from servotwin.models.terms.bridge import Bridge
-from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.source import Source
 from servotwin.physics import bridge, motor, supply
-from servotwin.physics.pieces import Piece
 
 _EDGE = 1e-8  # of a limit: so near to it the sum of currents counts as being there
 
 # What the source does: it follows its resistance, gives its most, has broken down, or takes nothing back.
 FOLLOWING, LIMITED, BROKEN_DOWN, KEEPING = range(4)
-
-
-class Member(NamedTuple):
-    """A servo whose motor is connected to the bus."""
-
-    numbers: Numbers  # as on a stiff source
-    mode: Mode
-    sign: float  # of the bus voltage in its circuit
-    tau: Piece
-    returns: bool  # through diodes, against the bus alone
 
 
 def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
@@ -48,74 +38,81 @@ def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
         numbers.heat)
 
 
-def member_of(stiff: Numbers, mode: Mode, drive: float, tau: Piece, y: Vector) -> Member:
-    """Return a servo as a member, driven or (0) returning current through the diodes of a coasting bridge."""
-    sign = drive
-    if sign == 0.0:  # against the current, or against the one that the back-EMF would drive
-        sign = -math.copysign(1.0, y[2]) if y[2] != 0.0 else math.copysign(1.0, y[6])
-    return Member(stiff, mode, sign, tau, drive == 0.0)
+def sign_on_bus(drive: float, y: Vector) -> float:
+    """Return the sign of the bus voltage in a circuit, driven or (0) through the diodes of a coasting bridge."""
+    if drive != 0.0:
+        return drive
+    # against the current, or against the one that the back-EMF would drive
+    return -math.copysign(1.0, y[2]) if y[2] != 0.0 else math.copysign(1.0, y[6])
 
 
-def _demand(members: list[Member], states: list[Vector]) -> tuple[float, float, float]:
-    """Return g, h and I_B of the current Σ s i = g V − h + I_B that the members take at the bus voltage V."""
+def _loop(mate: Any) -> tuple[float, float, float]:
+    """Return resistance [Ω], voltage drop [V] and K_b of the circuit of a mate."""
+    if mate.numbers.heat.C_w > 0.0:
+        now = warm(numbers_of(mate.numbers), vector_of(mate.y))
+        return now.bridge.R_drive, now.bridge.D_drive, now.motor.K_b
+    return mate.numbers.bridge.R_drive, mate.numbers.bridge.D_drive, mate.numbers.motor.K_b
+
+
+def _demand(mates: Any, count: int) -> tuple[float, float, float]:
+    """Return g, h and I_B of the current Σ s i = g V − h + I_B that the mates take at the bus voltage V."""
     g = h = given = 0.0
-    for j in range(len(members)):
-        member, y = members[j], states[j]
-        if inductive(member.numbers.motor):
-            given += member.sign * y[2]
-        elif member.mode.zone != NO_CURRENT:
-            now = warm(member.numbers, y)
-            g += motor.steady_armature_current(1.0, 0.0, now.bridge.R_drive, now.motor.K_b)
-            v = bridge.driving_voltage(0.0, sign_of(member.mode.zone), now.bridge.D_drive)
-            h -= member.sign * motor.steady_armature_current(v, y[6], now.bridge.R_drive, now.motor.K_b)
+    for k in range(count):
+        mate = mates[k]
+        if mate.numbers.motor.L > 0.0:
+            given += mate.sign * mate.y[2]
+        elif mate.mode.zone != NO_CURRENT:
+            R, D, K_b = _loop(mate)
+            g += motor.steady_armature_current(1.0, 0.0, R, K_b)
+            v = bridge.driving_voltage(0.0, sign_of(mate.mode.zone), D)
+            h -= mate.sign * motor.steady_armature_current(v, mate.y[6], R, K_b)
     return g, h, given
 
 
-def bus_voltage(source: Source, state: int, members: list[Member], states: list[Vector]) -> float:
+def bus_voltage(source: Source, state: int, mates: Any, count: int) -> float:
     """Return V_bus [V] for a state of the source."""
     if state == BROKEN_DOWN:
         return 0.0
     if state == KEEPING:
         return source.V
-    g, h, given = _demand(members, states)
+    g, h, given = _demand(mates, count)
     if state == FOLLOWING:
         free = supply.source_voltage(given - h, source.V, source.R_b)
         return free / (1.0 - supply.source_voltage(g, 0.0, source.R_b))
     if g > 0.0:
         return (source.I_max + h - given) / g
     above = below = 0.0  # the currents have inertia: their sum has to stay
-    for j in range(len(members)):
-        member, y = members[j], states[j]
-        if member.mode.zone != NO_CURRENT:
-            now = warm(member.numbers, y)
-            v = bridge.driving_voltage(0.0, sign_of(member.mode.zone), now.bridge.D_drive)
-            R, L, K_b = now.bridge.R_drive, now.motor.L, now.motor.K_b
-            above -= member.sign * motor.armature_current_rate(v, y[2], y[6], R, L, K_b)
+    for k in range(count):
+        mate = mates[k]
+        if mate.mode.zone != NO_CURRENT:
+            R, D, K_b = _loop(mate)
+            v, L = bridge.driving_voltage(0.0, sign_of(mate.mode.zone), D), mate.numbers.motor.L
+            above -= mate.sign * motor.armature_current_rate(v, mate.y[2], mate.y[6], R, L, K_b)
             below += motor.armature_current_rate(1.0, 0.0, 0.0, R, L, K_b)
     return above / below
 
 
-def drawn(source: Source, V_bus: float, members: list[Member], states: list[Vector]) -> float:
+def drawn(V_bus: float, mates: Any, count: int) -> float:
     """Return the current Σ s i [A] that the source gives."""
-    g, h, given = _demand(members, states)
+    g, h, given = _demand(mates, count)
     return g * V_bus - h + given
 
 
-def source_state(source: Source, members: list[Member], states: list[Vector]) -> int:
-    """Return what the source does for members in these zones and states."""
+def source_state(source: Source, mates: Any, count: int) -> int:
+    """Return what the source does for mates in these zones and states."""
     if source.I_max == math.inf:
         return FOLLOWING
-    V = bus_voltage(source, FOLLOWING, members, states)
-    total = drawn(source, V, members, states)
+    V = bus_voltage(source, FOLLOWING, mates, count)
+    total = drawn(V, mates, count)
     if total < 0.0:
         return KEEPING
-    g, _, _ = _demand(members, states)
+    g, _, _ = _demand(mates, count)
     edge = _EDGE if g == 0.0 else 0.0  # the sum of currents with inertia is at the limit but for rounding
     if total < source.I_max * (1.0 - edge):
         return FOLLOWING
     if g == 0.0 and total > source.I_max * (1.0 + edge):
         return BROKEN_DOWN
-    V = bus_voltage(source, LIMITED, members, states)
+    V = bus_voltage(source, LIMITED, mates, count)
     if V < 0.0:
         return BROKEN_DOWN
     return LIMITED if V <= supply.source_voltage(source.I_max, source.V, source.R_b) else FOLLOWING
@@ -134,36 +131,32 @@ def source_guards(source: Source, state: int, V_bus: float, total: float) -> tup
     return total - source.I_max, 1.0
 
 
-def put_in_zones(source: Source, members: list[Member], states: list[Vector], V_bus: float) -> tuple[int, float]:
-    """Put the members into the zones of their currents; return what the source does, and V_bus; from a guess of V_bus.
+def put_in_zones(source: Source, mates: Any, count: int, V_bus: float) -> tuple[int, float]:
+    """Put the mates into the zones of their currents; return what the source does, and V_bus; from a guess of V_bus.
 
     The bus sags the more of them conduct, and the fewer conduct the more it sags: a few rounds settle it.
     """
     state = FOLLOWING
-    for _ in range(20 + 4 * len(members)):
-        for j in range(len(members)):
-            members[j] = in_zone(members[j], _zone(members[j], states[j], V_bus))
-        state = source_state(source, members, states)
-        before, V_bus = V_bus, bus_voltage(source, state, members, states)
+    for _ in range(20 + 4 * count):
+        for k in range(count):
+            mate = mates[k]
+            mate.mode.zone = _zone(mate, V_bus)
+        state = source_state(source, mates, count)
+        before, V_bus = V_bus, bus_voltage(source, state, mates, count)
         if abs(V_bus - before) <= 1e-14 * source.V:
             break
     return state, V_bus
 
 
-def _zone(member: Member, y: Vector, V_bus: float) -> int:
-    return let_through(member, currents.zone_of(
-        warm(member.numbers, y), behind(member, V_bus), 0.0, y[0], y[6], y[2]))
+def _zone(mate: Any, V_bus: float) -> int:
+    y = vector_of(mate.y)
+    numbers = warm(numbers_of(mate.numbers), y)
+    return let_through(mate, currents.zone_of(numbers, behind(mate, V_bus), 0.0, y[0], y[6], y[2]))
 
 
-def in_zone(member: Member, zone: int) -> Member:
-    """Return a member in a zone."""
-    numbers, mode, sign, tau, returns = member
-    return Member(numbers, Mode(zone, mode.contact, mode.mesh, mode.motor), sign, tau, returns)
-
-
-def let_through(member: Member, zone: int) -> int:
-    """Return the zone of a member: diodes block what the bus would drive."""
-    return NO_CURRENT if member.returns and sign_of(zone) * member.sign > 0.0 else zone
+def let_through(mate: Any, zone: int) -> int:
+    """Return the zone of a mate: diodes block what the bus would drive."""
+    return NO_CURRENT if mate.returns > 0 and sign_of(zone) * mate.sign > 0.0 else zone
 
 
 def after(state: int, guard: int) -> int:
@@ -175,6 +168,7 @@ def after(state: int, guard: int) -> int:
     return FOLLOWING if state == KEEPING else LIMITED
 
 
-def behind(member: Member, V_bus: float) -> float:
-    """Return the voltage in a member's circuit [V]; a bus without any is still connected."""
-    return member.sign * (V_bus if V_bus != 0.0 else 5e-324)
+def behind(mate: Any, V_bus: float) -> float:
+    """Return the voltage in a mate's circuit [V]; a bus without any is still connected."""
+    sign: float = mate.sign
+    return sign * (V_bus if V_bus != 0.0 else 5e-324)

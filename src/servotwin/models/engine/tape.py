@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine.joint_motion import ROOM, Dense
-from servotwin.models.engine.memory import Point
-from servotwin.models.engine.modes import Mode, Vector
-from servotwin.models.engine.motion import Motion
-from servotwin.models.engine.together import Together
-from servotwin.models.terms.frame import Frame
-from servotwin.physics.pieces import Piece
+from servotwin.models.engine.modes import Mode
+from servotwin.models.engine.seats import DENSE as _DENSE
+from servotwin.models.engine.seats import ROOM, mode_of, vector_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,7 +18,6 @@ ALONE, SERIES, DENSE = range(3)
 DRIVES, SILENCE, REFUSED = -10, -20, -30
 ROW, EVENT = 42, 6  # numbers of a row
 UNTIL, FIRST = 4, 24  # where a row of a motion has its end, and the place of its first number
-_STEPS = 49  # numbers of a dense output
 _MOST = 8  # rows of one servo between two looks at the room that is left
 
 
@@ -33,20 +28,6 @@ class Tape(NamedTuple):
     events: NDArray[np.float64]
     numbers: NDArray[np.float64]
     used: NDArray[np.int64]
-
-
-class Track(NamedTuple):
-    """The motion of a servo that moves on its own."""
-
-    kind: int
-    length: float
-    end: Vector
-    next_step: float
-
-
-def track_of(m: Motion) -> Track:
-    """Return what has to be known of a motion to have it again."""
-    return Track(m.kind, m.length, m.end, m.next_step)
 
 
 def runs(tape: Tape) -> bool:
@@ -60,7 +41,7 @@ def is_full(tape: Tape, servos: int) -> bool:
         return False
     most = _MOST * servos
     return bool(tape.used[0] + most > len(tape.motions) or tape.used[1] + most > len(tape.events)
-            or tape.used[2] + 2 * most * ROOM > len(tape.numbers))
+                or tape.used[2] + 2 * most * ROOM > len(tape.numbers))
 
 
 def write_event(tape: Tape, unit: int, time: float, kind: int, mode: Mode, angle: float) -> None:
@@ -74,47 +55,40 @@ def write_event(tape: Tape, unit: int, time: float, kind: int, mode: Mode, angle
     tape.used[1] = n + 1
 
 
-def write_alone(tape: Tape, unit: int, origin: float, before: Point, until: float, now: Frame, u: float, tau: Piece,
-                track: Track) -> None:
-    """Write down the motion of a servo on its own, from a point to a time by its own clock [s]."""
-    _write(tape, unit, ALONE, origin, before, until, now, u, tau, track.kind, track.length, track.next_step, 0,
-           0.0, before.anchor_time, track.end, before.anchor, before.mode)
+def write_alone(tape: Tape, unit: int, seat: Any, until: float) -> None:
+    """Write down the motion of a servo on its own, from its point to a time by its own clock [s]."""
+    track = seat.track
+    _write(tape, unit, ALONE, seat, until, mode_of(seat.point.mode), track.kind, track.length, track.next_step, 0, 0,
+           track.end, seat.point.anchor)
 
 
-def write_together(tape: Tape, unit: int, origin: float, before: Point, until: float, now: Frame, u: float, tau: Piece,
-                   group: Together, j: int) -> None:
-    """Write down the common motion of a servo, the j-th of those that move together."""
-    first = tape.used[2]
-    returns = 1.0 if group.members[j].returns else 0.0
-    if group.terms > 0:
-        for n in range(group.terms):
-            tape.numbers[first + n] = group.speed[j * ROOM + n]
-            tape.numbers[first + group.terms + n] = group.current[j * ROOM + n]
-        tape.used[2] = first + 2 * group.terms
+def write_together(tape: Tape, unit: int, seat: Any, until: float, shared: Any, mate: Any) -> None:
+    """Write down the common motion of a servo, from its point to a time by its own clock [s]."""
+    first, terms = tape.used[2], shared.terms
+    if terms > 0:
+        for n in range(terms):
+            tape.numbers[first + n] = mate.speed[n]
+            tape.numbers[first + terms + n] = mate.current[n]
+        tape.used[2] = first + 2 * terms
     else:
-        _write_dense(tape, first, group.dense[j])
-    _write(tape, unit, SERIES if group.terms > 0 else DENSE, origin, before, until, now, u, tau, group.terms,
-           group.length, 0.0, first, returns, before.anchor_time, group.ends[j], group.starts[j], group.members[j].mode)
+        for n in range(_DENSE):
+            tape.numbers[first + n] = mate.dense[n]
+        tape.used[2] = first + _DENSE
+    _write(tape, unit, SERIES if terms > 0 else DENSE, seat, until, mode_of(mate.mode), terms, shared.length, 0.0,
+           first, mate.returns, mate.end, mate.start)
 
 
-def _write_dense(tape: Tape, first: int, dense: Dense) -> None:
-    for k in range(7):
-        vector = dense[k]
-        for n in range(7):
-            tape.numbers[first + 7 * k + n] = vector[n]
-    tape.used[2] = first + _STEPS
-
-
-def _write(tape: Tape, unit: int, how: int, origin: float, before: Point, until: float, now: Frame, u: float,
-           tau: Piece, kind: int, length: float, next_step: float, first: int, returns: float, anchor: float,
-           end: Vector, start: Vector, mode: Mode) -> None:
-    values = (1.0 * unit, 1.0 * how, origin, before.time, until, now.error, before.wiper, now.drive, 1.0 * now.silent,
-              1.0 * mode.zone, 1.0 * mode.contact, 1.0 * mode.mesh, 1.0 * mode.motor, u,
-              tau.start, tau.value, tau.slope, tau.amplitude, tau.frequency, tau.phase, tau.sweep,
-              1.0 * kind, length, next_step, 1.0 * first, returns, anchor, before.step,
-              end[0], end[1], end[2], end[3], end[4], end[5], end[6],
-              start[0], start[1], start[2], start[3], start[4], start[5], start[6])
+def _write(tape: Tape, unit: int, how: int, seat: Any, until: float, mode: Mode, kind: int, length: float,
+           next_step: float, first: int, returns: int, end: Any, start: Any) -> None:
+    now, point, tau = seat.decided, seat.point, seat.tau
+    y, z = vector_of(end), vector_of(start)
+    values = (1.0 * unit, 1.0 * how, seat.origin, point.time, until, now.error, point.wiper, now.drive,
+              1.0 * now.silent, 1.0 * mode.zone, 1.0 * mode.contact, 1.0 * mode.mesh, 1.0 * mode.motor,
+              seat.numbers.source.V * now.drive,
+              tau.start - seat.origin, tau.value, tau.slope, tau.amplitude, tau.frequency, tau.phase, tau.sweep,
+              1.0 * kind, length, next_step, 1.0 * first, 1.0 * returns, point.anchor_time, point.step,
+              y[0], y[1], y[2], y[3], y[4], y[5], y[6], z[0], z[1], z[2], z[3], z[4], z[5], z[6])
     n = tape.used[0]
-    for k in range(len(values)):
+    for k in range(ROW):
         tape.motions[n, k] = values[k]
     tape.used[0] = n + 1

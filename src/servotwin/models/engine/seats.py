@@ -1,0 +1,128 @@
+"""What servos on a bus work with while they go on: a record for each, and one for each that moves with others.
+
+For a compiler these are numpy's records, in plain Python objects of the same names (`records.object_of`).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.models.engine.memory import Point
+from servotwin.models.engine.modes import Mode, Vector
+from servotwin.models.engine.records import record_reader, record_writer
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.source import Source
+from servotwin.physics.pieces import Piece
+
+ROOM = 42  # coefficients of a series at most
+DENSE = 49  # numbers of the dense output of a step
+
+if TYPE_CHECKING:
+    Coefficients = list[float]
+    Numerals = list[float]
+    State = list[float]
+else:
+    Coefficients = tuple[(float,) * ROOM]
+    Numerals = tuple[(float,) * DENSE]
+    State = Vector
+
+
+class Track(NamedTuple):
+    """The motion of a servo that moves on its own, as far as it has to be known to have it again."""
+
+    kind: int
+    length: float
+    end: Vector
+    next_step: float
+
+
+class Seat(NamedTuple):
+    """A servo on a bus; times by its own clock [s] unless said."""
+
+    numbers: Numbers
+    chip: Chip
+    point: Point
+    decided: Frame  # what its chip remembers
+    tau: Piece
+    tau_end: float
+    frames: int  # where its clock counts from, as in `Memory`
+    beat: float
+    origin: float
+    period: float  # of its frames; 0: as listed
+    clock: float  # its time now
+    late: float  # by how much its clock is ahead of that of the bus
+    end: float  # when the run is over
+    switch: float  # when bridge or load change next
+    edge: float  # when its next frame begins
+    limit: float  # when anything is to be done next
+    due: float  # the same by the clock of the bus
+    arrival: float  # when it has its next point, left alone, by the clock of the bus; nan: not found out
+    ahead: Point
+    event: int  # that it has there; −1: none
+    track: Track
+    joined: int  # its place among those that move together; −1: none
+
+
+class Mate(NamedTuple):
+    """A servo whose motor is connected to the bus; times by the clock of the bus [s]."""
+
+    unit: int
+    numbers: Numbers  # as on a stiff source
+    mode: Mode
+    sign: float  # of the bus voltage in its circuit
+    returns: int  # 1: through diodes, against the bus alone
+    tau: Piece
+    start: State  # where the common motion began
+    end: State  # where it ends when nothing happens
+    y: State  # where it is looked at
+    speed: Coefficients  # of power series
+    current: Coefficients
+    dense: Numerals  # of a step
+
+
+class Shared(NamedTuple):
+    """What servos on one source remember besides what each does; times by the clock of the first of them [s]."""
+
+    phase: int
+    state: int  # what the source does
+    jumped: int  # 1: the common motion has ended with a jump, so that zones have to be found anew
+    whose: int  # event will end it, by number among those that move together; −1: the source's, or none
+    kind: int
+    count: int  # how many move together
+    terms: int  # of their series; 0: it is a step
+    voltage: float  # of the bus when it was worked out last
+    step: float  # the next to try
+    begin: float  # of the common motion
+    length: float
+    end: float
+    source: Source
+
+
+numbers_of = record_reader("numbers_of", Numbers)
+put_numbers = record_writer("put_numbers", Numbers)
+chip_of = record_reader("chip_of", Chip)
+put_chip = record_writer("put_chip", Chip)
+point_of = record_reader("point_of", Point)
+put_point = record_writer("put_point", Point)
+decided_of = record_reader("decided_of", Frame)
+put_decided = record_writer("put_decided", Frame)
+piece_of = record_reader("piece_of", Piece)
+put_piece = record_writer("put_piece", Piece)
+mode_of = record_reader("mode_of", Mode)
+put_mode = record_writer("put_mode", Mode)
+put_track = record_writer("put_track", Track)
+put_shared = record_writer("put_shared", Shared)
+source_of = record_reader("source_of", Source)
+
+
+def vector_of(values: Any) -> Vector:
+    """Return a state that stands in a record."""
+    return (values[0], values[1], values[2], values[3], values[4], values[5], values[6])
+
+
+def put_vector(values: Any, y: Vector) -> None:
+    """Put a state into a record."""
+    for n in range(7):
+        values[n] = y[n]
