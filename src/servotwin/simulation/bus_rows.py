@@ -14,6 +14,7 @@ from servotwin.models.engine import motion, rodas, tape
 from servotwin.models.engine.modes import Mode
 from servotwin.models.engine.motion import Motion
 from servotwin.models.engine.rates import jacobian
+from servotwin.models.engine.seats import vector_of
 from servotwin.models.engine.shared_source import on_stiff_source
 from servotwin.models.engine.step import at_pulses
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
@@ -88,8 +89,8 @@ class _Maker:
         mode = Mode(int(zone), int(contact), int(mesh), int(motor))
         numbers = at_pulses(self._plan.numbers, int(silent))
         base = motion.nothing(numbers, Piece(value=u), tau)._replace(
-            kind=int(kind), mode=mode, t0=anchor, length=length, end=tuple(rest[14:21]), start=tuple(rest[21:28]),
-            next_step=next_step)
+            kind=int(kind), mode=mode, t0=anchor, length=length, next_step=next_step, end=vector_of(rest[14:21]),
+            start=vector_of(rest[21:28]))
         if how == tape.ALONE:
             m = _alone(base, step)
         else:
@@ -103,7 +104,7 @@ class _Maker:
             return motion.by_series(numbers, mode, u, tau, m.t0, m.start, m.length, tuple(both[:m.kind]),
                                     tuple(both[m.kind:]))
         dense = self._given[first:first + _STEPS * _STEPS].reshape(_STEPS, _STEPS).tolist()
-        return motion.by_step(numbers, mode, u, tau, m.t0, m.start, m.length, tuple(map(tuple, dense)), m.end)
+        return motion.by_step(numbers, mode, u, tau, m.t0, m.start, m.length, tuple(map(vector_of, dense)), m.end)
 
 
 def _alone(m: Motion, step: float) -> Motion:

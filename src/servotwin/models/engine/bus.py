@@ -145,7 +145,7 @@ def _come(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: 
     if shared.phase != TOGETHER or shared.end > time:
         return COMPLETED
     mode = together.arrive(shared, mates)
-    for k in range(shared.count):
+    for k in range(shared.members):
         mate, own = mates[k], k == shared.whose
         seat, y = seats[mate.unit], vector_of(mate.y)
         if step.status_of(y) != COMPLETED:
@@ -297,7 +297,7 @@ def _join(count: int, shared: Any, seats: Any, mates: Any, same: bool, written: 
             limit = min(limit, seat.switch - seat.late)
             crew.take_part(seat, j, mates[members], seat.point.y, seat.point.y)
             members += 1
-    shared.count = members
+    shared.members = members
     together.begin(shared, mates, time, max(limit, time), same)
     for k in range(members):
         mate = mates[k]

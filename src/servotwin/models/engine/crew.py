@@ -110,7 +110,7 @@ def set_clock(seat: Any, time: float, until: float) -> None:
 
 def by_bus(seat: Any, time: float, until: float) -> float:
     """Return when it is this time by a servo's clock, by that of the bus, the end of the run at the latest [s]."""
-    return until if time >= seat.end else min(time - seat.late, until)
+    return until if time >= seat.end else float(min(time - seat.late, until))
 
 
 def plan_ahead(seat: Any, edge: float, until: float) -> None:

@@ -11,25 +11,27 @@ from typing import Any, NamedTuple
 from servotwin.models.engine import contacts, dormand_prince
 from servotwin.models.engine.dormand_prince import STAGES
 from servotwin.models.engine.modes import INSIDE, NO_CURRENT, NOWHERE, Vector, at_rest, sign_of
+from servotwin.models.engine.motion import LONG_STEP
 from servotwin.models.engine.rates import rates_of
 from servotwin.models.engine.seats import ROOM, mode_of, numbers_of, piece_of, put_vector, vector_of
 from servotwin.models.engine.shared_source import BROKEN_DOWN, FOLLOWING, KEEPING, LIMITED, behind, bus_voltage
 from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import piece_value
 
+BY_SERIES = -1  # how mates move: beside LONG_STEP, which a recipe may leave out
 _LONGEST = 1.5  # of a series, in times of its fastest rate
 _TOLERANCE = 1e-12  # error of one step, relative to 1 + |state|
 _SIZE = 7  # of a state
 
 
-def are_linear(mates: Any, count: int) -> bool:
-    """Tell whether all mates move by linear laws."""
+def kind_of(mates: Any, count: int) -> int:
+    """Return how mates move: by series where the laws of all are linear, else by a step."""
     for k in range(count):
         mate = mates[k]
         if mate.numbers.heat.C_w > 0.0 or mate.numbers.load.gravity != 0.0 or mate.mode.mesh == INSIDE or (
                 mate.numbers.friction.varies > 0.0 and not at_rest(mate.mode.contact)):
-            return False
-    return True
+            return LONG_STEP
+    return BY_SERIES
 
 
 def fastest_rate(mates: Any, count: int) -> float:

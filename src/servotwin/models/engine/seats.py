@@ -90,8 +90,9 @@ class Shared(NamedTuple):
     jumped: int  # 1: the common motion has ended with a jump, so that zones have to be found anew
     whose: int  # event will end it, by number among those that move together; −1: the source's, or none
     kind: int
-    count: int  # how many move together
-    terms: int  # of their series; 0: it is a step
+    members: int  # how many move together
+    how: int  # by series, or by a step: BY_SERIES or LONG_STEP
+    terms: int  # of the series
     voltage: float  # of the bus when it was worked out last
     step: float  # the next to try
     begin: float  # of the common motion

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.modes import Mode
+from servotwin.models.engine.motion import LONG_STEP
 from servotwin.models.engine.seats import DENSE as _DENSE
 from servotwin.models.engine.seats import ROOM, mode_of, vector_of
 
@@ -64,8 +65,8 @@ def write_alone(tape: Tape, unit: int, seat: Any, until: float) -> None:
 
 def write_together(tape: Tape, unit: int, seat: Any, until: float, shared: Any, mate: Any) -> None:
     """Write down the common motion of a servo, from its point to a time by its own clock [s]."""
-    first, terms = tape.used[2], shared.terms
-    if terms > 0:
+    first, terms, how = tape.used[2], shared.terms, SERIES
+    if shared.how != LONG_STEP:
         for n in range(terms):
             tape.numbers[first + n] = mate.speed[n]
             tape.numbers[first + terms + n] = mate.current[n]
@@ -73,8 +74,8 @@ def write_together(tape: Tape, unit: int, seat: Any, until: float, shared: Any, 
     else:
         for n in range(_DENSE):
             tape.numbers[first + n] = mate.dense[n]
-        tape.used[2] = first + _DENSE
-    _write(tape, unit, SERIES if terms > 0 else DENSE, seat, until, mode_of(mate.mode), terms, shared.length, 0.0,
+        tape.used[2], how = first + _DENSE, DENSE
+    _write(tape, unit, how, seat, until, mode_of(mate.mode), terms, shared.length, 0.0,
            first, mate.returns, mate.end, mate.start)
 
 

@@ -1,6 +1,6 @@
 """Servos whose motors are connected to one source at the same time: their common motion, and what ends it.
 
-The functions take records of `seats.Mate`, of which the first `shared.count` move together.
+The functions take records of `seats.Mate`, of which the first `shared.members` move together.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from servotwin.models.engine import contacts, guards, joint_motion, shared_sourc
 from servotwin.models.engine.joint_motion import turns
 from servotwin.models.engine.memory import FIRST_STEP
 from servotwin.models.engine.modes import BACKWARD, FORWARD, NO_CURRENT, RIGID, STUCK, Mode, Vector, sign_of
+from servotwin.models.engine.motion import LONG_STEP
 from servotwin.models.engine.seats import (
     Shared,
     mode_of,
@@ -39,7 +40,8 @@ APART, TOGETHER, ENDED = range(3)
 
 def at_start(source: Source) -> Shared:
     """Return what servos on a source remember when none has moved yet."""
-    return Shared(APART, shared_source.FOLLOWING, 1, -1, -1, 0, 0, source.V, FIRST_STEP, 0.0, 0.0, math.inf, source)
+    return Shared(APART, shared_source.FOLLOWING, 1, -1, -1, 0, joint_motion.BY_SERIES, 0, source.V, FIRST_STEP, 0.0, 0.0,
+                  math.inf, source)
 
 
 def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> None:
@@ -47,7 +49,7 @@ def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> Non
 
     The `same` mates go on after an event of theirs that has already told zones and source.
     """
-    source, count = source_of(shared.source), shared.count
+    source, count = source_of(shared.source), shared.members
     _look_at_start(mates, count)
     if same and shared.jumped == 0:
         shared.voltage = shared_source.bus_voltage(source, shared.state, mates, count)
@@ -56,20 +58,22 @@ def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> Non
         shared.state, shared.voltage = state, voltage
         for k in range(count):
             _settle(mates[k], time, voltage)
-    linear = joint_motion.are_linear(mates, count)
-    shared.begin, shared.phase = time, TOGETHER
-    shared.length = min(limit - time, joint_motion.longest_series(mates, count) if linear else shared.step)
-    following = _move(shared, mates, linear)
-    if not linear:
+    shared.begin, shared.phase, shared.how = time, TOGETHER, joint_motion.kind_of(mates, count)
+    if shared.how == LONG_STEP:
+        shared.length = min(limit - time, shared.step)
+        following = _move(shared, mates)
         shared.step = max(shared.step, following) if shared.length == limit - time else following
+    else:
+        shared.length = min(limit - time, joint_motion.longest_series(mates, count))
+        _move(shared, mates)
     if shared.length >= 0.0:
         _find_end(source, shared, mates, limit)
 
 
 def resume(shared: Any, mates: Any) -> None:
     """Take up a common motion again, as it was."""
-    _look_at_start(mates, shared.count)
-    _move(shared, mates, joint_motion.are_linear(mates, shared.count))
+    _look_at_start(mates, shared.members)
+    _move(shared, mates)
 
 
 def _look_at_start(mates: Any, count: int) -> None:
@@ -83,24 +87,23 @@ def _settle(mate: Any, time: float, voltage: float) -> None:
                                        piece_value(piece_of(mate.tau), time), y, mode.mesh, False))
 
 
-def _move(shared: Any, mates: Any, linear: bool) -> float:
+def _move(shared: Any, mates: Any) -> float:
     """Work out the motion of mates in their modes for its length [s] or less; return the next step to try."""
-    source, count = source_of(shared.source), shared.count
-    if linear:
-        shared.terms = joint_motion.series(source, shared.state, mates, count, shared.begin, shared.length)
-        for k in range(count):
-            put_vector(mates[k].end, state_at(shared, mates[k], shared.length))
-        return 0.0
-    shared.terms = 0
-    step = joint_motion.joint_step(source, shared.state, mates, count, shared.begin, shared.length)
-    shared.length = step.length
-    return step.following
+    source, count = source_of(shared.source), shared.members
+    if shared.how == LONG_STEP:
+        step = joint_motion.joint_step(source, shared.state, mates, count, shared.begin, shared.length)
+        shared.terms, shared.length = 0, step.length
+        return step.following
+    shared.terms = joint_motion.series(source, shared.state, mates, count, shared.begin, shared.length)
+    for k in range(count):
+        put_vector(mates[k].end, state_at(shared, mates[k], shared.length))
+    return 0.0
 
 
 def state_at(shared: Any, mate: Any, s: float) -> Vector:
     """Return the state of a mate at s [s] after the beginning."""
     start = vector_of(mate.start)
-    if shared.terms == 0:
+    if shared.how == LONG_STEP:
         if s >= shared.length:
             return vector_of(mate.end)
         return joint_motion.between(mate, s / shared.length) if s > 0.0 else start
@@ -124,8 +127,8 @@ def state_at(shared: Any, mate: Any, s: float) -> Vector:
 def _find_end(source: Source, shared: Any, mates: Any, limit: float) -> None:
     """Find the first event of a mate or of the source."""
     first, whose, which = shared.length, -1, -1
-    for j in range(shared.count):
-        if shared.terms > 0 and _is_calm(shared, mates[j]):
+    for j in range(shared.members):
+        if shared.how != LONG_STEP and _is_calm(shared, mates[j]):
             continue
         kinds = _kinds(mates[j])
         for kind in range(guards.MOTOR_RELEASE_BACKWARD + 1):
@@ -168,7 +171,7 @@ def _holds(mate: Any, terms: int, length: float) -> bool:
     numbers = numbers_of(mate.numbers)
     against = external_torque(numbers.load, mate.tau.value, mate.end[0])
     low, high = contacts.holding_bounds(numbers, 0.0, 0.0)
-    return -low < numbers.motor.K * min(i0, i1) - against and numbers.motor.K * max(i0, i1) - against < high
+    return bool(-low < numbers.motor.K * min(i0, i1) - against and numbers.motor.K * max(i0, i1) - against < high)
 
 
 def _keeps_its_sign(series: Any, terms: int, end: float, sign: float, length: float) -> bool:
@@ -226,8 +229,8 @@ def _guard(source: Source, shared: Any, mates: Any, j: int, kind: int, s: float)
     """Return a guard of a mate, or (j < 0) of the source."""
     if j < 0:
         look(shared, mates, s)
-        V = shared_source.bus_voltage(source, shared.state, mates, shared.count)
-        total = shared_source.drawn(V, mates, shared.count)
+        V = shared_source.bus_voltage(source, shared.state, mates, shared.members)
+        total = shared_source.drawn(V, mates, shared.members)
         guard, other = shared_source.source_guards(source, shared.state, V, total)
         return guard if kind == 0 else other
     mate, u, t = mates[j], 0.0, shared.begin + s
@@ -235,7 +238,7 @@ def _guard(source: Source, shared: Any, mates: Any, j: int, kind: int, s: float)
         put_vector(mate.y, state_at(shared, mate, s))
     else:
         look(shared, mates, s)
-        u = shared_source.behind(mate, shared_source.bus_voltage(source, shared.state, mates, shared.count))
+        u = shared_source.behind(mate, shared_source.bus_voltage(source, shared.state, mates, shared.members))
     tau, y = piece_of(mate.tau), vector_of(mate.y)
     return guards.guard(numbers_of(mate.numbers), mode_of(mate.mode), kind, u, 0.0, piece_value(tau, t),
                         piece_rate(tau, t), y, y)[0]
@@ -243,13 +246,13 @@ def _guard(source: Source, shared: Any, mates: Any, j: int, kind: int, s: float)
 
 def look(shared: Any, mates: Any, s: float) -> None:
     """Put all mates where they are at s [s] after the beginning."""
-    for k in range(shared.count):
+    for k in range(shared.members):
         put_vector(mates[k].y, state_at(shared, mates[k], s))
 
 
 def arrive(shared: Any, mates: Any) -> Mode:
     """Take the mates to the end of their common motion; return the mode of the one whose event it was."""
-    source, count, whose, kind = source_of(shared.source), shared.count, shared.whose, shared.kind
+    source, count, whose, kind = source_of(shared.source), shared.members, shared.whose, shared.kind
     if kind < 0:
         for k in range(count):
             put_vector(mates[k].y, vector_of(mates[k].end))
