@@ -40,7 +40,7 @@ LOOK_SIDE_BY_SIDE = Recipe(
 LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",))
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
-_SHARED = ("pieces", "edges")  # by all lanes
+_SHARED = ("pieces", "edges", "accuracy")  # by all lanes
 _TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
 _SMALLEST = 2.0**-150  # what is not more is zero in float32
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
@@ -211,7 +211,7 @@ def lanes_of(work: Work) -> Lanes:
         tiles_with(Numbers, work.numbers, work.lanes), tiles_with(Chip, work.chip or NO_CHIP, work.lanes),
         _own(work.start, np.float64), _column(work.constant_torque, work.lanes), _indices(work.seeds),
         _rows(work.command.rows), _indices(work.command.first), _indices(work.command.count),
-        _own(own, np.float64), _indices(work.edges.first), _indices(work.edges.count))
+        _own(own, np.float64), _indices(work.edges.first), _indices(work.edges.count), work.accuracy)
 
 
 def _column(values: Any, lanes: int) -> Floats:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.records import mapped
 
 if TYPE_CHECKING:
@@ -102,6 +103,8 @@ class Work:
         "float64" or "float32".
     curve : tuple
         Angles [rad] and errors [V] of the potentiometer's linearity table, the same for all lanes.
+    accuracy : float
+        Of what is integrated [rad].
     """
 
     law: str
@@ -118,6 +121,7 @@ class Work:
     fields: tuple[str, ...]
     dtype: str
     curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    accuracy: float = ACCURACY
 
     @property
     def lanes(self) -> int:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+ACCURACY = 1e-9  # rad, unless another is asked for
 FIRST_STEP = 1e-4  # s, the first that the integrator tries
 BEAT = 0.0625  # s, by which the clock counts where no pulses come regularly
 FRAMES = 256  # after so many times count anew: not after each, for that would round all of them anew
@@ -64,6 +65,7 @@ class Inputs(NamedTuple):
     edges: Sequence[float] | NDArray[np.float64]
     curve: Sequence[Sequence[float]] | NDArray[np.float64]  # of the potentiometer: angles and errors
     seed: int
+    accuracy: float  # of what is integrated [rad]
 
 
 NOTHING = Piece()

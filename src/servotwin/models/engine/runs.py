@@ -71,7 +71,8 @@ def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
     own = lanes.edge_count[lane]
     edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
     period = 0.0 if own >= 0 else chip_of(lanes, lane).frame_period
-    return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane])
+    return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane],
+                  lanes.accuracy)
 
 
 def mode_of(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> Mode:

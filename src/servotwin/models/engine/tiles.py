@@ -188,6 +188,7 @@ class Lanes(NamedTuple):
     edges: Floats
     edge_first: Indices
     edge_count: Indices
+    accuracy: float  # of what is integrated [rad]
 
 
 class Outputs(NamedTuple):
