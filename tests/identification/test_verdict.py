@@ -12,7 +12,7 @@ from servotwin.identification.fitting.diagnosis.bench import gain, teaching
 from servotwin.identification.fitting.noise import Series, isolated, noise_of
 from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.identification.fitting.verdict import judge
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 
 NOISE = 1e-3  # rad
 COUNT = 2.0 * np.pi / 4096.0  # rad, of a 12-bit encoder

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from servotwin import plotting
 from servotwin.cli.curves_words import Row, hot_words, lift_pairs, notes, rows
+from servotwin.look import document, escape, picture, table, to_bytes
 from servotwin.parameters import printed_points
-from servotwin.units.look import document, escape, picture, table, to_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

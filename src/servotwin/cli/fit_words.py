@@ -11,8 +11,8 @@ from servotwin.cli.numbers import quantity
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.report.shown import dimension_of_free
-from servotwin.simulation.sweep.kinds import Distribution, Normal, Offset, Relative, Uniform
-from servotwin.simulation.sweep.words import distribution_of
+from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform
+from servotwin.studies.words import distribution_of
 
 if TYPE_CHECKING:
     from servotwin.identification import Log

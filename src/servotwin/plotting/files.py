@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from servotwin.errors import OutputError
+from servotwin.look import FORMATS, to_bytes
 from servotwin.parameters import write_file
-from servotwin.units.look import FORMATS, to_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

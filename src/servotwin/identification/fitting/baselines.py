@@ -23,7 +23,7 @@ from servotwin.identification.fitting.slew_lag import (
     first_angle,
     usable,
 )
-from servotwin.identification.logs.log import ANGLES, Log
+from servotwin.logs.log import ANGLES, Log
 from servotwin.units import is_finite
 
 Array = NDArray[np.float64]

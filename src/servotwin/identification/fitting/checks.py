@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive, default_model
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES
@@ -33,7 +33,7 @@ _OVERFITTED = 1.6  # error of new logs over that of the fitted ones
 
 def checked_logs(logs: Any) -> tuple[Log, ...]:
     """Return logs, at least one of which moves."""
-    from servotwin.identification.logs.readers import read_logs
+    from servotwin.logs.readers import read_logs
 
     found = read_logs(logs) if isinstance(logs, str | Path) else [logs] if isinstance(logs, Log) else logs
     if not isinstance(found, Sequence) or not found or not all(isinstance(log, Log) for log in found):

@@ -13,8 +13,8 @@ from servotwin.identification.fitting.noise import Series, noise_of
 from servotwin.identification.fitting.phases import Scan, drifts, likely_periods, settled, with_period
 from servotwin.identification.fitting.point import PERIOD_SCALE, Point
 from servotwin.identification.fitting.scatter import by_sensor
-from servotwin.identification.logs.log import ANGLES
-from servotwin.identification.logs.regular import made_regular, regular_times
+from servotwin.logs.log import ANGLES
+from servotwin.logs.regular import made_regular, regular_times
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.task import Task

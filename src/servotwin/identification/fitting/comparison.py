@@ -18,7 +18,7 @@ from servotwin.identification.fitting.held_out import with_pulses_of
 from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
 from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.identification.fitting.task import Task
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
 

@@ -19,8 +19,8 @@ from servotwin.identification.fitting.frames import gap_of, near_edges
 from servotwin.identification.fitting.phases import Choice, Scan
 from servotwin.identification.fitting.point import DELAY_SCALE, LogPart
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
-from servotwin.identification.logs.log import Log
-from servotwin.identification.logs.regular import regular_times
+from servotwin.logs.log import Log
+from servotwin.logs.regular import regular_times
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from servotwin.identification.fitting.frames import latency, widest
 from servotwin.identification.fitting.phases import Choice, Scan, settled
 from servotwin.identification.fitting.point import DELAY_SCALE, LogPart, Point
 from servotwin.identification.fitting.scatter import by_sensor
-from servotwin.identification.logs.log import ANGLES
+from servotwin.logs.log import ANGLES
 
 Array = NDArray[np.float64]
 

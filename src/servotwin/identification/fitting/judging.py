@@ -15,7 +15,7 @@ from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, rows_of
 from servotwin.identification.fitting.verdict import Cause, Verdict, judge, shown
-from servotwin.identification.logs.log import ANGLES
+from servotwin.logs.log import ANGLES
 
 _OUTLIERS = 0.005  # of the samples: then they are told
 _EFFORT = 3.0  # times that of the fit, for all trials: the verdict itself and their start are not counted

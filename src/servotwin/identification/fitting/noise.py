@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.units import is_finite
 
 Array = NDArray[np.float64]

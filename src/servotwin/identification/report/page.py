@@ -11,8 +11,8 @@ from servotwin.identification.report import pictures as report_pictures
 from servotwin.identification.report import tables as report_tables
 from servotwin.identification.report.parts import STYLE, figure, space
 from servotwin.identification.report.shown import error_shown, error_unit, estimate_lines, share_text, tables_of
+from servotwin.look import document, escape, number
 from servotwin.parameters import write_file
-from servotwin.units.look import document, escape, number
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.fit import Fit

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from servotwin.identification.report import parts as report_parts
 from servotwin.identification.report.parts import STYLE, space
 from servotwin.identification.report.shown import error_shown, rig_text
+from servotwin.look import document, escape, number
 from servotwin.parameters import write_file
-from servotwin.units.look import document, escape, number
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.validate import Validation

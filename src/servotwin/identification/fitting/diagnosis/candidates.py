@@ -10,8 +10,8 @@ import numpy as np
 from servotwin.errors import ServotwinError
 from servotwin.identification.fitting.diagnosis.bench import Bench, Setting
 from servotwin.identification.fitting.free import LUMPED, nominal
-from servotwin.identification.logs.log import Log
 from servotwin.loads import Load
+from servotwin.logs.log import Log
 from servotwin.models import BoundedServo, Model
 from servotwin.parameters import Servo
 

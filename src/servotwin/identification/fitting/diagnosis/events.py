@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.diagnosis.bench import Bench, Gain, Told, gain, teaching
 from servotwin.identification.fitting.point import Point
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import BoundedServo
 
 Array = NDArray[np.float64]
