@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -23,7 +21,7 @@ from servotwin.logs.reading import Reading
 from servotwin.logs.sidecar import FOLDER_FILE, Sidecar, sidecar_of, sidecar_path, sidecar_words
 from servotwin.logs.stamps import CLOCKS, stamps_of
 from servotwin.parameters import write_file
-from servotwin.tables import TextTable, read_table
+from servotwin.tables import TextTable, csv_text, read_table
 
 
 def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
@@ -117,15 +115,13 @@ def write_log(log: Log, path: str | Path, *, overwrite: bool = False) -> None:
         if not overwrite and _exists(file):
             raise OutputExistsError(file)
     command = next(name for name, kind in COMMANDS.items() if kind == log.command_kind)
-    columns = {TIME: log.time, command: log.command, **log.measured}
-    rows = [[_cell(x) for x in values.tolist()] for values in columns.values()]
+    columns: dict[str, list[object]] = {
+        name: ["" if math.isnan(x) else x for x in values.tolist()]
+        for name, values in {TIME: log.time, command: log.command, **log.measured}.items()}
     if log.torque_on is not None:
-        rows.append([str(int(x)) for x in log.torque_on.tolist()])
-    header = [*columns, SWITCH][:len(rows)]
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([header, *zip(*rows, strict=True)])
+        columns[SWITCH] = [int(x) for x in log.torque_on.tolist()]
     write_json(sidecar_path(path), sidecar_words(log), overwrite=overwrite)
-    write_file(path, lambda file: file.write_text(text.getvalue(), encoding="utf-8"), overwrite=overwrite)
+    write_file(path, csv_text(columns).encode(), overwrite=overwrite)
 
 
 def _exists(path: Path) -> bool:
@@ -133,10 +129,6 @@ def _exists(path: Path) -> bool:
         return path.exists()
     except (OSError, ValueError):  # writing says what is wrong with the name
         return False
-
-
-def _cell(value: float) -> str:
-    return "" if math.isnan(value) else repr(value)
 
 
 def _command_of(table: TextTable, columns: Mapping[str, Column], said: Sidecar) -> str:

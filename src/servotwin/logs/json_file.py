@@ -58,7 +58,7 @@ def write_json(path: str | Path, content: Mapping[str, Any], *, overwrite: bool 
         If the file exists and `overwrite` is false, or it cannot be written.
     """
     text = json.dumps(content, indent=1) + "\n"
-    write_file(path, lambda file: file.write_text(text, encoding="utf-8"), overwrite=overwrite)
+    write_file(path, text.encode(), overwrite=overwrite)
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
-import io
 import math
 import os
 import secrets
@@ -17,6 +15,7 @@ from pathlib import Path
 from servotwin.errors import OutputError, OutputExistsError
 from servotwin.paper.study import Study, headline_numbers, run_study
 from servotwin.parameters.output_file import undone
+from servotwin.tables import csv_text
 
 _PAGE = "report.html"
 _TABLES = ("table-2.csv", "fits.csv", "parameters.csv")
@@ -159,18 +158,7 @@ def _move(partial: Path, out: Path) -> list[Path]:
 
 
 def _write_csv(path: Path, columns: Mapping[str, Sequence[float] | Sequence[str]]) -> None:
-    """Write columns of any lengths; shorter ones end in empty cells."""
-    length = max(len(column) for column in columns.values())
-    with io.StringIO(newline="") as text:
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(columns)
-        for k in range(length):
-            writer.writerow([_cell(column[k]) if k < len(column) else "" for column in columns.values()])
-        path.write_text(text.getvalue(), encoding="utf-8", newline="\n")
-
-
-def _cell(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.9g}"
+    path.write_bytes(csv_text(columns, digits=9).encode())
 
 
 def _write_tables(folder: Path, study: Study) -> None:

@@ -37,4 +37,4 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> None:
     if file_format not in FORMATS:
         raise OutputError("ending of a picture's name", got=target.name,
                           allowed=", ".join(f".{name}" for name in FORMATS))
-    write_file(target, lambda file: file.write_bytes(to_bytes(figure, file_format)), overwrite=overwrite)
+    write_file(target, to_bytes(figure, file_format), overwrite=overwrite)

@@ -102,7 +102,7 @@ class Folder:
 
     def _write(self, name: str, content: bytes) -> None:
         try:
-            write_file(self.path / name, lambda file: file.write_bytes(content), overwrite=True)
+            write_file(self.path / name, content, overwrite=True)
         except OutputError as error:
             raise OutputError(f"{error.what}; what is finished is kept, and resume=True (--resume) goes on") from None
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -45,11 +46,31 @@ def encoded(columns: Mapping[str, Column], file_format: str) -> bytes:
 
         pyarrow.parquet.write_table(arrow.table({name: arrow.array(x) for name, x in columns.items()}), file)
         return file.getvalue()
+    return csv_text({name: _signless(column).tolist() for name, column in columns.items()}).encode()
+
+
+def csv_text(columns: Mapping[str, Iterable[object]], *, digits: int | None = None) -> str:
+    """Return columns as the text of a CSV file; shorter ones end in empty cells.
+
+    Parameters
+    ----------
+    columns : mapping of str to iterable
+        Words and numbers.
+    digits : int, optional
+        Of each float; as many as bring it back to the last bit unless given.
+
+    Examples
+    --------
+    >>> csv_text({"servo": ["a, b", "c"], "torque_Nm": [1.0 / 3.0]}, digits=3).splitlines()
+    ['servo,torque_Nm', '"a, b",0.333', 'c,']
+    """
+    rows = zip_longest(*columns.values(), fillvalue="")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
-    writer.writerows(zip(*(_signless(column).tolist() for column in columns.values()), strict=True))
-    return text.getvalue().encode()
+    writer.writerows(rows if digits is None else (
+        [f"{cell:.{digits}g}" if isinstance(cell, float) else cell for cell in row] for row in rows))
+    return text.getvalue()
 
 
 def _signless(column: Column) -> Column:

@@ -37,7 +37,7 @@ def write_report(fit: Fit, path: Path, *, overwrite: bool = False) -> Path:
     OutputExistsError, OutputError
         If the file exists and `overwrite` is false, or it cannot be written.
     """
-    write_file(path, lambda file: file.write_text(page(fit), encoding="utf-8", newline="\n"), overwrite=overwrite)
+    write_file(path, page(fit).encode(), overwrite=overwrite)
     return Path(path)
 
 

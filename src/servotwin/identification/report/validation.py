@@ -23,7 +23,7 @@ def write_validation(found: Validation, path: Path, *, overwrite: bool = False) 
     OutputExistsError, OutputError
         If the file exists and `overwrite` is false, or it cannot be written.
     """
-    write_file(path, lambda file: file.write_text(page(found), encoding="utf-8", newline="\n"), overwrite=overwrite)
+    write_file(path, page(found).encode(), overwrite=overwrite)
     return Path(path)
 
 
