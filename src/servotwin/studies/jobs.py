@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +15,7 @@ from servotwin.signals import Signal
 from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.many import simulate_lanes
 from servotwin.simulation.remarks import columns
+from servotwin.simulation.workers import HERE
 from servotwin.studies.metrics import lane_metrics, signals_of
 
 _AT_ONCE = 2**17  # numbers of one signal: they stay in a core's cache
@@ -60,28 +60,10 @@ def run_chunk(job: Job, parameters: Mapping[str, NDArray[Any]], seeds: NDArray[n
     """
     batch = simulate_lanes(
         lanes_of(job.model, job.command, job.load, parameters, None, seeds), duration=job.duration,
-        output_times=job.times, outputs=signals_of(job.metrics), executor=Here(), chunk=job.block)
+        output_times=job.times, outputs=signals_of(job.metrics), executor=HERE, chunk=job.block)
     ended = np.full(len(batch), job.duration)
     for failure in batch.failures:
         ended[failure.lane] = failure.time
     found = lane_metrics(job.metrics, job.times, job.start, batch.signals)
     return {**{name: np.where(batch.status == 0, column, np.nan) for name, column in found.items()},
             "status": np.asarray(batch.status), "ended": ended, **columns(batch.remarks, len(batch))}
-
-
-class Here:
-    """An executor that does the work when it is handed in, in the thread that hands it in.
-
-    Examples
-    --------
-    >>> Here().submit(abs, -1).result()
-    1
-    """
-
-    _max_workers = 1
-
-    def submit(self, work: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
-        """Return the finished work."""
-        future: Future[Any] = Future()
-        future.set_result(work(*arguments))
-        return future

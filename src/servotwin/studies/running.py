@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Generator, Mapping
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServotwinError
-from servotwin.simulation.many import workers_of
+from servotwin.simulation.many import own_threads, workers_of
 from servotwin.simulation.remarks import COLUMNS
 from servotwin.simulation.status import Status
 from servotwin.studies.jobs import run_chunk
@@ -58,7 +58,7 @@ def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[i
             table[name][part] = column
         done += part.stop - part.start
         show(done)
-    with _own(executor) as pool, closing(_finished(plan, missing, pool, given=executor is not None)) as running:
+    with closing(_finished(plan, missing, executor)) as running:
         for k, found in running:
             part = _slice(plan, k)
             for name, column in found.items():
@@ -80,18 +80,9 @@ def _slice(plan: Plan, k: int) -> slice:
     return slice(k * plan.chunk, min((k + 1) * plan.chunk, plan.lanes))
 
 
-@contextmanager
-def _own(executor: Any) -> Iterator[Any]:
-    if executor is not None:
-        yield executor
-        return
-    with ThreadPoolExecutor(workers_of(None), thread_name_prefix="servotwin-sweep") as own:
-        yield own
-
-
-def _finished(plan: Plan, missing: list[int], executor: Any, *,
-              given: bool) -> Generator[tuple[int, Mapping[str, Any]]]:
+def _finished(plan: Plan, missing: list[int], given: Any) -> Generator[tuple[int, Mapping[str, Any]]]:
     """Run chunks, some ahead; return number and columns of each, in order."""
+    executor = own_threads(os.getpid()) if given is None else given
     known = isinstance(getattr(executor, "_max_workers", None), int)
     ahead = 2 * workers_of(executor) if known else _AHEAD
     waiting, flying = deque(missing), deque[tuple[int, Any]]()
@@ -105,7 +96,7 @@ def _finished(plan: Plan, missing: list[int], executor: Any, *,
     except ServotwinError:
         raise
     except Exception as error:
-        if not given:
+        if given is None:
             raise
         raise InputError("executor", got=f"{type(error).__name__}: {error}",
                          allowed="one that finishes every chunk; those that it has finished are kept") from None
