@@ -91,11 +91,12 @@ def _targets(out: Path | None, plot: Path | None, csv: Path | None, servos: list
 
 
 def _voltages(words: list[str] | None) -> list[float] | None:
-    from servotwin.cli.figures import VOLTAGE, with_usual_unit
+    from servotwin.units.quantities import quantity
 
     if words is None:
         return None
-    return [with_usual_unit("--voltage", part, VOLTAGE, "V") for word in words for part in word.split(",")]
+    return [quantity("--voltage", part, "voltage", bare=True, positive=True)
+            for word in words for part in word.split(",")]
 
 
 def _computed(servos: list[str], model: str | None, change: list[str], options: dict[str, Any]) -> list[DataSheet]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.cli.figures import LENGTH, MASS, figure
 from servotwin.cli.load_words import FORMS, mass_on_arm, parts_of, torque_of
 from servotwin.errors import InputError
+from servotwin.units.quantities import quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,7 +39,7 @@ def lift_of(lift: str | None, arm: str | None) -> tuple[float, float] | None:
     if lift is None or arm is None:
         raise InputError("--arm needs --lift MASS" if lift is None else "--lift needs --arm LENGTH",
                          allowed="both, such as --lift 0.5kg --arm 10cm")
-    return figure("--lift", lift, MASS), figure("--arm", arm, LENGTH)
+    return quantity("--lift", lift, "mass", positive=True), quantity("--arm", arm, "length", positive=True)
 
 
 def loads_of(lift: str | None, arm: str | None, load: Sequence[str]) -> Asked:

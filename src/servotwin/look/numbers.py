@@ -6,8 +6,8 @@ import math
 
 from servotwin import units
 
-_FOREIGN = ("kgf cm", "ozf in", "V/krpm", "min", "%", "%/K", "s/deg", "N m/deg", "V/deg", "rpm", "deg/s",
-            "oz", "lb", "in")
+_FOREIGN = ("N cm", "kgf cm", "gf cm", "ozf in", "V/krpm", "min", "%", "%/K", "s/deg", "N m/deg", "V/deg", "rpm",
+            "deg/s", "oz", "lb", "in")
 _PRINTED = {"ohm": "Ω", "mohm": "mΩ", "us": "µs", "uH": "µH", "us/V": "µs/V", "deg": "°", "1": "",
             "mV/us": "mV/µs", "deg/us": "°/µs",
             "deg/s": "°/s"}

@@ -17,8 +17,8 @@ from servotwin.studies.kinds import (
     Triangular,
     Uniform,
 )
+from servotwin.units.quantities import number_and_unit, unit_named
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 _ABOUT = re.compile(r"±|\+-|\+/-")
 FORMS = {
     "uniform": "uniform:10%, uniform:1us or uniform:4us..8us",
@@ -65,18 +65,18 @@ class _Numbers:
     """The numbers of a text, each with its unit."""
 
     def __init__(self, kind: str, parts: list[str], dimension: str) -> None:
-        found = [_NUMBER.fullmatch(part) for part in parts]
-        if not all(found):
+        found = [pair for part in parts if (pair := number_and_unit(part)) is not None]
+        if len(found) < len(parts):
             raise InputError(kind, got=", ".join(parts) or "nothing", allowed=FORMS[kind])
         self.kind, self.dimension = kind, dimension
-        self.numbers = [float(match[1]) for match in found if match]
-        self.units = [match[2] for match in found if match]
+        self.numbers, self.units = [number for number, _ in found], [unit for _, unit in found]
         for k in reversed(range(len(parts) - 1)):
             self.units[k] = self.units[k] or self.units[k + 1]
 
     def si(self, k: int = 0) -> float:
         """Return a number in SI."""
-        return units.to_si(self.numbers[k], self.units[k] or units.si_unit(self.dimension), self.dimension)
+        unit = unit_named(self.units[k], self.dimension) if self.units[k] else units.si_unit(self.dimension)
+        return units.to_si(self.numbers[k], unit, self.dimension)
 
     def percent(self, k: int = 0) -> bool:
         """Whether a spread is relative."""
