@@ -2,6 +2,8 @@
 
 import json
 import math
+import sys
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from hypothesis import strategies as some
 
 import servotwin as st
 from servotwin.errors import InputError
-from servotwin.identification import read_logs, read_miuzei_logs
+from servotwin.logs import LOG_FORMATS, Log, LogFormat, read_logs, read_miuzei_logs
 
 CSV = "time_s,pulse_width_us,output_angle_deg\n0,1500,0\n0.02,1600,9\n0.04,1600,18\n"
 BAM = {"mass": 0.5, "length": 0.1, "kp": 100, "vin": 7.4, "motor": "xl330", "trajectory": "lift", "entries": [
@@ -47,6 +49,21 @@ def test_a_format_is_told_by_the_content(tmp_path, content, format, names, endin
     auto, told = read_logs(path), read_logs(path, format)
     assert [log.name for log in auto] == [log.name for log in told] == names
     assert all(log.source == str(path) for log in auto)
+
+
+def test_a_module_and_a_line_of_the_table_make_a_format_known(tmp_path, monkeypatch):
+    mine = ModuleType("servotwin.logs.mine")
+    mine.recognises = lambda content: isinstance(content, dict) and "mine" in content
+    mine.logs_of = lambda path, content: [
+        Log(name=content["mine"], time=[0.0, 0.1, 0.2], command=[0.0015] * 3, command_kind="pulse_width",
+            measured={"output_angle": [0.0] * 3}, source=str(path))]
+    path = write(tmp_path, "run.json", {"mine": "first"})
+    refused(path, "one of the formats bam, miuzei")
+    monkeypatch.setitem(sys.modules, mine.__name__, mine)
+    monkeypatch.setitem(LOG_FORMATS, "mine", LogFormat("my logs", "json", "mine"))
+    assert [log.name for log in read_logs(path)] == ["first"]
+    write(tmp_path, "other.csv", CSV)
+    assert [log.name for log in read_logs(tmp_path)] == ["other", "first"]
 
 
 def test_a_folder_is_read_in_the_order_of_its_names(tmp_path):

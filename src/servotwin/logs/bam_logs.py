@@ -41,16 +41,20 @@ def read_bam_log(path: str | Path, *, convention: BamConvention | None = None) -
     InputError
         If it is no such file, or an entry lacks a number.
     """
-    return bam_log(Path(path), read_json(path), convention)
+    return _log(Path(path), read_json(path), convention)
 
 
-def is_bam_log(content: object) -> bool:
+def recognises(content: object) -> bool:
     """Return whether the content of a JSON file looks like a raw log of BAM."""
     return isinstance(content, Mapping) and "entries" in content
 
 
-def bam_log(path: Path, content: object, convention: BamConvention | None = None) -> Log:
-    """Return the log that the content of a file is."""
+def logs_of(path: Path, content: object) -> list[Log]:
+    """Return the log that the content of a file is, alone in a list."""
+    return [_log(path, content)]
+
+
+def _log(path: Path, content: object, convention: BamConvention | None = None) -> Log:
     if not isinstance(content, Mapping) or not isinstance(content.get("entries"), list):
         raise InputError(f"{path}", got=type(content).__name__, allowed='an object with "entries", as BAM records it')
     number = {key: _number(path, content, key) for key in ("mass", "length", "kp", "vin")}

@@ -80,6 +80,11 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
                    reading=reading, **given)
 
 
+def logs_of(path: Path, *, sidecar: str | Path | None, columns: str | Mapping[str, str] | None) -> list[Log]:
+    """Return the log of a table, alone in a list."""
+    return [read_csv_log(path, sidecar=sidecar, columns=columns)]
+
+
 @contextmanager
 def in_file(path: object, name: str) -> Iterator[None]:
     """Let the errors of a log name the file that it comes from."""

@@ -52,7 +52,7 @@ class _Joint:
         return "gripper" in self.name.lower()
 
 
-def dataset_of(path: Path) -> Path | None:
+def _dataset_of(path: Path) -> Path | None:
     """Return the folder of the dataset that a path belongs to, None where it is none.
 
     Parameters
@@ -70,6 +70,16 @@ def dataset_of(path: Path) -> Path | None:
     except (OSError, ValueError):  # reading says what is wrong with the name
         pass
     return None
+
+
+def recognises(path: Path) -> bool:
+    """Return whether a path belongs to a dataset."""
+    return _dataset_of(path) is not None
+
+
+def logs_of(path: Path, *, joints: str | Mapping[str, str] | None) -> list[Log]:
+    """Return the logs of a dataset, as `read_lerobot_logs` does."""
+    return read_lerobot_logs(path, joints=joints)
 
 
 def read_lerobot_logs(path: str | Path, *, joints: str | Mapping[str, str] | None = None) -> list[Log]:
@@ -93,7 +103,7 @@ def read_lerobot_logs(path: str | Path, *, joints: str | Mapping[str, str] | Non
         If pyarrow is not installed.
     """
     path = Path(path)
-    folder = dataset_of(path)
+    folder = _dataset_of(path)
     if folder is None:
         raise InputError(f"{path}", got="no dataset of LeRobot", allowed=f"a folder with {_INFO}, or a file of it")
     info = read_json(folder / _INFO)

@@ -41,10 +41,10 @@ def read_miuzei_logs(path: str | Path) -> list[Log]:
     InputError
         If it is no such file, or a run lacks something: names the run.
     """
-    return miuzei_logs(Path(path), read_json(path))
+    return logs_of(Path(path), read_json(path))
 
 
-def is_miuzei(content: object) -> bool:
+def recognises(content: object) -> bool:
     """Return whether the content of a JSON file looks like the Miuzei data set."""
     return isinstance(content, Mapping) and isinstance(content.get("data"), list)
 
@@ -56,7 +56,7 @@ def arm() -> Load:
                     gravity=GRAVITY).as_load()
 
 
-def miuzei_logs(path: Path, content: object) -> list[Log]:
+def logs_of(path: Path, content: object) -> list[Log]:
     """Return the logs that the content of a file is."""
     if not isinstance(content, Mapping) or not isinstance(content.get("data"), list):
         raise InputError(f"{path}", got=type(content).__name__, allowed='an object with a list "data" of runs')

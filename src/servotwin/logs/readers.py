@@ -2,34 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.logs.bam_logs import bam_log, is_bam_log
-from servotwin.logs.csv_logs import read_csv_log
+from servotwin.logs.formats import FORMATS, LOG_FORMATS, formats_that_hold
 from servotwin.logs.json_file import read_json
-from servotwin.logs.lerobot import dataset_of, read_lerobot_logs
 from servotwin.logs.log import Log
-from servotwin.logs.miuzei import is_miuzei, miuzei_logs
 from servotwin.logs.sidecar import FOLDER_FILE, FORMAT
 from servotwin.signals.time_base import warn_of_time_base
 
-
-class _JsonFormat(NamedTuple):
-    """A format of JSON files: what its content looks like, and the logs that it holds."""
-
-    recognises: Callable[[object], bool]
-    logs: Callable[[Path, object], list[Log]]
-
-
-# one line here makes a format known; `recognises` gets the content of the file
-JSON_FORMATS: dict[str, _JsonFormat] = {
-    "bam": _JsonFormat(is_bam_log, lambda path, content: [bam_log(path, content)]),
-    "miuzei": _JsonFormat(is_miuzei, miuzei_logs),
-}
-FORMATS = ("auto", "csv", *JSON_FORMATS, "lerobot")
 _CSV_ENDINGS = (".csv", ".tsv")
 
 
@@ -41,10 +24,10 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     Parameters
     ----------
     path : str or Path
-        A CSV file, whose sidecar says more; a JSON file of BAM or of the Miuzei data; a folder of such files; or the
-        folder of a LeRobot dataset.
-    format : {"auto", "csv", "bam", "miuzei", "lerobot"}
-        "auto" tells by the content; JSON files of a folder that are no logs are then passed over.
+        A table, whose sidecar says more; a JSON file of a known format; a folder of such files; or a dataset.
+    format : str
+        A name of `LOG_FORMATS`, or "auto", which tells by the content; JSON files of a folder that are no logs are
+        then passed over.
     sidecar : str or Path, optional
         What holds for all CSV files, in place of a `logs.json` in their folder.
     columns : str or mapping, optional
@@ -77,19 +60,20 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
     if format not in FORMATS:
         raise UnknownNameError("format of logs", str(format), FORMATS)
     path = Path(path)
-    if format == "lerobot" or (format == "auto" and dataset_of(path) is not None):
-        if columns is not None:
-            raise InputError(f"--columns for {path}", got="a dataset of LeRobot",
-                             allowed="--joint (joints=), which says the units of its joints")
-        return read_lerobot_logs(path, joints=joints)
+    for name, dataset in formats_that_hold("dataset").items():
+        if format == name or (format == "auto" and dataset.room.recognises(path)):
+            if columns is not None:
+                raise InputError(f"--columns for {path}", got=f"a dataset ({name})",
+                                 allowed="--joint (joints=), which says the units of its joints")
+            return list(dataset.room.logs_of(path, joints=joints))
     if joints is not None:
-        raise InputError(f"--joint for {path}", got="no dataset of LeRobot", allowed="--columns (columns=) for tables")
+        raise InputError(f"--joint for {path}", got="no dataset", allowed="--columns (columns=) for tables")
     files = _files(path, format) if _is_folder(path) else [path]
     given = {"sidecar": sidecar, "columns": columns}
     logs = [log for file in files for log in _logs(file, format, given, alone=file is path)]
     if not logs:
         raise InputError(f"{path}", got="a folder without logs", allowed="*.csv, *.json of a known format ("
-                         + ", ".join(JSON_FORMATS) + "), or a dataset of LeRobot")
+                         + ", ".join(formats_that_hold("json")) + "), or a dataset")
     seen: dict[str, str] = {}
     for log in logs:
         if log.name in seen:
@@ -116,28 +100,31 @@ def _files(folder: Path, format: str) -> list[Path]:
     beside = {file.stem for file in tables}
     others = [file for file in files if file.suffix.lower() == ".json" and file.name != FOLDER_FILE
               and file.stem not in beside]
-    return sorted((tables if format in ("auto", "csv") else []) + (others if format != "csv" else []))
+    asked = ("table", "json") if format == "auto" else (LOG_FORMATS[format].holds,)
+    return sorted((tables if "table" in asked else []) + (others if "json" in asked else []))
 
 
 def _logs(file: Path, format: str, given: Mapping[str, Any], *, alone: bool) -> list[Log]:
-    if format == "csv" or (format == "auto" and not _is_json(file)):
-        return [read_csv_log(file, **given)]
+    name = "csv" if format == "auto" and not _is_json(file) else format
+    if name != "auto" and LOG_FORMATS[name].holds == "table":
+        return list(LOG_FORMATS[name].room.logs_of(file, **given))
     if alone and given["columns"] is not None:
         raise InputError(f"--columns for {file}", got="JSON", allowed="tables; JSON says what it holds")
     content: Any = read_json(file)
-    if format != "auto":
-        return JSON_FORMATS[format].logs(file, content)
+    if name != "auto":
+        return list(LOG_FORMATS[name].room.logs_of(file, content))
     if isinstance(content, dict) and content.get("format") == FORMAT:
         if not alone:
             return []
         raise InputError(f"{file}", got="a sidecar", allowed="the CSV file that it describes, or its folder")
-    known = next((known for known in JSON_FORMATS.values() if known.recognises(content)), None)
+    rooms = [known.room for known in formats_that_hold("json").values()]
+    known = next((room for room in rooms if room.recognises(content)), None)
     if known is None:
         if not alone:
             return []
         raise InputError(f"{file}", got="JSON that is no known log", allowed="one of the formats "
-                         + ", ".join(JSON_FORMATS))
-    return known.logs(file, content)
+                         + ", ".join(formats_that_hold("json")))
+    return list(known.logs_of(file, content))
 
 
 def _is_json(file: Path) -> bool:
