@@ -100,7 +100,7 @@ def ratio(option: str, text: str) -> float:
     return max(one, two) / min(one, two)
 
 
-def at_voltage(option: str, text: str, usual: float | None) -> tuple[str, float]:
+def without_voltage(option: str, text: str, usual: float | None) -> tuple[str, float]:
     """Return a figure's text without its voltage, and the voltage [V].
 
     Parameters
@@ -116,7 +116,7 @@ def at_voltage(option: str, text: str, usual: float | None) -> tuple[str, float]
 
     Examples
     --------
-    >>> at_voltage("--torque", "1.29 N m @ 6.0", None), at_voltage("--torque", "13 kgf.cm at 6V", None)
+    >>> without_voltage("--torque", "1.29 N m @ 6.0", None), without_voltage("--torque", "13 kgf.cm at 6V", None)
     (('1.29 N m', 6.0), ('13 kgf.cm', 6.0))
     """
     front, at, back = (part.strip() for part in re.sub(r"\s+at\s+", "@", text, count=1).partition("@"))

@@ -143,7 +143,7 @@ def _points(given: dict[str, _Figures], usual: float | None) -> tuple[Any, ...]:
     for field, texts in given.items():
         option = options[field]
         for text in texts or ():
-            words, volts = fig.at_voltage(option, text, usual)
+            words, volts = fig.without_voltage(option, text, usual)
             value = fig.speed(option, words) if field == "no_load_speed" else quantity(
                 option, words, "torque" if field == "stall_torque" else "current", positive=True)
             if field in found.setdefault(volts, {}):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from servotwin.errors import InputError, UnitError, UnknownNameError
-from servotwin.logs.columns import COMMANDS, NAMES, SWITCH, Column, dimension_of
+from servotwin.logs.columns import COMMANDS, NAMES, SWITCH, Column, dimension_of_signal
 from servotwin.logs.stamps import CLOCKS
 from servotwin.units.words import scaled_unit, units_written
 
@@ -16,7 +16,7 @@ SHORT = {"pulse": "pulse_width", "angle": "output_angle", "feedback": "feedback_
          "voltage": "bus_voltage", "speed": "output_speed"}
 SIGNALS = ("time", COMMAND, *SHORT, *(name for name in NAMES if name != "time"))
 _FORM = 'SIGNAL=COLUMN:UNIT, such as "time=t:ms angle=pos:deg-90"'
-_KINDS = {dimension_of(name): name for name in COMMANDS}
+_KINDS = {dimension_of_signal(name): name for name in COMMANDS}
 _WORD = re.compile(r"""\s*(?P<signal>[^\s=:'"]+)\s*=\s*
                        (?:"(?P<double>[^"]*)"|'(?P<single>[^']*)'|(?P<bare>[^"'\s].*?))
                        \s*(?::(?P<unit>[^:=]*?))?\s*(?=$|\s[^\s=:'"]+\s*=)""", re.VERBOSE)
@@ -120,8 +120,8 @@ def column_said(one: Wanted, column: str, option: str = "--columns") -> tuple[st
         if dimension not in _KINDS:
             raise UnitError(what, got=one.unit, allowed="us, ms, s (pulse width), deg, rad (angle) or V, mV (voltage)")
         signal = _KINDS[dimension]
-    if dimension_of(signal) != dimension:
-        raise UnitError(what, got=one.unit, allowed=units_written(dimension_of(signal)) + (
+    if dimension_of_signal(signal) != dimension:
+        raise UnitError(what, got=one.unit, allowed=units_written(dimension_of_signal(signal)) + (
             ", iso, clock" if signal == "time" else ""))
     return signal, Column(column, unit, scale, offset)
 

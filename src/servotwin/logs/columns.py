@@ -64,10 +64,10 @@ class Column:
             values = self.scale * values + self.offset
         if self.unit == "ns":
             return np.asarray(values / round(1.0 / _NANOSECOND))
-        return np.asarray(units.to_si(values, self.unit, dimension_of(name)))
+        return np.asarray(units.to_si(values, self.unit, dimension_of_signal(name)))
 
 
-def dimension_of(name: str) -> str:
+def dimension_of_signal(name: str) -> str:
     """Return the dimension of a column's signal, as `servotwin.units` calls it.
 
     Examples
@@ -80,7 +80,7 @@ def dimension_of(name: str) -> str:
 
 def si_unit_of(name: str) -> str:
     """Return the SI unit of a column's signal."""
-    return units.si_unit(dimension_of(name))
+    return units.si_unit(dimension_of_signal(name))
 
 
 def check_unit(what: str, unit: object, name: str) -> str:
@@ -91,16 +91,16 @@ def check_unit(what: str, unit: object, name: str) -> str:
     UnitError
         If it does not.
     """
-    if unit == "ns" and dimension_of(name) == "time":
+    if unit == "ns" and dimension_of_signal(name) == "time":
         return "ns"
     if isinstance(unit, str) and unit in CLOCKS and name == TIME:
         return unit
     if not isinstance(unit, str):
         raise UnitError(what, got=unit, allowed="a text, such as " + si_unit_of(name))
     try:
-        units.factor(unit, dimension_of(name))
+        units.factor(unit, dimension_of_signal(name))
     except UnitError as error:
-        more = (", ns" if dimension_of(name) == "time" else "") + (", iso, clock" if name == TIME else "")
+        more = (", ns" if dimension_of_signal(name) == "time" else "") + (", iso, clock" if name == TIME else "")
         raise UnitError(what, got=error.got, allowed=f"{error.allowed}{more}") from None
     return unit
 
@@ -144,11 +144,11 @@ def columns_of(header: Sequence[str], where: object, *, taken: Container[str] = 
 def _unit_behind(column: str, name: str) -> str | None:
     """Return the unit behind a name, None where it is none of the signal's."""
     suffix = column[len(name) + 1:]
-    known = _SUFFIXES[dimension_of(name)]
+    known = _SUFFIXES[dimension_of_signal(name)]
     if suffix in known:
         return known[suffix]
     unit, dimension = unit_word(suffix) or ("", "")
-    return unit if suffix and dimension == dimension_of(name) else None
+    return unit if suffix and dimension == dimension_of_signal(name) else None
 
 
 def _name_of(column: str, where: object, says_more: Callable[[str], object]) -> str | None:
@@ -162,7 +162,7 @@ def _name_of(column: str, where: object, says_more: Callable[[str], object]) -> 
         if name in (TIME, SWITCH, "drive"):  # "time_of_day", "drive_mode": another thing
             return None
         raise UnitError(f"{where}: unit of column {column}", got=column[len(name) + 1:],
-                        allowed=f"{', '.join(_SUFFIXES[dimension_of(name)]) or 'none'}; without one it is in "
+                        allowed=f"{', '.join(_SUFFIXES[dimension_of_signal(name)]) or 'none'}; without one it is in "
                         f"{si_unit_of(name)}")
     near = get_close_matches(_stem(column), NAMES, n=1, cutoff=0.85)
     if near and not says_more(column):

@@ -10,7 +10,7 @@ from servotwin.errors import InputError, UnitError
 from servotwin.logs import column_names as names
 from servotwin.logs.column_values import Guess, guess, is_increasing, range_of
 from servotwin.logs.column_words import COMMAND, SHORT, Wanted, column_said
-from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, columns_of, dimension_of, si_unit_of
+from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, columns_of, dimension_of_signal, si_unit_of
 from servotwin.logs.log import ANGLES
 from servotwin.logs.reading import ReadColumn
 from servotwin.tables import TextTable
@@ -100,9 +100,9 @@ def _named(table: TextTable, others: list[str], made: Mapping[str, object]) -> d
         below = table.units[table.header.index(column.column)] if table.units else ""
         meaning = names.meaning_of("time" if signal == TIME else signal, below) if below else None
         if meaning is not None and column.column == signal and meaning.dimension:
-            if meaning.dimension != dimension_of(signal):
+            if meaning.dimension != dimension_of_signal(signal):
                 raise UnitError(f"{table.path}: unit of column {signal}", got=below,
-                                allowed=units_written(dimension_of(signal)))
+                                allowed=units_written(dimension_of_signal(signal)))
             column = Column(column.column, meaning.unit)
         found[signal] = column
     return found
@@ -260,7 +260,7 @@ def _no_unit(table: TextTable, signal: str, column: str, meaning: names.Meaning 
         example, more = units, others.get(signal, "us or ms, or a scale such as 4.88us")
     else:
         example, more = {TIME: ("ms", "s, ms or us"), "output_angle": ("deg", "deg or rad")}.get(
-            signal, (si_unit_of(signal), units_written(dimension_of(signal))))
+            signal, (si_unit_of(signal), units_written(dimension_of_signal(signal))))
     values = range_of(table, column)  # raises where they are no numbers
     if meaning is not None and COUNTS in (meaning.role, meaning.dimension):
         example = "0.3deg-90" if short == "angle" else f"0.3{example}"

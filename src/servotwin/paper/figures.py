@@ -11,7 +11,7 @@ import numpy as np
 
 from servotwin import plotting
 from servotwin.look import fixed
-from servotwin.paper.study import APPROACH_ROW, LABELS, BenchStudy, Study
+from servotwin.paper.study import APPROACH_ROW, LABELS, BenchStudy, PaperStudy
 from servotwin.plotting import Curve, Limit
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ _RESPONSES: tuple[tuple[str, str, str, str, str, str], ...] = (
 )
 
 
-def pictures(study: Study, progress: Callable[[float], None]) -> tuple[Picture, ...]:
+def pictures(study: PaperStudy, progress: Callable[[float], None]) -> tuple[Picture, ...]:
     """Return all pictures; `progress` is told the fraction that is drawn."""
     makers: list[Callable[[], Picture]] = [lambda row=row: _response(study, *row) for row in _RESPONSES]  # type: ignore[misc]
     makers += [lambda: _last_degrees(study), lambda: _feedback_over_position(study)]
@@ -81,7 +81,7 @@ def pictures(study: Study, progress: Callable[[float], None]) -> tuple[Picture, 
     return tuple(done)
 
 
-def _response(study: Study, name: str, title: str, signal: str, label: str, unit: str, caption: str) -> Picture:
+def _response(study: PaperStudy, name: str, title: str, signal: str, label: str, unit: str, caption: str) -> Picture:
     time = study.steps["bounded"].time
     values = {model: plotting.shown(signal, step[signal]) for model, step in study.steps.items()}
     limits: list[Limit] = []
@@ -101,7 +101,7 @@ def _response(study: Study, name: str, title: str, signal: str, label: str, unit
     return Picture(name=name, title=title, caption=caption, figure=figure, columns=columns)
 
 
-def _last_degrees(study: Study) -> Picture:
+def _last_degrees(study: PaperStudy) -> Picture:
     """Draw how the servos that know a supply come to a stand, and the pulses that bring one of them there."""
     time = np.linspace(*_LAST, 2001)
     columns: dict[str, Column] = {"time_s": time.tolist()}
@@ -121,7 +121,7 @@ def _last_degrees(study: Study) -> Picture:
                    figure=figure, columns=columns)
 
 
-def _standing(study: Study) -> Picture:
+def _standing(study: PaperStudy) -> Picture:
     """Draw what is left to the target of one row, from below and from above, one curve for each model."""
     columns: dict[str, Column] = {}
     drawn = []
@@ -149,7 +149,7 @@ def _standing(study: Study) -> Picture:
                    caption=caption, figure=figure, columns=columns)
 
 
-def _feedback_over_position(study: Study) -> Picture:
+def _feedback_over_position(study: PaperStudy) -> Picture:
     angle, voltage = study.table["q_deg"], study.table["V_o_V"]
     columns: dict[str, Column] = {}
     drawn = []
@@ -168,7 +168,7 @@ def _feedback_over_position(study: Study) -> Picture:
                    figure=figure, columns=columns)
 
 
-def _pulses(study: Study, number: int, row: int) -> Picture:
+def _pulses(study: PaperStudy, number: int, row: int) -> Picture:
     from servotwin import signals
 
     bench = study.on_bench["bounded"].bench
@@ -188,12 +188,12 @@ def _pulses(study: Study, number: int, row: int) -> Picture:
                  "pulse_width_us": [1e6 * w for w in widths]})
 
 
-def _over_voltage(study: Study) -> Picture:
+def _over_voltage(study: PaperStudy) -> Picture:
     return _comparison(study, "figure-25", "Figure 25: position over command voltage", "q(V_i)", "output_angle",
                        "command voltage $V_i$ (V)", "The paper's Figure 25.")
 
 
-def _over_pulse(study: Study) -> Picture:
+def _over_pulse(study: PaperStudy) -> Picture:
     test = study.fits["q(t_a)"].curvature
     return _comparison(study, "figure-26", "Figure 26: position over pulse width", "q(t_a)", "output_angle",
                        "pulse width $t_a$ (µs)",
@@ -202,14 +202,14 @@ def _over_pulse(study: Study) -> Picture:
                        "ends. The simulated servos are straight.")
 
 
-def _over_angle(study: Study) -> Picture:
+def _over_angle(study: PaperStudy) -> Picture:
     worst = study.fits["V_o(q)"].line.max_residual
     return _comparison(study, "figure-27", "Figure 27: feedback voltage over position", "V_o(q)", "feedback_voltage",
                        "output angle $q$ (°)",
                        f"The paper's Figure 27. The measured points lie within {1e3 * worst:.1f} mV of the line.")
 
 
-def _comparison(study: Study, name: str, title: str, fit_name: str, quantity: str, x_label: str,
+def _comparison(study: PaperStudy, name: str, title: str, fit_name: str, quantity: str, x_label: str,
                 caption: str) -> Picture:
     """Draw measured points, their line and both simulated tables, and below all less the line."""
     fit = study.fits[fit_name]

@@ -9,7 +9,7 @@ import numpy as np
 from servotwin.loads import Inertia
 from servotwin.look import picture
 from servotwin.models import AveragedServo, DCMotor, GearedMotor
-from servotwin.paper.study import LOAD_INERTIA, Study
+from servotwin.paper.study import LOAD_INERTIA, PaperStudy
 from servotwin.plotting import formula_svg
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class Numeric(NamedTuple):
     words: str
 
 
-def numeric(study: Study, number: int) -> Numeric | None:
+def numeric(study: PaperStudy, number: int) -> Numeric | None:
     """Return the transfer function of a figure with the numbers of the servo; None where it has none of its own."""
     from servotwin.linear import transfer_function
 

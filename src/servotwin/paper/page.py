@@ -10,7 +10,7 @@ from servotwin import __version__
 from servotwin.look import document, escape, fixed, number, picture, plain
 from servotwin.paper import linear, tables, vibration_page
 from servotwin.paper.findings import corrections, disagreements
-from servotwin.paper.study import LABELS, LOAD_INERTIA, SERVO, BenchStudy, Study
+from servotwin.paper.study import LABELS, LOAD_INERTIA, SERVO, BenchStudy, PaperStudy
 
 if TYPE_CHECKING:
     from servotwin.paper.figures import Picture
@@ -25,7 +25,7 @@ _SECTIONS = (
 )
 
 
-def page(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def page(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
     """Return the whole report; `svg` holds the pictures by name."""
     parts = {
         "summary": _summary(study), "values": _values(study), "step": _step(study, pictures, svg),
@@ -48,7 +48,7 @@ Simulations and Experimental Results”, <cite>Canadian Journal on Automation, C
 {body}""")
 
 
-def _summary(study: Study) -> str:
+def _summary(study: PaperStudy) -> str:
     peak = study.peak_voltage["averaged"]
     bounded, pulse = study.on_bench["bounded"], study.on_bench["pulse"]
     common, apart = (study.vibration.circuits[name].still for name in ("common", "separate"))
@@ -95,12 +95,12 @@ it.</li></ul>
 """
 
 
-def _sheet_speed(study: Study) -> str:
+def _sheet_speed(study: PaperStudy) -> str:
     seconds = study.sheet_seconds_per_60deg
     return f" (the maker's sheet: {number(seconds)} s for 60°, {fixed(60.0 / seconds, 0)} °/s)" if seconds else ""
 
 
-def _values(study: Study) -> str:
+def _values(study: PaperStudy) -> str:
     count = tables.origins(study)
     words = ", ".join(f"{n} {origin}" for origin, n in sorted(count.items(), key=lambda item: -item[1]))
     return f"""<div class="note"><p><strong>The paper publishes no parameter values.</strong> It gives no number for
@@ -114,7 +114,7 @@ most have a range, and they have to be identified for a real unit. <a href="#par
 """
 
 
-def _step(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def _step(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
     names = ("figure-13", "figure-14", "figure-15", "figure-16", "figure-armature-voltage", "figure-last-degrees",
              "figure-17")
     return f"""<p>The command goes from 0 to 180° at 0.1 s. The load is an inertia of {number(LOAD_INERTIA)} kg m²
@@ -126,7 +126,7 @@ frame its bridge gives the full voltage for as long as the error asks, and brake
 {tables.step_table(study)}"""
 
 
-def _bench(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def _bench(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
     apparatus = study.on_bench["bounded"].bench
     low, high = study.offsets
     servo = apparatus.model.servo
@@ -152,7 +152,7 @@ steps: the averaged and the pulse servo are read while they still creep.</li></u
 {tables.ranges_table(study)}"""
 
 
-def _measured(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def _measured(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
     shares = "".join(tables.model_shares_table(study, name) for name in study.on_bench)
     return f"""<div class="figures">{_figures(("figure-25", "figure-26", "figure-27"), pictures, svg)}</div>
 {tables.comparison_table(study)}
@@ -171,7 +171,7 @@ t<sub>a</sub> and V<sub>o</sub> over q, rounded, against q over t<sub>a</sub>). 
 {shares}"""
 
 
-def _band_words(study: Study) -> str:
+def _band_words(study: PaperStudy) -> str:
     """Return what the bands say about the paper's points, and why pulses narrow them."""
     bounded, pulse = study.on_bench["bounded"], study.on_bench["pulse"]
     dead = study.shortest_pulse
@@ -203,7 +203,7 @@ def _inside(one: BenchStudy) -> str:
     return "none" if count == 0 else "all" if count == len(one.rows) else f"{count}"
 
 
-def _fits(study: Study) -> str:
+def _fits(study: PaperStudy) -> str:
     curved = [tables.pretty(name) for name, fit in study.fits.items() if fit.curvature.p_value < 0.05]
     verdict = f"At the 5 % level curved: {', '.join(curved)}." if curved else "None is curved at the 5 % level."
     return f"""{tables.fits_table(study)}<p>Five points leave three degrees of freedom to a line and two to a
@@ -211,7 +211,7 @@ parabola. p is the probability of such an F or a larger one if the truth were st
 """
 
 
-def _models(study: Study, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def _models(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
     parts = ["<p>The paper's diagrams, redrawn, with their transfer functions. The numbers are those of the servo "
              "file; dry friction has no transfer function and is left out.</p>"]
     for which, formulas in linear.FORMULAS.items():
@@ -232,7 +232,7 @@ def _pole(p: complex) -> str:
     return f"{fixed(p.real, 1)} ± {fixed(p.imag, 1)} j"
 
 
-def _parameters(study: Study) -> str:
+def _parameters(study: PaperStudy) -> str:
     return f"""<p>No value here is one of the paper's authors. A range belongs to an assumed or derived value, ± one
 standard error to a fitted one.</p>
 {tables.parameter_table(study)}"""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from servotwin.errors import OutputError, OutputExistsError
-from servotwin.paper.study import Study, headline_numbers, run_study
+from servotwin.paper.study import PaperStudy, headline_numbers, run_study
 from servotwin.parameters.output_file import undone
 from servotwin.tables import csv_text
 
@@ -161,7 +161,7 @@ def _write_csv(path: Path, columns: Mapping[str, Sequence[float] | Sequence[str]
     path.write_bytes(csv_text(columns, digits=9).encode())
 
 
-def _write_tables(folder: Path, study: Study) -> None:
+def _write_tables(folder: Path, study: PaperStudy) -> None:
     columns: dict[str, Sequence[float]] = {f"measured_{name}": c.tolist() for name, c in study.table.items()}
     for model, one in study.on_bench.items():
         readings = [row.reading for row in one.rows]

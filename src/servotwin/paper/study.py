@@ -63,7 +63,7 @@ class BenchStudy:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Study:
+class PaperStudy:
     """All results of the report.
 
     Parameters
@@ -145,7 +145,7 @@ class Study:
         return _value(self.servo, name)
 
 
-def run_study(progress: Progress) -> Study:
+def run_study(progress: Progress) -> PaperStudy:
     """Compute everything; `progress` is told words and a fraction of the whole report."""
     progress("reading the servo and the tables", 0.02)
     servo = load_servo(SERVO)
@@ -159,7 +159,7 @@ def run_study(progress: Progress) -> Study:
     at_bench = bench.bench_servo(servo)
     on_bench = {name: _bench(model(at_bench), table, fits) for name, model in MODELS.items()}
     progress("letting it vibrate on a common supply", 0.20)
-    return Study(
+    return PaperStudy(
         servo=servo, table=table, ranges=ranges, steps=steps,
         metrics={name: step.step_metrics() for name, step in steps.items()},
         peak_voltage={name: step.peak("armature_voltage") for name, step in steps.items()},
@@ -191,7 +191,7 @@ def _approach(apparatus: Bench, row: TableRow, away: float) -> Result:
                     initial={"output_angle": row.target_angle + away}).raise_if_failed()
 
 
-def headline_numbers(study: Study) -> dict[str, float]:
+def headline_numbers(study: PaperStudy) -> dict[str, float]:
     """Return the numbers of the summary, the unit in each name."""
     numbers: dict[str, float] = {}
     for name, one in study.on_bench.items():

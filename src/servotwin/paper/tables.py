@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 from servotwin import units
 from servotwin.look import escape, fixed, number, table, with_error
-from servotwin.paper.study import LABELS, LOAD_INERTIA, MODELS, Study
+from servotwin.paper.study import LABELS, LOAD_INERTIA, MODELS, PaperStudy
 from servotwin.parameters import GROUPS
 
 if TYPE_CHECKING:
     from servotwin.bench import ModelShares
-    from servotwin.paper.findings import Finding
+    from servotwin.paper.findings import Passage
     from servotwin.parameters import Quantity
 
 # dimension -> units in which a reader expects it: (smallest value in SI, unit, as printed), largest first
@@ -29,7 +29,7 @@ _READABLE: dict[str, tuple[tuple[float, str, str], ...]] = {
 }
 
 
-def step_table(study: Study) -> str:
+def step_table(study: PaperStudy) -> str:
     """Return the metrics of the step for all models."""
     rows: list[list[str]] = []
     one = study.metrics
@@ -49,7 +49,7 @@ def step_table(study: Study) -> str:
                  caption=f"Step from 0 to 180°, load inertia {number(LOAD_INERTIA)} kg m² (assumed)")
 
 
-def ranges_table(study: Study) -> str:
+def ranges_table(study: PaperStudy) -> str:
     """Return Table I of the paper."""
     rows = [[f"{q:.0f}", f"{t:.0f}", f"{v:.1f}"] for q, t, v in
             zip(*(study.ranges[name].tolist() for name in ("q_deg", "t_a_us", "V_o_V")), strict=True)]
@@ -57,7 +57,7 @@ def ranges_table(study: Study) -> str:
                  caption="Table I of the paper: the range of operation of analog servos", text_columns=0)
 
 
-def comparison_table(study: Study) -> str:
+def comparison_table(study: PaperStudy) -> str:
     """Return Table II, measured beside simulated."""
     t = {name: column.tolist() for name, column in study.table.items()}
     head = ["", "V<sub>i</sub> (V)", "ADC<sub>i</sub>", "t<sub>a</sub> (µs)", "f (Hz)", "q (°)", "V<sub>o</sub> (V)",
@@ -78,7 +78,7 @@ def comparison_table(study: Study) -> str:
                  "of an approach from below and one from above; the band is half their difference.")
 
 
-def difference_table(study: Study) -> str:
+def difference_table(study: PaperStudy) -> str:
     """Return simulated less measured."""
     rows = []
     for name, one in study.on_bench.items():
@@ -98,7 +98,7 @@ def difference_table(study: Study) -> str:
                  caption="Simulated less measured, and what the standing band is made of")
 
 
-def band_table(study: Study) -> str:
+def band_table(study: PaperStudy) -> str:
     """Return how far from its target each model may stand, row by row, and what the pulses make of it."""
     models = study.on_bench
     bands = [[math.degrees(row.standing_band) for row in one.rows] for one in models.values()]
@@ -116,7 +116,7 @@ def band_table(study: Study) -> str:
                  "as friction.")
 
 
-def measured_shares_table(study: Study) -> str:
+def measured_shares_table(study: PaperStudy) -> str:
     """Return why the measured angles lie off a straight line over the command voltage."""
     rows = [[f"{q:.0f}", *(fixed(math.degrees(v), 2) for v in (s.total, s.quantum, s.curvature, s.rest))]
             for q, s in zip(study.table["q_deg"], study.measured_shares, strict=True)]
@@ -125,7 +125,7 @@ def measured_shares_table(study: Study) -> str:
                  caption="Why the measured angles (°) scatter about a straight line over V<sub>i</sub>")
 
 
-def model_shares_table(study: Study, name: str) -> str:
+def model_shares_table(study: PaperStudy, name: str) -> str:
     """Return why one model differs from the measured table."""
     one = study.on_bench[name]
 
@@ -141,7 +141,7 @@ def model_shares_table(study: Study, name: str) -> str:
                  caption=f"What the difference is made of: {escape(LABELS[name])}")
 
 
-def fits_table(study: Study) -> str:
+def fits_table(study: PaperStudy) -> str:
     """Return the straight lines with standard errors, and the test for curvature."""
     rows = []
     for fit in study.fits.values():
@@ -174,19 +174,19 @@ def pretty(name: str) -> str:
     return name
 
 
-def findings_table(findings: Sequence[Finding], caption: str) -> str:
+def findings_table(findings: Sequence[Passage], caption: str) -> str:
     """Return corrections or disagreements, numbered."""
     rows = [[f"{k}. {pretty(f.place)}", pretty(f.remark), pretty(f.shown_by)]
             for k, f in enumerate(findings, start=1)]
     return table(["place", "what is done about it", "the number that shows it"], rows, caption=caption, text_columns=3)
 
 
-def origins(study: Study) -> dict[str, int]:
+def origins(study: PaperStudy) -> dict[str, int]:
     """Return how many parameters there are of each origin."""
     return dict(Counter(study.servo.source(name).origin for name in study.servo.names()))
 
 
-def parameter_table(study: Study) -> str:
+def parameter_table(study: PaperStudy) -> str:
     """Return every parameter with value, range, origin and source."""
     rows = []
     for name in study.servo.names():

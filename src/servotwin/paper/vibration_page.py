@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from servotwin.paper.study import Study
+    from servotwin.paper.study import PaperStudy
     from servotwin.paper.vibration import Stand
 
     Array = NDArray[np.float64]
@@ -28,12 +28,12 @@ _CLOSE = (2.0, 2.3)  # s: some swings
 _WORDS = {"common": "one soft supply", "separate": "separate supplies"}
 
 
-def pictures(study: Study) -> tuple[Picture, ...]:
+def pictures(study: PaperStudy) -> tuple[Picture, ...]:
     """Return the two pictures of the vibration."""
     return _overview(study), _frames(study)
 
 
-def _overview(study: Study) -> Picture:
+def _overview(study: PaperStudy) -> Picture:
     """Draw the angle over time, and below it the supply as the program saw it when it looked."""
     time = np.arange(0.0, _OVERVIEW, 2e-3)
     drawn, seen, columns = [], [], {"time_s": time.tolist()}
@@ -57,7 +57,7 @@ def _overview(study: Study) -> Picture:
                    figure=figure, columns=columns)
 
 
-def _frames(study: Study) -> Picture:
+def _frames(study: PaperStudy) -> Picture:
     """Draw some swings: what each pulse asks for, the angle, the supply, and where it is looked at."""
     one = study.vibration.circuits["common"]
     time = np.linspace(*_CLOSE, 3001)
@@ -83,7 +83,7 @@ def _frames(study: Study) -> Picture:
                        "supply_V": bus.tolist(), "sampled_at_s": looks.tolist(), "sampled_supply_V": volts.tolist()})
 
 
-def _seen(study: Study, one: Stand) -> tuple[Array, Array]:
+def _seen(study: PaperStudy, one: Stand) -> tuple[Array, Array]:
     """Return when the program looked [s], and what the supply of the control circuit was [V]."""
     looks = one.control.sampling_times(one.run.pulses)
     looks = looks[looks < _OVERVIEW]
@@ -91,17 +91,17 @@ def _seen(study: Study, one: Stand) -> tuple[Array, Array]:
     return looks, study.supply - one.control.command_share * sag
 
 
-def _scale_supply(ax: Axes, study: Study) -> None:
+def _scale_supply(ax: Axes, study: PaperStudy) -> None:
     """Show the voltages at which a supply sags, and not zero."""
     lowest = study.vibration.circuits["common"].still.lowest_bus
     ax.set_ylim(lowest - 0.15, study.supply + 0.15)
 
 
-def _angle(study: Study, row: int) -> str:
+def _angle(study: PaperStudy, row: int) -> str:
     return fixed(float(study.table["q_deg"][row]), 0)
 
 
-def section(study: Study, figures: Callable[[Sequence[str]], str]) -> str:
+def section(study: PaperStudy, figures: Callable[[Sequence[str]], str]) -> str:
     """Return the words, tables and pictures; `figures` makes HTML of names."""
     common, apart = (study.vibration.circuits[name] for name in ("common", "separate"))
     delay = number(1e3 * common.control.sampling_delay)
@@ -133,7 +133,7 @@ shows that the paper's explanation works, and not that its bench was this one.</
 """
 
 
-def _circuits(study: Study) -> str:
+def _circuits(study: PaperStudy) -> str:
     rows = [[words, fixed(math.degrees(one.off), 1), fixed(math.degrees(one.still.swing), 2),
              fixed(one.still.frequency, 1), fixed(one.still.current, 2), fixed(one.still.lowest_bus, 2)]
             for name, (words, _, _) in CIRCUITS.items() for one in (study.vibration.circuits[name],)]
@@ -142,7 +142,7 @@ def _circuits(study: Study) -> str:
                  caption=f"At {_angle(study, SHOWN_ROW)}°, from {number(LOOKED_AT)} s on")
 
 
-def _angles(study: Study) -> str:
+def _angles(study: PaperStudy) -> str:
     pairs = zip(study.vibration.common, study.vibration.separate, strict=True)
     rows = [[f"{_angle(study, k)}°", fixed(math.degrees(one.off), 1), fixed(math.degrees(one.still.swing), 2),
              fixed(one.still.frequency, 1), fixed(math.degrees(two.off), 1), fixed(math.degrees(two.still.swing), 2),

@@ -20,7 +20,7 @@ from servotwin.simulation.progress import lines, on_terminal
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from servotwin.identification.fitting.comparison import Tables
+    from servotwin.identification.fitting.comparison import ErrorTables
     from servotwin.identification.fitting.yielding import Yielded
 
 Array = NDArray[np.float64]
@@ -204,7 +204,7 @@ def checked_count(what: str, number: Any, *, least: int) -> int:
     return int(number)
 
 
-def warnings_of(yielded: Sequence[Yielded], tables: Tables) -> tuple[str, ...]:
+def warnings_of(yielded: Sequence[Yielded], tables: ErrorTables) -> tuple[str, ...]:
     """Return what a reader has to know of a fit, a line each."""
     found = [str(one) for one in yielded]
     if tables.holdout and tables.training:

@@ -127,7 +127,7 @@ class Trial:
     residuals: tuple[Array, ...]
 
 
-class Bench:
+class TrialBench:
     """Some logs of a fit, and where trials begin.
 
     Parameters
