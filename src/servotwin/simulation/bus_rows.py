@@ -72,7 +72,7 @@ def events_of(plans: Sequence[Plan], rows: Rows) -> list[tuple[Event, ...]]:
     """Return the events of each servo."""
     found: list[list[Event]] = [[] for _ in plans]
     for unit, time, kind, zone, contact, angle in rows.events.tolist():
-        name = _WORDS.get(kind) or event_name(int(kind), Mode(int(zone), int(contact), 0, 0))
+        name = _WORDS.get(kind) or event_name(int(kind), Mode(int(zone), int(contact), 0, 0, 0))
         found[int(unit)].append(Event(time, name, angle))
     return [tuple(events) for events in found]
 
@@ -84,15 +84,15 @@ class _Maker:
         self._plan, self._given = plan, numbers
 
     def __call__(self, row: list[float]) -> Segment:
-        (_, how, origin, start, end, error, wiper, drive, silent, zone, contact, mesh, motor, u, *rest) = row
+        (_, how, origin, start, end, error, wiper, drive, silent, zone, contact, mesh, motor, share, u, *rest) = row
         tau, (kind, length, next_step, first, returns, anchor, step) = Piece(*rest[:7]), rest[7:14]
-        mode = Mode(int(zone), int(contact), int(mesh), int(motor))
+        mode = Mode(int(zone), int(contact), int(mesh), int(motor), int(share))
         numbers = at_pulses(self._plan.numbers, int(silent))
         base = motion.nothing(numbers, Piece(value=u), tau)._replace(
             kind=int(kind), mode=mode, t0=anchor, length=length, next_step=next_step, end=vector_of(rest[14:21]),
             start=vector_of(rest[21:28]))
         if how == tape.ALONE:
-            m = _alone(base, step)
+            m = _alone(base, step, self._plan.accuracy)
         else:
             m = self._together(base._replace(numbers=on_stiff_source(numbers, returns > 0.0)), int(how), int(first))
         return Segment(origin + start, origin + end, m, error, wiper, drive, int(silent), origin)
@@ -107,10 +107,10 @@ class _Maker:
         return motion.by_step(numbers, mode, u, tau, m.t0, m.start, m.length, tuple(map(vector_of, dense)), m.end)
 
 
-def _alone(m: Motion, step: float) -> Motion:
+def _alone(m: Motion, step: float, accuracy: float) -> Motion:
     """Return the motion of a servo on its own; of a step, length and end are known."""
     if not motion.is_step(m):
-        return motion.begin(m.numbers, m.mode, m.u, m.tau, m.t0, m.start, step, math.inf)
+        return motion.begin(m.numbers, m.mode, m.u, m.tau, m.t0, m.start, step, math.inf, accuracy)
     if m.kind == motion.LONG_STEP:
         return m
     jac = jacobian(m.numbers, m.mode, piece_value(m.u, m.t0), piece_rate(m.u, m.t0), piece_rate(m.tau, m.t0),

@@ -111,7 +111,7 @@ class _Plainly:
         self._seats, self._mates = ([object_of(kind) for _ in range(n * len(plans))] for kind, n in (
             (Seat, 1), (Mate, 2)))
         for seat, plan in zip(self._seats, plans, strict=True):
-            crew.sit(seat, plan.numbers, plan.chip, plan.inputs.period)
+            crew.sit(seat, plan.numbers, plan.chip, plan.inputs)
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
         """Go on to a time [s]; return a status and when."""
@@ -160,7 +160,7 @@ def _lanes_of(plans: Sequence[Plan]) -> Lanes:
     return Lanes(_tiles_of(Numbers, [plan.numbers for plan in plans]), _tiles_of(Chip, [plan.chip for plan in plans]),
                  np.zeros((7, len(plans))), np.array([plan.external_torque for plan in plans]),
                  np.array([plan.seed for plan in plans]), np.concatenate(pieces), first, count, np.concatenate(edges),
-                 edge_first, np.where(regular, -1, edge_count))
+                 edge_first, np.where(regular, -1, edge_count), plans[0].accuracy)
 
 
 def _tables_of(plans: Sequence[Plan]) -> Tables:

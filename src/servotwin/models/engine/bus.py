@@ -32,7 +32,9 @@ from servotwin.models.engine.seats import (
     numbers_of,
     piece_of,
     point_of,
+    put_mode,
     put_piece,
+    put_vector,
     source_of,
     vector_of,
 )
@@ -202,7 +204,7 @@ def _measure(inputs: Inputs, j: int, count: int, shared: Any, seats: Any, mates:
     t_in = piece_value(since(piece, origin), now)
     here = crew.point_now(seat, shared, mates, time)
     if not frame.accepted(chip, t_in):
-        tape.write_event(written, j, origin + now, tape.REFUSED, Mode(0, 0, 0, 0), here.y[0])
+        tape.write_event(written, j, origin + now, tape.REFUSED, Mode(0, 0, 0, 0, 0), here.y[0])
     v_m, V_bus = 0.0, chip.V_oc
     if chip.beta != 0.0 or chip.c_s != 0.0:
         v_m, V_bus = _voltages(j, count, shared, seats, mates, here.y, time)
@@ -302,10 +304,8 @@ def _join(count: int, shared: Any, seats: Any, mates: Any, same: bool, written: 
     for k in range(members):
         mate = mates[k]
         seat = seats[mate.unit]
-        point, mode, t = seat.point, mate.mode, seat.clock
-        point.time, point.anchor_time = t, t
-        point.mode.zone, point.mode.contact, point.mode.mesh, point.mode.motor = (
-            mode.zone, mode.contact, mode.mesh, mode.motor)
-        for n in range(len(mate.start)):
-            point.anchor[n] = point.y[n]
+        point = seat.point
+        point.time = point.anchor_time = seat.clock
+        put_mode(point.mode, mode_of(mate.mode))
+        put_vector(point.anchor, vector_of(point.y))
         seat.joined, seat.arrival = k, math.nan

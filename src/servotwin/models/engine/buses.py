@@ -73,9 +73,9 @@ def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, dura
 
 def _go_on(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int], duration: float, until: float,
            seats: Any, mates: Any, written: Tape) -> int:
-    memories = _seated(lanes, buses, places, seats)
-    ends = [m.point.time + duration if until == math.inf else until - origin_of(m) for m in memories]
     inputs, joined = [inputs_of(lanes, tables, buses.which[j]) for j in places], [buses.joined[j] for j in places]
+    memories = _seated(lanes, buses, places, inputs, seats)
+    ends = [m.point.time + duration if until == math.inf else until - origin_of(m) for m in memories]
     status, when = bus.through(inputs, memories, ends, joined, buses.shared[k], seats, mates, written)
     for n in range(len(places)):
         j = places[n]
@@ -90,12 +90,11 @@ def _alive(buses: Buses, k: int) -> list[int]:
     return [j for j in range(buses.first[k], buses.first[k + 1]) if buses.status[j] == COMPLETED]
 
 
-def _seated(lanes: Lanes, buses: Buses, places: list[int], seats: Any) -> list[Memory]:
+def _seated(lanes: Lanes, buses: Buses, places: list[int], inputs: list[Inputs], seats: Any) -> list[Memory]:
     """Give lanes their seats, and return what they remember."""
     for n in range(len(places)):
         lane = buses.which[places[n]]
-        period = 0.0 if lanes.edge_count[lane] >= 0 else chip_of(lanes, lane).frame_period
-        crew.sit(seats[n], numbers_of(lanes, lane), chip_of(lanes, lane), period)
+        crew.sit(seats[n], numbers_of(lanes, lane), chip_of(lanes, lane), inputs[n])
     return [memory_of(buses.records[j]) for j in places]
 
 
@@ -116,7 +115,8 @@ def look(lanes: Lanes, tables: Tables, buses: Buses, seats: Any, mates: Any, see
 
 def _look(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int], seats: Any, mates: Any,
           seen: Floats) -> None:
-    memories = _seated(lanes, buses, places, seats)
+    told = [inputs_of(lanes, tables, buses.which[j]) for j in places]
+    memories = _seated(lanes, buses, places, told, seats)
     for n in range(len(places)):
         memory = memories[n]
         crew.place(seats[n], memory, memory.point.time, memory.point.time, -1)
@@ -124,7 +124,7 @@ def _look(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int],
     V = bus.bus_voltage(len(places), buses.shared[k], seats, mates, 0.0)
     for n in range(len(places)):
         memory, lane = memories[n], buses.which[places[n]]
-        inputs, point, time, origin = inputs_of(lanes, tables, lane), memory.point, memory.point.time, origin_of(memory)
+        inputs, point, time, origin = told[n], memory.point, memory.point.time, origin_of(memory)
         numbers = on_bus(crew.numbers_now(seats[n]), V)
         u = memory.chip.drive * numbers.source.V
         piece, _ = in_force(inputs.torque, origin, time, inputs.constant_torque)

@@ -43,11 +43,11 @@ if TYPE_CHECKING:
 _UNKNOWN = math.nan
 
 
-def sit(seat: Any, numbers: Numbers, chip: Chip, period: float) -> None:
-    """Give a servo, whose frames have this period [s], a seat."""
+def sit(seat: Any, numbers: Numbers, chip: Chip, inputs: Inputs) -> None:
+    """Give a servo a seat."""
     put_numbers(seat.numbers, numbers)
     put_chip(seat.chip, chip)
-    seat.period = period
+    seat.period, seat.accuracy = inputs.period, inputs.accuracy
 
 
 def place(seat: Any, memory: Memory, first: float, end: float, joined: int) -> None:
@@ -125,7 +125,8 @@ def edge_of(seat: Any, inputs: Inputs) -> float:
     """Return when the next frame begins, by the servo's clock [s]."""
     if seat.period > 0.0:
         return frame.edge_time(seat.period, inputs.edges, seat.decided.number - seat.frames)
-    return frame.edge_time(0.0, inputs.edges, seat.decided.number) - seat.origin
+    edge: float = frame.edge_time(0.0, inputs.edges, seat.decided.number) - seat.origin
+    return edge
 
 
 def forget(seat: Any) -> None:
@@ -142,7 +143,8 @@ def alone(seat: Any, until: float) -> int:
         point = step.anchored(numbers, u, tau, point.time, point)
         put_point(seat.point, point)
     after, m, event, status = step.onward(
-        numbers, point, u, tau, motion.nothing(numbers, u, tau), True, seat.limit, seat.end)
+        numbers, point, u, tau, motion.nothing(numbers, u, tau), True, seat.limit, seat.end,
+        seat.accuracy)
     put_point(seat.ahead, after)
     put_track(seat.track, Track(m.kind, m.length, m.end, m.next_step))
     seat.event, seat.arrival = event, by_bus(seat, after.time, until)
@@ -160,7 +162,7 @@ def point_now(seat: Any, shared: Any, mates: Any, time: float) -> Point:
         numbers = numbers_now(seat)
         u = step.source(numbers, decided_of(seat.decided))
         m = motion.prepared(motion.begin(numbers, p.mode, u, tau_by(seat, seat.origin), p.anchor_time, p.anchor,
-                                         p.step, seat.limit - p.anchor_time))
+                                         p.step, seat.limit - p.anchor_time, seat.accuracy))
         y = motion.state(m, t - m.t0)
     return Point(t, y, p.mode, p.anchor_time, p.anchor, p.step, wiper_of(seat, y[0]))
 
@@ -194,7 +196,7 @@ def hear(seat: Any, unit: int, now: Frame, written: Tape) -> None:
     before, angle, time, heeds = decided_of(seat.decided), seat.point.y[0], seat.origin + seat.clock, (
         heeds_silence(seat))
     put_decided(seat.decided, now)
-    nothing = Mode(0, 0, 0, 0)
+    nothing = Mode(0, 0, 0, 0, 0)
     if now.drive != before.drive:
         tape.write_event(written, unit, time, tape.DRIVES + int(now.drive), nothing, angle)
     if heeds and now.silent != before.silent:

@@ -51,6 +51,7 @@ class Seat(NamedTuple):
     beat: float
     origin: float
     period: float  # of its frames; 0: as listed
+    accuracy: float  # of what is integrated [rad]
     clock: float  # its time now
     late: float  # by how much its clock is ahead of that of the bus
     end: float  # when the run is over

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 ALONE, SERIES, DENSE = range(3)
 # Events besides those of guards: how the bridge drives after it, silence, and a pulse that is not taken.
 DRIVES, SILENCE, REFUSED = -10, -20, -30
-ROW, EVENT = 42, 6  # numbers of a row
-UNTIL, FIRST = 4, 24  # where a row of a motion has its end, and the place of its first number
+ROW, EVENT = 43, 6  # numbers of a row
+UNTIL, FIRST = 4, 25  # where a row of a motion has its end, and the place of its first number
 _MOST = 8  # rows of one servo between two looks at the room that is left
 
 
@@ -84,7 +84,8 @@ def _write(tape: Tape, unit: int, how: int, seat: Any, until: float, mode: Mode,
     now, point, tau = seat.decided, seat.point, seat.tau
     y, z = vector_of(end), vector_of(start)
     values = (1.0 * unit, 1.0 * how, seat.origin, point.time, until, now.error, point.wiper, now.drive,
-              1.0 * now.silent, 1.0 * mode.zone, 1.0 * mode.contact, 1.0 * mode.mesh, 1.0 * mode.motor,
+              1.0 * now.silent,
+              1.0 * mode.zone, 1.0 * mode.contact, 1.0 * mode.mesh, 1.0 * mode.motor, 1.0 * mode.share,
               seat.numbers.source.V * now.drive,
               tau.start - seat.origin, tau.value, tau.slope, tau.amplitude, tau.frequency, tau.phase, tau.sweep,
               1.0 * kind, length, next_step, 1.0 * first, 1.0 * returns, point.anchor_time, point.step,

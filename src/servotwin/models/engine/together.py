@@ -40,8 +40,8 @@ APART, TOGETHER, ENDED = range(3)
 
 def at_start(source: Source) -> Shared:
     """Return what servos on a source remember when none has moved yet."""
-    return Shared(APART, shared_source.FOLLOWING, 1, -1, -1, 0, joint_motion.BY_SERIES, 0, source.V, FIRST_STEP, 0.0, 0.0,
-                  math.inf, source)
+    return Shared(APART, shared_source.FOLLOWING, 1, -1, -1, 0, joint_motion.BY_SERIES, 0, source.V, FIRST_STEP, 0.0,
+                  0.0, math.inf, source)
 
 
 def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> None:
@@ -131,7 +131,7 @@ def _find_end(source: Source, shared: Any, mates: Any, limit: float) -> None:
         if shared.how != LONG_STEP and _is_calm(shared, mates[j]):
             continue
         kinds = _kinds(mates[j])
-        for kind in range(guards.MOTOR_RELEASE_BACKWARD + 1):
+        for kind in range(guards.KINDS):
             if kinds >> kind & 1:
                 s = _crossing(source, shared, mates, j, kind, first)
                 if s < first or (s == first and which < 0):
@@ -264,12 +264,12 @@ def arrive(shared: Any, mates: Any) -> Mode:
     shared.jumped = 1 if whose >= 0 and jumps(kind) else 0
     shared.voltage, shared.phase = V, ENDED
     if whose < 0:
-        return Mode(0, 0, 0, 0)
+        return mode_of(mates[0].mode)
     mate = mates[whose]
     mode, y = guards.cross(numbers_of(mate.numbers), mode_of(mate.mode), kind, shared_source.behind(mate, V),
                            piece_value(piece_of(mate.tau), shared.end), vector_of(mate.y))
     put_vector(mate.y, y)
-    return Mode(shared_source.let_through(mate, mode.zone), mode.contact, mode.mesh, mode.motor)
+    return Mode(shared_source.let_through(mate, mode.zone), mode.contact, mode.mesh, mode.motor, mode.share)
 
 
 def jumps(kind: int) -> bool:
