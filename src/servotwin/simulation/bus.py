@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from servotwin.errors import InputError, SimulationError, UnknownNameError
-from servotwin.models import Model, PulseServo, PulseServoInductive
+from servotwin.models import Model
 from servotwin.models.engine import shared_source
 from servotwin.models.engine.modes import Vector
 from servotwin.models.engine.records import object_of
@@ -25,6 +25,7 @@ from servotwin.parameters.groups import Supply
 from servotwin.signals import Signal
 from servotwin.simulation import bus_run, files, frames
 from servotwin.simulation.bus_rows import events_of, segments_of
+from servotwin.simulation.bus_supply import MODELS, check_supply, on_supply, source_of
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
 from servotwin.simulation.oddities import warn_of
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 _BUS_UNITS = {"bus_voltage": "V", "bus_current": "A"}
-_OF_SERVO = ("bridge_drop_voltage", "bridge_drop_resistance")
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,14 +241,14 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     given = _checked(servos, supply, initial)
     sims, plans, states = {}, [], []
     for k, (name, (model, command, load)) in enumerate(given.items()):
-        sim = Simulator(_on_supply(model, supply), load, int(seed) + k)
+        sim = Simulator(on_supply(model, supply), load, int(seed) + k)
         sim.load.check_span(0.0, duration)
         states.append(sim.initial(command, (initial or {}).get(name)))
         plans.append(sim.plan(command))
         sims[name] = sim
     for name, (_, command, _) in given.items():
         warn_of(sims[name].model.servo, [command], duration)
-    source = _source(supply)
+    source = source_of(supply)
     rows = bus_run.run(plans, states, source, duration)
     status = Status.of_code(rows.status)
     ended = duration if status.ok else rows.ended
@@ -268,12 +268,7 @@ def _checked(servos: Mapping[str, Sequence[Any]], supply: Supply,
     allowed = "a mapping of names to (model, command) or (model, command, load)"
     if not isinstance(servos, Mapping) or not servos:
         raise InputError("servos", got=servos, allowed=allowed)
-    if not isinstance(supply, Supply) or supply.open_circuit_voltage is None:
-        raise InputError("supply", got=supply, allowed="a Supply with open_circuit_voltage, such as "
-                         "Supply(open_circuit_voltage=6.0, internal_resistance=0.5)")
-    for name in _OF_SERVO:
-        if getattr(supply, name) is not None:
-            raise InputError(f"supply.{name} of a bus", got=getattr(supply, name), allowed="it belongs to each servo")
+    check_supply("supply", supply)
     for name in initial or {}:
         if name not in servos:
             raise UnknownNameError("servo of initial", name, tuple(servos))
@@ -281,23 +276,10 @@ def _checked(servos: Mapping[str, Sequence[Any]], supply: Supply,
     for name, parts in servos.items():
         if not isinstance(parts, Sequence) or isinstance(parts, str) or len(parts) not in (2, 3):
             raise InputError(f"servo {name!r}", got=parts, allowed="(model, command) or (model, command, load)")
-        if not isinstance(parts[0], PulseServo | PulseServoInductive):
+        if not isinstance(parts[0], MODELS):
             raise InputError(f"model of servo {name!r}", got=parts[0], allowed="PulseServo or PulseServoInductive")
         found[str(name)] = (parts[0], parts[1], parts[2] if len(parts) == 3 else None)
     return found
-
-
-def _on_supply(model: Model, supply: Supply) -> Model:
-    """Return the model with this supply instead of its own."""
-    return type(model)(model.servo.replace({
-        f"supply.{name}": getattr(supply, name)
-        for name in ("open_circuit_voltage", "internal_resistance", "current_limit")},
-        source="the supply that all share"))
-
-
-def _source(supply: Supply) -> Source:
-    V_oc, R_b, I_max = supply.open_circuit_voltage, supply.internal_resistance, supply.current_limit
-    return Source(V_oc or 0.0, R_b or 0.0, np.inf if I_max is None else I_max)
 
 
 @dataclass(frozen=True, eq=False)

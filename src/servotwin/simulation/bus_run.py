@@ -51,7 +51,7 @@ class Rows(NamedTuple):
 
 def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration: float) -> Rows:
     """Run servos on one source from t = 0 to `duration` [s]."""
-    recipe = PLAIN_BUSES if all(is_plain(plan.numbers) for plan in plans) else ALL_BUSES
+    recipe = ALL_BUSES if any(not_plain(plan.numbers) for plan in plans) else PLAIN_BUSES
     work = duration * sum(1.0 / plan.chip.frame_period for plan in plans)
     way: _Compiled | _Plainly = (_Compiled if _worth_it(recipe, work) else _Plainly)(recipe, plans, states, source)
     written = tape_of(len(plans))
@@ -78,18 +78,16 @@ def tape_of(servos: int) -> Tape:
                 np.empty(max(_NUMBERS, 64 * servos * ROOM)), np.zeros(3, np.int64))
 
 
-def is_plain(numbers: Numbers) -> bool:
-    """Tell whether a servo has none of the terms that the plain form leaves out."""
-    return not any(_has(numbers, name) for name in PLAIN_BUSES.absent)
-
-
-def _has(numbers: Numbers, name: str) -> bool:
-    term, _, field = name.partition(".")
-    if term not in Numbers._fields:  # of an input
-        return False
-    neutral, own = getattr(NEUTRAL, term), getattr(numbers, term)
-    field = field or neutral._fields[0]
-    return bool(getattr(own, field) != getattr(neutral, field))
+def not_plain(numbers: Numbers) -> Any:
+    """Tell of a servo, or of lanes, which have a term that the plain form leaves out."""
+    found: Any = False
+    for name in PLAIN_BUSES.absent:
+        term, _, field = name.partition(".")
+        if term in Numbers._fields:  # not of an input
+            neutral, own = getattr(NEUTRAL, term), getattr(numbers, term)
+            field = field or neutral._fields[0]
+            found = found | (getattr(own, field) != getattr(neutral, field))
+    return found
 
 
 def _worth_it(recipe: Recipe, frames: float) -> bool:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.memory import BEAT, FIRST_STEP, SAME, Memory
+from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.records import TILE, record_of
+
+if TYPE_CHECKING:
+    from servotwin.simulation.vector_numbers import LaneNumbers
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -76,6 +80,27 @@ def put_records(tiles: NDArray[Any], places: Indices, records: NDArray[Any], per
     for group, columns in values.items():
         for name, column in columns.items():
             put(tiles, group, name, places, column)
+
+
+def impose_on_records(records: NDArray[Any], places: Indices, lanes: Indices, angle: Floats | None,
+                      speed: Floats | None, numbers: LaneNumbers) -> None:
+    """Set angles [rad] and speeds [rad/s] of the output; motor and potentiometer go along as far as their play.
+
+    The `lanes` have these places among the records.
+    """
+    rows, half = records[places], numbers.now("play", lanes).half
+    point, y, play = rows["point"], rows["point"]["y"], half > 0.0
+    if angle is not None:
+        slack = numbers.now("sensor", lanes).half_slack
+        y[:, 0] = angle
+        y[:, 5] = np.where(play, np.clip(y[:, 5], angle - half, angle + half), angle)
+        point["wiper"] = np.clip(point["wiper"], angle - slack, angle + slack)
+    if speed is not None:
+        y[:, 1] = speed
+        y[:, 6] = np.where(play, y[:, 6], speed)
+    point["anchor_time"], point["anchor"] = math.inf, y
+    point["mode"]["mesh"] = np.where(play, INSIDE, RIGID)
+    records[places] = rows
 
 
 _READ = {

@@ -16,6 +16,7 @@ from servotwin.models.base import KINDS, PULSE_RANGE, Model
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.observe import Observed
 from servotwin.simulation.batch import Failure
+from servotwin.simulation.bus_supply import supplies_of
 from servotwin.simulation.lane_inputs import lanes_of, pick
 from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
 from servotwin.simulation.start import accuracy_of
@@ -55,6 +56,9 @@ class VectorSimulator:
         As in `simulate_many`.
     parameters : mapping, optional
         Number or array (lanes,) (SI) by dotted name, of the servo or of the load.
+    bus : Supply or sequence of tuple (Supply, lanes), optional
+        A supply that all lanes share, or several, each with the lanes on it: a mask, or numbers of lanes. It replaces
+        what their servo files say of the source. A lane on none has its own.
     dtype : str
         "float64" or "float32"; the latter for lanes that run side by side.
     threads : int, optional
@@ -88,9 +92,7 @@ class VectorSimulator:
         count = _whole("lanes", lanes, 1)
         if count * _BYTES > 0.8 * memory_limit():
             raise InputError("lanes", got=count, allowed="what fits into memory: take fewer")
-        if bus is not None:
-            raise InputError("bus of VectorSimulator", got=bus, allowed="None: several servos on one supply are run by "
-                             "simulate_bus")
+        supplies = supplies_of(bus, model, count)
         base = _whole("seed", seed, None)
         from servotwin import signals
 
@@ -99,7 +101,7 @@ class VectorSimulator:
         if inputs.count != count:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
-        self._numbers = LaneNumbers(inputs, accuracy_of(accuracy))
+        self._numbers = LaneNumbers(inputs, accuracy_of(accuracy), supplies)
         self._threads = _whole("threads", threads, 1) if threads is not None else workers_of(None)
         self._pool = own_threads(os.getpid())
         self._store = Store(self._numbers, real_type(dtype), self._threads, self._pool)
@@ -223,7 +225,7 @@ class VectorSimulator:
         load_inertia : float or array, optional
             J_L instead of the load's [kg m²]; the gear's own stays.
         bus_voltage : float or array, optional
-            Voltage at the bridge instead of what the supply would leave, positive [V].
+            Voltage at the bridge instead of what the supply would leave, positive [V]; not of a lane on a bus.
         parameters : mapping, optional
             Number or array by dotted name, as at the beginning.
         lanes : array of bool, shape (lanes,), or of int, optional
@@ -246,6 +248,8 @@ class VectorSimulator:
             _check_lanes("load_inertia", inertia, which, inertia >= 0.0, "at least 0 kg m²")
         if bus is not None:
             _check_lanes("bus_voltage", bus, which, bus > 0.0, "a positive voltage")
+            _check_lanes("bus_voltage", bus, which, self._numbers.supplies.bus_of[which] < 0,
+                         "nothing: what all on its bus draw decides it")
         if angle is not None:
             self._numbers.check_angles(angle, which)
         if parameters:
@@ -267,7 +271,7 @@ class VectorSimulator:
         store = self._store
         return VectorMemory(type(self._numbers.model).__name__, store.records(), self._command.copy(),
                             self._torque.copy(), store.status.copy(), store.ended.copy(), store.work.copy(),
-                            self._numbers.columns.numbers.copy())
+                            self._numbers.columns.numbers.copy(), store.common())
 
     def restore(self, memory: VectorMemory) -> None:
         """Go back to what was saved, here or in another simulator of this model with as many lanes.

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+class Common(NamedTuple):
+    """What lanes on shared supplies remember together.
+
+    Each lane's bus and its place among those that move together there (−1: none), shape (lanes,); and a record of
+    `models.engine.seats.Shared` for each bus.
+    """
+
+    bus_of: NDArray[np.int64]
+    joined: NDArray[np.int64]
+    shared: Mapping[int, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +43,8 @@ class VectorMemory:
     numbers : ndarray
         Tiles of `models.terms.numbers.Numbers`: what the lanes were. They are not restored; a lane that has others by
         then goes on from where it stood.
+    common : Common, optional
+        Of lanes that share supplies.
     """
 
     model: str
@@ -40,3 +55,4 @@ class VectorMemory:
     ended: Array
     work: Array
     numbers: NDArray[Any]
+    common: Common | None = None

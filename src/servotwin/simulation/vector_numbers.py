@@ -20,6 +20,7 @@ from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.models.terms.shaft import Shaft
 from servotwin.physics.laws import array_form
 from servotwin.simulation import lane_runs
+from servotwin.simulation.bus_supply import Supplies
 from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
 from servotwin.simulation.lane_memory import RECORD
 from servotwin.simulation.lanes import Tables
@@ -55,16 +56,19 @@ class LaneNumbers:
         Angles [rad] and errors [V] of the potentiometers.
     accuracy : float
         Of what is integrated [rad].
+    supplies : Supplies
+        Those that lanes share.
     """
 
-    def __init__(self, inputs: Lanes, accuracy: float, imposed: Imposed | None = None) -> None:
+    def __init__(self, inputs: Lanes, accuracy: float, supplies: Supplies, imposed: Imposed | None = None) -> None:
         self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
-        self.accuracy = accuracy
+        self.accuracy, self.supplies = accuracy, supplies
         self.available = inputs.model.available
         nothing = np.full(self.count, math.nan)
         self.imposed = Imposed(nothing, nothing.copy())
         commands = Commands(inputs)
-        self.chunks = [Chunk(inputs, commands, which) for which in groups(inputs, commands)]
+        self.chunks = [Chunk(own, commands, part) for which in groups(inputs, commands)
+                       for own, part in supplies.parts(inputs, which)]
         self.pulsed = LAWS[type(inputs.model)] == "pulse"
         self.curve = np.array(inputs.model.curve(), np.float64).reshape(2, -1)
         self.neutral = np.empty(self.count)
@@ -146,11 +150,12 @@ class LaneNumbers:
         inputs = self.inputs
         if not isinstance(parameters, Mapping):
             raise InputError("parameters", got=parameters, allowed="a mapping of names to numbers or arrays (SI)")
+        self.supplies.check_parameters(list(parameters), which)
         merged = {name: self._merged(name, value, which) for name, value in parameters.items()}
         known = {**inputs.numbers, **inputs.words}
         loads = [inputs.loads[k] for k in inputs.load_of.tolist()]
         inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
-        return LaneNumbers(inputs, self.accuracy, self.imposed)
+        return LaneNumbers(inputs, self.accuracy, self.supplies, self.imposed)
 
     def _merged(self, name: str, value: Any, which: Indices) -> Any:
         """Return a parameter of all lanes, of which some have new values."""

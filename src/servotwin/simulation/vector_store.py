@@ -18,8 +18,10 @@ from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
-from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
+from servotwin.simulation.lane_memory import RECORD, flat, impose_on_records, put, put_records, records_of
 from servotwin.simulation.lane_runs import OneByOne, SideBySide, some_of
+from servotwin.simulation.vector_buses import BusSet, sets_of
+from servotwin.simulation.vector_memory import Common
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_memory import VectorMemory
@@ -58,9 +60,10 @@ class Store:
         self._total[:] = self._base
         self._columns = columns._replace(torque=self._total)
         self._kinds = self._kinds_now()
-        self._sets: list[_Tiles | _Records] = [
-            _Tiles(kind, some_of(self._columns, kind.which), self._threads)
-            if isinstance(kind, SideBySide) else _Records(kind) for kind in self._kinds]
+        self._buses = sets_of(numbers, self._threads, self._pool) if numbers.supplies.lanes else []
+        self._sets: list[_Tiles | _Records | BusSet] = [
+            *(_Tiles(kind, some_of(self._columns, kind.which), self._threads)
+              if isinstance(kind, SideBySide) else _Records(kind) for kind in self._kinds), *self._buses]
         self._set_of, self._place = np.empty((2, numbers.count), np.int64)
         for k, some in enumerate(self._sets):
             self._set_of[some.which], self._place[some.which] = k, np.arange(len(some.which))
@@ -70,10 +73,14 @@ class Store:
     def _kinds_now(self) -> list[SideBySide | OneByOne]:
         numbers, lanes = self._numbers, slice(self._numbers.count)
         own = columns_of(Numbers, numbers.columns.numbers, lanes), columns_of(Chip, numbers.columns.chips, lanes)
-        return lane_runs.kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
-                                  numbers.torque.count > 0, bool(numbers.curve.size))
+        kinds = lane_runs.kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
+                                   numbers.torque.count > 0, bool(numbers.curve.size))
+        if numbers.supplies.lanes:
+            bus_of = numbers.supplies.bus_of
+            kinds = [kind._replace(which=kind.which[bus_of[kind.which] < 0]) for kind in kinds]
+        return [kind for kind in kinds if len(kind.which)]
 
-    def _parts(self, which: Indices) -> Iterator[tuple[_Tiles | _Records, Indices, Indices]]:
+    def _parts(self, which: Indices) -> Iterator[tuple[_Tiles | _Records | BusSet, Indices, Indices]]:
         """Return the sets that hold some lanes, where in the set they are, and where in `which`."""
         set_of, place = self._set_of[which], self._place[which]
         for k, some in enumerate(self._sets):
@@ -96,10 +103,10 @@ class Store:
 
     def renew(self, numbers: LaneNumbers, which: Indices, torque: Array) -> None:
         """Take other numbers of some lanes; memories go on."""
-        memory = self.records()
+        memory, common = self.records(), self.common()
         self._build(numbers)
         self.hang(torque)
-        self._go_on_from(memory, which)
+        self._go_on_from(memory, which, common)
 
     def restore(self, memory: VectorMemory, torque: Array) -> None:
         """Go back to what was saved."""
@@ -109,9 +116,18 @@ class Store:
         before, now = (x.view(np.float64).reshape(len(x), -1, TILE)
                        for x in (memory.numbers, self._numbers.columns.numbers))
         others = np.flatnonzero((before != now).any(axis=1).ravel()[:count])
-        self._go_on_from(memory.records.copy(), others)
+        self._go_on_from(memory.records.copy(), others, memory.common)
 
-    def _go_on_from(self, memory: NDArray[Any], others: Indices) -> None:
+    def common(self) -> Common | None:
+        """Return what lanes on shared supplies remember together."""
+        if not self._buses:
+            return None
+        joined, shared = np.full(len(self.status), -1), dict[int, Any]()
+        for some in self._buses:
+            some.common(joined, shared)
+        return Common(self._numbers.supplies.bus_of, joined, shared)
+
+    def _go_on_from(self, memory: NDArray[Any], others: Indices, common: Common | None) -> None:
         """Take the memories of all lanes, of which some have other numbers than when they were made."""
         play = self._numbers.now("play").half > 0.0
         point = memory["point"]
@@ -119,7 +135,15 @@ class Store:
         mesh = point["mode"]["mesh"]
         point["mode"]["mesh"] = np.where(play, np.where(mesh == RIGID, INSIDE, mesh), RIGID)
         point["y"][~play, 5:7] = point["y"][~play, 0:2]
+        anchors = point["anchor_time"].copy()
+        if common is not None:
+            point["anchor_time"][common.joined >= 0] = math.inf  # unless their bus is the same as then
         self._put(np.arange(len(self.status)), memory)
+        if common is not None and np.array_equal(common.bus_of, self._numbers.supplies.bus_of):
+            touched = common.bus_of[others]
+            shared = {k: record for k, record in common.shared.items() if k not in touched}
+            for some in self._buses:
+                some.set_common(common.joined, shared, anchors)
 
     def start(self, which: Indices, records: NDArray[Any]) -> None:
         """Put lanes where they start; their noise goes on."""
@@ -162,6 +186,9 @@ class Store:
         for some in self._sets:
             if isinstance(some, _Tiles):
                 self._advance_tiles(some, duration, command)
+            elif isinstance(some, BusSet):
+                self._columns.pieces[:, 1] = command
+                some.advance(self._columns, duration, self.status, self.ended)
             else:
                 self._columns.pieces[:, 1] = command
                 own = np.flatnonzero(self.status[some.which] == 0)
@@ -225,7 +252,7 @@ class Store:
         self._columns.pieces[:, 1] = command
         seen = np.empty((len(self.status), len(Observed._fields)))
         for some in self._sets:
-            some.look(self._columns, self._inputs, seen)
+            some.look(self._columns, self._inputs, self.status, seen)
         seen[self.status != 0] = math.nan
         return seen
 
@@ -296,7 +323,7 @@ class _Tiles:
         edge, since = (flat(self.rows, "clock", name)[:len(self.which)] for name in ("edge", "since"))
         return np.asarray(edge + since)
 
-    def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
+    def look(self, columns: tiles.Lanes, inputs: Any, status: Any, seen: Array) -> None:
         kernels(lane_runs.LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
 
 
@@ -316,20 +343,7 @@ class _Records:
 
     def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
         """Set angles [rad] and speeds [rad/s] of the output; motor and potentiometer go along as far as their play."""
-        rows, lanes = self.rows[places], self.which[places]
-        half = numbers.now("play", lanes).half
-        point, y, play = rows["point"], rows["point"]["y"], half > 0.0
-        if angle is not None:
-            slack = numbers.now("sensor", lanes).half_slack
-            y[:, 0] = angle
-            y[:, 5] = np.where(play, np.clip(y[:, 5], angle - half, angle + half), angle)
-            point["wiper"] = np.clip(point["wiper"], angle - slack, angle + slack)
-        if speed is not None:
-            y[:, 1] = speed
-            y[:, 6] = np.where(play, y[:, 6], speed)
-        point["anchor_time"], point["anchor"] = math.inf, y
-        point["mode"]["mesh"] = np.where(play, INSIDE, RIGID)
-        self.rows[places] = rows
+        impose_on_records(self.rows, places, self.which[places], angle, speed, numbers)
 
     def records(self, columns: tiles.Lanes) -> NDArray[Any]:
         return self.rows.copy()
@@ -341,5 +355,5 @@ class _Records:
     def time(self) -> Array:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
-    def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
+    def look(self, columns: tiles.Lanes, inputs: Any, status: Any, seen: Array) -> None:
         kernels(lane_runs.LOOK_ONE_BY_ONE).one_by_one(columns, *inputs, self.which, self.rows, seen)

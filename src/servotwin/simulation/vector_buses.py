@@ -1,0 +1,149 @@
+"""Lanes of a `VectorSimulator` that share supplies: where they are kept and moved, bus by bus."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.models.engine import tape
+from servotwin.models.engine.buses import Buses, Tables
+from servotwin.models.engine.records import columns_of
+from servotwin.models.engine.step import COMPLETED
+from servotwin.models.engine.tape import Tape
+from servotwin.models.engine.tiles import Lanes
+from servotwin.models.engine.together import APART
+from servotwin.models.terms.numbers import Numbers
+from servotwin.simulation.bus_run import ALL_BUSES, PLAIN_BUSES, not_plain, room_of, shared_of
+from servotwin.simulation.bus_supply import Supplies, source_of
+from servotwin.simulation.compile import kernels
+from servotwin.simulation.lane_memory import RECORD, impose_on_records
+
+if TYPE_CHECKING:
+    from servotwin.simulation.vector_numbers import LaneNumbers
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+_NO_TAPE = Tape(np.zeros((0, tape.ROW)), np.zeros((0, tape.EVENT)), np.zeros(0), np.zeros(0, np.int64))
+_WORTH = 4  # buses for a thread: fewer cost more in waking it
+
+
+def sets_of(numbers: LaneNumbers, threads: int, pool: Any) -> list[BusSet]:
+    """Return the sets of all buses: those of plain servos, and others."""
+    supplies = numbers.supplies
+    rare = not_plain(columns_of(Numbers, numbers.columns.numbers, slice(numbers.count)))
+    plain = [not np.any(np.broadcast_to(rare, numbers.count)[lanes]) for lanes in supplies.lanes]
+    parts = ((recipe, [k for k, own in enumerate(plain) if own == kind])
+             for recipe, kind in ((PLAIN_BUSES, True), (ALL_BUSES, False)))
+    return [BusSet(numbers, recipe, which, threads, pool) for recipe, which in parts if which]
+
+
+class BusSet:
+    """Lanes on buses, in the order of the buses.
+
+    Attributes
+    ----------
+    which : ndarray of int64
+        The lanes.
+    rows : ndarray
+        What each remembers, a record of `models.engine.memory.Memory`.
+    """
+
+    def __init__(self, numbers: LaneNumbers, recipe: Any, buses: list[int], threads: int, pool: Any) -> None:
+        supplies: Supplies = numbers.supplies
+        lanes = [supplies.lanes[k] for k in buses]
+        self.numbers_of_buses, self._recipe, self._pool = np.array(buses), recipe, pool
+        self.which = np.concatenate(lanes)
+        sizes = np.array([len(some) for some in lanes])
+        count = len(self.which)
+        self.rows = np.zeros(count, RECORD)
+        self._bus_at = np.repeat(np.arange(len(buses)), sizes)
+        self._buses = Buses(self.which, np.concatenate([[0], np.cumsum(sizes)]), self.rows, np.full(count, -1),
+                            shared_of([source_of(supplies.supplies[k]) for k in buses]), np.zeros(count, np.int64),
+                            np.zeros(count))
+        none = np.zeros(numbers.count, np.int64)
+        curve = numbers.curve
+        self._tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, curve, none,
+                              none + curve.shape[1])
+        self._rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(buses) // _WORTH)))]
+
+    def advance(self, columns: Lanes, duration: float, status: NDArray[np.int8], ended: Array) -> None:
+        """Let all buses go on for a duration [s]; `status` and `ended` of all lanes are kept up to date."""
+        buses = self._buses
+        buses.status[:] = status[self.which]
+        before = buses.status.copy()
+        go_on, count, workers = kernels(self._recipe).go_on, len(self.numbers_of_buses), len(self._rooms)
+
+        def go(k: int) -> None:
+            go_on(columns, self._tables, buses, count * k // workers, count * (k + 1) // workers, duration, math.inf,
+                  *self._rooms[k], _NO_TAPE)
+
+        if workers == 1:
+            go(0)
+        else:
+            for run in [self._pool.submit(go, k) for k in range(workers)]:
+                run.result()
+        failed = np.flatnonzero((buses.status != COMPLETED) & (before == COMPLETED))
+        if len(failed):
+            status[self.which[failed]], ended[self.which[failed]] = buses.status[failed], self.time[failed]
+            self.rows["point"]["y"][failed] = math.nan
+
+    def _break_up(self, places: Indices) -> None:
+        """Let nobody on the buses of these lanes move together, until time goes on."""
+        touched = np.unique(self._bus_at[places])
+        mates = np.flatnonzero(np.isin(self._bus_at, touched) & (self._buses.joined >= 0))
+        self.rows["point"]["anchor_time"][mates] = math.inf
+        self._buses.joined[mates] = -1
+        self._buses.shared["phase"][touched] = APART
+        self._buses.shared["jumped"][touched] = 1
+
+    def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
+        """Put what lanes remember into their places."""
+        self._break_up(places)
+        self.rows[places] = records
+
+    def refit(self, columns: Lanes, lanes: Indices, places: Indices) -> None:
+        """Let motions of lanes begin anew: their numbers are read at each step."""
+        self._break_up(places)
+        self.rows["point"]["anchor_time"][places] = math.inf
+
+    def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
+        """Set angles [rad] and speeds [rad/s] of the output; motor and potentiometer go along as far as their play."""
+        self._break_up(places)
+        impose_on_records(self.rows, places, self.which[places], angle, speed, numbers)
+
+    def records(self, columns: Lanes) -> NDArray[Any]:
+        """Return what the lanes remember."""
+        return self.rows.copy()
+
+    def common(self, joined: Indices, shared: dict[int, Any]) -> None:
+        """Put into `joined` (lanes,) and `shared` what the lanes of each bus remember together."""
+        joined[self.which] = self._buses.joined
+        shared |= {int(k): self._buses.shared[n].copy() for n, k in enumerate(self.numbers_of_buses)}
+
+    def set_common(self, joined: Indices, shared: dict[int, Any], anchors: Array) -> None:
+        """Let those lanes move together again whose buses are in `shared`, from motions that began at `anchors` [s]."""
+        for n, k in enumerate(self.numbers_of_buses.tolist()):
+            if k in shared:
+                places = np.flatnonzero(self._bus_at == n)
+                source = self._buses.shared[n]["source"].copy()
+                self._buses.shared[n] = shared[k]
+                self._buses.shared["source"][n] = source
+                self._buses.joined[places] = joined[self.which[places]]
+                self.rows["point"]["anchor_time"][places] = anchors[self.which[places]]
+
+    def shaft(self, name: str) -> Array:
+        """Return angle [rad] or speed [rad/s] of each shaft."""
+        return np.asarray(self.rows["point"]["y"][:, ("output_angle", "output_speed").index(name)])
+
+    @property
+    def time(self) -> Array:
+        """Time of each lane since its start [s]."""
+        return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
+
+    def look(self, columns: Lanes, inputs: Any, status: NDArray[np.int8], seen: Array) -> None:
+        """Put what shows of the lanes into their rows of `seen`."""
+        self._buses.status[:] = status[self.which]
+        kernels(self._recipe).look(columns, self._tables, self._buses, *self._rooms[0], seen)
