@@ -1,4 +1,4 @@
-"""How servos on one source move together: the short way for plain members against the general one, and the step."""
+"""How servos on one source move together: the short way for plain mates against the general one, and the step."""
 
 import math
 
@@ -8,6 +8,8 @@ import servotwin as st
 from servotwin.loads import Constant, Inertia, as_load
 from servotwin.models.engine import joint_motion, shared_source
 from servotwin.models.engine.modes import BACKWARD, CURRENT_BACKWARD, CURRENT_FORWARD, FORWARD, FREE, RIGID, Mode
+from servotwin.models.engine.records import object_of
+from servotwin.models.engine.seats import Mate
 from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece
 
@@ -15,41 +17,47 @@ SOURCE = Source(6.0, 0.4, 1.5)
 STATES = (shared_source.FOLLOWING, shared_source.LIMITED, shared_source.BROKEN_DOWN, shared_source.KEEPING)
 
 
-def members(stiffness=0.0):
-    """Return two plain members that drive, one each way; a spring makes them take the general way."""
+def mates(stiffness=0.0):
+    """Return two plain mates that drive, one each way; a spring makes them take the general way."""
     model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
-    found, states = [], []
+    found = []
     for k, (sign, contact, zone) in enumerate([(1.0, FORWARD, CURRENT_FORWARD), (-1.0, BACKWARD, CURRENT_BACKWARD)]):
         numbers = shared_source.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
-        numbers = numbers._replace(load=numbers.load._replace(stiffness=stiffness))
-        found.append(shared_source.Member(numbers, Mode(zone, contact, RIGID, FREE, 0), sign, Piece(value=0.1), False))
-        w = sign * (1.0 + k)
-        states.append((0.5, w, 0.0, 0.0, 0.0, 0.5, w))
-    return found, states
+        mate, w = object_of(Mate), sign * (1.0 + k)
+        mate.numbers = numbers._replace(load=numbers.load._replace(stiffness=stiffness))
+        mate.mode, mate.sign, mate.tau = Mode(zone, contact, RIGID, FREE, 0), sign, Piece(value=0.1)
+        mate.start = [0.5, w, 0.0, 0.0, 0.0, 0.5, w]
+        found.append(mate)
+    return found
+
+
+def value(coefficients, terms, s):
+    return sum(c * s**n for n, c in enumerate(coefficients[:terms]))
 
 
 @pytest.mark.parametrize("state", STATES)
-def test_the_short_way_for_plain_members_is_the_general_one(state):
-    length = 0.4 * joint_motion.longest_series(members()[0])
-    short = joint_motion.series(SOURCE, state, *members(), 0.0, length)
-    general = joint_motion.series(SOURCE, state, *members(1e-300), 0.0, length)  # a spring that nobody feels
+def test_the_short_way_for_plain_mates_is_the_general_one(state):
+    short, general = mates(), mates(1e-300)  # a spring that nobody feels
+    length = 0.4 * joint_motion.longest_series(short, 2)
+    terms = [joint_motion.series(SOURCE, state, some, 2, 0.0, length) for some in (short, general)]
     for one, other in zip(short, general, strict=True):
-        for ours, theirs in ((one.speed, other.speed), (one.current, other.current)):
-            at_end = [sum(c * length**n for n, c in enumerate(series)) for series in (ours, theirs)]
+        for name in ("speed", "current"):
+            at_end = [value(getattr(mate, name), n, length) for mate, n in zip((one, other), terms, strict=True)]
             assert at_end[0] == pytest.approx(at_end[1], rel=1e-13)
 
 
 @pytest.mark.parametrize("state", STATES)
 def test_a_series_is_what_the_step_finds(state):
-    found, states = members()
-    length, _, _, ends = joint_motion.joint_step(SOURCE, state, found, states, 0.0, 1e-3)
-    for one, end in zip(joint_motion.series(SOURCE, state, found, states, 0.0, length), ends, strict=True):
-        assert sum(c * length**n for n, c in enumerate(one.speed)) == pytest.approx(end[1], abs=1e-11)
+    found = mates()
+    length = joint_motion.joint_step(SOURCE, state, found, 2, 0.0, 1e-3).length
+    terms = joint_motion.series(SOURCE, state, found, 2, 0.0, length)
+    for mate in found:
+        assert value(mate.speed, terms, length) == pytest.approx(mate.end[1], abs=1e-11)
+        assert value(mate.speed, terms, 0.3 * length) == pytest.approx(joint_motion.between(mate, 0.3)[1], abs=1e-10)
 
 
 def test_a_step_that_cannot_be_made_says_so():
-    found, states = members()
-    broken = [(y[0], math.nan, *y[2:]) for y in states]
-    length, _, dense, _ = joint_motion.joint_step(SOURCE, shared_source.FOLLOWING, found, broken, 0.0, 1e-3)
-    assert length == 0.0
-    assert not dense
+    found = mates()
+    for mate in found:
+        mate.start[1] = math.nan
+    assert joint_motion.joint_step(SOURCE, shared_source.FOLLOWING, found, 2, 0.0, 1e-3).length < 0.0

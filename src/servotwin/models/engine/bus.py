@@ -25,6 +25,7 @@ from servotwin.models.engine.memory import (
     time_of,
 )
 from servotwin.models.engine.modes import Mode, Vector
+from servotwin.models.engine.motion import LONG_STEP
 from servotwin.models.engine.seats import (
     chip_of,
     decided_of,
@@ -38,7 +39,7 @@ from servotwin.models.engine.seats import (
     source_of,
     vector_of,
 )
-from servotwin.models.engine.step import CHATTER, COMPLETED, CROWDED, MOST_IDLE, STEP_TOO_SMALL
+from servotwin.models.engine.step import CHATTER, COMPLETED, CROWDED, MOST_IDLE, STEP_TOO_SMALL, TOO_FAST
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.together import APART, ENDED, TOGETHER
 from servotwin.models.terms import frame
@@ -269,7 +270,7 @@ def _go_on(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time:
         if connected > 1:
             _join(count, shared, seats, mates, same, written, time)
             if shared.length < 0.0:
-                return STEP_TOO_SMALL
+                return STEP_TOO_SMALL if shared.how == LONG_STEP else TOO_FAST
     for j in range(count):
         if seats[j].joined < 0 and not crew.is_known(seats[j].arrival):
             how = crew.alone(seats[j], until)

@@ -65,29 +65,20 @@ def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, dura
     """
     status = COMPLETED
     for k in range(begin, end):
-        places = _alive(buses, k)
-        if len(places) > 0:
-            status = _go_on(lanes, tables, buses, k, places, duration, until, seats, mates, written)
+        places = [j for j in range(buses.first[k], buses.first[k + 1]) if buses.status[j] == COMPLETED]
+        if len(places) == 0:
+            continue
+        inputs, joined = [inputs_of(lanes, tables, buses.which[j]) for j in places], [buses.joined[j] for j in places]
+        memories = _seated(lanes, buses, places, inputs, seats)
+        ends = [m.point.time + duration if until == math.inf else until - origin_of(m) for m in memories]
+        status, when = bus.through(inputs, memories, ends, joined, buses.shared[k], seats, mates, written)
+        for n in range(len(places)):
+            j = places[n]
+            put_memory(buses.records[j], memories[n])
+            buses.joined[j], buses.ended[j] = joined[n], when
+            if status != COMPLETED and status != bus.PAUSED:
+                buses.status[j] = status
     return status
-
-
-def _go_on(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int], duration: float, until: float,
-           seats: Any, mates: Any, written: Tape) -> int:
-    inputs, joined = [inputs_of(lanes, tables, buses.which[j]) for j in places], [buses.joined[j] for j in places]
-    memories = _seated(lanes, buses, places, inputs, seats)
-    ends = [m.point.time + duration if until == math.inf else until - origin_of(m) for m in memories]
-    status, when = bus.through(inputs, memories, ends, joined, buses.shared[k], seats, mates, written)
-    for n in range(len(places)):
-        j = places[n]
-        put_memory(buses.records[j], memories[n])
-        buses.joined[j], buses.ended[j] = joined[n], when
-        if status != COMPLETED and status != bus.PAUSED:
-            buses.status[j] = status
-    return status
-
-
-def _alive(buses: Buses, k: int) -> list[int]:
-    return [j for j in range(buses.first[k], buses.first[k + 1]) if buses.status[j] == COMPLETED]
 
 
 def _seated(lanes: Lanes, buses: Buses, places: list[int], inputs: list[Inputs], seats: Any) -> list[Memory]:
@@ -108,7 +99,7 @@ def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
 def look(lanes: Lanes, tables: Tables, buses: Buses, seats: Any, mates: Any, seen: Floats) -> None:
     """Look at all lanes as they stand; `seen` has a row of signals for each lane there is."""
     for k in range(len(buses.shared)):
-        places = _alive(buses, k)
+        places = [j for j in range(buses.first[k], buses.first[k + 1]) if buses.status[j] == COMPLETED]
         if len(places) > 0:
             _look(lanes, tables, buses, k, places, seats, mates, seen)
 

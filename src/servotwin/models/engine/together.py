@@ -31,6 +31,7 @@ from servotwin.physics.pieces import piece_rate, piece_value
 _BELOW = -1e-13  # rounding is not an event
 _BELOW_OF_SUM = -1e-10  # A: nor what the currents of all have gathered
 _HALVINGS = 200
+_MOST_SERIES = 1e6  # one after the other
 _LOOKS = (0.25, 0.5, 0.75, 1.0)  # parts of a motion at which its guards are looked at
 _SOURCE_GUARDS = 2
 
@@ -45,7 +46,7 @@ def at_start(source: Source) -> Shared:
 
 
 def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> None:
-    """Begin a common motion at `time`, to `limit` at the latest [s]; its length is below 0 if no step is possible.
+    """Begin a common motion at `time`, to `limit` at the latest [s]; its length is below 0 if it cannot be followed.
 
     The `same` mates go on after an event of theirs that has already told zones and source.
     """
@@ -64,7 +65,8 @@ def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> Non
         following = _move(shared, mates)
         shared.step = max(shared.step, following) if shared.length == limit - time else following
     else:
-        shared.length = min(limit - time, joint_motion.longest_series(mates, count))
+        longest = joint_motion.longest_series(mates, count)
+        shared.length = min(limit - time, longest) if limit - time <= _MOST_SERIES * longest else -1.0
         _move(shared, mates)
     if shared.length >= 0.0:
         _find_end(source, shared, mates, limit)
