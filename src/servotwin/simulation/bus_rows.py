@@ -111,7 +111,7 @@ def _alone(m: Motion, step: float, accuracy: float) -> Motion:
     """Return the motion of a servo on its own; of a step, length and end are known."""
     if not motion.is_step(m):
         return motion.begin(m.numbers, m.mode, m.u, m.tau, m.t0, m.start, step, math.inf, accuracy)
-    if m.kind == motion.LONG_STEP:
+    if m.kind != motion.STEP:
         return m
     jac = jacobian(m.numbers, m.mode, piece_value(m.u, m.t0), piece_rate(m.u, m.t0), piece_rate(m.tau, m.t0),
                    m.start[0], m.start[1])

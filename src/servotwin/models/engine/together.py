@@ -183,7 +183,7 @@ def _keeps_its_sign(series: Any, terms: int, end: float, sign: float, length: fl
 
 def _kinds(mate: Any) -> int:
     """Return which guards can end the mode of a mate, as a sum of 1 << kind."""
-    kinds = guards.guards(numbers_of(mate.numbers), mode_of(mate.mode), mate.sign, False)
+    kinds = guards.guards(numbers_of(mate.numbers), mode_of(mate.mode), mate.sign, False) & ~(1 << guards.CREEPS)
     if mate.returns > 0 and mate.mode.zone == NO_CURRENT:  # its diodes block the other way
         kinds &= ~(1 << (guards.ZONE_UP if mate.sign > 0.0 else guards.ZONE_DOWN))
     return kinds
