@@ -1,6 +1,6 @@
 """Servos that stop and go on at every tick, beside MuJoCo's own step of a hinge; and whole calls of 4096 signals.
 
-`run.py` does all parts; `run.py ticks`, `run.py between` or `run.py calls` one of them. MuJoCo is the peer; without it
+`run.py` does all parts; `run.py ticks`, `run.py between`, `run.py buses` or `run.py calls` one of them. MuJoCo is the peer; without it
 ratios are left out.
 """
 
@@ -114,6 +114,28 @@ def between() -> None:
                 print(f"{f'{lanes} lanes, {name}: {what}':36} {1e6 * time:9.2f} {1e6 * time / lanes:10.4f} {ratio}")
 
 
+def bus_tick(lanes: int, duration: float, changes: dict[str, float], bus: object) -> float:
+    """Return the time of a tick, on one thread, of servos that are sent to and fro [s]."""
+    model = st.PulseServo(MODEL.servo.replace({"supply.internal_resistance": 0.3} | changes))
+    sims = st.VectorSimulator(model, lanes, threads=1, bus=bus)
+    widths, turn = list(np.random.default_rng(0).uniform(1.1e-3, 1.9e-3, (2, lanes))), round(0.2 / duration)
+    return ticked(lambda k: sims.advance(duration, pulse_width=widths[k // turn % 2]), 200)
+
+
+def buses() -> None:
+    """Print what a tick costs of four servos on one bus, of sixteen buses of four, and of servos alone."""
+    battery = st.Supply(open_circuit_voltage=6.0, internal_resistance=0.3)
+    alone = {"potentiometer.quantisation": 1e-9}  # what no lane side by side has
+    fours = [(battery, list(range(k, k + 4))) for k in range(0, 64, 4)]
+    print(f"{'a tick on one thread, us':36} {'1 ms':>9} {'5 ms':>9} {'20 ms':>9}")
+    for name, lanes, changes, bus in (
+            ("4 on one bus", 4, {}, battery), ("16 alone, one by one", 16, alone, None),
+            ("16 alone, side by side", 16, {}, None), ("1 on a bus", 1, {}, battery),
+            ("1 alone, one by one", 1, alone, None), ("64 on 16 buses of 4", 64, {}, fours), ("64 alone, one by one", 64, alone, None)):
+        times = [bus_tick(lanes, duration, changes, bus) for duration in (1e-3, 5e-3, 0.02)]
+        print(f"{name:36} " + " ".join(f"{1e6 * time:9.2f}" for time in times), flush=True)
+
+
 def calls() -> None:
     """Print what a whole call of `simulate_many` costs beside `mujoco.rollout`, which takes a lane after the other."""
     fleet = random_fleet(LANES, duration=DURATION)
@@ -141,7 +163,7 @@ def calls() -> None:
 
 
 def main() -> None:
-    parts = {"ticks": ticks, "between": between, "calls": calls}
+    parts = {"ticks": ticks, "between": between, "buses": buses, "calls": calls}
     for part in sys.argv[1:] or parts:
         if part not in parts:
             sys.exit(f"run.py: {part!r} is not one of {', '.join(parts)}")
