@@ -1,4 +1,4 @@
-"""The entry for C: bit for bit what Python does on the same lanes, called from compiled code, from C and from threads."""
+"""The entry for C: bit for bit what Python does on the same lanes, from compiled code, from C and from threads."""
 
 import ctypes
 import shutil
@@ -83,7 +83,8 @@ def test_it_is_python_bit_for_bit(servo, name, kind, dtype):
 
 def test_lanes_of_several_ways_side_by_side(servo):
     """Some run side by side, some one by one, one fails; parameters and a reset in Python come between."""
-    parameters = {"load.spring.stiffness": [0.0, 0.1, 1e18, 0.0], "electronics.off_state": ["brake", "brake", "brake", "coast"],
+    parameters = {"load.spring.stiffness": [0.0, 0.1, 1e18, 0.0],
+                  "electronics.off_state": ["brake", "brake", "brake", "coast"],
                   "stops.upper_angle": [1.7, 2.0, 2.0, 2.0]}
     python, both = (st.VectorSimulator(st.PulseServo(servo), LANES, load=st.loads.Spring(0.1), parameters=parameters)
                     for _ in range(2))
@@ -181,10 +182,11 @@ def test_bad_durations(servo, duration):
 
 def test_commands_at_the_very_edge_are_taken_as_python_takes_them(servo):
     """Bounds of commands are per lane, and the same in both."""
-    models = (model_of(servo, {"stops.lower_angle": 0.2, "stops.upper_angle": 2.0}),
-              model_of(servo, {"stops.lower_angle": 0.2, "stops.upper_angle": 2.0}, st.BoundedServo), st.PulseServo(servo))
+    stops = {"stops.lower_angle": 0.2, "stops.upper_angle": 2.0}
+    models = (model_of(servo, stops), model_of(servo, stops, st.BoundedServo), st.PulseServo(servo))
     table = {"command_angle": (0.2 - 2e-9, 0.2 - 1e-10, 0.2, 2.0, 2.0 + 1e-10, 2.0 + 2e-9, 1e3),
-             "pulse_width": (0.0, 1e-9, 2.9e-4, 3.1e-4, 2.6e-3, 2.8e-3, 0.0199, 0.02), "command_voltage": (-50.0, 1.0, 99.0)}
+             "pulse_width": (0.0, 1e-9, 2.9e-4, 3.1e-4, 2.6e-3, 2.8e-3, 0.0199, 0.02),
+             "command_voltage": (-50.0, 1.0, 99.0)}
     answers = set()
     for model in models:
         sims = st.VectorSimulator(model, LANES)
@@ -314,7 +316,7 @@ def test_a_program_in_c(servo, program):
     entry, widths = sims.c_entry(), np.linspace(1.2e-3, 1.8e-3, LANES)
     angle, status = np.empty(LANES), np.full(LANES, 7, np.int8)
     pointers = [ctypes.c_void_p(array.ctypes.data) for array in (widths, angle, status)]
-    numbers = [ctypes.c_void_p(entry.address), ctypes.c_void_p(entry.simulator), ctypes.c_int64(LANES), ctypes.c_int64(500)]
+    numbers = [*map(ctypes.c_void_p, (entry.address, entry.simulator)), *map(ctypes.c_int64, (LANES, 500))]
     assert program.run(*numbers, *pointers) == 0
     for _ in range(500):
         python.advance(1e-3, pulse_width=widths)

@@ -24,13 +24,15 @@ if TYPE_CHECKING:
     from servotwin.simulation.vector_store import Store
 
 Array = NDArray[np.float64]
-_WORDS = {"version": ctypes.c_int64, "lanes": ctypes.c_int64, "duration": ctypes.c_double}  # the rest are addresses
+_WORDS: dict[str, Any] = {  # the rest are addresses
+    "version": ctypes.c_int64, "lanes": ctypes.c_int64, "duration": ctypes.c_double}
 
 
 class CTick(ctypes.Structure):
     """`servotwin_tick` of the header: what C hands over at a tick."""
 
-    _fields_: ClassVar = [(name, _WORDS.get(name, ctypes.c_void_p)) for name in TICK]
+    _fields_: ClassVar[Any] = [(name, _WORDS.get(name, ctypes.c_void_p)) for name in TICK]
+    arrays: Mapping[str, NDArray[Any]]
 
 
 class Parts(NamedTuple):
@@ -112,7 +114,7 @@ class CEntry:
         duration : float
             Of the tick [s].
         **arrays : ndarray, shape (lanes,)
-            By the member's name; the struct keeps them, and what stands in them counts when it is used. Others are NULL.
+            By the member's name; the struct keeps them, and reads them when it is used. Others are NULL.
 
         Raises
         ------

@@ -36,14 +36,14 @@ def records_of(tiles: NDArray[Any], places: Indices, temperatures: Floats) -> ND
     if len(places):
         side = Side(*(columns_of(kind, tiles[group], places) for group, kind in _GROUPS.items()))
         regular = flat(tiles, "count", "edges")[places] < 0
-        put_in(records, _remembered(mapped(_doubled, side), regular, *temperatures))
+        _put_in(records, _remembered(mapped(_doubled, side), regular, *temperatures))
     return records
 
 
 def put_records(tiles: NDArray[Any], places: Indices, records: NDArray[Any], period: Floats) -> None:
     """Put what lanes remember back into tiles; their frames are regular, of these periods from now on [s]."""
     if len(places):
-        side = _side_of(read_from(Memory, records), period)
+        side = _side_of(_read_from(Memory, records), period)
         for group, values in zip(_GROUPS, side, strict=True):
             put_columns(tiles[group], places, values)
 
@@ -52,22 +52,22 @@ def _doubled(column: NDArray[Any]) -> NDArray[Any]:
     return column.astype(np.float64) if column.dtype == np.float32 else column
 
 
-def read_from(kind: type[Any], records: NDArray[Any]) -> Any:
+def _read_from(kind: type[Any], records: NDArray[Any]) -> Any:
     """Return the fields of records as a named tuple of columns, with those in it."""
     return kind(*(_read(hint, records[name]) for name, hint in fields_of(kind)))
 
 
 def _read(hint: Any, field: NDArray[Any]) -> Any:
     if hasattr(hint, "_fields"):
-        return read_from(hint, field)
+        return _read_from(hint, field)
     return field if field.ndim == 1 else tuple(field.T)
 
 
-def put_in(records: NDArray[Any], values: Any) -> None:
+def _put_in(records: NDArray[Any], values: Any) -> None:
     """Set the fields of records from a named tuple of columns and numbers, with those in it."""
     for name, value in zip(values._fields, values, strict=True):
         if hasattr(value, "_fields"):
-            put_in(records[name], value)
+            _put_in(records[name], value)
         elif isinstance(value, tuple):
             for k, column in enumerate(value):
                 records[name][:, k] = column

@@ -255,10 +255,9 @@ class VectorSimulator:
             self._numbers = self._numbers.changed(which, parameters)
             self._store.renew(self._numbers, which, self._torque)
             self._translate = Translator(self._numbers)
-        if inertia is not None:
-            self._numbers.hang(which, inertia)
-        otherwise = bus is not None and self._numbers.feed(which, bus)
+        otherwise = False
         if inertia is not None or bus is not None:
+            otherwise = self._numbers.impose(which, inertia, bus)
             self._store.refit(which, otherwise, self._torque)
         if self._entry is not None and (parameters or otherwise):
             self._entry.refresh()

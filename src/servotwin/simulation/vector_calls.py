@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -47,13 +48,23 @@ class Room(NamedTuple):
                    np.zeros((2, lanes)), np.zeros((lanes, len(Observed._fields))))
 
 
+def asked(rows: Mapping[int, Array | None], which: Indices, lanes: int) -> tuple[Indices, Array]:
+    """Return which rows are given of those of `engine.ticks`, and all of them with numbers of some lanes."""
+    has, given = np.zeros(len(GIVEN), np.int64), np.empty((len(GIVEN), lanes))
+    for row, values in rows.items():
+        if values is not None:
+            has[row], given[row, which] = 1, values
+    return has, given
+
+
 def programs_of(numbers: LaneNumbers, store: Store, room: Room, scales: Array, command: Array,
                 torque: Array) -> Programs:
     """Return the programs of all stages; `scales` are those of `Translator.table`."""
     columns = store.columns
     accept = call_of(TICKS, "accept", store.now, room.has, room.given, scales, columns.numbers, room.clock,
                      numbers.record_ends(), room.wanted, returns=True)
-    change = call_of(TICKS, "change", room.has, room.given, numbers.given, numbers.load_total, numbers.V_oc,
+    every = np.arange(numbers.count)
+    change = call_of(TICKS, "change", room.has, room.given, every, numbers.given, numbers.load_total, numbers.V_oc,
                      numbers.pulsed, *numbers.imposed, columns.numbers, returns=True)
     follow = call_of(TICKS, "follow", room.has, room.given, room.wanted, store.base, command, torque, store.total,
                      columns.pieces, store.now)
@@ -68,6 +79,7 @@ def programs_of(numbers: LaneNumbers, store: Store, room: Room, scales: Array, c
 def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[str, list[Call]]:
     """Return what is called for lanes in tiles at each stage; those that are given up go on one by one."""
     kernels, rows, which = some.recipe, some.rows, some.which
+    places = np.arange(len(which))
     advance = call_of(kernels, "advance", which, some.braked, 0, len(rows), Now(store.now, 0), command, store.total,
                       Now(store.now, 1, True), rows, some.plans[0], returns=True)
     alone = _Alone(len(which))
@@ -75,9 +87,9 @@ def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[
             *alone.go_on(lane_runs.PLAIN_RUNS, store),
             call_of(TICKS, "put_lost", *alone.some("places", "lanes", "records"), store.numbers.frame_period, rows)]
     return {
-        "refit": [call_of(kernels, "refit", store.columns, which, np.arange(len(which)), rows)],
-        "impose": [call_of(TICKS, "impose_on_tiles", room.has, room.given, store.columns.numbers, which, store.work,
-                           rows)],
+        "refit": [call_of(kernels, "refit", store.columns, which, places, rows)],
+        "impose": [call_of(TICKS, "impose_on_tiles", room.has, room.given, store.columns.numbers, which, places,
+                           store.work, rows)],
         "advance": [advance, *lost], "show": [call_of(TICKS, "show_tiles", which, rows, room.shaft)],
         "look": [call_of(lane_runs.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns, store.inputs[0], which, rows,
                          room.seen)]}
@@ -90,19 +102,20 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
                *alone.go_on(some.recipe, store), call_of(TICKS, "put", *alone.some("places", "records"), rows)]
     found = {
         "refit": [call_of(TICKS, "forget_motions", rows)],
-        "impose": [call_of(TICKS, "impose_on_records", room.has, room.given, store.columns.numbers, which, store.work,
-                           rows)],
+        "impose": [call_of(TICKS, "impose_on_records", room.has, room.given, store.columns.numbers, which,
+                           np.arange(len(which)), store.work, rows)],
         "advance": advance, "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
-        "look": [call_of(lane_runs.LOOK_ONE_BY_ONE, "one_by_one", store.columns, *store.inputs, which, rows, room.seen)]}
+        "look": [call_of(lane_runs.LOOK_ONE_BY_ONE, "one_by_one", store.columns, *store.inputs, which, rows,
+                         room.seen)]}
     if store.numbers.torque.count[which].any():
         found["clock"] = [call_of(TICKS, "read_clocks", which, store.status, store.ended, rows, room.clock)]
     return found
 
 
 class _Gathered(NamedTuple):
-    """Lanes that have been put together: how many, where they are in their set, who, how far they go, and memories."""
+    """Lanes that have been put together: where they are in their set, who, how far they go, and their memories."""
 
-    count: Indices
+    number: Indices  # of them
     places: Indices
     lanes: Indices
     durations: Array
@@ -120,12 +133,12 @@ class _Alone:
 
     def some(self, *names: str) -> list[Some]:
         """Return of the room what is gathered now."""
-        return [Some(getattr(self.room, name), self.room.count) for name in names]
+        return [Some(getattr(self.room, name), self.room.number) for name in names]
 
     def go_on(self, recipe: Recipe, store: Store) -> list[Call]:
         """Return the calls that let the lanes go on and note who has failed."""
         lanes, durations, records = self.some("lanes", "durations", "records")
-        how, at = Some(self._how, self.room.count), Some(self._at, self.room.count)
+        how, at = Some(self._how, self.room.number), Some(self._at, self.room.number)
         return [call_of(recipe, "go_on", store.columns, *store.inputs, lanes, durations, _NONE, self._first,
                         self._outputs, records, how, at),
                 call_of(TICKS, "note_failures", lanes, how, at, records, store.status, store.ended)]

@@ -11,26 +11,23 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.engine.memory import put_memory, started
-from servotwin.models.engine.imposing import on_known_bus, runs_otherwise, with_load_inertia
 from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.records import columns_of, put_columns, tiles_with
-from servotwin.models.engine.ticks import SLACK
+from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.tiles import Lanes as Columns
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
-from servotwin.models.terms.shaft import Shaft
-from servotwin.physics.laws import array_form
 from servotwin.simulation import lane_runs
+from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
 from servotwin.simulation.lane_memory import RECORD
 from servotwin.simulation.lanes import Tables
 from servotwin.simulation.packing import Asked, Chunk, Commands, flat, groups
 from servotwin.simulation.start import start_vector
+from servotwin.simulation.vector_calls import TICKS, asked
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-_with_load_inertia, _on_known_bus, _runs_otherwise = (
-    array_form(law, __name__) for law in (with_load_inertia, on_known_bus, runs_otherwise))
 
 
 class Imposed(NamedTuple):
@@ -79,9 +76,9 @@ class LaneNumbers:
             self.V_oc[chunk.which] = flat(chunk.model.value("supply.open_circuit_voltage"))
         self.given = self.columns.numbers.copy()
         if imposed is not None:
-            for put, values in ((self.hang, imposed.load_inertia), (self.feed, imposed.bus_voltage)):
-                which = np.flatnonzero(~np.isnan(values))
-                put(which, values[which])
+            hung, fed = (np.flatnonzero(~np.isnan(values)) for values in imposed)
+            self.impose(hung, imposed.load_inertia[hung], None)
+            self.impose(fed, None, imposed.bus_voltage[fed])
 
     def _packed(self) -> tuple[Columns, Tables]:
         B = self.count
@@ -110,26 +107,14 @@ class LaneNumbers:
         return columns_of(type(getattr(NEUTRAL, room)), self.columns.numbers[room],
                           slice(self.count) if which is None else which)
 
-    def hang(self, which: Indices, J_L: Array) -> None:
-        """Put inertias [kg m²] in the place of those of some lanes' loads."""
-        self.imposed.load_inertia[which] = J_L
-        given = columns_of(Shaft, self.given["shaft"], which)
-        put_columns(self.columns.numbers["shaft"], which, _with_load_inertia(given, J_L, self.load_total[which]))
-
-    def feed(self, which: Indices, V: Array) -> bool:
-        """Put voltages [V] in the place of what some lanes' supplies would leave.
+    def impose(self, which: Indices, J_L: Array | None, V: Array | None) -> bool:
+        """Put inertias [kg m²] and bus voltages [V] in the place of those of some lanes' loads and supplies.
 
         Return whether the lanes may have to run in another way than before.
         """
-        self.imposed.bus_voltage[which] = V
-        rooms = ("bridge", "source", "follower")
-        given = NEUTRAL._replace(**{
-            room: columns_of(type(getattr(NEUTRAL, room)), self.given[room], which) for room in rooms})
-        otherwise = _runs_otherwise(self.now("source", which), V, given.bridge.D_drive, self.pulsed)
-        new = _on_known_bus(given, V, self.V_oc[which], self.pulsed)
-        for room in rooms:
-            put_columns(self.columns.numbers[room], which, getattr(new, room))
-        return bool(np.any(otherwise))
+        has, given = asked({INERTIA: J_L, VOLTAGE: V}, which, self.count)
+        return bool(kernels(TICKS).change(has, given, which, self.given, self.load_total, self.V_oc, self.pulsed,
+                                          *self.imposed, self.columns.numbers))
 
     def changed(self, which: Indices, parameters: Mapping[str, Any]) -> LaneNumbers:
         """Return these lanes with other parameters in some of them.

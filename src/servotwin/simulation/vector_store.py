@@ -11,18 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
-from servotwin.models.engine.imposing import impulse_work, placed
-from servotwin.models.engine.memory import Point
 from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.records import TILE, columns_of, room
+from servotwin.models.engine.ticks import ANGLE, SPEED
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import Numbers
-from servotwin.physics.laws import array_form
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
-from servotwin.simulation.lane_memory import RECORD, flat, put, put_in, put_records, read_from, records_of
+from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
 from servotwin.simulation.lane_runs import PLAIN_RUNS, SIDE_BY_SIDE, OneByOne, SideBySide, some_of
-from servotwin.simulation.vector_calls import calls_in_records, calls_in_tiles
+from servotwin.simulation.vector_calls import TICKS, asked, calls_in_records, calls_in_tiles
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_memory import VectorMemory
@@ -233,19 +231,12 @@ class Store:
 
     def impose(self, which: Indices, angle: Array | None, speed: Array | None) -> None:
         """Set angles [rad] and speeds [rad/s] of the output; book the work of the impulses."""
-        if angle is not None:
-            lower, upper, _ = self.numbers.now("stops", which)
-            angle = np.clip(angle, lower, upper)
+        has, given = asked({ANGLE: angle, SPEED: speed}, which, len(self.status))
         for some, places, of in self._parts(which):
-            if speed is not None:
-                shaft, play = (self.numbers.now(room, which[of]) for room in ("shaft", "play"))
-                self.work[which[of]] += _impulse_work(shaft, play.half, some.shaft("output_speed")[places], speed[of])
-            some.impose(places, None if angle is None else angle[of], None if speed is None else speed[of],
-                        self.numbers)
+            some.impose(has, given, self.columns.numbers, which[of], places, self.work)
 
 
 _NONE = np.zeros(0)
-_impulse_work, _placed = (array_form(law, __name__) for law in (impulse_work, placed))
 
 
 def _same(some: list[SideBySide | OneByOne], others: list[SideBySide | OneByOne]) -> bool:
@@ -276,11 +267,9 @@ class _Tiles:
         """Take the numbers of lanes anew."""
         self._refit(columns, lanes, places, self.rows)
 
-    def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
-        """Set angles [rad] and speeds [rad/s]; none of these lanes has play."""
-        for name, values in (("q", angle), ("w", speed)):
-            if values is not None:
-                put(self.rows, "servo", name, places, values)
+    def impose(self, *imposed: Any) -> None:
+        """Set angles and speeds, as `engine.lane_ticks` does."""
+        kernels(TICKS).impose_on_tiles(*imposed, self.rows)
 
     def forget(self, places: Indices) -> None:
         """Let the general way finish the calls of these lanes."""
@@ -319,13 +308,9 @@ class _Records:
         """Let motions of lanes begin anew: their numbers are read at each step."""
         self.rows["point"]["anchor_time"][places] = math.inf
 
-    def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
-        """Set angles [rad] and speeds [rad/s] of the output; motor and potentiometer go along as far as their play."""
-        rows, lanes = self.rows[places], self.which[places]
-        half, slack = numbers.now("play", lanes).half, numbers.now("sensor", lanes).half_slack
-        put_in(rows["point"], _placed(read_from(Point, rows["point"]), 0.0 if angle is None else angle,
-                                      0.0 if speed is None else speed, angle is not None, speed is not None, half, slack))
-        self.rows[places] = rows
+    def impose(self, *imposed: Any) -> None:
+        """Set angles and speeds, as `engine.lane_ticks` does; motor and potentiometer go along as far as their play."""
+        kernels(TICKS).impose_on_records(*imposed, self.rows)
 
     def records(self, columns: tiles.Lanes) -> NDArray[Any]:
         return self.rows.copy()

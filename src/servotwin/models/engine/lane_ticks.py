@@ -90,10 +90,11 @@ def forget_motions(rows: Any) -> None:
         rows[k].point.anchor_time = math.inf
 
 
-def impose_on_tiles(has: Indices, given: Floats, numbers: Any, which: Indices, work: Floats, tile_rows: Any) -> None:
-    """Set angles and speeds of lanes in tiles, which have no play, and book the work of the impulses [J]."""
+def impose_on_tiles(has: Indices, given: Floats, numbers: Any, which: Indices, places: Indices, work: Floats,
+                    tile_rows: Any) -> None:
+    """Set angles and speeds of lanes at these places of tiles, and book the work of the impulses [J]; none has play."""
     for k in range(which.size):
-        lane, servo, j = which[k], tile_rows[k // TILE].servo, k % TILE
+        lane, servo, j = which[k], tile_rows[places[k] // TILE].servo, places[k] % TILE
         own, i = numbers[lane // TILE], lane % TILE
         if has[SPEED] != 0:
             after = given[SPEED, lane]
@@ -103,10 +104,11 @@ def impose_on_tiles(has: Indices, given: Floats, numbers: Any, which: Indices, w
             servo.q[j] = within_stops(own, i, given[ANGLE, lane])
 
 
-def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices, work: Floats, rows: Any) -> None:
-    """Set angles and speeds of lanes in records, and book the work of the impulses [J]."""
+def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices, places: Indices, work: Floats,
+                      rows: Any) -> None:
+    """Set angles and speeds of lanes at these places of records, and book the work of the impulses [J]."""
     for k in range(which.size):
-        lane, memory = which[k], memory_of(rows[k])
+        lane, memory = which[k], memory_of(rows[places[k]])
         own, i = numbers[lane // TILE], lane % TILE
         half, angle = own.play.half[i], 0.0
         if has[SPEED] != 0:
@@ -115,8 +117,8 @@ def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices,
             angle = within_stops(own, i, given[ANGLE, lane])
         point = placed(memory.point, angle, given[SPEED, lane], has[ANGLE] != 0, has[SPEED] != 0, half,
                        own.sensor.half_slack[i])
-        put_memory(rows[k], Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau,
-                                   memory.tau_end))
+        put_memory(rows[places[k]], Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end,
+                                           memory.tau, memory.tau_end))
 
 
 def within_stops(numbers: Any, i: int, angle: float) -> float:

@@ -41,7 +41,7 @@ def accept(now: Floats, has: Indices, given: Floats, scales: Floats, numbers: An
            wanted: Floats) -> int:
     """Return `ACCEPTED`, or what is wrong with what is given; put commands into `wanted` as the engine follows them.
 
-    `now` has the duration [s]; `scales` a row for each kind of command and lane: gain, offset, and the bounds of
+    `now` has the duration [s]; `scales`, for each kind of command and lane, gain, offset and the bounds of
     `possible`. `clock` and `ends` are the time of each lane, and when its recorded torque is over [s].
     """
     duration = now[0]
@@ -76,15 +76,15 @@ def accept(now: Floats, has: Indices, given: Floats, scales: Floats, numbers: An
     return ACCEPTED
 
 
-def change(has: Indices, given: Floats, before: Any, load_total: Floats, V_oc: Floats, pulsed: bool,
+def change(has: Indices, given: Floats, which: Indices, before: Any, load_total: Floats, V_oc: Floats, pulsed: bool,
            inertias: Floats, voltages: Floats, numbers: Any) -> int:
-    """Put imposed inertias and voltages into the numbers of all lanes, `before` as the servo and its load say them.
+    """Put imposed inertias and voltages into the numbers of some lanes, `before` as servo and load say them.
 
     Return 1 where a lane may have to run in another way from now on, else 0. What is imposed stays in `inertias` and
     `voltages`.
     """
     otherwise = 0
-    for k in range(load_total.size):
+    for k in which:
         tile, own, j = numbers[k // TILE], before[k // TILE], k % TILE
         if has[INERTIA] != 0:
             inertias[k] = given[INERTIA, k]

@@ -44,10 +44,10 @@ class Now(NamedTuple):
 
 
 class Some(NamedTuple):
-    """The first of an array, as many as stand in `count[0]` when the call is made."""
+    """The first of an array, as many as `number[0]` says when the call is made."""
 
     array: NDArray[Any]
-    count: NDArray[np.int64]
+    number: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class _Block:
             text = f"_numbers(w[{place}], (1,))[0]"
             return f"{text} != 0.0" if argument.truth else text
         if isinstance(argument, Some):
-            self.words.append(argument.count.ctypes.data)
+            self.words.append(argument.number.ctypes.data)
             return self._array(argument.array, f"_words(w[{place}], (1,))[0]")
         if isinstance(argument, np.ndarray):
             return self._array(argument, None)

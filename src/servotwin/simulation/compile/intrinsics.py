@@ -1,7 +1,7 @@
 """What derived modules alone import: the primitives of `engine.elementary` as single instructions, and addresses."""
 
 # numba's and llvmlite's own types are not annotated
-# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped, call-overload"
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ It is not imported from here. Words are those of `layout`.
 """
 
 # numba's own types are not annotated
-# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped, call-arg, unreachable"
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import math
 
 from numba import cfunc, njit, types  # noqa: F401 - the last lines of the derived module need them
 
+from servotwin.models.engine.observe import Observed
 from servotwin.simulation.compile.intrinsics import array_maker, called
 from servotwin.simulation.compile.layout import (
     DONE,
@@ -25,7 +26,6 @@ from servotwin.simulation.compile.layout import (
     TICK,
     VERSION,
 )
-from servotwin.models.engine.observe import Observed
 
 _words, _table = array_maker("<i8", 1, True), array_maker("<f8", 2, True)
 _numbers, _bytes = array_maker("<f8", 1, True), array_maker("|i1", 1, True)
