@@ -29,8 +29,8 @@ int run(servotwin_advance advance, servotwin_tick *tick, double *width, int64_t 
 TICKS = 4000
 SHAFT, TORQUE = ("output_angle", "output_speed"), ("output_angle", "load_torque", "armature_current")
 IMPOSED = {"set_output_speed": 0.0, "set_load_inertia": 1e-3}
-ASKED = {  # what goes out, what is imposed
-    "no signal": ((), {}), "shaft": (SHAFT, {}), "torque, current": (TORQUE, {}), "the same, imposed": (TORQUE, IMPOSED)}
+ASKED = {"no signal": ((), {}), "shaft": (SHAFT, {}),  # what goes out, what is imposed
+         "torque, current": (TORQUE, {}), "the same, imposed": (TORQUE, IMPOSED)}
 ROWS = ((1, "plain", "no signal"), (1, "plain", "shaft"), (1, "plain", "torque, current"),
         (1, "plain", "the same, imposed"), (6, "plain", "shaft"), (6, "plain", "the same, imposed"),
         (128, "plain", "shaft"), (1, "play", "shaft"), (6, "play", "the same, imposed"))
