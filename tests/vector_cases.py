@@ -18,6 +18,9 @@ CASES = {  # what leads to each way in which lanes run
     "play": ({"gear.backlash": 0.02, "gear.output_inertia": 1e-3}, None),
     "limp in another way": ({"electronics.silence_state": "coast", "electronics.pulse_timeout": 0.013}, None),
     "dry load": ({"supply.internal_resistance": 0.3}, st.loads.Inertia(1e-3) + st.loads.Coulomb(0.1)),
+    "regulator, load friction": ({"supply.current_limit": 1.2, "supply.internal_resistance": 0.2,
+                                  "friction.load_friction_motor": 0.06, "friction.load_friction_external": 0.1}, None),
+    "worn potentiometer": ({"potentiometer.backlash": 0.02}, None),
     "everything": (EVERYTHING, st.loads.Recorded([0.0, 0.2, 10.0], [0.0, 0.1, -0.1])),
 }
 

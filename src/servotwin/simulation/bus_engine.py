@@ -114,7 +114,7 @@ class Unit:
         if new:
             self.point = step.anchored(numbers, u, self.tau, time, self.point)
         point, self.motion, kind, status = step.onward(numbers, self.point, u, self.tau, m, new, self.limit,
-                                                        until)
+                                                        until, self.plan.accuracy)
         if status != step.COMPLETED:
             raise failure(Status.of_code(status), time)
         self.arrival = (point, kind)

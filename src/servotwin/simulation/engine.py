@@ -13,7 +13,17 @@ from typing import NamedTuple
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
 from servotwin.models.engine import guards, motion
-from servotwin.models.engine.memory import Inputs, Memory, counted_anew, due, instant, origin_of, resumed, time_of
+from servotwin.models.engine.memory import (
+    ACCURACY,
+    Inputs,
+    Memory,
+    counted_anew,
+    due,
+    instant,
+    origin_of,
+    resumed,
+    time_of,
+)
 from servotwin.models.engine.modes import (
     CONDUCTING,
     CORE,
@@ -64,6 +74,8 @@ class Plan:
         Angles [rad] and errors [V] of its potentiometer's linearity table.
     external_torque : float
         Constant, beside the load's [N m].
+    accuracy : float
+        Of what is integrated [rad].
     """
 
     numbers: Numbers
@@ -74,6 +86,7 @@ class Plan:
     seed: int = 0
     curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     external_torque: float = 0.0
+    accuracy: float = ACCURACY
 
     @property
     def pulsed(self) -> bool:
@@ -96,7 +109,7 @@ class Plan:
         """What the servo is told, as a step reads it."""
         period = self.chip.frame_period if self.edges is None else 0.0
         return Inputs(self.command.table, self.torque.table, self.external_torque, period, self.edges or (),
-                      self.curve, self.seed)
+                      self.curve, self.seed, self.accuracy)
 
 
 @dataclass(frozen=True)

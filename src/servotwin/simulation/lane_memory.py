@@ -35,8 +35,8 @@ def records_of(tiles: NDArray[Any], places: Indices, temperatures: Floats) -> ND
     records = np.zeros(len(places), RECORD)
     if len(places):
         side = Side(*(columns_of(kind, tiles[group], places) for group, kind in _GROUPS.items()))
-        regular = flat(tiles, "count", "edges")[places] < 0
-        _put_in(records, _remembered(mapped(_doubled, side), regular, *temperatures))
+        regular, half_slack = flat(tiles, "count", "edges")[places] < 0, flat(tiles, "hung", "half_slack")[places]
+        _put_in(records, _remembered(mapped(_doubled, side), regular, half_slack, *temperatures))
     return records
 
 

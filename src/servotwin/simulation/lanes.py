@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.records import mapped
 
 if TYPE_CHECKING:
@@ -17,9 +18,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Record = TypeVar("Record", bound=tuple[object, ...])
 
-FIELDS = ("angle", "speed", "contact", "drive", "error")
-MORE_FIELDS = ("current", "winding", "housing", "motor_angle", "motor_speed", "wiper", "mesh",
-               "motor", "silent")  # of servos that run one by one
+FIELDS = ("angle", "speed", "contact", "drive", "error", "wiper")
+MORE_FIELDS = ("current", "winding", "housing", "motor_angle", "motor_speed", "mesh", "motor",
+               "silent")  # of servos that run one by one
 SMALL_FIELDS = ("contact", "drive", "mesh", "motor", "silent")  # fields that are kept as int8
 
 
@@ -96,12 +97,15 @@ class Work:
     times : ndarray, shape (T,)
         Output times [s], not decreasing, within [0, duration].
     fields : tuple of str
-        Of "angle" [rad], "speed" [rad/s], "contact" (`engine.modes.FREE` … `ON_UPPER`), "drive" (−1, 0, +1) and
-        "error" (of the latest decision [s]), or of `MORE_FIELDS`; only these are computed and kept.
+        Of "angle" [rad], "speed" [rad/s], "contact" (`engine.modes.FREE` … `ON_UPPER`), "drive" (−1, 0, +1),
+        "error" (of the latest decision [s]) and "wiper" (of the potentiometer [rad]), or of `MORE_FIELDS`; only these
+        are computed and kept.
     dtype : str
         "float64" or "float32".
     curve : tuple
         Angles [rad] and errors [V] of the potentiometer's linearity table, the same for all lanes.
+    accuracy : float
+        Of what is integrated [rad].
     """
 
     law: str
@@ -118,6 +122,7 @@ class Work:
     fields: tuple[str, ...]
     dtype: str
     curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    accuracy: float = ACCURACY
 
     @property
     def lanes(self) -> int:

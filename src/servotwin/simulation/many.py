@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.models.engine.memory import ACCURACY
 from servotwin.simulation.batch import Batch, Failure
 from servotwin.simulation.lane_inputs import Lanes, lanes_of
 from servotwin.simulation.lane_runs import goes_together
@@ -26,6 +27,7 @@ from servotwin.simulation.packing import Asked, Chunk, Commands, groups
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import lane_remarks
 from servotwin.simulation.simulator import times_asked
+from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
 from servotwin.units import is_finite
 
@@ -53,7 +55,7 @@ def simulate_many(
     output_step: float | None = None, output_times: ArrayLike | None = None,
     outputs: Sequence[str] = ("output_angle",), initial: Mapping[str, ArrayLike] | None = None,
     dtype: DTypeLike = "float64", seeds: ArrayLike | None = None, executor: Any = None, chunk: int | None = None,
-    progress: Progress = False,
+    progress: Progress = False, accuracy: float = ACCURACY,
 ) -> Batch:
     """Simulate many servos (lanes) from t = 0 to `duration`.
 
@@ -89,6 +91,8 @@ def simulate_many(
         it.
     progress : bool or callable
         True shows a bar on stderr; a callable is called with the lanes that are done and all of them.
+    accuracy : float
+        As in `simulate` [rad].
 
     Returns
     -------
@@ -119,13 +123,14 @@ def simulate_many(
         warn_of(lanes.model.servo, lanes.commands, duration,
                 voltages=lanes.numbers.get("supply.open_circuit_voltage"), known=lanes.headers)
     return simulate_lanes(lanes, duration=duration, output_step=output_step, output_times=output_times,
-                          outputs=outputs, dtype=dtype, executor=executor, chunk=chunk, progress=progress)
+                          outputs=outputs, dtype=dtype, executor=executor, chunk=chunk, progress=progress,
+                          accuracy=accuracy)
 
 
 def simulate_lanes(
     lanes: Lanes, *, duration: float, output_step: float | None = None, output_times: ArrayLike | None = None,
     outputs: Sequence[str] = ("output_angle",), dtype: DTypeLike = "float64", executor: Any = None,
-    chunk: int | None = None, progress: Progress = False,
+    chunk: int | None = None, progress: Progress = False, accuracy: float = ACCURACY,
 ) -> Batch:
     """Return what `simulate_many` does of lanes that were zipped before, without warnings."""
     if not (is_finite(duration) and duration > 0.0):
@@ -135,7 +140,7 @@ def simulate_lanes(
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     times = np.array(times_asked(duration, output_step, output_times))  # a copy: it becomes read-only
-    asked = Asked(float(duration), times, _outputs(lanes.model, outputs), real_type(dtype))
+    asked = Asked(float(duration), times, _outputs(lanes.model, outputs), real_type(dtype), accuracy_of(accuracy))
     commands = Commands(lanes)
     packs = _packs(lanes, commands, asked, chunk, workers_of(executor))
     signals = _space(lanes, asked)

@@ -44,6 +44,7 @@ class Asked:
     times: Array
     outputs: tuple[str, ...]
     dtype: str
+    accuracy: float
 
 
 class Commands:
@@ -245,7 +246,8 @@ class Chunk:
                     chip=None if chip is None else mapped(flat, chip), command=command, torque=torque,
                     constant_torque=flat(self.load.torque), edges=self.commands.frame_edges(self.which),
                     start=self.start, seeds=self.lanes.seeds[self.which], duration=asked.duration,
-                    times=asked.times, fields=fields, dtype=asked.dtype, curve=self.model.curve())
+                    times=asked.times, fields=fields, dtype=asked.dtype, curve=self.model.curve(),
+                    accuracy=asked.accuracy)
 
     def fields(self, asked: Asked) -> tuple[str, ...]:
         """Return the raw fields that the outputs read: those that they look at when they are computed for one lane."""

@@ -12,7 +12,7 @@ import numpy as np
 from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
 from servotwin.loads import Constant, as_load
 from servotwin.models import Model
-from servotwin.models.engine.memory import started, with_play
+from servotwin.models.engine.memory import ACCURACY, started, with_play
 from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.runs import mode_of
 from servotwin.models.samples import Samples
@@ -26,7 +26,7 @@ from servotwin.simulation.lane_loads import LOAD_NAMES, check_number, with_numbe
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.result import Result
-from servotwin.simulation.start import check_start, start_vector
+from servotwin.simulation.start import accuracy_of, check_start, start_vector
 from servotwin.simulation.status import Status
 from servotwin.simulation.trajectory import Trajectory
 from servotwin.units import is_finite
@@ -51,6 +51,9 @@ class Simulator:
         What hangs on the shaft; nothing unless given.
     seed : int
         Seed of all noise (the models without pulses have none).
+    accuracy : float
+        What angles may be off by where motions are integrated, not solved in closed form [rad], from 1e-13 to 1e-4. A
+        decision or a stop at the very edge may fall otherwise.
 
     Examples
     --------
@@ -63,10 +66,12 @@ class Simulator:
     True
     """
 
-    def __init__(self, model: Model, load: Load | Part | None = None, seed: int = 0) -> None:
+    def __init__(self, model: Model, load: Load | Part | None = None, seed: int = 0,
+                 accuracy: float = ACCURACY) -> None:
         self.model = _model(model)
         self.load = as_load(load)
         self.seed = _seed(seed)
+        self.accuracy = accuracy_of(accuracy)
         self._numbers = model.pack(self.load)
         self._torque = self.load.torque_pieces
         self._last: tuple[Signal, Plan] | None = None
@@ -224,7 +229,8 @@ class Simulator:
             model = type(self.model)(self.model.servo.replace(servo)) if servo else self.model
             if len(self._others) >= _MOST_OTHERS:
                 self._others.clear()
-            self._others[changes] = Simulator(model, with_numbers(self.load, of_load), self.seed)
+            self._others[changes] = Simulator(model, with_numbers(self.load, of_load), self.seed,
+                                               self.accuracy)
         return self._others[changes]
 
     def _check(self, state: State, what: str, model: Model | None = None) -> None:
@@ -253,14 +259,16 @@ class Simulator:
         if self._last is not None and self._last[0] is command and self._last[1].external_torque == external_torque:
             return self._last[1]
         plan = Plan(self._numbers, self.drive(command), self._torque, self.model.chip(command) or NO_CHIP,
-                    self.model.edges(command), self.seed, self.model.curve(), float(external_torque))
+                    self.model.edges(command), self.seed, self.model.curve(), float(external_torque),
+                    self.accuracy)
         self._last = (command, plan)
         return plan
 
 
 def simulate(model: Model, command: Signal, *, duration: float, load: Load | Part | None = None,
              output_step: float | None = None, output_times: ArrayLike | None = None,
-             initial: Mapping[str, float] | None = None, seed: int = 0, progress: Progress = False) -> Result:
+             initial: Mapping[str, float] | None = None, seed: int = 0, progress: Progress = False,
+             accuracy: float = ACCURACY) -> Result:
     """Simulate from t = 0 to `duration` and return the result.
 
     Parameters
@@ -282,6 +290,8 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
         Seed of all noise.
     progress : bool or callable
         True shows a bar for what lasts over a second; a callable is called with the thousandths that are done and 1000.
+    accuracy : float
+        Of what is integrated, as in `Simulator` [rad].
 
     Raises
     ------
@@ -305,7 +315,7 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
     times = times_asked(duration, output_step, output_times)
-    simulator = Simulator(model, load, seed)
+    simulator = Simulator(model, load, seed, accuracy)
     simulator.drive(command)  # raises if the model cannot follow it
     warn_of(model.servo, [command], duration)
     return simulated(simulator, command, duration, times, initial, progress)

@@ -11,9 +11,19 @@ from servotwin.errors import InputError
 from servotwin.models.base import Place
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE
+from servotwin.units import is_finite
 
 _SLACK = 1e-12  # rad
 COLDEST_WINDING = REFERENCE_TEMPERATURE - 1.0 / COPPER_COEFFICIENT  # K
+
+_FINEST, _COARSEST = 1e-13, 1e-4  # rad: finer than rounding, or coarser than what a step could tell of
+
+
+def accuracy_of(value: Any) -> float:
+    """Return an accuracy [rad], or raise InputError."""
+    if not (is_finite(value) and _FINEST <= value <= _COARSEST):
+        raise InputError("accuracy", got=value, allowed=f"a number of radians, from {_FINEST:g} to {_COARSEST:g}")
+    return float(value)
 
 
 def start_vector(places: Sequence[Place], plant: Numbers, angle: Any, initial: Mapping[str, Any]) -> Any:

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from servotwin import physics
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.base import KINDS, PULSE_RANGE, Model
+from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.ticks import LONGEST
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.lane_inputs import lanes_of, pick
 from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
+from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.vector_calls import Room
 from servotwin.simulation.vector_commands import Translator
@@ -61,6 +63,8 @@ class VectorSimulator:
         How many share the lanes; all cores unless given. Results do not depend on it.
     seed : int
         Of all noise; the k-th lane has the seed `seed` + k.
+    accuracy : float
+        Of what is integrated, as in `Simulator` [rad].
 
     Raises
     ------
@@ -81,7 +85,7 @@ class VectorSimulator:
     def __init__(
         self, model: Model, lanes: int, *, load: loads.Load | loads.Part | list[Any] | None = None,
         parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
-        threads: int | None = None, seed: int = 0,
+        threads: int | None = None, seed: int = 0, accuracy: float = ACCURACY,
     ) -> None:
         count = _whole("lanes", lanes, 1)
         if count * _BYTES > 0.8 * memory_limit():
@@ -97,7 +101,7 @@ class VectorSimulator:
         if inputs.count != count:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
-        self._numbers = LaneNumbers(inputs)
+        self._numbers = LaneNumbers(inputs, accuracy_of(accuracy))
         self._threads = _whole("threads", threads, 1) if threads is not None else workers_of(None)
         self._pool = own_threads(os.getpid())
         self._store = Store(self._numbers, real_type(dtype), self._threads, self._pool)

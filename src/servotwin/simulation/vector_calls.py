@@ -80,14 +80,14 @@ def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[
     """Return what is called for lanes in tiles at each stage; those that are given up go on one by one."""
     kernels, rows, which = some.recipe, some.rows, some.which
     places = np.arange(len(which))
-    advance = call_of(kernels, "advance", which, some.braked, 0, len(rows), Now(store.now, 0), command, store.total,
+    advance = call_of(kernels, "advance", which, *some.form, 0, len(rows), Now(store.now, 0), command, store.total,
                       Now(store.now, 1, True), rows, some.plans[0], returns=True)
     alone = _Alone(len(which))
     lost = [call_of(TICKS, "gather_lost", which, store.status, store.columns.start, rows, *alone.room, returns=True),
-            *alone.go_on(lane_runs.PLAIN_RUNS, store),
+            *alone.go_on(some.general, store),
             call_of(TICKS, "put_lost", *alone.some("places", "lanes", "records"), store.numbers.frame_period, rows)]
     return {
-        "refit": [call_of(kernels, "refit", store.columns, which, places, rows)],
+        "refit": [call_of(kernels, "refit", store.columns, some.form[0], which, places, rows)],
         "impose": [call_of(TICKS, "impose_on_tiles", room.has, room.given, store.columns.numbers, which, places,
                            store.work, rows)],
         "advance": [advance, *lost], "show": [call_of(TICKS, "show_tiles", which, rows, room.shaft)],

@@ -55,10 +55,13 @@ class LaneNumbers:
         Tiles of the numbers as servo and load say them, without what is imposed.
     load_total, V_oc : ndarray, shape (lanes,)
         Inertia of each load [kg m²], and voltage of each supply without a current [V].
+    accuracy : float
+        Of what is integrated [rad].
     """
 
-    def __init__(self, inputs: Lanes, imposed: Imposed | None = None) -> None:
+    def __init__(self, inputs: Lanes, accuracy: float, imposed: Imposed | None = None) -> None:
         self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
+        self.accuracy = accuracy
         self.available = inputs.model.available
         nothing = np.full(self.count, math.nan)
         self.imposed = Imposed(nothing, nothing.copy())
@@ -86,7 +89,7 @@ class LaneNumbers:
         torque, first, count = np.empty(B), np.zeros(B, np.int64), np.zeros(B, np.int64)
         rows: list[Array] = []
         for chunk in self.chunks:
-            asked = Asked(1.0, np.zeros(1), (), "float64")
+            asked = Asked(1.0, np.zeros(1), (), "float64", self.accuracy)
             work = chunk.work(asked, ())
             packed, which = lane_runs.lanes_of(work), chunk.which
             put_columns(numbers, which, columns_of(Numbers, packed.numbers, slice(len(which))))
@@ -99,7 +102,7 @@ class LaneNumbers:
         pieces = np.zeros((B, 7))
         index, none = np.arange(B), np.zeros(B, np.int64)
         columns = Columns(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), pieces, index, none + 1,
-                          np.zeros(0), none, none - 1)
+                          np.zeros(0), none, none - 1, self.accuracy)
         return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
 
     def now(self, room: str, which: Indices | None = None) -> Any:
@@ -131,7 +134,7 @@ class LaneNumbers:
         known = {**inputs.numbers, **inputs.words}
         loads = [inputs.loads[k] for k in inputs.load_of.tolist()]
         inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
-        return LaneNumbers(inputs, self.imposed)
+        return LaneNumbers(inputs, self.accuracy, self.imposed)
 
     def _merged(self, name: str, value: Any, which: Indices) -> Any:
         """Return a parameter of all lanes, of which some have new values."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
 from time import perf_counter
 from typing import Any
 
@@ -33,13 +32,14 @@ from servotwin.identification.fitting.point import (
     LogPart,
     Point,
 )
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters.output_side import output_value
 from servotwin.signals import Signal
 from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.lane_loads import LOAD_NAMES
-from servotwin.simulation.many import simulate_lanes
+from servotwin.simulation.many import own_threads, simulate_lanes, workers_of
+from servotwin.simulation.workers import HERE
 
 Array = NDArray[np.float64]
 
@@ -51,18 +51,6 @@ _HELD = 1e-6  # of its scale: how far a number moves that stays
 _KEPT = 500  # commands
 _WORTH = 4e-3  # s of simulation: three times what a call costs besides
 _POTENTIOMETER = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")
-
-
-class _Here:
-    """An executor that does its work at once, where it is asked."""
-
-    def submit(self, work: Any, *arguments: Any) -> Future[Any]:
-        done: Future[Any] = Future()
-        done.set_result(work(*arguments))
-        return done
-
-
-_HERE = _Here()
 
 
 class Forecast:
@@ -225,11 +213,11 @@ class Forecast:
             groups.setdefault((lane.case.key, lane.delay), []).append(lane)
         jobs = [job for group in groups.values() for job in _split(group, self._pace)]
         jobs.sort(key=lambda job: -sum(lane.cost for lane in job))
-        if len(jobs) == 1 or _workers() == 1:
+        if len(jobs) == 1 or workers_of(None) == 1:
             for job in jobs:
                 self._try(job)
         else:
-            list(_pool().map(self._try, jobs))
+            list(own_threads(os.getpid()).map(self._try, jobs))
         found: list[list[LogPart]] = [[] for _ in points]
         for lane in lanes:
             found[lane.at].append(lane.part)
@@ -276,7 +264,7 @@ class Forecast:
                      [load for lane in job for load in [lane.case.log.load] * lane.count], columns, initial or None,
                      np.zeros(lanes, np.int64)),
             duration=max(float(asked.max()), case.log.duration), output_times=asked[order], outputs=tuple(names),
-            executor=_HERE)
+            executor=HERE)
         pace = (perf_counter() - began) / sum(lane.cost for lane in job)
         self._pace = min(pace, self._pace or pace)
         back = np.empty_like(order)
@@ -296,19 +284,5 @@ class Forecast:
 def _split(group: list[LogLanes], pace: float) -> list[list[LogLanes]]:
     """Return the lanes of a group as jobs, at most two a core, and only as many as are worth the call of each."""
     worth = sum(lane.cost for lane in group) * pace / _WORTH
-    parts = max(1, min(len(group), 2 * _workers(), round(worth)))
+    parts = max(1, min(len(group), 2 * workers_of(None), round(worth)))
     return [group[len(group) * k // parts:len(group) * (k + 1) // parts] for k in range(parts)]
-
-
-def _workers() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-_POOL: list[tuple[int, ThreadPoolExecutor]] = []
-
-
-def _pool() -> ThreadPoolExecutor:
-    """Return the threads of this process; a forked child has none of its parent's."""
-    if not _POOL or _POOL[0][0] != os.getpid():
-        _POOL[:] = [(os.getpid(), ThreadPoolExecutor(_workers(), thread_name_prefix="servotwin-fit"))]
-    return _POOL[0][1]

@@ -35,7 +35,7 @@ from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
 from servotwin.identification.fitting.words import explain, simplest, vague_directions
 from servotwin.identification.fitting.yielding import Dropped, Yielded, settle, yielded
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
 

@@ -28,6 +28,7 @@ class Held(NamedTuple):
     later_sign: float
     later_duration: float
     later_decided: float
+    wiper: float
 
 
 class Hour(NamedTuple):
@@ -62,10 +63,10 @@ put_hour = writer("put_hour", Hour)
 put_counted = writer("put_counted", Counted)
 
 
-def remembered(side: Side, regular: bool, T_w: float, T_h: float) -> Memory:
+def remembered(side: Side, regular: bool, half_slack: float, T_w: float, T_h: float) -> Memory:
     """Return the memory of a servo that ran side by side, at temperatures that stay [K].
 
-    `regular` is whether its frames come regularly.
+    `regular` is whether its frames come regularly; without slack the potentiometer goes with the shaft.
     """
     held, hour, number = side.held, side.hour, side.counted.number
     now = hour.since - hour.length if regular else hour.edge + hour.since
@@ -75,7 +76,8 @@ def remembered(side: Side, regular: bool, T_w: float, T_h: float) -> Memory:
         now + held.left if held.drive != 0.0 else math.inf, now + held.silence, 0, 1.0 * held.error,
         Decision(now + held.due, 1.0 * held.sign, 1.0 * held.duration, 1.0 * held.decided),
         Decision(now + held.later_due, 1.0 * held.later_sign, 1.0 * held.later_duration, 1.0 * held.later_decided))
-    point = Point(now, y, Mode(0, 0, RIGID, 0), math.inf, y, FIRST_STEP, 1.0 * held.q)
+    wiper = 1.0 * held.wiper if half_slack > 0.0 else 1.0 * held.q
+    point = Point(now, y, Mode(0, 0, RIGID, 0, 0), math.inf, y, FIRST_STEP, wiper)
     return Memory(number if regular else 0, hour.period if regular else BEAT, point, chip, NOTHING, math.inf, NOTHING,
                   math.inf)
 
@@ -92,6 +94,6 @@ def side_of(memory: Memory, period: float) -> Side:
     held = Held(
         memory.point.y[0], memory.point.y[1], chip.drive, chip.drive_end - now if chip.drive != 0.0 else 0.0,
         chip.clock - now, chip.error, pending.time - now, pending.sign, pending.duration, pending.error,
-        later.time - now, later.sign, later.duration, later.error)
+        later.time - now, later.sign, later.duration, later.error, memory.point.wiper)
     return Side(held, Hour(period, (number - 1) * period, period - to_next, period),
                 Counted(number, chip.draws - number))

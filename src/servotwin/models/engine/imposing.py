@@ -59,11 +59,17 @@ def placed(point: Point, angle: float, speed: float, sets_angle: bool, sets_spee
     wiper, play = point.wiper, half_play > 0.0
     if sets_angle:
         q = angle
-        q_motor = min(max(q_motor, angle - half_play), angle + half_play) if play else angle
-        wiper = min(max(wiper, angle - half_slack), angle + half_slack)
+        q_motor = carried(q_motor, angle, half_play) if play else angle
+        wiper = carried(wiper, angle, half_slack)
     if sets_speed:
         w = speed
         w_motor = w_motor if play else speed
     y = (q, w, i, T_w, T_h, q_motor, w_motor)
-    mode = Mode(point.mode.zone, point.mode.contact, INSIDE if play else RIGID, point.mode.motor)
+    mode = Mode(point.mode.zone, point.mode.contact, INSIDE if play else RIGID, point.mode.motor,
+                point.mode.share)
     return Point(point.time, y, mode, math.inf, y, point.step, wiper)
+
+
+def carried(follows: float, angle: float, half_play: float) -> float:
+    """Return an angle [rad] that goes along with another one as far as the play between them."""
+    return min(max(follows, angle - half_play), angle + half_play)

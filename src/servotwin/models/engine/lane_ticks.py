@@ -19,7 +19,7 @@ from servotwin.models.engine.crossing import (
     remembered,
     side_of,
 )
-from servotwin.models.engine.imposing import impulse_work, placed
+from servotwin.models.engine.imposing import carried, impulse_work, placed
 from servotwin.models.engine.memory import Memory, memory_of, put_memory, time_of
 from servotwin.models.engine.records import TILE
 from servotwin.models.engine.step import COMPLETED
@@ -38,7 +38,8 @@ def gather_lost(which: Indices, status: Any, start: Floats, tile_rows: Any, coun
         if tile.clock.owed[j] > 0.0:
             if status[lane] == COMPLETED:
                 side = Side(held_at(tile.servo, j), hour_at(tile.clock, j), counted_at(tile.count, j))
-                put_memory(records[n], remembered(side, tile.count.edges[j] < 0, start[3, lane], start[4, lane]))
+                put_memory(records[n], remembered(
+                    side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j], start[3, lane], start[4, lane]))
                 places[n], lanes[n], durations[n] = k, lane, tile.clock.owed[j]
                 n += 1
             tile.clock.owed[j] = 0.0
@@ -101,7 +102,8 @@ def impose_on_tiles(has: Indices, given: Floats, numbers: Any, which: Indices, p
             work[lane] += impulse_work(shaft_at(own.shaft, i), own.play.half[i], 1.0 * servo.w[j], after)
             servo.w[j] = after
         if has[ANGLE] != 0:
-            servo.q[j] = within_stops(own, i, given[ANGLE, lane])
+            angle = within_stops(own, i, given[ANGLE, lane])
+            servo.q[j], servo.wiper[j] = angle, carried(1.0 * servo.wiper[j], angle, own.sensor.half_slack[i])
 
 
 def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices, places: Indices, work: Floats,

@@ -10,12 +10,16 @@ from typing import NamedTuple
 
 
 class Mode(NamedTuple):
-    """Zone of the voltage law, contact of the shaft, place in the play, and contact of the motor inside the play."""
+    """Zone of the voltage law, contact of the shaft, place in the play, contact of the motor inside the play, share.
+
+    The share is the sign of the torques through a sliding gear of whose magnitude friction is made; 0 where it is not.
+    """
 
     zone: int
     contact: int
     mesh: int
     motor: int
+    share: int
 
 
 Vector = tuple[float, float, float, float, float, float, float]

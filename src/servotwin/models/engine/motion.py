@@ -25,6 +25,7 @@ from servotwin.models.engine.rates import jacobian, rates_of
 from servotwin.models.engine.rodas import Triple
 from servotwin.models.terms import follower, friction, heat, load, motor, play, sensor, source
 from servotwin.models.terms.dependence import (
+    BY_SHARE,
     CURVED_Q,
     CURVED_T,
     CURVED_W,
@@ -42,8 +43,8 @@ from servotwin.physics.pieces import Piece, piece_rate, piece_value
 REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, IMPOSSIBLE = range(9)
 
 _TURN = 2.0 * math.pi
-_TOLERANCE = 3e-10  # error of one implicit step, relative to 1 + |state|
-_FINE_TOLERANCE = 1e-12  # of an explicit one
+# Error of one implicit step, relative to 1 + |state|, and of an explicit one: parts of the accuracy asked for
+_TOLERANCE, _FINE_TOLERANCE = 0.3, 1e-3
 _ORIGIN = (0.0, 0.0, 0.0)
 _NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
 _NO_DENSE = (_ORIGIN, _ORIGIN, _ORIGIN)
@@ -74,7 +75,8 @@ class Motion(NamedTuple):
 
 def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
     """Return a motion that is none yet."""
-    return _closed(IMPOSSIBLE, numbers, Mode(0, 0, 0, 0), u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+    nowhere = Mode(0, 0, 0, 0, 0)
+    return _closed(IMPOSSIBLE, numbers, nowhere, u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
 
 
 def is_step(motion: Motion) -> bool:
@@ -83,20 +85,20 @@ def is_step(motion: Motion) -> bool:
 
 
 def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
-          limit: float) -> Motion:
-    """Return the motion from y at t0 [s]: exact, or one accepted step of at most `limit` [s]."""
+          limit: float, accuracy: float) -> Motion:
+    """Return the motion from y at t0 [s]: exact, or one step of at most `limit` [s] that is accurate enough [rad]."""
     still = at_rest(mode.contact) and (mode.mesh != INSIDE or at_rest(mode.motor))
     on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
     if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
         return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & ON_Q))):
-        return _long_step(numbers, mode, u, tau, t0, y, step, limit)
+    if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & (ON_Q | BY_SHARE)))):
+        return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
     if on & ON_I and still and mode.zone >= CONDUCTING:
         v, R = currents.loop(numbers, mode.zone, u.value)
         fading = (R / numbers.motor.L, v / R, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return _closed(HELD, numbers, mode, u, tau, t0, y, fading, (0.0, 0.0), step)
     if on & (CURVED_Q | STEEP_W | CURVED_T) or (on & ON_I and (still or (not behind and on & ON_Q))):
-        return _integrated(numbers, mode, u, tau, t0, y, step, limit)
+        return _integrated(numbers, mode, u, tau, t0, y, step, limit, accuracy)
     follows = in_linear_zone(mode.zone)
     wave = (u.value + u.slope * (t0 - u.start), u.slope, 0.0, 0.0, 0.0)
     if follows:
@@ -140,14 +142,14 @@ def by_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Ve
 
 
 def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
-                limit: float) -> Motion:
+                limit: float, accuracy: float) -> Motion:
     jac = jacobian(numbers, mode, piece_value(u, t0), piece_rate(u, t0), piece_rate(tau, t0), y[0], y[1])
     h = min(step, limit)
     h = min(h, period(u, tau, t0, t0 + h) / 6.0)
     for _ in range(60):
         y1, error, stages = rodas.step(numbers, mode, u, tau, jac, t0, y, h)
         size = max(abs(error[0]) / (1.0 + abs(y1[0])), abs(error[1]) / (1.0 + abs(y1[1])),
-                   abs(error[2]) / (1.0 + abs(y1[2]))) / _TOLERANCE
+                   abs(error[2]) / (1.0 + abs(y1[2]))) / (_TOLERANCE * accuracy)
         if not size < 1e6:
             size = 1e6
         factor = min(5.0, max(0.1, 0.85 * size**-0.2)) if size > 0.0 else 5.0
@@ -161,12 +163,12 @@ def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y
 
 
 def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
-               limit: float) -> Motion:
+               limit: float, accuracy: float) -> Motion:
     h = min(step, limit)
     h = min(h, period(u, tau, t0, t0 + h) / 3.0)
     for _ in range(60):
         y1, error = dormand_prince.step(numbers, mode, u, tau, t0, y, h)
-        size = error / _FINE_TOLERANCE
+        size = error / (_FINE_TOLERANCE * accuracy)
         if not size < 1e12:
             size = 1e12
         factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0

@@ -67,12 +67,13 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
     local_u, local_tau = (since(u, origin), since(tau, origin)) if origin != 0.0 else (u, tau)
     if new:
         point = anchored(numbers, local_u, local_tau, t, point)
-    point, m, event, status = onward(numbers, point, local_u, local_tau, m, new, min(u_end, tau_end), until)
+    point, m, event, status = onward(numbers, point, local_u, local_tau, m, new, min(u_end, tau_end), until,
+                                       inputs.accuracy)
     return Memory(frames, beat, point, now, u, u_end, tau, tau_end), m, event, status
 
 
 def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new: bool, limit: float,
-           until: float) -> tuple[Point, Motion, int, int]:
+           until: float, accuracy: float) -> tuple[Point, Motion, int, int]:
     """Go on, under inputs that stay until `limit` [s], to the next event or to `until`.
 
     `m` is the motion so far, which is taken up again if it is still the right one and the inputs are not `new`. Return
@@ -80,7 +81,7 @@ def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new:
     """
     if new or m.t0 != point.anchor_time or m.mode != point.mode or motion.is_step(m):
         m = motion.begin(numbers, point.mode, u, tau, point.anchor_time, point.anchor, point.step,
-                         limit - point.anchor_time)
+                         limit - point.anchor_time, accuracy)
     if m.kind == motion.IMPOSSIBLE:
         return point, m, -1, STEP_TOO_SMALL
     point, event, status = follow(m, point, min(limit, until))
