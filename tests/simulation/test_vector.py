@@ -236,6 +236,16 @@ def test_a_speed_that_is_set_is_an_impulse(servo, changes):
     assert sims["output_angle"][1] > sims["output_angle"][0]
 
 
+@pytest.mark.parametrize("load", [None, st.loads.Spring(1e-3)], ids=["side by side", "one by one"])
+def test_an_angle_that_is_set_carries_the_potentiometer_along(servo, load):
+    model = st.PulseServo(servo.replace({"potentiometer.backlash": 0.02}))
+    sims = st.VectorSimulator(model, 3, load=load)
+    sims.reset(output_angle=1.5)
+    sims.set(output_angle=[1.2, 1.505, 1.9])
+    p, b_o = servo.potentiometer.feedback_gain, servo.potentiometer.feedback_offset or 0.0
+    np.testing.assert_allclose(sims["feedback_voltage"], p * np.array([1.21, 1.5, 1.89]) + b_o, rtol=1e-12)
+
+
 def test_an_inertia_that_is_set_is_that_of_the_load(servo):
     model = st.PulseServo(servo)
     imposed = st.VectorSimulator(model, 2)
