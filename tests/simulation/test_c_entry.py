@@ -233,10 +233,14 @@ def test_a_record_that_ends(servo):
     np.testing.assert_allclose(sims.time, 0.05)
 
 
+READ_ONLY = np.zeros(LANES)
+READ_ONLY.flags.writeable = False
 BAD_ARRAYS = {
     "unknown": {"output_torque": np.zeros(LANES)}, "too few": {"pulse_width": np.zeros(LANES - 1)},
     "single": {"pulse_width": np.zeros(LANES, np.float32)}, "a list": {"pulse_width": [1.5e-3] * LANES},
     "every other": {"pulse_width": np.zeros(2 * LANES)[::2]}, "status of floats": {"status": np.zeros(LANES)},
+    "masked": {"pulse_width": np.ma.zeros(LANES)}, "not to be written": {"output_angle": READ_ONLY},
+    "no time": {"duration": "a second"},
 }
 
 
@@ -244,8 +248,9 @@ BAD_ARRAYS = {
 def test_bad_arrays_are_one_clear_line(servo, name):
     entry = st.VectorSimulator(st.PulseServo(servo), LANES).c_entry()
     with pytest.raises(InputError, match=f"tick\\({next(iter(BAD_ARRAYS[name]))}\\)") as error:
-        entry.tick(0.01, **BAD_ARRAYS[name])
+        entry.tick(**BAD_ARRAYS[name])
     assert "\n" not in str(error.value)
+    entry.tick(pulse_width=READ_ONLY)  # what is only read need not be writeable
 
 
 # --- who calls --------------------------------------------------------------------------------------------------------

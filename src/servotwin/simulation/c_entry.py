@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.simulation.compile.calls import program, tick_address
-from servotwin.simulation.compile.layout import HANDLE, MESSAGES, STAGES, TICK, VERSION
+from servotwin.simulation.compile.layout import GIVEN, HANDLE, MESSAGES, STAGES, TICK, VERSION
 from servotwin.simulation.vector_calls import Room, programs_of
 
 if TYPE_CHECKING:
@@ -119,17 +119,22 @@ class CEntry:
         Raises
         ------
         InputError
-            If there is no such member, or an array is not one of float64 (`status`: int8) in a row.
+            If the duration is no number, there is no such member, or an array is not one of float64 (`status`: int8).
         """
-        tick = CTick(version=VERSION, lanes=self.lanes, duration=duration, simulator=self.simulator)
+        try:
+            tick = CTick(version=VERSION, lanes=self.lanes, duration=duration, simulator=self.simulator)
+        except TypeError:
+            raise InputError("tick(duration)", got=duration, allowed="a number of seconds") from None
         for name, array in arrays.items():
             if name not in TICK[4:]:
                 raise InputError(f"tick({name})", allowed="one of " + ", ".join(TICK[4:]))
             kind = np.int8 if name == "status" else np.float64
-            good = isinstance(array, np.ndarray) and array.dtype == kind and array.shape == (self.lanes,)
-            if not (good and array.flags.c_contiguous and array.flags.writeable):
+            plain = isinstance(array, np.ndarray) and not np.ma.isMaskedArray(array)
+            good = plain and array.dtype == kind and array.shape == (self.lanes,) and array.flags.c_contiguous
+            if not (good and (name in GIVEN or array.flags.writeable)):
+                allowed = f"an array ({self.lanes},) of {kind.__name__}, its numbers in a row"
                 raise InputError(f"tick({name})", got=_told(array),
-                                 allowed=f"a writeable array ({self.lanes},) of {kind.__name__}, its numbers in a row")
+                                 allowed=allowed if name in GIVEN else f"{allowed}, to write into")
             setattr(tick, name, array.ctypes.data)
         tick.arrays = arrays
         return tick

@@ -80,8 +80,10 @@ class LaneNumbers:
         self.given = self.columns.numbers.copy()
         if imposed is not None:
             hung, fed = (np.flatnonzero(~np.isnan(values)) for values in imposed)
-            self.impose(hung, imposed.load_inertia[hung], None)
-            self.impose(fed, None, imposed.bus_voltage[fed])
+            if len(hung):
+                self.impose(hung, imposed.load_inertia[hung], None)
+            if len(fed):
+                self.impose(fed, None, imposed.bus_voltage[fed])
 
     def _packed(self) -> tuple[Columns, Tables]:
         B = self.count

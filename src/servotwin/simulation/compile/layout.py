@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from servotwin.models.engine import ticks
+
 VERSION = 1
 GIVEN = ("pulse_width", "command_angle", "command_voltage", "external_torque", "set_output_angle", "set_output_speed",
          "set_load_inertia", "set_bus_voltage")
@@ -16,20 +18,21 @@ STAGES = ("clock", "accept", "change", "refit", "impose", "follow", "advance", "
 HANDLE = ("lanes", "given", "has", "now", "status", "shaft", "seen", "fresh", "renew", *STAGES)
 """Words of a simulator: a number, and addresses."""
 
-DONE, NOTHING_GIVEN, OTHER_VERSION, OTHER_LANES = range(4)
+DONE = ticks.ACCEPTED
+NOTHING_GIVEN, OTHER_VERSION, OTHER_LANES = range(1, 4)
 NOT_RENEWED = 11
 MESSAGES = {
     DONE: "done",
     NOTHING_GIVEN: "no struct, or no simulator in it",
     OTHER_VERSION: "the struct has another version",
     OTHER_LANES: "the struct has another number of lanes",
-    4: "the duration is not a number of seconds from 0 to 1e5",
-    5: "a number is not finite",
-    6: "a command is not possible, or more than one is given",
-    7: "an angle is beyond a stop",
-    8: "an inertia is negative",
-    9: "a bus voltage is not positive",
-    10: "a recorded torque ends before",
+    ticks.BAD_DURATION: f"the duration is not a number of seconds from 0 to {ticks.LONGEST:.0e}",
+    ticks.BAD_NUMBER: "a number is not finite",
+    ticks.BAD_COMMAND: "a command is not possible, or more than one is given",
+    ticks.BAD_ANGLE: "an angle is beyond a stop",
+    ticks.BAD_INERTIA: "an inertia is negative",
+    ticks.BAD_VOLTAGE: "a bus voltage is not positive",
+    ticks.BEYOND_RECORD: "a recorded torque ends before",
     NOT_RENEWED: "lanes that run in another way now could not be prepared",
 }
-"""What the numbers mean that a tick returns; from 4 to 10 those of `engine.ticks`."""
+"""What the numbers mean that a tick returns."""
