@@ -14,6 +14,7 @@ from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Vector
 from servotwin.models.engine.motion import FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
 from servotwin.models.engine.rodas import not_constant
 from servotwin.models.terms import source
+from servotwin.models.terms.friction import creeping_speed
 from servotwin.physics.motor import back_emf
 from servotwin.physics.pieces import piece_rate, piece_value
 
@@ -51,11 +52,13 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
     low, high = currents.zone_limits(numbers, motion.mode.zone, u)
     w, x = after[1], u - back_emf(after[1], numbers.motor.K_b)
     first, found = math.inf, -1
+    way = 1.0 if motion.mode.contact == FORWARD else -1.0
+    slow = creeping_speed(numbers.friction)
     share, turn = guards.share_along(numbers, motion.mode, u, piece_value(motion.tau, motion.t0), after)
-    for kind, left, there in ((guards.SPEED, w if motion.mode.contact == FORWARD else -w, 0.0),
+    for kind, left, there in ((guards.SPEED, way * w, 0.0),
                               (guards.ZONE_UP, high - x, (u - high) / numbers.motor.K_b),
                               (guards.ZONE_DOWN, x - low, (u - low) / numbers.motor.K_b),
-                              (guards.SHARE, share, turn)):
+                              (guards.SHARE, share, turn), (guards.CREEPS, way * w - slow, way * slow)):
         if not kinds >> kind & 1 or left >= _BELOW:  # monotone: what holds at the end has held
             continue
         s = first_order.time_to(rate, f, w0, there)

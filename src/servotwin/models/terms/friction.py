@@ -13,10 +13,11 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.engine.modes import CORE, at_rest
-from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, STEEP_W
+from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, FADING, STEEP_W
 from servotwin.models.terms.given import Given
 from servotwin.physics.friction import breakaway_torque, coulomb_torque
 from servotwin.physics.load_friction import (
+    faded_speed,
     gear_friction_budget,
     share_balance,
     sliding_gear_friction,
@@ -78,17 +79,34 @@ def depends(friction: Friction, contact: int) -> int:
         return STEEP_W
     if friction.varies == 0.0 or at_rest(contact):
         return 0
-    return BY_SHARE if straight(friction) else CURVED_W
+    if not straight(friction):
+        return CURVED_W
+    return BY_SHARE | FADING if friction.w_s > 0.0 else BY_SHARE
 
 
 def straight(friction: Friction) -> bool:
     """Tell whether sliding friction follows the torques in straight lines, and lets the motor turn the gear."""
-    return friction.w_s == 0.0 and friction.K_m < 1.0 and friction.K_e <= 1.0
+    return friction.K_m < 1.0 and friction.K_e <= 1.0
 
 
 def shared(friction: Friction) -> bool:
     """Tell whether the torques through the gear add to sliding friction."""
     return friction.K_m > 0.0 or friction.K_e > 0.0
+
+
+def fades(friction: Friction) -> bool:
+    """Tell whether friction fades as the shaft speeds up, and not at once."""
+    return friction.varies > 0.0 and friction.w_s > 0.0
+
+
+def creeping_speed(friction: Friction) -> float:
+    """Return the output speed [rad/s] up to which a shaft creeps: from there on no static friction is left."""
+    return faded_speed(friction.w_s, friction.alpha) if friction.varies > 0.0 else 0.0
+
+
+def static_share(friction: Friction, tau_m: float, tau_e: float) -> float:
+    """Return the torque through the gear [N m] whose magnitude adds to static friction."""
+    return share_balance(tau_m, tau_e, friction.K_ms, friction.K_es)
 
 
 def share(friction: Friction, tau_m: float, tau_e: float) -> float:
