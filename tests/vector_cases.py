@@ -20,6 +20,9 @@ CASES = {  # what leads to each way in which lanes run
     "dry load": ({"supply.internal_resistance": 0.3}, st.loads.Inertia(1e-3) + st.loads.Coulomb(0.1)),
     "regulator, load friction": ({"supply.current_limit": 1.2, "supply.internal_resistance": 0.2,
                                   "friction.load_friction_motor": 0.06, "friction.load_friction_external": 0.1}, None),
+    "friction that fades with speed": ({"friction.breakaway_ratio": 1.3, "friction.stribeck_speed": 10.0,
+                                        "friction.stribeck_exponent": 1.5, "friction.load_friction_motor": 0.06,
+                                        "friction.load_friction_motor_stribeck": 0.05}, None),
     "worn potentiometer": ({"potentiometer.backlash": 0.02}, None),
     "everything": (EVERYTHING, st.loads.Recorded([0.0, 0.2, 10.0], [0.0, 0.1, -0.1])),
 }
