@@ -1,7 +1,7 @@
 """Servos that stop and go on at every tick, beside MuJoCo's own step of a hinge; and whole calls of 4096 signals.
 
-`run.py` does all parts; `run.py ticks`, `run.py between`, `run.py buses` or `run.py calls` one of them. MuJoCo is the peer; without it
-ratios are left out.
+`run.py` does all parts; `run.py ticks`, `run.py between`, `run.py buses`, `run.py c` or `run.py calls` one of them.
+MuJoCo is the peer; without it ratios are left out.
 """
 
 import sys
@@ -14,6 +14,7 @@ import servotwin as st
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "pulse_servo"))
+import from_c
 import peer_mujoco
 from common import best
 from fleet import random_fleet
@@ -131,9 +132,16 @@ def buses() -> None:
     for name, lanes, changes, bus in (
             ("4 on one bus", 4, {}, battery), ("16 alone, one by one", 16, alone, None),
             ("16 alone, side by side", 16, {}, None), ("1 on a bus", 1, {}, battery),
-            ("1 alone, one by one", 1, alone, None), ("64 on 16 buses of 4", 64, {}, fours), ("64 alone, one by one", 64, alone, None)):
+            ("1 alone, one by one", 1, alone, None), ("64 on 16 buses of 4", 64, {}, fours),
+            ("64 alone, one by one", 64, alone, None)):
         times = [bus_tick(lanes, duration, changes, bus) for duration in (1e-3, 5e-3, 0.02)]
         print(f"{name:36} " + " ".join(f"{1e6 * time:9.2f}" for time in times), flush=True)
+
+
+def c() -> None:
+    """Print what a tick costs where compiled code calls the entry for C."""
+    from_c.table({"plain": MODEL, "play": st.PulseServo(MODEL.servo.replace(WORN["play"]))}, lanes_tick(1, 1e-3),
+                 mujoco_tick())
 
 
 def calls() -> None:
@@ -163,7 +171,7 @@ def calls() -> None:
 
 
 def main() -> None:
-    parts = {"ticks": ticks, "between": between, "buses": buses, "calls": calls}
+    parts = {"ticks": ticks, "between": between, "buses": buses, "c": c, "calls": calls}
     for part in sys.argv[1:] or parts:
         if part not in parts:
             sys.exit(f"run.py: {part!r} is not one of {', '.join(parts)}")

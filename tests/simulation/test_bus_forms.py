@@ -25,13 +25,13 @@ CASES = {
 SIGNALS = ("output_angle", "output_speed", "armature_current", "supply_current", "error_time")
 
 
-def fleet_of(servo, name, duration=0.15, times=np.linspace(0.0, 0.15, 16)):
+def fleet_of(servo, name):
     changes, load, supply, model = CASES[name]
     model = model(servo.replace(changes))
     trains = st.signals.pulse_train([0.003 + 0.018 * k for k in range(9)], [1900.0, 1250.0, 1500.0] * 3)
     steps = [st.signals.step(a, b, at=0.03, unit="deg") for a, b in ((10.0, 60.0), (90.0, 40.0))]
     return st.simulate_bus({str(k): (model, signal, load) for k, signal in enumerate((*steps, trains))}, supply=supply,
-                           duration=duration, output_times=times, seed=2**65 + 7)
+                           duration=0.15, output_step=0.01, seed=2**65 + 7)
 
 
 def same(one, other, tolerance):

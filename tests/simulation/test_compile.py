@@ -96,7 +96,8 @@ def test_a_cache_that_cannot_be_written(tmp_path):
     assert "Traceback" not in errors
 
 
-@pytest.mark.parametrize("module", ["servotwin.simulation.lane_runs", "servotwin.simulation.compile"])
+@pytest.mark.parametrize("module", ["servotwin.simulation.lane_runs", "servotwin.simulation.compile",
+                                    "servotwin.simulation.c_entry"])
 def test_numba_comes_late(module):
     code = f"import sys, {module}; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -95,7 +95,6 @@ sliding_gear_friction = array_form(load_friction.sliding_gear_friction)
 static_gear_friction = array_form(load_friction.static_gear_friction)
 stribeck_factor = array_form(load_friction.stribeck_factor)
 torque_on_gear = array_form(load_friction.torque_on_gear)
-faded_speed = array_form(load_friction.faded_speed)
 share_balance = array_form(load_friction.share_balance)
 torque_share = array_form(load_friction.torque_share)
 
@@ -191,7 +190,6 @@ __all__ = [
     "error_between",
     "error_beyond_deadband",
     "error_time",
-    "faded_speed",
     "feedback_error",
     "feedback_voltage",
     "forward_acceleration",

@@ -11,7 +11,6 @@ import math
 
 from servotwin.physics.friction import breakaway_torque, sticks
 
-_FADED = 39.0  # e^−39 is less than rounding
 _NOTHING_LEFT = 7.0  # exp(−exp(7)) is 0, and a trial step may be far too fast for a power
 
 
@@ -47,29 +46,6 @@ def stribeck_factor(speed: float, stribeck_speed: float = 0.0, stribeck_exponent
         return 0.0
     log_power = stribeck_exponent * math.log(abs(speed) / stribeck_speed)
     return math.exp(-math.exp(log_power)) if log_power < _NOTHING_LEFT else 0.0
-
-
-def faded_speed(stribeck_speed: float, stribeck_exponent: float = 1.0) -> float:
-    """Return the speed from which on nothing counts of the static friction.
-
-    Parameters
-    ----------
-    stribeck_speed : float or array
-        w_s [rad/s].
-    stribeck_exponent : float or array
-        α, positive [1].
-
-    Returns
-    -------
-    float or array
-        w_s 39^(1/α), where `stribeck_factor` is less than 1e-16 [rad/s].
-
-    Examples
-    --------
-    >>> stribeck_factor(faded_speed(2.0), 2.0) < 2e-17
-    True
-    """
-    return stribeck_speed * math.exp(math.log(_FADED) / stribeck_exponent)
 
 
 def torque_on_gear(external_torque: float, output_speed: float, load_viscous_friction: float) -> float:

@@ -157,8 +157,8 @@ def _lanes_of(plans: Sequence[Plan]) -> Lanes:
     edge_first, edge_count = _places(edges)
     return Lanes(_tiles_of(Numbers, [plan.numbers for plan in plans]), _tiles_of(Chip, [plan.chip for plan in plans]),
                  np.zeros((7, len(plans))), np.array([plan.external_torque for plan in plans]),
-                 np.array([_in_64_bits(plan.seed) for plan in plans]), np.concatenate(pieces), first, count, np.concatenate(edges),
-                 edge_first, np.where(regular, -1, edge_count), plans[0].accuracy)
+                 np.array([_in_64_bits(plan.seed) for plan in plans]), np.concatenate(pieces), first, count,
+                 np.concatenate(edges), edge_first, np.where(regular, -1, edge_count), plans[0].accuracy)
 
 
 def _in_64_bits(seed: int) -> int:

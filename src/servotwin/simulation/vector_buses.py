@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.errors import InputError
 from servotwin.models.engine import tape
 from servotwin.models.engine.buses import Buses, Tables
 from servotwin.models.engine.records import columns_of
@@ -19,7 +20,8 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.bus_run import ALL_BUSES, PLAIN_BUSES, not_plain, room_of, shared_of
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
-from servotwin.simulation.lane_memory import RECORD, impose_on_records
+from servotwin.simulation.lane_memory import RECORD
+from servotwin.simulation.vector_calls import TICKS
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_numbers import LaneNumbers
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 _NO_TAPE = Tape(np.zeros((0, tape.ROW)), np.zeros((0, tape.EVENT)), np.zeros(0), np.zeros(0, np.int64))
+_PLACES = 4  # among what is imposed
 _WORTH = 4  # buses for a thread: fewer cost more in waking it
 
 
@@ -109,10 +112,15 @@ class BusSet:
         self._break_up(places)
         self.rows["point"]["anchor_time"][places] = math.inf
 
-    def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
-        """Set angles [rad] and speeds [rad/s] of the output; motor and potentiometer go along as far as their play."""
-        self._break_up(places)
-        impose_on_records(self.rows, places, self.which[places], angle, speed, numbers)
+    def impose(self, *imposed: Any) -> None:
+        """Set angles and speeds, as `engine.lane_ticks` does; motor and potentiometer go along as far as their play."""
+        self._break_up(imposed[_PLACES])
+        kernels(TICKS).impose_on_records(*imposed, self.rows)
+
+    def calls(self, store: Any, room: Any, command: Array) -> dict[str, list[Any]]:
+        """Refuse the entry for C: lanes on buses are run from Python alone."""
+        raise InputError("c_entry of lanes on a bus", got=f"{len(self.which)} lanes on buses",
+                         allowed="lanes with supplies of their own")
 
     def records(self, columns: Lanes) -> NDArray[Any]:
         """Return what the lanes remember."""

@@ -17,13 +17,13 @@ from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, FADING, STEEP_
 from servotwin.models.terms.given import Given
 from servotwin.physics.friction import breakaway_torque, coulomb_torque
 from servotwin.physics.load_friction import (
-    faded_speed,
     gear_friction_budget,
     share_balance,
     sliding_gear_friction,
     static_gear_friction,
 )
 
+_FADED = 39.0  # exp(−39) is less than rounding: beyond (w/w_s)^α = 39 no static friction counts
 _SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
 _SHARES = {"K_m": "motor", "K_e": "external", "K_ms": "motor_stribeck", "K_es": "external_stribeck",
            "K_mq": "motor_quad", "K_eq": "external_quad"}
@@ -101,7 +101,7 @@ def fades(friction: Friction) -> bool:
 
 def creeping_speed(friction: Friction) -> float:
     """Return the output speed [rad/s] up to which a shaft creeps: from there on no static friction is left."""
-    return faded_speed(friction.w_s, friction.alpha) if friction.varies > 0.0 else 0.0
+    return friction.w_s * math.exp(math.log(_FADED) / friction.alpha) if fades(friction) else 0.0
 
 
 def static_share(friction: Friction, tau_m: float, tau_e: float) -> float:

@@ -16,7 +16,7 @@ from servotwin.simulation.compile import derive as derive_module
 from servotwin.simulation.compile.derive import Recipe, derive, surroundings
 from servotwin.simulation.compile.storage import is_stored, key_of, loaded, stored
 
-__all__ = ["Recipe", "is_compiled", "kernels"]
+__all__ = ["Recipe", "is_compiled", "kernels", "source_key"]
 
 _lock = threading.Lock()
 
@@ -39,6 +39,11 @@ def _sources() -> tuple[str, ...]:
     return tuple(file.read_text(encoding="utf-8") for file in files)
 
 
+def source_key() -> str:
+    """Return a short name for all that compiled code depends on, a recipe apart."""
+    return key_of(*_sources(), version("numba"), version("llvmlite"))
+
+
 def is_compiled(recipe: Recipe) -> bool:
     """Tell whether this machine has compiled a recipe before, without loading the compiler."""
     return is_stored(_name(recipe))
@@ -46,8 +51,7 @@ def is_compiled(recipe: Recipe) -> bool:
 
 @cache
 def _name(recipe: Recipe) -> str:
-    key = key_of(*_sources(), surroundings(recipe), version("numba"), version("llvmlite"))
-    return f"servotwin_{recipe.name}_{key}"
+    return f"servotwin_{recipe.name}_{key_of(source_key(), surroundings(recipe))}"
 
 
 @cache
