@@ -16,7 +16,7 @@ from servotwin.models.engine.coefficients import linear_coefficients
 from servotwin.models.engine.elementary import decay, fma
 from servotwin.models.engine.guards import CREEPS, SHARE, SPEED, ZONE_DOWN, ZONE_UP
 from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, RIGID, Mode, Vector
-from servotwin.models.terms.friction import creeping_speed
+from servotwin.models.terms.friction import creeping_speed, fades
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.motor import back_emf
 
@@ -139,7 +139,7 @@ def leg(numbers: Numbers, torque: float, u: float, forward: bool, zone: int, sha
         time: float, tolerance: float) -> Leg:
     """Return where a shaft slides to within its band, or creeps to, in `time` [s] at most."""
     arc, ends_at, creeps = band_at(numbers, torque, u, forward, zone, share, w)
-    if creeps:
+    if creeps and fades(numbers.friction):
         y = (q, w, 0.0, 0.0, 0.0, q, w)
         crept = creep.creep(numbers, mode_of(numbers, forward, zone, share), u, torque, y, time, tolerance)
         return Leg(crept.q, crept.w, max(time - crept.time, 0.0), crept.ends_by, crept.done)

@@ -75,13 +75,8 @@ def varying(friction: Friction) -> bool:
 
 def depends(friction: Friction, contact: int) -> int:
     """Return on what the acceleration depends through the friction of a shaft in a contact."""
-    if contact == CORE:
-        return STEEP_W
-    if friction.varies == 0.0 or at_rest(contact):
-        return 0
-    if not straight(friction):
-        return CURVED_W
-    return BY_SHARE | FADING if friction.w_s > 0.0 else BY_SHARE
+    return (STEEP_W if contact == CORE else 0 if friction.varies == 0.0 or at_rest(contact)
+            else CURVED_W if not straight(friction) else BY_SHARE | FADING if friction.w_s > 0.0 else BY_SHARE)
 
 
 def straight(friction: Friction) -> bool:
