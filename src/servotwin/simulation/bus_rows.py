@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import motion, rodas, tape
+from servotwin.models.engine import guards, motion, rodas, tape
 from servotwin.models.engine.modes import Mode
 from servotwin.models.engine.motion import Motion
 from servotwin.models.engine.rates import jacobian
@@ -72,6 +72,8 @@ def events_of(plans: Sequence[Plan], rows: Rows) -> list[tuple[Event, ...]]:
     """Return the events of each servo."""
     found: list[list[Event]] = [[] for _ in plans]
     for unit, time, kind, zone, contact, angle in rows.events.tolist():
+        if kind == guards.SHARE:  # where a law of friction has a kink; nothing that anybody sees
+            continue
         name = _WORDS.get(kind) or event_name(int(kind), Mode(int(zone), int(contact), 0, 0, 0))
         found[int(unit)].append(Event(time, name, angle))
     return [tuple(events) for events in found]

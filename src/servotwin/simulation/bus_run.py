@@ -33,7 +33,7 @@ ALL_BUSES = Recipe("buses", _ENTRIES)
 PLAIN_BUSES = Recipe("plain_buses", _ENTRIES, absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never)
 SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 
-LOADS_FROM, COMPILES_FROM = 2_000, 60_000  # frames of servos in one process: about what it takes, in plain Python
+LOADS_FROM, COMPILES_FROM = 2e3, 6e4  # frames of servos in one process: about what it takes, in plain Python
 _INTEGRATED = 8  # a servo that does not move by plain laws takes so many times as long
 _ROWS, _NUMBERS = 4096, 1 << 17  # of a tape
 _frames_run: dict[str, float] = {}  # in plain Python, of what each recipe would do
