@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import Future
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from servotwin.loads import Load
 from servotwin.models import Model
 from servotwin.signals import Signal
+from servotwin.simulation.crew import Here
 from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.many import simulate_lanes
 from servotwin.simulation.remarks import columns
@@ -67,21 +67,3 @@ def run_chunk(job: Job, parameters: Mapping[str, NDArray[Any]], seeds: NDArray[n
     found = lane_metrics(job.metrics, job.times, job.start, batch.signals)
     return {**{name: np.where(batch.status == 0, column, np.nan) for name, column in found.items()},
             "status": np.asarray(batch.status), "ended": ended, **columns(batch.remarks, len(batch))}
-
-
-class Here:
-    """An executor that does the work when it is handed in, in the thread that hands it in.
-
-    Examples
-    --------
-    >>> Here().submit(abs, -1).result()
-    1
-    """
-
-    _max_workers = 1
-
-    def submit(self, work: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
-        """Return the finished work."""
-        future: Future[Any] = Future()
-        future.set_result(work(*arguments))
-        return future
