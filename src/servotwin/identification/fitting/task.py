@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,9 +122,9 @@ class Task:
             place = case.places.get("output_angle", np.zeros(0, np.int64))
             model = self._model_of(case)
             drive = model.command(case.signal)
-            for i in range(0, len(place), max(1, len(place) // _LOOKS)):
-                asked = model.start_angle(float(drive(case.times[place[i]])))
-                gaps.append(float(case.values["output_angle"][i]) - asked)
+            some = np.arange(0, len(place), max(1, len(place) // _LOOKS))
+            asked = np.asarray(model.start_angle(cast("Any", drive(case.times[place[some]]))))
+            gaps += (case.values["output_angle"][some] - asked).tolist() if len(some) else []
         middle = float(np.median(gaps)) if gaps else 0.0
         return middle if abs(middle) > _NEAR else 0.0
 
