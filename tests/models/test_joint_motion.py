@@ -22,7 +22,7 @@ def members(stiffness=0.0):
     for k, (sign, contact, zone) in enumerate([(1.0, FORWARD, CURRENT_FORWARD), (-1.0, BACKWARD, CURRENT_BACKWARD)]):
         numbers = shared_source.on_stiff_source(model.pack(as_load(Inertia(1e-3 * (k + 1)) + Constant(0.1))), False)
         numbers = numbers._replace(load=numbers.load._replace(stiffness=stiffness))
-        found.append(shared_source.Member(numbers, Mode(zone, contact, RIGID, FREE), sign, Piece(value=0.1), False))
+        found.append(shared_source.Member(numbers, Mode(zone, contact, RIGID, FREE, 0), sign, Piece(value=0.1), False))
         w = sign * (1.0 + k)
         states.append((0.5, w, 0.0, 0.0, 0.0, 0.5, w))
     return found, states

@@ -18,7 +18,7 @@ from servotwin.physics.pieces import Piece, piece_rate, piece_value
 # A pendulum behind a motor with inductance: ẇ = −sin q − 0.3 w + i + cos 2t, di/dt = −50 i + 50 (sin 3t − w)
 NUMBERS = Numbers(motor=Motor(K=1.0, K_b=1.0, R=1.0, L=0.02), shaft=Shaft(J=1.0, b=0.3, J_out=0.0, b_out=0.0),
                   load=NO_LOAD._replace(gravity=1.0))
-MODE = Mode(LINEAR, FREE, RIGID, FREE)
+MODE = Mode(LINEAR, FREE, RIGID, FREE, 0)
 U = Piece(amplitude=1.0, frequency=3.0)
 TAU = Piece(amplitude=-1.0, frequency=2.0, phase=0.5 * math.pi)
 

@@ -129,7 +129,7 @@ class FullDrive:
         plant, y = self._plant, _state(0.0, speed)
         zone = currents.zone_of(plant, self.voltage, 0.0, 0.0, speed, 0.0)
         sliding = FORWARD if contacts.has_friction(plant) else FREE
-        return contacts.acceleration(plant, Mode(zone, sliding, RIGID, FREE), self.voltage, torque, y)
+        return contacts.acceleration(plant, Mode(zone, sliding, RIGID, FREE, 0), self.voltage, torque, y)
 
     def torque(self, speed: float) -> float:
         """Return the torque [N m] against which the shaft turns steadily at a speed [rad/s]; 0 beyond no load."""

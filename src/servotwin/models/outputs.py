@@ -92,7 +92,7 @@ def torques_of(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Tor
     plant, w = warm_plant(model, samples, load), samples.speed
     i = _armature_current(*_circuit(plant, samples, drive))
     external = load.external_torque(samples.time, samples.angle)
-    mode: Any = Mode(0, cast("Any", samples.contact), RIGID, FREE)
+    mode: Any = Mode(0, cast("Any", samples.contact), RIGID, FREE, 0)
     if not np.any(plant.play.half):
         return cast("Torques", _torques(plant, mode, w, w, i, external))
     mode = mode._replace(mesh=samples.mesh, motor=samples.motor)

@@ -58,8 +58,8 @@ class Samples:
     @classmethod
     def make(cls, time: Array, states: Array, wiper: Array, mode: Array, drive: Array, error: Array,
              silent: Array, bus: Array | None = None) -> Samples:
-        """Build from arrays of states, shape (7, n), and of modes, shape (4, n)."""
+        """Build from arrays of states, shape (7, n), and of modes, shape (5, n)."""
         q, w, i, T_w, T_h, q_m, w_m = states
-        zone, contact, mesh, motor = mode.astype(np.int64)
+        zone, contact, mesh, motor, _ = mode.astype(np.int64)
         return cls(time, q, w, i, T_w, T_h, q_m, w_m, wiper, zone, contact, mesh, motor, drive, error, silent,
                    bus)

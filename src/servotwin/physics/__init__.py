@@ -95,6 +95,7 @@ sliding_gear_friction = array_form(load_friction.sliding_gear_friction)
 static_gear_friction = array_form(load_friction.static_gear_friction)
 stribeck_factor = array_form(load_friction.stribeck_factor)
 torque_on_gear = array_form(load_friction.torque_on_gear)
+share_balance = array_form(load_friction.share_balance)
 torque_share = array_form(load_friction.torque_share)
 
 armature_current_rate = array_form(motor.armature_current_rate)
@@ -251,6 +252,7 @@ __all__ = [
     "supply_current",
     "thermal_time_constants",
     "torque_on_gear",
+    "share_balance",
     "torque_share",
     "two_mass_temperatures",
     "unbounded_armature_voltage",

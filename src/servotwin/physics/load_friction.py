@@ -73,6 +73,36 @@ def torque_on_gear(external_torque: float, output_speed: float, load_viscous_fri
     return -external_torque - load_viscous_friction * output_speed
 
 
+def share_balance(motor_torque: float, external_torque_on_gear: float, motor_share: float,
+                  external_share: float) -> float:
+    """Return the torque through a gear whose magnitude makes friction.
+
+    Parameters
+    ----------
+    motor_torque : float or array
+        τ_m, at the output shaft [N m].
+    external_torque_on_gear : float or array
+        τ_e, what acts on the gear from outside, towards +q [N m].
+    motor_share, external_share : float or array
+        K_m and K_e of sliding, or K_ms and K_es of static friction [1].
+
+    Returns
+    -------
+    float or array
+        K_m τ_m − K_e τ_e [N m].
+
+    Notes
+    -----
+    Models M3 to M6 of Duclusaud et al., 2025.
+
+    Examples
+    --------
+    >>> share_balance(1.0, -0.5, 0.5, 0.25)
+    0.625
+    """
+    return motor_share * motor_torque - external_share * external_torque_on_gear
+
+
 def torque_share(motor_torque: float, external_torque_on_gear: float, motor_share: float,
                  external_share: float) -> float:
     """Return the friction that the torques through a gear make.
@@ -100,7 +130,7 @@ def torque_share(motor_torque: float, external_torque_on_gear: float, motor_shar
     >>> torque_share(1.0, -0.5, 0.5, 0.25)
     0.625
     """
-    return abs(motor_share * motor_torque - external_share * external_torque_on_gear)
+    return abs(share_balance(motor_torque, external_torque_on_gear, motor_share, external_share))
 
 
 def quadratic_gear_friction(motor_torque: float, external_torque_on_gear: float, load_friction_motor_quad: float = 0.0,

@@ -329,7 +329,7 @@ class _BusVoltage:
                 numbers = numbers._replace(bridge=off_now(numbers.bridge, 1))
             if drive == 0.0 and not (coasts(numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
                 continue
-            mode = Mode(int(s.zone[k]), int(s.contact[k]), int(s.mesh[k]), int(s.motor[k]))
+            mode = Mode(int(s.zone[k]), int(s.contact[k]), int(s.mesh[k]), int(s.motor[k]), 0)
             stiff = shared_source.on_stiff_source(numbers, drive == 0.0)
             members.append(shared_source.member_of(stiff, mode, drive, Piece(), y))
             states.append(y)

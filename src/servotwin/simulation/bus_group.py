@@ -142,7 +142,7 @@ class Group:
         kinds = guards.guards(member.numbers, member.mode, member.sign, False)
         if member.returns and member.mode.zone == NO_CURRENT:  # its diodes block the other way
             kinds &= ~(1 << (guards.ZONE_UP if member.sign > 0.0 else guards.ZONE_DOWN))
-        return [kind for kind in range(guards.MOTOR_RELEASE_BACKWARD + 1) if kinds >> kind & 1]
+        return [kind for kind in range(guards.KINDS) if kinds >> kind & 1]
 
     def _crossing(self, j: int, kind: int, time: float, length: float) -> float:
         """Return when a guard falls below zero, at most `length` [s]; inf where it does not."""
@@ -205,7 +205,7 @@ class Group:
             if j == whose:
                 mode, y = guards.cross(member.numbers, mode, kind, shared_source.behind(member, V),
                                        piece_value(member.tau, time), y)
-                mode = Mode(shared_source.let_through(member, mode.zone), mode.contact, mode.mesh, mode.motor)
+                mode = Mode(shared_source.let_through(member, mode.zone), mode.contact, mode.mesh, mode.motor, mode.share)
                 event = kind
             found.append((Point(time, y, mode, time, y, point.step, wiper), event))
         self._voltage = V

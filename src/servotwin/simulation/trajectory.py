@@ -37,7 +37,7 @@ class Trajectory:
         t = np.asarray(time, dtype=np.float64)
         if not self.segments:
             nothing = np.full(t.size, math.nan)
-            return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((4, t.size)), *np.zeros((3, t.size)))
+            return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((5, t.size)), *np.zeros((3, t.size)))
         index = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
         return self._states(t, index)
 
@@ -59,7 +59,7 @@ class Trajectory:
     def _states(self, t: Array, index: NDArray[np.intp], ages: Array | None = None) -> Samples:
         """Return the states at times by the motions of segments; `ages` are t − anchor without what t rounds away."""
         y = np.full((7, t.size), math.nan)
-        mode, wiper, drive, error, silent = np.zeros((4, t.size)), *np.zeros((4, t.size))
+        mode, wiper, drive, error, silent = np.zeros((5, t.size)), *np.zeros((4, t.size))
         order = np.argsort(index, kind="stable")
         used, first = np.unique(index[order], return_index=True)
         groups = np.split(order, first[1:]) if t.size else []

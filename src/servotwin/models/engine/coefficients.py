@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from servotwin.models.engine import contacts, currents
-from servotwin.models.engine.modes import CONDUCTING, Mode, constant_current, in_linear_zone
+from servotwin.models.engine.modes import CONDUCTING, FORWARD, Mode, constant_current, in_linear_zone
 from servotwin.models.terms import follower
+from servotwin.models.terms.friction import share_slopes
 from servotwin.models.terms.load import springy
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import accelerated, acceleration
 from servotwin.physics import electronics, motor, potentiometer, shaft
+from servotwin.physics.load_friction import torque_on_gear
 
 
 def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau: tuple[float, ...],
@@ -22,14 +24,19 @@ def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau:
     if springy(numbers.load):
         stiffness = shaft.spring_torque(1.0, numbers.load.stiffness)
         pull = shaft.spring_torque(0.0, numbers.load.stiffness, numbers.load.rest_angle)
-    torque = -pull - contacts.friction_torque(numbers, mode.contact, w, 0.0, 0.0) - tau[0]
-    rate = -tau[1]
+    of_motor = of_load = 0.0  # what friction takes of the torques through the gear
+    if mode.share != 0:
+        of_motor, of_load = share_slopes(numbers.friction, mode.contact == FORWARD, float(mode.share))
+    on_gear = torque_on_gear(pull + tau[0], 0.0, numbers.shaft.b_out)
+    torque = -pull - contacts.friction_torque(numbers, mode.contact, w, 0.0, 0.0) - tau[0] - of_load * on_gear
+    rate = -tau[1] - of_load * torque_on_gear(tau[1], 0.0, numbers.shaft.b_out)
+    stiffness += of_load * torque_on_gear(stiffness, 0.0, numbers.shaft.b_out)
     sinusoid = per_volt = 0.0
     if constant_current(mode.zone):
-        torque += motor.electromagnetic_torque(currents.current(numbers, mode.zone, u[0], q, w), numbers.motor.K)
+        torque += (1.0 - of_motor) * motor.electromagnetic_torque(currents.current(numbers, mode.zone, u[0], q, w), numbers.motor.K)
     elif mode.zone >= CONDUCTING:
         v, R = currents.loop(numbers, mode.zone, u[0])
-        per_volt = currents.torque_per_volt(numbers, R)
+        per_volt = (1.0 - of_motor) * currents.torque_per_volt(numbers, R)
         torque += per_volt * v
     elif in_linear_zone(mode.zone):
         per_volt = currents.torque_per_volt(numbers, numbers.motor.R)
@@ -41,8 +48,9 @@ def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau:
     else:
         per_volt = currents.torque_per_volt(numbers, numbers.motor.R)
         torque += per_volt * follower.voltage(numbers.follower, mode.zone, 0.0)
-    damping = numbers.shaft.b + per_volt * motor.back_emf(1.0, numbers.motor.K_b)
     own = numbers.shaft
+    damping = (own.b + of_load * torque_on_gear(0.0, 1.0, own.b_out)
+               + per_volt * motor.back_emf(1.0, numbers.motor.K_b))
     a, f0 = 0.5 * accelerated(own, damping), accelerated(own, torque)
     if stiffness == 0.0 and rate == 0.0 and sinusoid == 0.0:
         return a, 0.0, f0, 0.0, 0.0, u[3], u[4], q, w

@@ -19,6 +19,7 @@ from servotwin.models.engine.modes import (
     Mode,
     Vector,
     at_rest,
+    sign_of,
 )
 from servotwin.models.terms import friction, play, shaft, source
 from servotwin.models.terms.friction import Friction, holding_friction, sliding_friction
@@ -33,6 +34,7 @@ from servotwin.physics.friction import smoothed_coulomb_torque
 from servotwin.physics.load_friction import torque_on_gear
 
 _REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
+_NEXT_TO_NOTHING = 1e-300  # N m: where a current is about to flow
 _REST_HEIGHT = 4e-15  # relative to the angle: a rebound this low is rounding
 
 
@@ -81,10 +83,10 @@ def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: 
         return apart(numbers, zone, u, tau, y)
     if friction.smoothed(numbers.friction):
         if not has_friction(numbers):
-            return Mode(zone, FREE, mesh, FREE)
+            return Mode(zone, FREE, mesh, FREE, 0)
         if smooth or abs(w) <= friction.core_speed(numbers.friction):
-            return Mode(zone, CORE, mesh, FREE)
-        return Mode(zone, FORWARD if w > 0.0 else BACKWARD, mesh, FREE)
+            return Mode(zone, CORE, mesh, FREE, 0)
+        return Mode(zone, FORWARD if w > 0.0 else BACKWARD, mesh, FREE, 0)
     if w == 0.0:
         torque = drive_torque(numbers, zone, u, y)
         against = external_torque(numbers.load, tau, q)
@@ -93,10 +95,24 @@ def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: 
                             has_friction(numbers))
     else:
         contact = sliding(w > 0.0, has_friction(numbers))
-    mode = Mode(zone, contact, mesh, FREE)
+    mode = Mode(zone, contact, mesh, FREE, share_sign(numbers, zone, contact, u, tau, y))
     if play.present(numbers.play) and pressing(numbers, mode, u, tau, y) < 0.0:
         return apart(numbers, zone, u, tau, y)
     return mode
+
+
+def share_sign(numbers: Numbers, zone: int, contact: int, u: float, tau: float, y: Vector) -> int:
+    """Return the sign of what the torques through a gear add to its friction before its magnitude is taken."""
+    if (contact != FORWARD and contact != BACKWARD) or not friction.shared(numbers.friction):
+        return 0
+    tau_m = drive_torque(numbers, zone, u, y) or sign_of(zone) * _NEXT_TO_NOTHING
+    return 1 if through_gear(numbers, tau_m, tau, y) >= 0.0 else -1
+
+
+def through_gear(numbers: Numbers, tau_m: float, tau: float, y: Vector) -> float:
+    """Return the torque through the gear [N m] whose magnitude adds to sliding friction."""
+    against = external_torque(numbers.load, tau, y[0])
+    return friction.share(numbers.friction, tau_m, torque_on_gear(against, y[1], numbers.shaft.b_out))
 
 
 def apart(numbers: Numbers, zone: int, u: float, tau: float, y: Vector) -> Mode:
@@ -110,7 +126,7 @@ def apart(numbers: Numbers, zone: int, u: float, tau: float, y: Vector) -> Mode:
     if y[6] == 0.0:
         motor = from_rest(torque, holding_friction(numbers.friction, False, torque, 0.0),
                           holding_friction(numbers.friction, True, torque, 0.0), False, False, dry)
-    return Mode(zone, contact, INSIDE, motor)
+    return Mode(zone, contact, INSIDE, motor, 0)
 
 
 def motor_acceleration(numbers: Numbers, motor: int, torque: float, w: float) -> float:
@@ -161,7 +177,7 @@ def rebound(numbers: Numbers, mode: Mode, upper: bool, u: float, tau: float, y: 
     if mesh == INSIDE:
         back = output_acceleration(numbers, sliding(w > 0.0, holds(numbers)), external_torque(numbers.load, tau, q), w)
     else:
-        back = acceleration(numbers, Mode(zone, sliding(w > 0.0, has_friction(numbers)), mesh, FREE), u, tau, after)
+        back = acceleration(numbers, Mode(zone, sliding(w > 0.0, has_friction(numbers)), mesh, FREE, 0), u, tau, after)
     low = back * w < 0.0 and 0.5 * w * w < abs(back) * _REST_HEIGHT * max(abs(q), 1.0)
     if abs(w) < _REST_SPEED or low:
         after = (q, 0.0, y[2], y[3], y[4], after[5], after[6] if mesh == INSIDE else 0.0)

@@ -51,11 +51,14 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
     low, high = currents.zone_limits(numbers, motion.mode.zone, u)
     w, x = after[1], u - back_emf(after[1], numbers.motor.K_b)
     first, found = math.inf, -1
-    for kind, left, limit in ((guards.SPEED, w if motion.mode.contact == FORWARD else -w, 0.0),
-                              (guards.ZONE_UP, high - x, high), (guards.ZONE_DOWN, x - low, low)):
+    share, turn = guards.share_along(numbers, motion.mode, u, piece_value(motion.tau, motion.t0), after)
+    for kind, left, there in ((guards.SPEED, w if motion.mode.contact == FORWARD else -w, 0.0),
+                              (guards.ZONE_UP, high - x, (u - high) / numbers.motor.K_b),
+                              (guards.ZONE_DOWN, x - low, (u - low) / numbers.motor.K_b),
+                              (guards.SHARE, share, turn)):
         if not kinds >> kind & 1 or left >= _BELOW:  # monotone: what holds at the end has held
             continue
-        s = first_order.time_to(rate, f, w0, 0.0 if kind == guards.SPEED else (u - limit) / numbers.motor.K_b)
+        s = first_order.time_to(rate, f, w0, there)
         s = s1 if s > s1 else s0 if s < s0 else s
         if s < first:
             first, found = s, kind
@@ -73,7 +76,7 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
 def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b: Vector) -> tuple[float, int]:
     """Return when the first of several guards falls below zero in [a, b], and which; (inf, -1) where none does."""
     first, found = math.inf, -1
-    for kind in range(guards.MOTOR_RELEASE_BACKWARD + 1):
+    for kind in range(guards.KINDS):
         if kinds >> kind == 0:
             break
         if not kinds >> kind & 1:

@@ -33,14 +33,15 @@ from servotwin.physics import motor
 # What can end a mode: first what a shaft and a zone of its own have, then what play adds.
 SPEED, CORE_FORWARD, CORE_BACKWARD, ZONE_UP, ZONE_DOWN, UPPER, LOWER, RELEASE_FORWARD, RELEASE_BACKWARD = range(9)
 MEET_FORWARD, MEET_BACKWARD, PART, PART_OUTPUT, PART_MOTOR = range(9, 14)
-MOTOR_SPEED, MOTOR_RELEASE_FORWARD, MOTOR_RELEASE_BACKWARD = range(14, 17)
+MOTOR_SPEED, MOTOR_RELEASE_FORWARD, MOTOR_RELEASE_BACKWARD, SHARE = range(14, 18)
+KINDS = 18
 _CORE = 1 << CORE_FORWARD | 1 << CORE_BACKWARD
 _RELEASE = 1 << RELEASE_FORWARD | 1 << RELEASE_BACKWARD
 _MEET = 1 << MEET_FORWARD | 1 << MEET_BACKWARD
 _MOTOR_RELEASE = 1 << MOTOR_RELEASE_FORWARD | 1 << MOTOR_RELEASE_BACKWARD
 EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper stop", "lower stop",
                "release forward", "release backward", "gear meets", "gear meets", "gear parts", "gear parts",
-               "gear parts", "motor speed zero", "motor release", "motor release")
+               "gear parts", "motor speed zero", "motor release", "motor release", "share turns")
 
 
 def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
@@ -63,6 +64,7 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
         kinds |= 1 << RELEASE_FORWARD
     elif shaft != FREE:
         kinds |= 1 << SPEED
+        kinds |= 1 << SHARE if mode.share != 0 else 0
     low, high = currents.zone_limits(numbers, zone, u)
     if high < math.inf:
         kinds |= 1 << ZONE_UP
@@ -105,9 +107,22 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
         rate = currents.zone_rate(numbers, zone, du, y[6], dy[6], dy[2])
         low, high = currents.zone_limits(numbers, zone, u)
         return (high - x, -rate) if kind == ZONE_UP else (x - low, rate)
+    if kind == SHARE:
+        tau_m = currents.drive_torque(numbers, zone, u, y)
+        return mode.share * contacts.through_gear(numbers, tau_m, tau, y), math.nan
     if play.present(numbers.play) and kind >= MEET_FORWARD:
         return _play_guard(numbers, mode, kind, u, tau, dtau, y, dy)
     return _release_guard(numbers, mode, kind, u, du, tau, dtau, y, dy)
+
+
+def share_along(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:
+    """Return the guard of a share at a state, and the speed [rad/s] at which it is zero if all else stays constant."""
+    if mode.share == 0:
+        return 0.0, 0.0
+    now = guard(numbers, mode, SHARE, u, 0.0, tau, 0.0, y, y)[0]
+    still = (y[0], 0.0, y[2], y[3], y[4], y[5], 0.0)
+    first = guard(numbers, mode, SHARE, u, 0.0, tau, 0.0, still, still)[0]
+    return now, first * y[1] / (first - now) if now != first else 0.0
 
 
 def _release_guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
@@ -155,28 +170,32 @@ def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, d
 def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     """Return mode and state just after the guard `kind` of `mode` has reached zero."""
     numbers = warm(numbers, y)
-    zone, shaft, mesh, motor = mode
+    zone, shaft, mesh, motor, share = mode
     if kind == ZONE_UP or kind == ZONE_DOWN:
         if currents.by_current(numbers, zone):
             y = _with_current_at_edge(numbers, zone, kind, u, y)
-            return Mode(currents.zone_of(numbers, u, 0.0, y[0], y[6], y[2]), shaft, mesh, motor), y
-        return Mode(currents.neighbour(numbers, zone, kind == ZONE_UP), shaft, mesh, motor), y
+            return Mode(currents.zone_of(numbers, u, 0.0, y[0], y[6], y[2]), shaft, mesh, motor, share), y
+        return Mode(currents.neighbour(numbers, zone, kind == ZONE_UP), shaft, mesh, motor, share), y
+    if kind == SHARE:
+        return Mode(zone, shaft, mesh, motor, -share), y
     if kind == SPEED and smoothed(numbers.friction):
-        return Mode(zone, CORE, mesh, motor), y
+        return Mode(zone, CORE, mesh, motor, 0), y
     if kind == CORE_FORWARD or kind == CORE_BACKWARD:
-        return Mode(zone, FORWARD if kind == CORE_FORWARD else BACKWARD, mesh, motor), y
+        return Mode(zone, FORWARD if kind == CORE_FORWARD else BACKWARD, mesh, motor, 0), y
     if kind == UPPER or kind == LOWER:
         return contacts.rebound(numbers, mode, kind == UPPER, u, tau, y)
     if kind == RELEASE_FORWARD or kind == RELEASE_BACKWARD:
         if kind == RELEASE_FORWARD and y[0] >= numbers.stops.upper:
-            return Mode(zone, ON_UPPER, mesh, motor), y
+            return Mode(zone, ON_UPPER, mesh, motor, 0), y
         if kind == RELEASE_BACKWARD and y[0] <= numbers.stops.lower:
-            return Mode(zone, ON_LOWER, mesh, motor), y
+            return Mode(zone, ON_LOWER, mesh, motor, 0), y
         shaft = FORWARD if kind == RELEASE_FORWARD else BACKWARD
         dry = contacts.holds(numbers) if mesh == INSIDE else contacts.has_friction(numbers)
-        return Mode(zone, shaft if dry else FREE, mesh, motor), y
+        shaft = shaft if dry else FREE
+        share = 0 if mesh == INSIDE else contacts.share_sign(numbers, zone, shaft, u, tau, y)
+        return Mode(zone, shaft, mesh, motor, share), y
     if kind == MOTOR_RELEASE_FORWARD or kind == MOTOR_RELEASE_BACKWARD:
-        return Mode(zone, shaft, mesh, FORWARD if kind == MOTOR_RELEASE_FORWARD else BACKWARD), y
+        return Mode(zone, shaft, mesh, FORWARD if kind == MOTOR_RELEASE_FORWARD else BACKWARD, 0), y
     if play.present(numbers.play) and (kind == PART or kind == PART_OUTPUT or kind == PART_MOTOR):
         return contacts.apart(numbers, zone, u, tau, y), y
     q, w, i, T_w, T_h, q_m, w_m = y
@@ -187,7 +206,7 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
             zone = currents.zone_of(numbers, u, 0.0, q, y[6], i)
         upper = shaft == ON_UPPER and y[1] > 0.0
         if upper or (shaft == ON_LOWER and y[1] < 0.0):  # the output rests on a stop: both hit it at once
-            return contacts.rebound(numbers, Mode(zone, shaft, mesh, motor), upper, u, tau, y)
+            return contacts.rebound(numbers, Mode(zone, shaft, mesh, motor, 0), upper, u, tau, y)
     elif kind == MOTOR_SPEED:
         y = (q, w, i, T_w, T_h, q_m, 0.0)
     else:

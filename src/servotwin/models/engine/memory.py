@@ -75,7 +75,7 @@ put_memory = record_writer("put_memory", Memory)
 
 def started(y: Vector, mesh: int) -> Memory:
     """Return the memory of a servo at t = 0, in no mode yet."""
-    point = Point(0.0, y, Mode(0, 0, mesh, 0), math.inf, y, FIRST_STEP, y[0])
+    point = Point(0.0, y, Mode(0, 0, mesh, 0, 0), math.inf, y, FIRST_STEP, y[0])
     return Memory(0, BEAT, point, frame.AT_START, NOTHING, math.inf, NOTHING, math.inf)
 
 
@@ -150,7 +150,7 @@ def with_play(memory: Memory, play: bool) -> Memory:
     q, w, i, T_w, T_h, _, _ = p.y
     mesh = (p.mode.mesh if p.mode.mesh != RIGID else INSIDE) if play else RIGID
     y = p.y if play else (q, w, i, T_w, T_h, q, w)
-    mode = Mode(p.mode.zone, p.mode.contact, mesh, p.mode.motor)
+    mode = Mode(p.mode.zone, p.mode.contact, mesh, p.mode.motor, p.mode.share)
     return forgotten(memory._replace(point=p._replace(y=y, mode=mode)))
 
 

@@ -10,12 +10,17 @@ from typing import NamedTuple
 
 
 class Mode(NamedTuple):
-    """Zone of the voltage law, contact of the shaft, place in the play, and contact of the motor inside the play."""
+    """Zone of the voltage law, contact of the shaft, place in the play, contact of the motor inside it; and the share.
+
+    That is which sign the torques through a sliding gear have where its friction takes their magnitude; 0 where there is
+    none.
+    """
 
     zone: int
     contact: int
     mesh: int
     motor: int
+    share: int
 
 
 Vector = tuple[float, float, float, float, float, float, float]

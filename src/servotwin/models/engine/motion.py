@@ -25,6 +25,7 @@ from servotwin.models.engine.rates import jacobian, rates_of
 from servotwin.models.engine.rodas import Triple
 from servotwin.models.terms import follower, friction, heat, load, motor, play, sensor, source
 from servotwin.models.terms.dependence import (
+    BY_SHARE,
     CURVED_Q,
     CURVED_T,
     CURVED_W,
@@ -74,7 +75,7 @@ class Motion(NamedTuple):
 
 def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
     """Return a motion that is none yet."""
-    return _closed(IMPOSSIBLE, numbers, Mode(0, 0, 0, 0), u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+    return _closed(IMPOSSIBLE, numbers, Mode(0, 0, 0, 0, 0), u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
 
 
 def is_step(motion: Motion) -> bool:
@@ -89,7 +90,7 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
     on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
     if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
         return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & ON_Q))):
+    if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & (ON_Q | BY_SHARE)))):
         return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
     if on & ON_I and still and mode.zone >= CONDUCTING:
         v, R = currents.loop(numbers, mode.zone, u.value)

@@ -152,8 +152,8 @@ def _zone(member: Member, y: Vector, V_bus: float) -> int:
 
 
 def _in_zone(member: Member, zone: int) -> Member:
-    numbers, (_, shaft, mesh, motor), sign, tau, returns = member
-    return Member(numbers, Mode(zone, shaft, mesh, motor), sign, tau, returns)
+    numbers, (_, shaft, mesh, motor, share), sign, tau, returns = member
+    return Member(numbers, Mode(zone, shaft, mesh, motor, share), sign, tau, returns)
 
 
 def let_through(member: Member, zone: int) -> int:

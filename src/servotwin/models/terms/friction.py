@@ -13,10 +13,15 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.engine.modes import CORE, at_rest
-from servotwin.models.terms.dependence import CURVED_W, STEEP_W
+from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, STEEP_W
 from servotwin.models.terms.given import Given
 from servotwin.physics.friction import breakaway_torque, coulomb_torque
-from servotwin.physics.load_friction import gear_friction_budget, sliding_gear_friction, static_gear_friction
+from servotwin.physics.load_friction import (
+    gear_friction_budget,
+    share_balance,
+    sliding_gear_friction,
+    static_gear_friction,
+)
 
 _SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
 _SHARES = {"K_m": "motor", "K_e": "external", "K_ms": "motor_stribeck", "K_es": "external_stribeck",
@@ -69,7 +74,34 @@ def varying(friction: Friction) -> bool:
 
 def depends(friction: Friction, contact: int) -> int:
     """Return on what the acceleration depends through the friction of a shaft in a contact."""
-    return STEEP_W if contact == CORE else CURVED_W if friction.varies > 0.0 and not at_rest(contact) else 0
+    if contact == CORE:
+        return STEEP_W
+    if friction.varies == 0.0 or at_rest(contact):
+        return 0
+    return BY_SHARE if straight(friction) else CURVED_W
+
+
+def straight(friction: Friction) -> bool:
+    """Tell whether sliding friction follows the torques in straight lines, and lets the motor turn the gear."""
+    return friction.w_s == 0.0 and friction.K_m < 1.0 and friction.K_e <= 1.0
+
+
+def shared(friction: Friction) -> bool:
+    """Tell whether the torques through the gear add to sliding friction."""
+    return friction.K_m > 0.0 or friction.K_e > 0.0
+
+
+def share(friction: Friction, tau_m: float, tau_e: float) -> float:
+    """Return the torque through the gear [N m] whose magnitude adds to sliding friction."""
+    return share_balance(tau_m, tau_e, friction.K_m, friction.K_e)
+
+
+def share_slopes(friction: Friction, forward: bool, sign: float) -> tuple[float, float]:
+    """Return by how much friction against +q grows per τ_m and per τ_e [1], where the share has this sign."""
+    F = sliding_friction(friction, forward, math.inf, 0.0, 0.0)
+    toward = sign if forward else -sign
+    return (toward * (sliding_friction(friction, forward, math.inf, 1.0, 0.0) - F),
+            -toward * (sliding_friction(friction, forward, math.inf, 0.0, 1.0) - F))
 
 
 def core_speed(friction: Friction) -> float:
