@@ -7,10 +7,10 @@ import time as clock
 from typing import NamedTuple
 
 import numpy as np
-from logs import FREE, SAMPLE, Task, servo_with
 from scipy.optimize import least_squares
 
 import servotwin as st
+from logs import FREE, SAMPLE, Task, servo_with
 
 STARTS, EVALUATIONS, NEAR = 3, 40, 1e-4
 NAMES = FREE[st.BoundedServo]

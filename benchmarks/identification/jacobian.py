@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import peer_jax
+
 from logs import DURATION, FREE, NOMINAL, SAMPLE
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))

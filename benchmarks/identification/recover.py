@@ -4,9 +4,9 @@ import os
 import time as clock
 
 import fixed_step
-from logs import DURATION, FREE, LOGS, NOISE, SAMPLE, Task, error, make
 
 import servotwin as st
+from logs import DURATION, FREE, LOGS, NOISE, SAMPLE, Task, error, make
 from servotwin.models import Model
 
 SEEDS, STARTS = 10, 3

@@ -18,7 +18,7 @@ import numpy as np
 
 import servotwin as st
 from servotwin.identification import write_log
-from servotwin.simulation.sweep import read_columns
+from servotwin.studies import read_columns
 
 SERVO = "hitec-hs-755hb"
 PROGRAM = str(Path(sys.executable).with_name("servotwin"))

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import servotwin as st
-from servotwin.units.look import COLOURS, LINES, WIDTH, context, finished, new_figure
+from servotwin.look import COLOURS, LINES, WIDTH, context, finished, new_figure
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 SERVO = st.load_servo("hitec-hs-755hb")

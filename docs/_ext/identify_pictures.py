@@ -9,7 +9,7 @@ import numpy as np
 
 import servotwin as st
 from servotwin.identification.fitting.baselines import fit_slew_lag
-from servotwin.units.look import COLOURS, LINES, WIDTH, context, finished, new_figure
+from servotwin.look import COLOURS, LINES, WIDTH, context, finished, new_figure
 
 DOCS = Path(__file__).resolve().parents[1]
 IMAGES, PAGE = DOCS / "images", DOCS / "guide" / "identify.md"

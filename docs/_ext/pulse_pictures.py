@@ -6,7 +6,7 @@ import numpy as np
 import set_s
 
 import servotwin as st
-from servotwin.units.look import context
+from servotwin.look import context
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 COLOURS, LINES, Curve = st.plotting.COLOURS, st.plotting.LINES, st.plotting.Curve

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import fields
 
 import servotwin as st
+from servotwin.logs import LOG_FORMATS
 from servotwin.models import MODELS
 from servotwin.models.outputs import SIGNALS
 from servotwin.parameters import GROUPS, catalog_names, load_servo
@@ -129,6 +130,11 @@ def catalog() -> str:
     return markdown(("id", "servo", "assumed", "flags of its sheet"), rows)
 
 
+def log_formats() -> str:
+    """The formats of logs."""
+    return markdown(("format", "what it is"), [(f"`{name}`", each.what) for name, each in LOG_FORMATS.items()])
+
+
 def top_level() -> str:
     """What `import servotwin as st` offers, and where it is described."""
     rows = []
@@ -163,7 +169,7 @@ def _is_own(module, name: str) -> bool:
 
 
 TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "signals": signals,
-          "units": units, "catalog": catalog, "top-level": top_level, "api": api}
+          "units": units, "catalog": catalog, "log-formats": log_formats, "top-level": top_level, "api": api}
 
 
 def setup(app):

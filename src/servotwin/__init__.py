@@ -21,12 +21,13 @@ _LAZY = {
     **dict.fromkeys(("Batch", "Fleet", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_bus",
                      "simulate_many", "VectorSimulator"), "simulation"),
     **dict.fromkeys(("DataSheet", "curves", "servos_that_lift"), "datasheet"),
-    **dict.fromkeys(("Study", "distributions", "sweep"), "simulation.sweep"),
-    **dict.fromkeys(("Fit", "Log", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "read_logs",
-                     "servo_from_sheet", "validate"), "identification"),
+    **dict.fromkeys(("Study", "distributions", "sweep"), "studies"),
+    **dict.fromkeys(("Log", "read_logs"), "logs"),
+    **dict.fromkeys(("Fit", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "servo_from_sheet",
+                     "validate"), "identification"),
 }
-_MODULES = ("bench", "datasheet", "errors", "identification", "linear", "loads", "models", "parameters", "physics",
-            "plotting", "signals", "simulation", "units")
+_MODULES = ("bench", "datasheet", "errors", "identification", "linear", "loads", "logs", "models", "parameters",
+            "physics", "plotting", "signals", "simulation", "studies", "units")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 

@@ -4,25 +4,27 @@ from servotwin import errors as errors
 from servotwin import identification as identification
 from servotwin import linear as linear
 from servotwin import loads as loads
+from servotwin import logs as logs
 from servotwin import models as models
 from servotwin import parameters as parameters
 from servotwin import physics as physics
 from servotwin import plotting as plotting
 from servotwin import signals as signals
 from servotwin import simulation as simulation
+from servotwin import studies as studies
 from servotwin import units as units
 from servotwin.datasheet import DataSheet as DataSheet
 from servotwin.datasheet import curves as curves
 from servotwin.datasheet import servos_that_lift as servos_that_lift
 from servotwin.identification import Fit as Fit
-from servotwin.identification import Log as Log
 from servotwin.identification import Sheet as Sheet
 from servotwin.identification import SheetPoint as SheetPoint
 from servotwin.identification import advise as advise
 from servotwin.identification import friction_ladder as friction_ladder
 from servotwin.identification import identify as identify
-from servotwin.identification import read_logs as read_logs
 from servotwin.identification import servo_from_sheet as servo_from_sheet
+from servotwin.logs import Log as Log
+from servotwin.logs import read_logs as read_logs
 from servotwin.models import AveragedServo as AveragedServo
 from servotwin.models import AveragedServoInductive as AveragedServoInductive
 from servotwin.models import BoundedServo as BoundedServo
@@ -47,8 +49,8 @@ from servotwin.simulation import grid as grid
 from servotwin.simulation import simulate as simulate
 from servotwin.simulation import simulate_bus as simulate_bus
 from servotwin.simulation import simulate_many as simulate_many
-from servotwin.simulation.sweep import Study as Study
-from servotwin.simulation.sweep import distributions as distributions
-from servotwin.simulation.sweep import sweep as sweep
+from servotwin.studies import Study as Study
+from servotwin.studies import distributions as distributions
+from servotwin.studies import sweep as sweep
 
 __version__: str

@@ -111,7 +111,7 @@ def test_pulses_do_not_overlap(simulate, tmp_path):
 
 @pytest.mark.parametrize(("load", "said"), [
     ("inertia=-1", "--load inertia: Inertia(inertia): got -1.0, allowed: a number of at least 0"),
-    ("inertia=nan", "got nan"),
+    ("inertia=nan", "got 'nan'"),
     ("inertia=a", "--load inertia: got 'a', allowed: a number"),
     ("inertia=1,5", "--load inertia: got '1,5', allowed: a number"),
     ("inertia", "--load: got 'inertia', allowed: inertia="),
@@ -121,7 +121,7 @@ def test_pulses_do_not_overlap(simulate, tmp_path):
     ("inertia=1,foo=1", "unknown part of --load 'foo'"),
     ("viscous=-1", "got -1.0"),
     ("coulomb=-1", "got -1.0"),
-    ("torque=inf", "got inf"),
+    ("torque=inf", "got 'inf'"),
     ("pendulum=1", "--load pendulum: got '1', allowed: KG:M"),
     ("pendulum=-1:1", "got -1.0"),
     ("spring=-1", "got -1.0"),
@@ -213,7 +213,7 @@ def test_a_report_needs_a_folder_with_a_name(cli):
 
 
 @pytest.mark.parametrize(("change", "said"), [
-    ("supply.open_circuit_voltage=5ohm", "got '5ohm', allowed: a number in SI, or a number with a unit: V, mV"),
+    ("supply.open_circuit_voltage=5ohm", "got '5ohm', allowed: a number in SI, or with one of the units V, mV"),
     ("electronics.deadband=8 us us", "got '8 us us'"),
     ("electronics.deadband=nan", "got 'nan'"),
     ("motor.armature_resistance=-3ohm", "got -3.0, allowed: a positive number [ohm]"),

@@ -12,7 +12,7 @@ from servotwin.errors import OutputExistsError
 def asked(monkeypatch):
     calls = []
 
-    def write(out, *, force, progress):
+    def write(out, *, force, progress, moving):
         calls.append((out, force))
         progress("drawing", 0.5)
         progress("drawing", 0.6)
@@ -22,7 +22,7 @@ def asked(monkeypatch):
         return SimpleNamespace(folder=out, page=out / "report.html", figures=(out / "figures" / "a.png",), data=(),
                                numbers={"worst_angle_deg": 0.98765432})
 
-    monkeypatch.setattr("servotwin.cli.paper.write_paper_report", write)
+    monkeypatch.setattr("servotwin.paper.write_paper_report", write)
     return calls
 
 

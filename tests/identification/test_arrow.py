@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from identification.toy_forecast import Toy
-from servotwin.identification.fitting.arrow import _LEAST_GAIN, Block, Loss, Normal, Prior, Search, block
+from servotwin.identification.fitting.arrow import _LEAST_GAIN, Block, Loss, NormalEquations, Prior, Search, block
 from servotwin.identification.fitting.point import LogPart, Point
 
 T = np.linspace(0.0, 4.0, 31)
@@ -257,6 +257,6 @@ def test_elimination_is_that_of_the_whole_matrix():
     for k, b in enumerate(blocks):
         rows = slice(2 + 2 * k, 4 + 2 * k)
         whole[:2, rows], whole[rows, :2], whole[rows, rows], right[rows] = b.H_so, b.H_so.T, b.H_oo, b.g_o
-    reduced = Normal(tuple(blocks), g, H).reduced()
+    reduced = NormalEquations(tuple(blocks), g, H).reduced()
     np.testing.assert_allclose(np.linalg.solve(reduced[1], reduced[0]), np.linalg.solve(whole, right)[:2], rtol=1e-8)
     assert isinstance(blocks[0], Block)

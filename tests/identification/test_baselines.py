@@ -8,8 +8,8 @@ import pytest
 from servotwin.errors import InputError
 from servotwin.identification.fitting.baselines import LOSSES, fit_slew_lag
 from servotwin.identification.fitting.slew_lag import SlewLag, usable
-from servotwin.identification.logs.log import Log
-from servotwin.identification.logs.readers import read_logs
+from servotwin.logs.log import Log
+from servotwin.logs.readers import read_logs
 
 TRUTH = SlewLag(delay=0.0537, slew_up=4.2, slew_down=5.6, lag=0.043, gain=1.0, offset=0.07, deadband=0.05)
 BY_PULSE = replace(TRUTH, gain=2300.0, offset=-3.4, command_kind="pulse_width")

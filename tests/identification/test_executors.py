@@ -17,7 +17,7 @@ from servotwin.identification.fitting.batches import Running
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.point import Point
-from simulation.test_crew import Backwards
+from simulation.test_workers import Backwards
 
 SPAWN = multiprocessing.get_context("spawn")
 OPTIONS = {"starts": 3, "holdout": 0.25, "compare_with": ("M1",)}

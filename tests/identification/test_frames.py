@@ -10,7 +10,7 @@ from identification.fits import FREE, TRUTH, WRONG, fitted, some
 from servotwin.identification import Log
 from servotwin.identification.fitting.frames import gap_of, gaps, latency, near_edges, signal, widest
 from servotwin.identification.fitting.point import Frames
-from servotwin.identification.logs.regular import made_regular, regular_times
+from servotwin.logs.regular import made_regular, regular_times
 
 PERIOD = 0.02
 DEFAULT = ("delay", "frame_phase", "angle_offset", "initial_state")

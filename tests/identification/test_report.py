@@ -18,8 +18,8 @@ from servotwin.identification.report import page as report
 from servotwin.identification.report import pictures as report_pictures
 from servotwin.identification.report import traces as report_traces
 from servotwin.identification.report.shown import dimension_of_free, error_rows, estimate_lines, nominal_of, tables_of
+from servotwin.look import figure_in, unit_for
 from servotwin.units import from_si
-from servotwin.units.look import figure_in, unit_for
 
 
 @pytest.fixture(scope="module")

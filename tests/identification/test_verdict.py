@@ -9,10 +9,10 @@ import servotwin as st
 from identification.synthetic_logs import TRUTH, noisy, run
 from servotwin.identification import identify
 from servotwin.identification.fitting.diagnosis.bench import gain, teaching
-from servotwin.identification.fitting.noise import Series, isolated, noise_of
+from servotwin.identification.fitting.noise import SensorSeries, isolated, noise_of
 from servotwin.identification.fitting.uncertainty import Rows
 from servotwin.identification.fitting.verdict import judge
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 
 NOISE = 1e-3  # rad
 COUNT = 2.0 * np.pi / 4096.0  # rad, of a 12-bit encoder
@@ -62,7 +62,7 @@ def bench(seed, kind="white", wrong=0.0, rests=True, logs=4):
         simulated = np.interp(stamps, time, angle) - wrong * np.gradient(angle, time)
         log = Log(name=f"log {k}", time=stamps, command=command, command_kind="angle",
                   measured={"output_angle": said})
-        found.append(Series(log, stamps, said, simulated))
+        found.append(SensorSeries(log, stamps, said, simulated))
     return found
 
 

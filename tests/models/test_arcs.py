@@ -68,7 +68,7 @@ def fine(numbers, torque, drive, q, w, end):
 def test_arcs_against_a_fine_solution(zones, torque):
     numbers = replaced(NUMBERS, {"bridge.D_drive": zones[0], "bridge.off.D": zones[1]})
     for drive, w in product((-1.0, 0.0, 1.0), (0.0, 4.0, -9.0)):
-        q, speed, done = arcs.slide(arcs.arc_numbers(numbers, torque), drive, 0.3, w, 0.06)
+        q, speed, _, done = arcs.slide(arcs.arc_numbers(numbers, torque), drive, 0.3, w, 0.06)
         assert done == 1.0
         assert (q, speed) == pytest.approx(fine(numbers, torque, drive, 0.3, w, 0.06), abs=2e-8), (drive, w)
 
@@ -77,7 +77,7 @@ def test_arcs_against_a_fine_solution(zones, torque):
 def test_a_free_shaft_has_no_cancellation(time):
     numbers = replaced(NUMBERS, {"shaft.b": 0.0, "friction.F_forward": 0.0, "friction.F_backward": 0.0,
                                "bridge.off.R": 1e15})
-    q, w, _ = arcs.slide(arcs.arc_numbers(numbers, -0.006), 0.0, 0.0, 0.0, time)
+    q, w, _, _ = arcs.slide(arcs.arc_numbers(numbers, -0.006), 0.0, 0.0, 0.0, time)
     assert q == pytest.approx(0.5 * time * time, rel=1e-9)  # a winding of 1e15 ohm hardly brakes
     assert w == pytest.approx(time, rel=1e-9)
 
@@ -90,7 +90,15 @@ FEATURES = {
     "limits": {"chip.shortest": 1e-3, "chip.longest": 2e-3, "chip.timeout": 0.05},
     "stops": {"stops.lower": 0.2, "stops.upper": 1.6}, "no drops": {"bridge.D_drive": 0.0, "bridge.off.D": 0.0},
     "brush drop": {"bridge.off.D": 0.15}, "no friction": {"friction.F_forward": 0.0, "friction.F_backward": 0.0},
-    "short frames": {"chip.frame_period": 0.004},
+    "short frames": {"chip.frame_period": 0.004}, "play": {"sensor.half_slack": 2e-3},
+    "play, open": OPEN | {"sensor.half_slack": 2e-3}, "regulator": {"source.I_max": 0.9},
+    "weak regulator": {"source.I_max": 0.5, "chip.c_s": 0.02, "chip.beta": 0.01, "chip.noise": 1e-3},
+    "M3": {"friction.varies": 1.0, "friction.K_m": 0.1, "friction.K_e": 0.1},
+    "M5": {"friction.varies": 1.0, "friction.K_m": 0.3, "friction.K_e": 0.8, "friction.K_ms": 0.1, "shaft.b_out": 2e-3},
+    "M5 of the load alone": {"friction.varies": 1.0, "friction.K_e": 0.8, "shaft.b_out": 2e-3},
+    "all bands": OPEN | {"friction.varies": 1.0, "friction.K_m": 0.1, "friction.K_e": 0.2, "source.I_max": 0.9,
+                         "sensor.half_slack": 2e-3, "stops.lower": 0.1, "stops.upper": 2.0, "friction.F_forward": 0.0,
+                         "friction.F_backward": 0.0},
     "everything": OPEN | {"chip.tau_s": 0.02, "chip.beta": 0.01, "chip.c_s": 0.02, "chip.noise": 1e-3,
                           "chip.timeout": 0.025, "chip.shortest": 0.9e-3, "stops.lower": 0.1, "stops.upper": 2.0}}
 
@@ -109,7 +117,7 @@ def test_side_by_side_against_one_by_one(name):
 
 def assert_same(raw, other, tolerance):
     np.testing.assert_array_equal(raw.status, other.status)
-    for name in ("angle", "error", "speed"):
+    for name in ("angle", "error", "speed", "wiper"):
         np.testing.assert_allclose(raw.fields[name], other.fields[name], rtol=0,
                                    atol=tolerance * (100.0 if name == "speed" else 1.0))
     for name in ("contact", "drive"):
@@ -122,16 +130,16 @@ def plain(work):
     (kind,) = lane_runs.kinds_of(work.numbers, work.chip, work.lanes, True, "float64", lane_runs.swept(lanes),
                                    work.torque.count > 0, False)
     with np.errstate(all="ignore"):
-        rows = room(1, tiles.tile_type("float64"))
-        side_by_side.start(lanes, work.times[0], rows)
+        rows = room(1, tiles.tile_type("float64", kind.form))
+        side_by_side.start(lanes, kind.form, work.times[0], rows)
         lost = side_by_side.go_on(
-            lanes.pieces, lanes.edges, kind.braked, kind.which, work.duration, work.times,
-            lane_runs.outputs_of(work, raw), rows, room(1, tiles.plan_type("float64")))
+            lanes.pieces, lanes.edges, kind.form, kind.slack, kind.which, work.duration,
+            work.times, lane_runs.outputs_of(work, raw, "float64"), rows, room(1, tiles.plan_type("float64")))
     assert lost == 0
     return raw
 
 
-@pytest.mark.parametrize("name", [name for name in FEATURES if name not in ("stops", "everything")])
+@pytest.mark.parametrize("name", [name for name in FEATURES if name not in ("stops", "everything", "all bands")])
 def test_plain_source_against_compiled(name):
     work = case(18, duration=0.12, times=np.linspace(0.0, 0.12, 7), fields=FIELDS, changes=FEATURES[name])
     assert_same(plain(work), run_lanes(work), 1e-12)

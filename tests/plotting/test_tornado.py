@@ -7,7 +7,7 @@ import pytest
 from servotwin import plotting
 from servotwin.errors import InputError
 from servotwin.models.outputs import SIGNALS
-from servotwin.simulation.sweep import METRICS, Bar, Tornado
+from servotwin.studies import METRICS, Bar, Tornado
 
 BARS = (Bar("motor.armature_resistance", 2.8, 3.3, 0.170, 0.190, 0.02, 0.7),
         Bar("electronics.off_state", "brake", "coast", 0.180, 0.185, 0.005, 0.2),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.simulation.sweep.tables import read_columns
+from servotwin.tables.columns import read_columns
 
 # signals that the second servo lacks
 WARM = ("winding_temperature", "housing_temperature")

@@ -11,7 +11,7 @@ import typer
 from servotwin.cli.terminal import emit_json, patience, show, table
 
 if TYPE_CHECKING:
-    from servotwin.datasheet import Candidate, Lifters
+    from servotwin.datasheet import Lifter, Lifters
 
 _WHY = {"torque": "lack the torque", "time": "are too slow", "voltage": "are not for this voltage"}
 
@@ -27,13 +27,13 @@ def which(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.")] = False,
 ) -> None:
     """List the servos of the catalog that lift a mass on an arm at all angles, lightest first."""
-    from servotwin.cli.figures import SECONDS, VOLTAGE, with_usual_unit
-    from servotwin.cli.lift_words import lift_of
+    from servotwin.cli.lift_words import asked_lift
     from servotwin.datasheet import servos_that_lift
+    from servotwin.units.quantities import quantity
 
-    mass, length = lift_of(lift, arm) or (math.nan, math.nan)
-    volts = with_usual_unit("--voltage", voltage, VOLTAGE, "V")
-    longest = None if time is None else with_usual_unit("--time", time, SECONDS, "s")
+    mass, length = asked_lift(lift, arm) or (math.nan, math.nan)
+    volts = quantity("--voltage", voltage, "voltage", bare=True, positive=True)
+    longest = None if time is None else quantity("--time", time, "time", bare=True, positive=True)
     with patience("asking the catalog"):
         found = servos_that_lift(mass, length, voltage=volts, time=longest)
     if as_json:
@@ -55,7 +55,7 @@ def _answer(found: Lifters) -> list[Any]:
     return ["", table(("id", "mass", "margin", "lifts", "60 deg in", "note"), rows, wraps="note"), "", tail]
 
 
-def _weight(each: Candidate) -> str:
+def _weight(each: Lifter) -> str:
     return "unknown" if math.isnan(each.mass) else f"{1e3 * each.mass:.4g} g"
 
 

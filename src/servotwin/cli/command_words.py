@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from servotwin import signals
-from servotwin.cli.numbers import numbers, read_columns
+from servotwin.cli.numbers import columns_in_si, numbers
 from servotwin.errors import CommandError, InputError
 from servotwin.signals import Signal
 
@@ -156,7 +156,7 @@ class CommandWords:
 
 
 def _pulses(path: Path) -> Signal:
-    edges, widths = read_columns(path, _EDGES, _WIDTHS)
+    edges, widths = columns_in_si(path, _EDGES, _WIDTHS)
     try:
         return signals.pulse_train(edges, widths, unit="s")
     except InputError as error:

@@ -91,11 +91,12 @@ def _targets(out: Path | None, plot: Path | None, csv: Path | None, servos: list
 
 
 def _voltages(words: list[str] | None) -> list[float] | None:
-    from servotwin.cli.figures import VOLTAGE, with_usual_unit
+    from servotwin.units.quantities import quantity
 
     if words is None:
         return None
-    return [with_usual_unit("--voltage", part, VOLTAGE, "V") for word in words for part in word.split(",")]
+    return [quantity("--voltage", part, "voltage", bare=True, positive=True)
+            for word in words for part in word.split(",")]
 
 
 def _computed(servos: list[str], model: str | None, change: list[str], options: dict[str, Any]) -> list[DataSheet]:
@@ -131,21 +132,16 @@ def _write(sheets: list[DataSheet], targets: list[Target], torque: float | None,
 
 
 def _write_points(sheets: list[DataSheet], path: Path) -> None:
-    import csv
-
+    from servotwin.tables import csv_text
     from servotwin.units import from_si
 
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(("servo", "supply_voltage_V", "winding_temperature_K", "output_speed_deg_per_s",
-                         "load_torque_Nm", "supply_current_A", "load_power_W", "efficiency"))
-        for sheet in sheets:
-            for part in sheet.voltages:
-                for curve in (part.cold, part.hot):
-                    speeds = [from_si(speed, "deg/s", "speed") for speed in curve.speed.tolist()]
-                    for point in zip(speeds, curve.torque, curve.current, curve.power, curve.efficiency, strict=True):
-                        writer.writerow((sheet.servo.name, f"{part.voltage:.12g}",
-                                         f"{curve.temperatures.winding:.12g}", *(f"{x:.12g}" for x in point)))
+    names = ("servo", "supply_voltage_V", "winding_temperature_K", "output_speed_deg_per_s", "load_torque_Nm",
+             "supply_current_A", "load_power_W", "efficiency")
+    rows = [(sheet.servo.name, float(part.voltage), float(curve.temperatures.winding), *point)
+            for sheet in sheets for part in sheet.voltages for curve in (part.cold, part.hot)
+            for point in zip([from_si(w, "deg/s", "speed") for w in curve.speed.tolist()], curve.torque,
+                             curve.current, curve.power, curve.efficiency, strict=True)]
+    path.write_bytes(csv_text(dict(zip(names, zip(*rows, strict=True), strict=True)), digits=12).encode())
 
 
 def _show(sheet: DataSheet, torque: float | None) -> None:

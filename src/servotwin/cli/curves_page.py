@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 from servotwin import plotting
-from servotwin.cli.curves_words import Row, hot_words, lift_pairs, notes, rows
+from servotwin.cli.curves_words import CurveRow, hot_words, lift_pairs, notes, rows
+from servotwin.look import document, escape, picture, table, to_bytes
 from servotwin.parameters import printed_points
-from servotwin.units.look import document, escape, picture, table, to_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -101,7 +101,7 @@ def _lift(part: VoltageSheet) -> str:
             f'<div class="pairs">{said}</div>\n')
 
 
-def _minus(row: Row) -> list[str]:
+def _minus(row: CurveRow) -> list[str]:
     return [cell.replace("-", "−") if k == len(row) - 1 else cell for k, cell in enumerate(row)]
 
 

@@ -19,7 +19,7 @@ _SHARES = (0.25, 0.5, 0.75)  # of the stall torque, whose errors of holding a ta
 NEVER = "–"
 
 
-class Row(NamedTuple):
+class CurveRow(NamedTuple):
     """A line of the table: what, cold and hot, what the sheet prints, and how far the cold value is off it."""
 
     label: str
@@ -50,7 +50,7 @@ _PRINTED = (
 )
 
 
-def rows(part: VoltageSheet, others: Sequence[PrintedPoint], torque: float | None = None) -> list[Row]:
+def rows(part: VoltageSheet, others: Sequence[PrintedPoint], torque: float | None = None) -> list[CurveRow]:
     """Return the table of one voltage.
 
     Parameters
@@ -64,26 +64,27 @@ def rows(part: VoltageSheet, others: Sequence[PrintedPoint], torque: float | Non
     found = [_beside(each, part, others) for each in _PRINTED]
     stall = "stall torque, kgf cm"
     in_kgf = [f"{units.from_si(curve.stall_torque, 'kgf cm', 'torque'):.1f}" for curve in (part.cold, part.hot)]
-    found.insert(1, Row(stall, *in_kgf))
-    found += [Row("most power to a load", *(_point(curve.most_power, curve.most_power.power, "W", ".2f")
-                                            for curve in (part.cold, part.hot))),
-              Row("best efficiency", *(_point(curve.best_efficiency, 100.0 * curve.best_efficiency.efficiency, "%",
-                                              ".0f") for curve in (part.cold, part.hot)))]
+    found.insert(1, CurveRow(stall, *in_kgf))
+    found += [CurveRow("most power to a load", *(_point(curve.most_power, curve.most_power.power, "W", ".2f")
+                                                 for curve in (part.cold, part.hot))),
+              CurveRow("best efficiency", *(_point(curve.best_efficiency, 100.0 * curve.best_efficiency.efficiency, "%",
+                                                   ".0f") for curve in (part.cold, part.hot)))]
     if torque is not None:
-        found.append(Row(f"against {torque:.3g} N m", *(_at(curve, torque) for curve in (part.cold, part.hot))))
+        found.append(CurveRow(f"against {torque:.3g} N m", *(_at(curve, torque) for curve in (part.cold, part.hot))))
     return found + _standing(part)
 
 
-def _beside(each: _Quantity, part: VoltageSheet, others: Sequence[PrintedPoint]) -> Row:
+def _beside(each: _Quantity, part: VoltageSheet, others: Sequence[PrintedPoint]) -> CurveRow:
     cold, hot = (_number(each.computed(curve), each) for curve in (part.cold, part.hot))
     label = f"{each.label}, {each.unit}"
     here = [value for point in part.printed if (value := each.printed(point)) is not None]
     if here:
+        printed = "; ".join(_number(value, each) for value in here)
         off = "; ".join(f"{100.0 * (each.computed(part.cold) / value - 1.0):+.0f} %" for value in here)
-        return Row(label, cold, hot, "; ".join(_number(value, each) for value in here), off.replace("-0 %", "+0 %"))
+        return CurveRow(label, cold, hot, printed, off.replace("-0 %", "+0 %"))
     elsewhere = [f"{_number(value, each)} at {point.supply_voltage:g} V" for point in others
                  if (value := each.printed(point)) is not None and point.supply_voltage is not None]
-    return Row(label, cold, hot, "; ".join(elsewhere), "")
+    return CurveRow(label, cold, hot, "; ".join(elsewhere), "")
 
 
 def _number(value: float, each: _Quantity) -> str:
@@ -105,20 +106,20 @@ def _speed(speed: float) -> str:
     return f"{units.from_si(speed, 'deg/s', 'speed'):.0f} deg/s"
 
 
-def _standing(part: VoltageSheet) -> list[Row]:
+def _standing(part: VoltageSheet) -> list[CurveRow]:
     move = NEVER if math.isnan(part.smallest_move) else f"{math.degrees(part.smallest_move):.2f} deg"
     pulse = "" if math.isnan(part.smallest_pulse) else f" ({1e6 * part.smallest_pulse:.1f} us)"
-    found = [Row("smallest move", move + pulse)]
+    found = [CurveRow("smallest move", move + pulse)]
     held = {round(each.torque / part.cold.stall_torque, 6): each for each in part.holding}
     for share in _SHARES:
         each = held.get(share)
         if each is not None:
             said = f"{math.degrees(each.error):.1f} deg, {each.current:.2f} A" if each.stands else "does not hold"
-            found.append(Row(f"holding {each.torque:.2g} N m, error", said))
+            found.append(CurveRow(f"holding {each.torque:.2g} N m, error", said))
     for band in part.bandwidth:
         said = ("below 1 Hz" if band.frequency == 0.0 else
                 "20 Hz and more" if math.isinf(band.frequency) else f"{band.frequency:.1f} Hz")
-        found.append(Row(f"bandwidth at {math.degrees(band.amplitude):.0f} deg", said))
+        found.append(CurveRow(f"bandwidth at {math.degrees(band.amplitude):.0f} deg", said))
     return found
 
 

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from servotwin.cli.numbers import quantity
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.free import Space, nominal
 from servotwin.identification.report.shown import dimension_of_free
-from servotwin.simulation.sweep.kinds import Distribution, Normal, Offset, Relative, Uniform
-from servotwin.simulation.sweep.words import distribution_of
+from servotwin.studies.kinds import Distribution, Normal, Offset, Relative, Uniform
+from servotwin.studies.words import distribution_of
+from servotwin.units.quantities import number_and_unit, quantity
 
 if TYPE_CHECKING:
     from servotwin.identification import Log
@@ -75,8 +75,7 @@ def share(option: str, text: str) -> float:
     >>> share("--level", "95%"), share("--level", "0.9")
     (0.95, 0.9)
     """
-    found = float(text.strip().removesuffix("%")) / (100.0 if text.strip().endswith("%") else 1.0) \
-        if _is_number(text) else math.nan
+    found = quantity(option, text, "number", bare=True) if _is_number(text) else math.nan
     if not 0.0 <= found < 1.0:
         raise InputError(option, got=text, allowed="a share from 0 to below 1, such as 0.25 or 25%")
     return found
@@ -96,11 +95,8 @@ def held_out(text: str | None) -> float | tuple[str, ...] | None:
 
 
 def _is_number(text: str) -> bool:
-    try:
-        float(text.strip().removesuffix("%"))
-    except ValueError:
-        return False
-    return True
+    found = number_and_unit(text)
+    return found is not None and found[1] in ("", "%")
 
 
 def bounds_of(words: Sequence[str], free: Sequence[str]) -> dict[str, tuple[float, float]]:
@@ -230,7 +226,7 @@ def left_out(words: Sequence[str]) -> list[tuple[str | None, float, float]]:
         ends = text.split("..")
         if len(ends) != 2 or (equals and not name):
             raise InputError("--leave-out", got=word, allowed="START..STOP or LOG=START..STOP, such as 3s..4.5s")
-        start, stop = (quantity("--leave-out", end, "time", bare="s") for end in ends)
+        start, stop = (quantity("--leave-out", end, "time", bare=True) for end in ends)
         if not start < stop:
             raise InputError("--leave-out", got=word, allowed="START..STOP, the earlier one first")
         found.append((name.strip() or None, start, stop))

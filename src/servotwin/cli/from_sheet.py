@@ -111,20 +111,21 @@ def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -
     from servotwin.cli import figures as fig
     from servotwin.errors import InputError
     from servotwin.identification import Sheet
+    from servotwin.units.quantities import quantity
 
     if not whole["name"]:
         raise InputError("--name is missing", allowed="a short id, such as --name my-servo")
-    usual = None if at is None else fig.figure("--at", at if at.strip()[-1:].isalpha() else f"{at} V", fig.VOLTAGE)
+    usual = None if at is None else quantity("--at", at, "voltage", bare=True, positive=True)
     low, high = fig.pulse_range("--pulse-range", whole["pulse_range"]) if whole["pulse_range"] else (None, None)
 
-    def one(option: str, known: dict[str, float]) -> float | None:
+    def one(option: str, dimension: str) -> float | None:
         text = whole[option]
-        return None if text is None else fig.figure(f"--{option}", text, known)
+        return None if text is None else quantity(f"--{option}", text, dimension, positive=True)
 
     return Sheet(
         name=whole["name"], title=whole["title"] or "", points=_points(points, usual), pulse_min=low, pulse_max=high,
-        deadband=one("deadband", fig.TIME), neutral_pulse=one("neutral", fig.TIME), travel=one("travel", fig.ANGLE),
-        stop_travel=one("stops", fig.ANGLE), mass=one("mass", fig.MASS), backlash=one("backlash", fig.ANGLE),
+        deadband=one("deadband", "time"), neutral_pulse=one("neutral", "time"), travel=one("travel", "angle"),
+        stop_travel=one("stops", "angle"), mass=one("mass", "mass"), backlash=one("backlash", "angle"),
         angle_per_pulse=fig.rate("--rate", whole["rate"]) if whole["rate"] else None,
         gear_reduction=fig.ratio("--gear-ratio", whole["gear_ratio"]) if whole["gear_ratio"] else None,
         motor_type=whole["motor_type"], modulation=whole["modulation"], source=whole["source"], note=whole["note"])
@@ -134,6 +135,7 @@ def _points(given: dict[str, _Figures], usual: float | None) -> tuple[Any, ...]:
     from servotwin.cli import figures as fig
     from servotwin.errors import InputError
     from servotwin.identification import SheetPoint
+    from servotwin.units.quantities import quantity
 
     options = {"stall_torque": "--torque", "no_load_speed": "--speed", "no_load_current": "--running-current",
                "stall_current": "--stall-current", "idle_current": "--idle-current"}
@@ -141,9 +143,9 @@ def _points(given: dict[str, _Figures], usual: float | None) -> tuple[Any, ...]:
     for field, texts in given.items():
         option = options[field]
         for text in texts or ():
-            words, volts = fig.at_voltage(option, text, usual)
-            value = fig.speed(option, words) if field == "no_load_speed" else fig.figure(
-                option, words, fig.TORQUE if field == "stall_torque" else fig.CURRENT)
+            words, volts = fig.without_voltage(option, text, usual)
+            value = fig.speed(option, words) if field == "no_load_speed" else quantity(
+                option, words, "torque" if field == "stall_torque" else "current", positive=True)
             if field in found.setdefault(volts, {}):
                 raise InputError(f"{option} at {volts:g} V",
                                  got=f"two, {found[volts][field]:.4g} and {value:.4g} in SI",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.cli.figures import LENGTH, MASS, figure
 from servotwin.cli.load_words import FORMS, mass_on_arm, parts_of, torque_of
 from servotwin.errors import InputError
+from servotwin.units.quantities import quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 _HERE = ("arm", "torque")  # parts of a load that a sheet takes
 
 
-class Asked(NamedTuple):
+class AskedLift(NamedTuple):
     """What is to be lifted, mass [kg] and arm [m], and a torque [N m] whose point on the curves is shown."""
 
     lift: tuple[float, float] | None
     torque: float | None
 
 
-def lift_of(lift: str | None, arm: str | None) -> tuple[float, float] | None:
+def asked_lift(lift: str | None, arm: str | None) -> tuple[float, float] | None:
     """Return mass [kg] and arm [m] of `--lift` and `--arm`; None where neither is given.
 
     Raises
@@ -31,7 +31,7 @@ def lift_of(lift: str | None, arm: str | None) -> tuple[float, float] | None:
 
     Examples
     --------
-    >>> lift_of("500g", "10cm")
+    >>> asked_lift("500g", "10cm")
     (0.5, 0.1)
     """
     if lift is None and arm is None:
@@ -39,10 +39,10 @@ def lift_of(lift: str | None, arm: str | None) -> tuple[float, float] | None:
     if lift is None or arm is None:
         raise InputError("--arm needs --lift MASS" if lift is None else "--lift needs --arm LENGTH",
                          allowed="both, such as --lift 0.5kg --arm 10cm")
-    return figure("--lift", lift, MASS), figure("--arm", arm, LENGTH)
+    return quantity("--lift", lift, "mass", positive=True), quantity("--arm", arm, "length", positive=True)
 
 
-def loads_of(lift: str | None, arm: str | None, load: Sequence[str]) -> Asked:
+def loads_of(lift: str | None, arm: str | None, load: Sequence[str]) -> AskedLift:
     """Return what the options ask for.
 
     Raises
@@ -53,9 +53,9 @@ def loads_of(lift: str | None, arm: str | None, load: Sequence[str]) -> Asked:
     Examples
     --------
     >>> loads_of(None, None, ["arm=0.5kg:10cm", "torque=0.3"])
-    Asked(lift=(0.5, 0.1), torque=0.3)
+    AskedLift(lift=(0.5, 0.1), torque=0.3)
     """
-    found, torque = lift_of(lift, arm), None
+    found, torque = asked_lift(lift, arm), None
     for name, value in parts_of(load):
         if name not in _HERE:
             raise InputError(f"--load {name} of servotwin curves",
@@ -67,4 +67,4 @@ def loads_of(lift: str | None, arm: str | None, load: Sequence[str]) -> Asked:
             found = mass_on_arm(value)
         else:
             torque = torque_of(value)
-    return Asked(found, torque)
+    return AskedLift(found, torque)

@@ -8,18 +8,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from servotwin import loads
-from servotwin.cli import figures
-from servotwin.cli.numbers import numbers, read_columns
+from servotwin.cli.numbers import columns_in_si, numbers
 from servotwin.errors import InputError, LoadError, UnknownNameError
 from servotwin.loads import Load, Part
 from servotwin.models import Model, mid_travel
+from servotwin.units.quantities import quantity
 
 FORMS = {
     "inertia": "KG_M2", "viscous": "NM_S_PER_RAD", "torque": "NM", "coulomb": "NM", "arm": "MASS:LENGTH",
     "pendulum": "KG:M[:HANGING_DEG]", "spring": "NM_PER_RAD[:REST_DEG]", "recorded": "FILE.csv",
 }
-_UNITS = {"inertia": figures.spelled("inertia"), "viscous": figures.spelled("torque per speed"),
-          "torque": figures.TORQUE, "coulomb": figures.TORQUE}
+_DIMENSIONS = {"inertia": "inertia", "viscous": "torque per speed", "torque": "torque", "coulomb": "torque"}
 _NEXT = re.compile(r",(?=\s*[A-Za-z_]+\s*=)")  # a comma that begins another part
 _TIMES = {"time_s": 1.0, "time_ms": 1e-3, "time": 1.0}
 _TORQUES = {"torque_Nm": 1.0, "torque_mNm": 1e-3, "torque": 1.0}
@@ -115,7 +114,8 @@ def mass_on_arm(text: str) -> tuple[float, float]:
     mass, colon, length = text.partition(":")
     if not colon:
         raise LoadError("--load arm", got=text, allowed="MASS:LENGTH, such as 0.5kg:10cm")
-    return figures.figure("--load arm", mass, figures.MASS), figures.figure("--load arm", length, figures.LENGTH)
+    return (quantity("--load arm", mass, "mass", positive=True),
+            quantity("--load arm", length, "length", positive=True))
 
 
 def torque_of(text: str) -> float:
@@ -131,10 +131,7 @@ def torque_of(text: str) -> float:
 
 def _with_unit(name: str, text: str) -> float:
     """Return a number in SI, or one with a unit; the sign counts."""
-    if not re.search(r"\d\s*[^\W\d_]", re.sub(r"[eE][-+]?\d+\s*$", "", text)):
-        return numbers(f"--load {name}", text, (FORMS[name],))[0]
-    sign = -1.0 if text.lstrip().startswith("-") else 1.0
-    return sign * figures.figure(f"--load {name}", text.lstrip().lstrip("+-"), _UNITS[name])
+    return quantity(f"--load {name}", text, _DIMENSIONS[name], bare=True)
 
 
 def _single(make: Callable[[float], Part], name: str) -> Callable[[str], Part]:
@@ -159,7 +156,7 @@ def _spring(text: str) -> Part:
 
 
 def _recorded(text: str) -> Part:
-    time, torque = read_columns(Path(text), _TIMES, _TORQUES)
+    time, torque = columns_in_si(Path(text), _TIMES, _TORQUES)
     return loads.Recorded(time, torque)
 
 

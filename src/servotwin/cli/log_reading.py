@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli.terminal import patience, show, table
+from servotwin.logs.formats import FORMATS, LOG_FORMATS
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -19,9 +20,9 @@ _MOST_REMARKS = 5
 _QUIET = ("named", "sidecar")  # someone said so before
 
 PANEL = "Logs and servo"
-HELP = "Log files or folders: tables (CSV) with or without a sidecar, BAM or Miuzei JSON, LeRobot datasets."
+HELP = f"Log files or folders: {', '.join(each.what for each in LOG_FORMATS.values())}."
 FormatOption = Annotated[str, typer.Option(
-    "--format", metavar="FORMAT", help="Format of the logs: auto, csv, bam, miuzei or lerobot.", rich_help_panel=PANEL)]
+    "--format", metavar="FORMAT", help=f"Format of the logs: {', '.join(FORMATS)}.", rich_help_panel=PANEL)]
 ColumnsOption = Annotated[list[str] | None, typer.Option(
     metavar="SIGNAL=COLUMN:UNIT", help='What the columns of a table mean: "time=t:ms angle=pos:deg-90"; kept in the '
     "sidecar. Other columns are recognised by name or guessed, and shown.", rich_help_panel=PANEL)]

@@ -2,47 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from servotwin import units
-from servotwin.errors import InputError, UnitError
+from servotwin.errors import InputError
 from servotwin.tables import read_table
-
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
-
-
-def quantity(option: str, text: str, dimension: str, *, bare: str | None = None) -> float:
-    """Return a number with its unit, in SI.
-
-    Parameters
-    ----------
-    option, text : str
-    dimension : str
-        Of `servotwin.units`.
-    bare : str, optional
-        Unit of a number without one; else a unit is required.
-
-    Raises
-    ------
-    InputError
-        If it is no number, or its unit does not fit.
-
-    Examples
-    --------
-    >>> quantity("--max-error", "180 deg", "angle"), quantity("--leave-out", "3", "time", bare="s")
-    (3.141592653589793, 3.0)
-    """
-    match = _NUMBER.fullmatch(text)
-    unit = (match[2] or bare) if match else None
-    try:
-        if match is not None and unit is not None:
-            return units.to_si(float(match[1]), unit, dimension)
-    except UnitError:
-        pass
-    raise InputError(option, got=text, allowed=("a number in SI, or " if bare else "") + "a number with a unit: "
-                     + ", ".join(units.DIMENSIONS[dimension]))
 
 
 def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | None = None) -> list[float]:
@@ -81,7 +45,7 @@ def numbers(what: str, text: str, names: tuple[str, ...], *, required: int | Non
     return values
 
 
-def read_columns(path: Path, *wanted: Mapping[str, float]) -> list[list[float]]:
+def columns_in_si(path: Path, *wanted: Mapping[str, float]) -> list[list[float]]:
     r"""Return columns of a CSV file with a header, in SI.
 
     Parameters
@@ -100,7 +64,7 @@ def read_columns(path: Path, *wanted: Mapping[str, float]) -> list[list[float]]:
     >>> import tempfile
     >>> file = Path(tempfile.mkdtemp()) / "torque.csv"
     >>> _ = file.write_text("time_s,torque_mNm\n0,0\n1,200\n")
-    >>> read_columns(file, {"time_s": 1.0}, {"torque_Nm": 1.0, "torque_mNm": 1e-3})
+    >>> columns_in_si(file, {"time_s": 1.0}, {"torque_Nm": 1.0, "torque_mNm": 1e-3})
     [[0.0, 1.0], [0.0, 0.2]]
     """
     known = {name for names in wanted for name in names}

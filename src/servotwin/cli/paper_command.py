@@ -20,12 +20,13 @@ def paper(
     as_json: Annotated[bool, typer.Option("--json", help="Print paths and headline numbers as JSON.")] = False,
 ) -> None:
     """Reproduce the paper's figures and tables in a report."""
-    from servotwin.cli.paper import write_paper_report
+    from servotwin.cli.interrupts import held
+    from servotwin.paper import write_paper_report
 
     if not out.strip():
         raise OutputError("--out", got=out, allowed="the name of a folder")
     with _progress() as progress:
-        report = write_paper_report(Path(out), force=force, progress=progress)
+        report = write_paper_report(Path(out), force=force, progress=progress, moving=held)
     if as_json:
         emit_json({
             "folder": str(report.folder), "report": str(report.page),

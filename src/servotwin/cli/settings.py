@@ -45,12 +45,11 @@ def settings(words: Sequence[str]) -> dict[str, Value]:
 
 
 def _value(name: str, text: str) -> Value:
-    from servotwin.cli.numbers import quantity
     from servotwin.parameters import dimension_of
-    from servotwin.units import si_unit
+    from servotwin.units.quantities import quantity
 
     dimension = dimension_of(name)
     if dimension == "word":
         return text
-    found = tuple(quantity(f"--set {name}", part, dimension, bare=si_unit(dimension)) for part in text.split(","))
+    found = tuple(quantity(f"--set {name}", part, dimension, bare=True) for part in text.split(","))
     return found if len(found) > 1 else found[0]

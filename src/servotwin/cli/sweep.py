@@ -13,7 +13,7 @@ from servotwin.cli.terminal import emit_json, patience, show
 
 if TYPE_CHECKING:
     from servotwin.models import Model
-    from servotwin.simulation.sweep import Study
+    from servotwin.studies import Study
 
 _VARIED = "What varies"
 
@@ -110,7 +110,7 @@ def _check_options(out: Path | None, *, resume: bool, plot: bool, varies: bool) 
 
 def _varied(model: Model, words: list[str], *, from_file: bool) -> dict[str, Any]:
     from servotwin.errors import InputError
-    from servotwin.simulation.sweep import stated
+    from servotwin.studies import stated
 
     given: dict[str, Any] = {}
     for word in words:
@@ -128,7 +128,7 @@ def _varied(model: Model, words: list[str], *, from_file: bool) -> dict[str, Any
 
 
 def _draws(path: Path | None) -> dict[str, Any] | None:
-    from servotwin.simulation.sweep import read_columns
+    from servotwin.studies import read_columns
 
     return None if path is None else dict(read_columns(path))
 
@@ -139,8 +139,8 @@ def _run(model: Model, words: Any, load: list[str], metric: list[str], options: 
     from servotwin.cli.load_words import load_from
     from servotwin.cli.scheduler import executor_at
     from servotwin.errors import InputError
-    from servotwin.simulation.sweep import sweep as run
-    from servotwin.simulation.sweep.metrics import checked_metrics
+    from servotwin.studies import sweep as run
+    from servotwin.studies.metrics import checked_metrics
     from servotwin.units import is_finite
 
     duration = options["duration"]
@@ -154,7 +154,7 @@ def _run(model: Model, words: Any, load: list[str], metric: list[str], options: 
 
 
 def _how_to_go_on(folder: Path | None) -> str | None:
-    from servotwin.simulation.sweep.folder import STUDY
+    from servotwin.studies.folder import STUDY
 
     if folder is None or not (folder / STUDY).exists():
         return None

@@ -10,12 +10,12 @@ from servotwin import plotting, units
 from servotwin.cli.summary import names
 from servotwin.cli.terminal import pairs, table
 from servotwin.simulation.remarks import words
-from servotwin.simulation.sweep import dimension_of
+from servotwin.studies import dimension_of
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from servotwin.simulation.sweep import Study
+    from servotwin.studies import Study
 
 _MOST_BARS = 12
 _MOST_FAILURES = 3

@@ -6,8 +6,8 @@ from servotwin.datasheet.holding import Held
 from servotwin.datasheet.lift import Lift, lift_of
 from servotwin.datasheet.sheet import Bandwidth, DataSheet, VoltageSheet, curves
 from servotwin.datasheet.warming import Masses, Warming, thermal_masses
-from servotwin.datasheet.which import Candidate, Lifters, Refused, servos_that_lift
+from servotwin.datasheet.which import Lifter, Lifters, Refused, servos_that_lift
 
-__all__ = ["Bandwidth", "Candidate", "DataSheet", "FullDrive", "Held", "Lift", "Lifters", "Masses", "OperatingPoint",
+__all__ = ["Bandwidth", "DataSheet", "FullDrive", "Held", "Lift", "Lifter", "Lifters", "Masses", "OperatingPoint",
            "Refused", "SpeedCurve", "Swing", "VoltageSheet", "Warming", "curves", "lift_of", "servos_that_lift",
            "thermal_masses"]

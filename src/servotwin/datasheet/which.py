@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Candidate:
+class Lifter:
     """A servo that lifts the mass.
 
     Parameters
@@ -62,7 +62,7 @@ class Lifters:
 
     torque: float
     voltage: float
-    found: tuple[Candidate, ...]
+    found: tuple[Lifter, ...]
     refused: tuple[Refused, ...]
 
 
@@ -103,13 +103,13 @@ def servos_that_lift(mass: float, arm: float, *, voltage: float, time: float | N
             raise InputError(name, got=value, allowed=f"a positive number [{unit}]")
     among = [load_servo(name) for name in catalog_names()] if servos is None else list(servos)
     judged = [_judged(servo, mass, arm, voltage, time) for servo in among]
-    found = [each for each in judged if isinstance(each, Candidate)]
+    found = [each for each in judged if isinstance(each, Lifter)]
     order = sorted(found, key=lambda each: (math.isnan(each.mass), each.mass, -each.margin, each.servo.name))
     return Lifters(torque=torque, voltage=voltage, found=tuple(order),
                    refused=tuple(each for each in judged if isinstance(each, Refused)))
 
 
-def _judged(servo: Servo, mass: float, arm: float, voltage: float, time: float | None) -> Candidate | Refused:
+def _judged(servo: Servo, mass: float, arm: float, voltage: float, time: float | None) -> Lifter | Refused:
     torque, most = check_lift(mass, arm), highest_voltage(servo)
     if voltage > 2.0 * most > 0.0:
         return Refused(servo=servo, kind="voltage", reason=f"its sheet ends at {most:g} V")
@@ -127,7 +127,7 @@ def _judged(servo: Servo, mass: float, arm: float, voltage: float, time: float |
         return Refused(servo=servo, kind="time", reason="creeps" if math.isnan(swing.time) else
                        f"takes {swing.time:.2f} s")
     weight = printed_fact(servo.sheet, "mass")
-    return Candidate(servo=servo, mass=math.nan if weight is None else weight, most_torque=capable,
+    return Lifter(servo=servo, mass=math.nan if weight is None else weight, most_torque=capable,
                      margin=capable / torque, time=swing.time, notes=_notes(servo, voltage, most))
 
 

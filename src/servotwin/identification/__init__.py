@@ -14,22 +14,28 @@ from servotwin.identification.fitting.validate import Validation, validate
 from servotwin.identification.fitting.verdict import Cause, Verdict
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.identification.fitting.yielding import Yielded
-from servotwin.identification.logs.bam_convention import BamConvention
-from servotwin.identification.logs.bam_logs import read_bam_log, write_bam_log
-from servotwin.identification.logs.bam_parameters import read_bam_parameters, write_bam_parameters
-from servotwin.identification.logs.csv_logs import read_csv_log, write_log
-from servotwin.identification.logs.keep import keep_columns
-from servotwin.identification.logs.lerobot import read_lerobot_logs
-from servotwin.identification.logs.log import Log
-from servotwin.identification.logs.miuzei import read_miuzei_logs
-from servotwin.identification.logs.readers import read_logs
-from servotwin.identification.logs.reading import ReadColumn, Reading
 from servotwin.identification.sheets.contradictions import Contradiction, sheet_contradictions, sheet_flags
 from servotwin.identification.sheets.csv_sheets import SheetList, read_sheets
 from servotwin.identification.sheets.motor_range import MotorRange, Range, motor_range
 from servotwin.identification.sheets.servo_of_sheet import servo_from_sheet
 from servotwin.identification.sheets.sheet import Sheet, SheetPoint
 from servotwin.identification.sheets.sheet_file import servo_file_text, sheet_of, sheet_table, write_servo_text
+from servotwin.logs import (
+    BamConvention,
+    Log,
+    ReadColumn,
+    Reading,
+    keep_columns,
+    read_bam_log,
+    read_bam_parameters,
+    read_csv_log,
+    read_lerobot_logs,
+    read_logs,
+    read_miuzei_logs,
+    write_bam_log,
+    write_bam_parameters,
+    write_log,
+)
 
 __all__ = [
     "LUMPED",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import UnknownNameError
+from servotwin.tables import read_columns
 
 _UNITS = ("deg", "V", "us", "Hz")  # a column's name ends in its unit; a count has none
 
@@ -66,8 +66,6 @@ def load_dataset(name: str) -> Dataset:
     """
     if name not in dataset_names():
         raise UnknownNameError("data set", name, dataset_names())
-    with (_folder() / f"{name}.csv").open(newline="", encoding="utf-8") as file:
-        header, *rows = list(csv.reader(file))
-    columns = {key: np.array([float(row[k]) for row in rows]) for k, key in enumerate(header)}
-    units = {key: next((u for u in _UNITS if key.endswith(f"_{u}")), "1") for key in header}
+    columns = read_columns(_folder() / f"{name}.csv")
+    units = {key: next((u for u in _UNITS if key.endswith(f"_{u}")), "1") for key in columns}
     return Dataset(name, columns, units, (_folder() / "SOURCE.md").read_text(encoding="utf-8"))

@@ -39,8 +39,15 @@ def undo_all() -> None:
             undo()
 
 
-def write_file(path: str | Path, write: Callable[[Path], object], *, overwrite: bool = False) -> None:
-    """Let `write` fill a temporary file beside `path`, then move it into place; on failure nothing has changed.
+def write_file(path: str | Path, content: bytes | Callable[[Path], object], *, overwrite: bool = False) -> None:
+    """Write a temporary file beside `path`, then move it into place; on failure nothing has changed.
+
+    Parameters
+    ----------
+    path : str or Path
+    content : bytes or callable
+        A callable fills the temporary file, whose path it is given.
+    overwrite : bool
 
     Raises
     ------
@@ -53,7 +60,7 @@ def write_file(path: str | Path, write: Callable[[Path], object], *, overwrite: 
     --------
     >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())
-    >>> write_file(folder / "a.txt", lambda path: path.write_text("text"))
+    >>> write_file(folder / "a.txt", b"text")
     >>> (folder / "a.txt").read_text()
     'text'
     """
@@ -70,7 +77,10 @@ def write_file(path: str | Path, write: Callable[[Path], object], *, overwrite: 
         partial = target.with_name(f".partial-{secrets.token_hex(8)}{target.suffix}")
         with undone(lambda: partial.unlink(missing_ok=True)):
             partial.touch(0o600, exist_ok=False)
-            write(partial)
+            if isinstance(content, bytes):
+                partial.write_bytes(content)
+            else:
+                content(partial)
             partial.chmod(0o666 & ~_umask())
             os.replace(partial, target)
     except OSError as error:

@@ -162,7 +162,7 @@ def write_servo_file(servo: Servo, path: Path, *, overwrite: bool = False) -> No
         content = _document(servo).as_string().encode()
     except UnicodeEncodeError:
         raise OutputError(f"{path} cannot be written (a text of the servo is not valid Unicode)") from None
-    write_file(path, lambda file: file.write_bytes(content), overwrite=overwrite)
+    write_file(path, content, overwrite=overwrite)
 
 
 def _document(servo: Servo) -> tomlkit.TOMLDocument:

@@ -4,6 +4,7 @@ Everything is drawn with matplotlib's objects and without its global state; matp
 asked for. Angles are in degrees and pulses in microseconds.
 """
 
+from servotwin.look import COLOURS, LINES, axes_grid, finished, readable, to_bytes
 from servotwin.plotting.block_diagrams import PAPER_DIAGRAMS, block_diagram
 from servotwin.plotting.characteristics import (
     bandwidth_curves,
@@ -18,7 +19,6 @@ from servotwin.plotting.formula import Formula, formula_svg
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
 from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
 from servotwin.plotting.tornado import metric_shown, tornado
-from servotwin.units.look import COLOURS, LINES, axes_grid, finished, readable, to_bytes
 
 __all__ = [
     "COLOURS",

@@ -10,8 +10,8 @@ import numpy as np
 
 from servotwin import units
 from servotwin.errors import InputError
+from servotwin.look import COLOURS, LINES, context, finished, new_figure
 from servotwin.plotting.panels import Curve, Limit, curves
-from servotwin.units.look import COLOURS, LINES, context, finished, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.units.look import COLOURS, context, new_figure
+from servotwin.look import COLOURS, context, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

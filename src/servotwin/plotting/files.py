@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from servotwin.errors import OutputError
+from servotwin.look import FORMATS, to_bytes
 from servotwin.parameters import write_file
-from servotwin.units.look import FORMATS, to_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,4 +37,4 @@ def save(figure: Figure, path: str | Path, *, overwrite: bool = False) -> None:
     if file_format not in FORMATS:
         raise OutputError("ending of a picture's name", got=target.name,
                           allowed=", ".join(f".{name}" for name in FORMATS))
-    write_file(target, lambda file: file.write_bytes(to_bytes(figure, file_format)), overwrite=overwrite)
+    write_file(target, to_bytes(figure, file_format), overwrite=overwrite)

@@ -6,7 +6,7 @@ import io
 from dataclasses import dataclass
 from functools import cache
 
-from servotwin.units.look import context
+from servotwin.look import context
 
 
 @dataclass(frozen=True, kw_only=True)

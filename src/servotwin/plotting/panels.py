@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from servotwin.errors import InputError
-from servotwin.units.look import COLOURS, LINES, axes_grid, context, finished
+from servotwin.look import COLOURS, LINES, axes_grid, context, finished
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

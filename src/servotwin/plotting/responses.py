@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin import units
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.look import LINES, axes_grid, context
 from servotwin.models.outputs import SIGNALS
-from servotwin.units.look import LINES, axes_grid, context
 
 if TYPE_CHECKING:
     import numpy as np

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 from servotwin import units
 from servotwin.errors import InputError
+from servotwin.look import COLOURS, axes_grid, context, finished, readable
 from servotwin.models.outputs import SIGNALS
 from servotwin.plotting.responses import SHOWN, Shown
-from servotwin.units.look import COLOURS, axes_grid, context, finished, readable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from servotwin.simulation.sweep import Bar, Tornado
+    from servotwin.studies import Bar, Tornado
 
 _METRICS = {
     "overshoot": Shown("overshoot", "", "%", "%", "number"),
@@ -69,7 +69,7 @@ def tornado(found: Tornado, *, most: int = 12) -> Figure:
 
     Examples
     --------
-    >>> from servotwin.simulation.sweep import Bar, Tornado
+    >>> from servotwin.studies import Bar, Tornado
     >>> bars = (Bar("motor.torque_constant", 3.3e-3, 4.1e-3, 0.19, 0.18, reach=0.01, share=0.9),)
     >>> tornado(Tornado("rise_time", 0.185, bars)).axes[0].get_xlabel()
     'rise time (ms)'
@@ -106,7 +106,7 @@ def _goes_right(at: float, nominal: float, side: int, *, leftward: bool) -> bool
 
 def _limits(bars: Sequence[Bar], nominal: float, shown: Shown, *, leftward: bool) -> tuple[float, float]:
     """Return an axis on which every label has room beside its bar."""
-    from servotwin.simulation.sweep import dimension_of
+    from servotwin.studies import dimension_of
 
     labels = [(_in(shown, at), _goes_right(at, nominal, side, leftward=leftward),
                (_GAP + _LETTER * len(readable(value, dimension_of(bar.name)))) / _ROOM) for bar in bars
@@ -123,7 +123,7 @@ def _limits(bars: Sequence[Bar], nominal: float, shown: Shown, *, leftward: bool
 
 
 def _draw(ax: Axes, row: int, bar: Bar, nominal: float, shown: Shown, *, leftward: bool) -> None:
-    from servotwin.simulation.sweep import dimension_of
+    from servotwin.studies import dimension_of
 
     for side, value, at, (_, colour, hatch) in ((-1, bar.low, bar.at_low, _SIDES[0]),
                                                 (1, bar.high, bar.at_high, _SIDES[1])):

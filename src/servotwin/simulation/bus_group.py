@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from servotwin.models.engine import guards, joint_motion, motion, shared_source
 from servotwin.models.engine.memory import FIRST_STEP, Point
-from servotwin.models.engine.modes import NO_CURRENT, Mode, Vector
+from servotwin.models.engine.modes import NO_CURRENT, Vector
 from servotwin.models.engine.motion import Motion
 from servotwin.models.engine.shared_source import Member
 from servotwin.models.terms.numbers import Numbers
@@ -205,7 +205,7 @@ class Group:
             if j == whose:
                 mode, y = guards.cross(member.numbers, mode, kind, shared_source.behind(member, V),
                                        piece_value(member.tau, time), y)
-                mode = Mode(shared_source.let_through(member, mode.zone), mode.contact, mode.mesh, mode.motor, mode.share)
+                mode = mode._replace(zone=shared_source.let_through(member, mode.zone))
                 event = kind
             found.append((Point(time, y, mode, time, y, point.step, wiper), event))
         self._voltage = V

@@ -84,7 +84,7 @@ def save_lanes(path: str | Path, time: NDArray[np.float64], signals: Mapping[str
     MissingExtraError
         If Parquet is asked for and pyarrow is not installed.
     """
-    from servotwin.simulation.sweep.tables import FORMATS, check_format, encoded
+    from servotwin.tables.columns import FORMATS, check_format, encoded
 
     ending = Path(path).suffix.lower().removeprefix(".")
     if ending not in FORMATS:

@@ -41,7 +41,8 @@ def records_of(tiles: NDArray[Any], places: Indices, temperatures: Floats) -> ND
     point["time"], point["anchor_time"], point["step"] = now, math.inf, FIRST_STEP
     for column, values in enumerate((servo["q"], servo["w"], 0.0, *temperatures, servo["q"], servo["w"])):
         point["y"][:, column] = values
-    point["anchor"], point["wiper"] = point["y"], servo["q"]
+    point["anchor"] = point["y"]
+    point["wiper"] = np.where(flat(tiles, "hung", "half_slack")[places] > 0.0, servo["wiper"], servo["q"])
     chip["number"], chip["draws"] = count["number"], count["first_draw"] + count["number"]
     chip["drive"], chip["error"] = servo["drive"], servo["error"]
     chip["drive_end"] = np.where(servo["drive"] != 0.0, now + servo["left"], math.inf)
@@ -63,7 +64,8 @@ def put_records(tiles: NDArray[Any], places: Indices, records: NDArray[Any], per
     to_next = np.where(same, (chip["number"] - records["frames"]) * beat - now, number * period - time)
     to_next = np.maximum(to_next, 0.0)
     values: dict[str, dict[str, Any]] = {
-        "servo": {"q": point["y"][:, 0], "w": point["y"][:, 1], "drive": chip["drive"], "error": chip["error"],
+        "servo": {"q": point["y"][:, 0], "w": point["y"][:, 1], "wiper": point["wiper"],
+                  "drive": chip["drive"], "error": chip["error"],
                   "left": np.where(chip["drive"] != 0.0, chip["drive_end"] - now, 0.0), "silence": chip["clock"] - now},
         "clock": {"edge": (number - 1) * period, "since": period - to_next, "length": period, "period": period},
         "count": {"number": number, "first_draw": chip["draws"] - number}}
@@ -77,7 +79,7 @@ def put_records(tiles: NDArray[Any], places: Indices, records: NDArray[Any], per
 
 
 _READ = {
-    "servo": ("q", "w", "drive", "left", "silence", "error", "due", "sign", "duration", "decided", "later_due",
+    "servo": ("q", "w", "wiper", "drive", "left", "silence", "error", "due", "sign", "duration", "decided", "later_due",
               "later_sign", "later_duration", "later_decided"),
     "clock": ("since", "length", "edge", "period"),
     "count": ("number", "first_draw", "edges"),

@@ -11,24 +11,29 @@ from servotwin.models.engine import tiles
 from servotwin.models.engine.records import columns_of, numbers_in, room, tiles_with
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.friction import straight
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.physics.laws import array_form
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.lane_memory import RECORD, flat, records_of
 from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
 
 Indices = NDArray[np.int64]
+_straight = array_form(straight, __name__)
 Mask = NDArray[np.bool_]
 
-SIDE_BY_SIDE = {
-    dtype: Recipe(f"side_by_side_{dtype}", tuple(
-        f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit")),
-        vector=True, single=dtype == "float32")
-    for dtype in ("float64", "float32")
-}
+_SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
+_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32", never=("BANDS",))
+            for dtype in ("float64", "float32")}
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
 ALL_RUNS = Recipe("runs", _ENTRIES)  # everything
-_RARE = ("friction.varies", "friction.kappa", "play", "heat", "sensor.half_slack", "motor.L", "source.I_max")
+_GENERAL = ("friction.kappa", "play", "heat", "motor.L")  # what only lanes one by one have
+_BANDED = ("friction.varies", "source.I_max")
+_RARE = (*_BANDED, *_GENERAL, "sensor.half_slack")
 _PENDULUM = "load.gravity"
+_BY_BANDS = Recipe("by_bands", _SIDE, vector=True, absent=(
+    *_GENERAL, _PENDULUM, "load.stiffness", "friction.w_s", "follower", "sweep"),
+                   never=("ONE_FORMULA", "ARCS", "CORE"))
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep"),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
@@ -36,7 +41,8 @@ PENDULUM_RUNS = Recipe(
     "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep"),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 LOOK_SIDE_BY_SIDE = Recipe(
-    "look_side_by_side", ("servotwin.models.engine.sights:side_by_side",), absent=(*_RARE, _PENDULUM, "load.stiffness"))
+    "look_side_by_side", ("servotwin.models.engine.sights:side_by_side",),
+    absent=(*_GENERAL, _PENDULUM, "load.stiffness"))
 LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",))
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
@@ -55,7 +61,7 @@ def run(work: Work) -> Raw:
         if isinstance(kind, OneByOne):
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
         else:
-            run_side_by_side(work, lanes, kind.which, kind.braked, raw)
+            run_side_by_side(work, lanes, kind, raw)
     kernels(_ENDING).look_at_lanes(
         work.law == "pulse", lanes, _rows(work.torque.rows), _indices(work.torque.first), _indices(work.torque.count),
         float(work.duration), raw.final, raw.refused, raw.marks)
@@ -64,22 +70,28 @@ def run(work: Work) -> Raw:
     return raw
 
 
-def run_side_by_side(work: Work, lanes: Lanes, which: Indices, braked: bool, raw: Raw) -> None:
-    """Run some lanes side by side, all of them `braked` or none; finish those that are given up one by one."""
-    rows = room(-(-len(which) // tiles.TILE), tiles.tile_type(work.dtype))
-    plans = room(1, tiles.plan_type(work.dtype))
+def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> None:
+    """Run some lanes side by side; finish those that are given up one by one."""
+    which = kind.which
+    rows = room(-(-len(which) // tiles.TILE), tiles.tile_type(kind.dtype, kind.form))
+    plans = room(1, tiles.plan_type(kind.dtype))
     times = _own(work.times, np.float64)
-    module = kernels(SIDE_BY_SIDE[work.dtype])
-    module.start(some_of(lanes, which), times[0] if len(times) else np.inf, rows)
-    lost = module.go_on(lanes.pieces, lanes.edges, braked, which, float(work.duration), times, outputs_of(work, raw),
-                        rows, plans)
+    module = kernels(kind.recipe)
+    module.start(some_of(lanes, which), kind.form, times[0] if len(times) else np.inf, rows)
+    outputs = outputs_of(work, raw, kind.dtype)
+    lost = module.go_on(lanes.pieces, lanes.edges, kind.form, kind.slack, which, float(work.duration), times,
+                        outputs, rows, plans)
+    for name, values in outputs._asdict().items():
+        if name in raw.fields and values is not raw.fields[name]:
+            with np.errstate(over="ignore"):
+                raw.fields[name][which] = values[which]
     raw.final[which, 0], raw.final[which, 1] = (flat(rows, "servo", name)[:len(which)] for name in ("q", "w"))
     if lost:
         owed = flat(rows, "clock", "owed")[:len(which)]
         places = np.flatnonzero(owed > 0.0)
         gone = which[places]
         _finish(work, lanes, gone, owed[places], flat(rows, "count", "output")[places],
-                records_of(rows, places, lanes.start[3:5, gone]), raw, PLAIN_RUNS)
+                records_of(rows, places, lanes.start[3:5, gone]), raw, kind.general)
 
 
 def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = ALL_RUNS) -> None:
@@ -118,10 +130,22 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
 
 
 class SideBySide(NamedTuple):
-    """Lanes that run side by side, all of them `braked` or none."""
+    """Lanes that run side by side, all of them in one form, and whether some have a potentiometer with play."""
 
     which: Indices
-    braked: bool
+    form: int
+    slack: bool
+    dtype: str
+
+    @property
+    def recipe(self) -> Recipe:
+        """Their kernels."""
+        return _BY_BANDS if self.form == tiles.BANDS else _BY_ARCS[self.dtype]
+
+    @property
+    def general(self) -> Recipe:
+        """The kernels of those that cannot go on side by side."""
+        return ALL_RUNS if self.form == tiles.BANDS or self.slack else PLAIN_RUNS
 
 
 class OneByOne(NamedTuple):
@@ -138,22 +162,31 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     `swept` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
     potentiometers have a table.
     """
-    bridge = numbers.bridge
-    rare, swinging = swept.any() and swept, _differs(numbers, _PENDULUM)
-    for name in _RARE:
-        rare = _either(rare, _differs(numbers, name))
+    bridge, own = numbers.bridge, numbers.friction
+    general, swinging = swept.any() and swept, _differs(numbers, _PENDULUM)
+    for name in _GENERAL:
+        general = _either(general, _differs(numbers, name))
+    slack, banded = _differs(numbers, "sensor.half_slack"), False
+    for name in _BANDED:
+        banded = _either(banded, _differs(numbers, name))
     side: Any = False
     if pulsed and not curved:
-        side = (np.logical_not(_either(_either(rare, swinging), recorded.any() and recorded))
+        side = (np.logical_not(_either(_either(general, swinging), recorded.any() and recorded))
                 & (numbers.load.stiffness == 0.0) & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
-                & (bridge.silence.coast == bridge.off.coast))
+                & (bridge.silence.coast == bridge.off.coast) & ((own.varies == 0.0) | _straight(own)))
     if dtype == "float32":  # what is not zero has to stay so
         for x in (*numbers_in(numbers), *numbers_in(chip)):
             fits = (x == 0.0) | (abs(x) > _SMALLEST)
             side = side if fits is True else side & fits
     braked = (bridge.off.D == 0.0) & (bridge.D_drive < numbers.source.V)
-    found: list[SideBySide | OneByOne] = [SideBySide(_where(side, np.equal(braked, kind), lanes), kind)
-                                          for kind in (True, False)]
+    banded = _either(banded, slack & np.logical_not(braked))
+    rare = _either(general, _either(banded, slack))
+    found: list[SideBySide | OneByOne] = []
+    for form, some in ((tiles.ONE_FORMULA, braked & np.logical_not(banded)),
+                       (tiles.ARCS, np.logical_not(braked) & np.logical_not(banded)), (tiles.BANDS, banded)):
+        which = _where(side, some, lanes)
+        lagging = bool(np.any(np.broadcast_to(slack, lanes)[which])) if np.any(slack) else False
+        found.append(SideBySide(which, form, lagging, dtype if form != tiles.BANDS else "float64"))
     found += [OneByOne(_where(some, np.logical_not(side), lanes), recipe) for recipe, some in (
         (PLAIN_RUNS, np.logical_not(_either(rare, swinging))), (PENDULUM_RUNS, swinging & np.logical_not(rare)),
         (ALL_RUNS, rare))]
@@ -162,7 +195,7 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
 
 def goes_together(numbers: Numbers, pulsed: bool) -> bool:
     """Tell whether all lanes take about as long, for none has a term that would let it run on its own."""
-    return pulsed and not any(np.any(_differs(numbers, name)) for name in (*_RARE, _PENDULUM))
+    return pulsed and not any(np.any(_differs(numbers, name)) for name in (*_GENERAL, _PENDULUM))
 
 
 def _either(a: Any, b: Any) -> Any:
@@ -233,8 +266,12 @@ def _own(values: Any, kind: Any) -> NDArray[Any]:
     return np.require(values, kind, ("C_CONTIGUOUS", "WRITEABLE"))
 
 
-def outputs_of(work: Work, raw: Raw) -> Outputs:
-    """Return the arrays into which the kernels write."""
-    none = {name: np.zeros((0, 0), np.int8 if name in SMALL_FIELDS else work.dtype) for name in FIELDS}
-    angle, speed, contact, drive, error = ({**none, **raw.fields}[name] for name in FIELDS)
-    return Outputs(angle, speed, contact, drive, error)
+def outputs_of(work: Work, raw: Raw, dtype: str) -> Outputs:
+    """Return the arrays into which the kernels write: those of `raw`, or others of their type."""
+    types = {name: np.dtype(np.int8 if name in SMALL_FIELDS else dtype) for name in FIELDS}
+    arrays = {name: np.zeros((0, 0), kind) for name, kind in types.items()}
+    for name in FIELDS:
+        if name in raw.fields:
+            own = raw.fields[name]
+            arrays[name] = own if own.dtype == types[name] else np.zeros(own.shape, types[name])
+    return Outputs(**arrays)

@@ -19,7 +19,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
-from servotwin.simulation.lane_runs import PLAIN_RUNS, SIDE_BY_SIDE, OneByOne, SideBySide, some_of
+from servotwin.simulation.lane_runs import OneByOne, SideBySide, some_of
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_memory import VectorMemory
@@ -59,7 +59,7 @@ class Store:
         self._columns = columns._replace(torque=self._total)
         self._kinds = self._kinds_now()
         self._sets: list[_Tiles | _Records] = [
-            _Tiles(kind, self._dtype, some_of(self._columns, kind.which), self._threads)
+            _Tiles(kind, some_of(self._columns, kind.which), self._threads)
             if isinstance(kind, SideBySide) else _Records(kind) for kind in self._kinds]
         self._set_of, self._place = np.empty((2, numbers.count), np.int64)
         for k, some in enumerate(self._sets):
@@ -177,10 +177,10 @@ class Store:
         count, workers = len(some.rows), some.workers
         arguments: tuple[Any, ...] = (duration, command, self._total, self._loads_change, some.rows)
         if workers == 1:
-            lost = some.advance(some.which, some.braked, 0, count, *arguments, some.plans[0])
+            lost = some.advance(some.which, *some.form, 0, count, *arguments, some.plans[0])
         else:
             cuts = [count * k // workers for k in range(workers + 1)]
-            runs = [self._pool.submit(some.advance, some.which, some.braked, cuts[k], cuts[k + 1], *arguments,
+            runs = [self._pool.submit(some.advance, some.which, *some.form, cuts[k], cuts[k + 1], *arguments,
                                       some.plans[k]) for k in range(workers)]
             lost = sum(run.result() for run in runs)
         if lost:
@@ -193,7 +193,7 @@ class Store:
             if len(places):
                 self._columns.pieces[:, 1] = command
                 part = records_of(some.rows, places, self._columns.start[3:5, some.which[places]])
-                self._one_by_one(PLAIN_RUNS, some.which[places], durations, part)
+                self._one_by_one(some.general, some.which[places], durations, part)
                 put_records(some.rows, places, part, self._numbers.frame_period[some.which[places]])
 
     def _one_by_one(self, recipe: Any, which: Indices, duration: float | Array, records: NDArray[Any]) -> None:
@@ -258,14 +258,14 @@ def _same(some: list[SideBySide | OneByOne], others: list[SideBySide | OneByOne]
 class _Tiles:
     """Lanes that run side by side."""
 
-    def __init__(self, kind: SideBySide, dtype: str, lanes: tiles.Lanes, threads: int) -> None:
-        self.which, self.braked = kind.which, kind.braked
-        self.rows = room(-(-len(self.which) // TILE), tiles.tile_type(dtype))
+    def __init__(self, kind: SideBySide, lanes: tiles.Lanes, threads: int) -> None:
+        self.which, self.form, self.general = kind.which, (kind.form, kind.slack), kind.general
+        self.rows = room(-(-len(self.which) // TILE), tiles.tile_type(kind.dtype, kind.form))
         self.workers = max(1, min(threads, len(self.rows) // _WORTH))
-        self.plans = [room(1, tiles.plan_type(dtype)) for _ in range(self.workers)]
-        module = kernels(SIDE_BY_SIDE[dtype])
+        self.plans = [room(1, tiles.plan_type(kind.dtype)) for _ in range(self.workers)]
+        module = kernels(kind.recipe)
         self.advance, self._refit = module.advance, module.refit
-        module.start(lanes, math.inf, self.rows)
+        module.start(lanes, kind.form, math.inf, self.rows)
         self.rows["clock"]["piece_end"] = math.inf
 
     def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
@@ -273,7 +273,7 @@ class _Tiles:
 
     def refit(self, columns: tiles.Lanes, lanes: Indices, places: Indices) -> None:
         """Take the numbers of lanes anew."""
-        self._refit(columns, lanes, places, self.rows)
+        self._refit(columns, self.form[0], lanes, places, self.rows)
 
     def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
         """Set angles [rad] and speeds [rad/s]; none of these lanes has play."""

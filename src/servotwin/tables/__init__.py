@@ -1,6 +1,7 @@
-"""Tables as other people's tools write them: one reader of CSV in all its dialects."""
+"""The one reader and writer of tables: CSV as this package writes it, and in all dialects of other people's tools."""
 
+from servotwin.tables.columns import csv_text, read_columns
 from servotwin.tables.dialect import SEPARATORS
 from servotwin.tables.reading import TextTable, read_table
 
-__all__ = ["SEPARATORS", "TextTable", "read_table"]
+__all__ = ["SEPARATORS", "TextTable", "csv_text", "read_columns", "read_table"]

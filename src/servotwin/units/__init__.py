@@ -34,7 +34,8 @@ DIMENSIONS: dict[str, dict[str, float]] = {
     "current": {"A": 1.0, "mA": 1e-3},
     "resistance": {"ohm": 1.0, "mohm": 1e-3},
     "inductance": {"H": 1.0, "mH": 1e-3, "uH": 1e-6},
-    "torque": {"N m": 1.0, "mN m": 1e-3, "kgf cm": _GRAVITY * 1e-2, "ozf in": _POUND / 16 * _GRAVITY * _INCH},
+    "torque": {"N m": 1.0, "mN m": 1e-3, "N cm": 1e-2, "kgf cm": _GRAVITY * 1e-2, "gf cm": _GRAVITY * 1e-5,
+               "ozf in": _POUND / 16 * _GRAVITY * _INCH},
     "torque per current": {"N m/A": 1.0, "mN m/A": 1e-3},
     "voltage per speed": {"V s/rad": 1.0, "mV s/rad": 1e-3, "V/krpm": 0.03 / math.pi},
     "inertia": {"kg m2": 1.0, "g cm2": 1e-7, "kg cm2": 1e-4},
@@ -90,10 +91,21 @@ def factor(unit: str, dimension: str) -> float:
     units = _units_of(dimension)
     if unit in units:
         return units[unit]
-    plain = unit.translate(_SPELLINGS).replace(" / ", "/") if isinstance(unit, str) else unit
+    plain = in_letters(unit).replace(" / ", "/") if isinstance(unit, str) else unit
     if plain not in units:
         raise UnitError(f"unit of a {dimension}", got=unit, allowed=", ".join(units))
     return units[plain]
+
+
+def in_letters(unit: str) -> str:
+    """Return a unit with µ, Ω, °, · and ² in letters, blanks and digits.
+
+    Examples
+    --------
+    >>> in_letters("µs"), in_letters("kg·m²")
+    ('us', 'kg m2')
+    """
+    return unit.translate(_SPELLINGS)
 
 
 @overload

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from servotwin.errors import UnitError
+from servotwin.units import in_letters
 
 COUNTS = "counts"  # what an analog-digital converter or an encoder gives: no unit before it is calibrated
 
@@ -19,7 +20,8 @@ _WORDS: dict[str, dict[str, str]] = {
               "rad/s": "rad/s rad/sec rad_per_s rad_per_sec rad_s", "rpm": "rpm 1/min u/min upm"},
     "voltage": {"V": "v volt volts", "mV": "mv millivolt millivolts"},
     "current": {"A": "a amp amps ampere amperes", "mA": "ma milliamp milliamps milliampere milliamperes"},
-    "torque": {"N m": "nm newtonmeter", "mN m": "mnm", "kgf cm": "kgcm kgfcm"},
+    "torque": {"N m": "nm newtonmeter", "mN m": "mnm", "N cm": "ncm", "kgf cm": "kgcm kgfcm", "gf cm": "gfcm",
+               "ozf in": "ozfin ozin"},
     "temperature": {"K": "k kelvin"},
     "frequency": {"Hz": "hz hertz"},
     "mass": {"kg": "kg kilogram", "g": "g gram"},
@@ -29,10 +31,9 @@ _WORDS: dict[str, dict[str, str]] = {
 }
 _UNITS = {word: (unit, dimension) for dimension, units in _WORDS.items() for unit, words in units.items()
           for word in words.split()}
-_SPELLED = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u00b0": "deg", "\u00b7": " ", "\u22c5": " "})
-_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_FORM = re.compile(rf"\s*(?P<sign>[+-]?)\s*(?P<over>{_NUMBER})?(?:\s*/\s*(?P<under>{_NUMBER}))?\s*\*?\s*"
-                   rf"(?P<unit>[^\s\d+*-][^+*-]*?)\s*(?P<offset>[+-]\s*{_NUMBER})?\s*")
+UNSIGNED = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"  # a number
+_FORM = re.compile(rf"\s*(?P<sign>[+-]?)\s*(?P<over>{UNSIGNED})?(?:\s*/\s*(?P<under>{UNSIGNED}))?\s*\*?\s*"
+                   rf"(?P<unit>[^\s\d+*-][^+*-]*?)\s*(?P<offset>[+-]\s*{UNSIGNED})?\s*")
 
 
 def unit_word(word: str) -> tuple[str, str] | None:
@@ -43,7 +44,7 @@ def unit_word(word: str) -> tuple[str, str] | None:
     >>> unit_word("µs"), unit_word("Degrees"), unit_word("kg"), unit_word("horn")
     (('us', 'time'), ('deg', 'angle'), ('kg', 'mass'), None)
     """
-    plain = word.strip().translate(_SPELLED).casefold()
+    plain = in_letters(word.strip()).casefold()
     found = _UNITS.get(plain) or _UNITS.get(plain.replace(" per ", "/").replace(" / ", "/"))
     return found or _UNITS.get(plain.replace(" ", ""))
 

@@ -20,8 +20,8 @@ from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Priors, Space, nominal
 from servotwin.identification.fitting.point import DELAY_SCALE, Point
-from servotwin.identification.logs.log import Log
 from servotwin.loads import Inertia, Load, Pendulum
+from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
 

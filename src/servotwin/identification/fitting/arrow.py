@@ -71,7 +71,7 @@ class Block(NamedTuple):
     H_oo: Array
 
 
-class Normal(NamedTuple):
+class NormalEquations(NamedTuple):
     """The normal equations of all logs; priors included in the shared ones."""
 
     blocks: tuple[Block, ...]
@@ -159,14 +159,14 @@ class Search:
         return [self.cost_of(point, parts)
                 for point, parts in zip(points, self.forecast.at_all(points, cases=self.cases), strict=True)]
 
-    def normal(self, point: Point, parts: Sequence[LogPart]) -> Normal:
+    def normal(self, point: Point, parts: Sequence[LogPart]) -> NormalEquations:
         """Return the normal equations at a point."""
         blocks = tuple(block(part, self.loss, own, point.own[k])
                        for k, part, own in zip(self.cases, parts, self.own, strict=True))
         off = (point.shared - self.prior.mean) * self.prior.weight**2
         g = off + np.sum([b.g_s for b in blocks], axis=0)
         H = np.diag(self.prior.weight**2) + np.sum([b.H_ss for b in blocks], axis=0)
-        return Normal(blocks, g, H)
+        return NormalEquations(blocks, g, H)
 
     def run(self, start: Point, *, most: int = 60, tell: Tell | None = None,
             least_gain: float = _LEAST_GAIN) -> Outcome:
@@ -211,7 +211,7 @@ class Search:
         """Tell which numbers are held, or at a bound over which the cost falls."""
         return np.asarray(self.held | ((x <= self.lower) & (g > 0.0)) | ((x >= self.upper) & (g < 0.0)))
 
-    def _promise(self, point: Point, normal: Normal) -> float:
+    def _promise(self, point: Point, normal: NormalEquations) -> float:
         """Return by how much the cost would fall in a whole step, if it were a parabola."""
         g, H = normal.reduced()
         moves = ~self._stays(point.shared, g)
@@ -221,10 +221,10 @@ class Search:
                 gain += 0.5 * float(b.g_o @ np.linalg.solve(_safe(b.H_oo), b.g_o))
         return gain
 
-    def _step(self, point: Point, normal: Normal, damping: float, scale: Array) -> tuple[Point, float]:
+    def _step(self, point: Point, normal: NormalEquations, damping: float, scale: Array) -> tuple[Point, float]:
         """Return the next point, and the largest change of a number."""
-        damped = Normal(tuple(b._replace(H_oo=b.H_oo + damping * np.diag(np.diag(b.H_oo))) for b in normal.blocks),
-                        normal.g, normal.H + damping * np.diag(scale))
+        blocks = tuple(b._replace(H_oo=b.H_oo + damping * np.diag(np.diag(b.H_oo))) for b in normal.blocks)
+        damped = NormalEquations(blocks, normal.g, normal.H + damping * np.diag(scale))
         g, H = damped.reduced()
         x = point.shared
         stays = self._stays(x, g)

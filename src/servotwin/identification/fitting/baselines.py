@@ -18,12 +18,12 @@ from servotwin.identification.fitting.slew_lag import (
     POSITIVE,
     Course,
     Courses,
-    Numbers,
+    LagNumbers,
     SlewLag,
     first_angle,
     usable,
 )
-from servotwin.identification.logs.log import ANGLES, Log
+from servotwin.logs.log import ANGLES, Log
 from servotwin.units import is_finite
 
 Array = NDArray[np.float64]
@@ -133,11 +133,11 @@ class _Fitted:
         self.lower = np.array([_bounds(name, self)[0] for name in self.free])
         self.upper = np.array([_bounds(name, self)[1] for name in self.free])
 
-    def numbers(self, x: Array) -> Numbers:
+    def numbers(self, x: Array) -> LagNumbers:
         """Return the numbers (SI) of points x, shape (C, p)."""
         made = {name: np.exp(x[:, k:k + 1]) if name in POSITIVE else self.scale[name] * x[:, k:k + 1]
                 for k, name in enumerate(self.free)}
-        return Numbers(**{"gain": np.ones((len(x), 1)), **made})
+        return LagNumbers(**{"gain": np.ones((len(x), 1)), **made})
 
     def residual(self, x: Array) -> Array:
         """Return modelled less measured angles."""

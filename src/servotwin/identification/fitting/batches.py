@@ -19,9 +19,9 @@ from servotwin.errors import InputError
 from servotwin.loads import Load
 from servotwin.models import Model
 from servotwin.signals import Signal
-from servotwin.simulation.crew import Crew, Here
 from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.many import simulate_lanes
+from servotwin.simulation.workers import HERE, Crew
 
 Array = NDArray[np.float64]
 
@@ -157,7 +157,7 @@ def _simulated(batch: Batch) -> list[dict[str, Array]]:
                      [bundle.load for bundle, count in zip(bundles, counts, strict=True) for _ in range(count)],
                      columns, initial or None, np.zeros(sum(counts), np.int64))
     made = simulate_lanes(lanes, duration=max(bundle.duration for bundle in bundles), output_times=times,
-                          outputs=batch.outputs, executor=Here(), accuracy=batch.accuracy)
+                          outputs=batch.outputs, executor=HERE, accuracy=batch.accuracy)
     found, lane = [], 0
     for bundle, count in zip(bundles, counts, strict=True):
         rows, at = slice(lane, lane + count), places[bundle.key]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.identification.fitting.free import LUMPED, Space
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import BoundedServo, Model
 from servotwin.parameters.output_side import N
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive, default_model
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES
@@ -20,7 +20,7 @@ from servotwin.simulation.progress import lines, on_terminal
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from servotwin.identification.fitting.comparison import Tables
+    from servotwin.identification.fitting.comparison import ErrorTables
     from servotwin.identification.fitting.yielding import Yielded
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ _OVERFITTED = 1.6  # error of new logs over that of the fitted ones
 
 def checked_logs(logs: Any) -> tuple[Log, ...]:
     """Return logs, at least one of which moves."""
-    from servotwin.identification.logs.readers import read_logs
+    from servotwin.logs.readers import read_logs
 
     found = read_logs(logs) if isinstance(logs, str | Path) else [logs] if isinstance(logs, Log) else logs
     if not isinstance(found, Sequence) or not found or not all(isinstance(log, Log) for log in found):
@@ -204,7 +204,7 @@ def checked_count(what: str, number: Any, *, least: int) -> int:
     return int(number)
 
 
-def warnings_of(yielded: Sequence[Yielded], tables: Tables) -> tuple[str, ...]:
+def warnings_of(yielded: Sequence[Yielded], tables: ErrorTables) -> tuple[str, ...]:
     """Return what a reader has to know of a fit, a line each."""
     found = [str(one) for one in yielded]
     if tables.holdout and tables.training:

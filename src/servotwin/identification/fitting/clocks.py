@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.noise import Series, noise_of
+from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.phases import Scan, drifts, likely_periods, settled, with_period
 from servotwin.identification.fitting.point import PERIOD_SCALE, Point
 from servotwin.identification.fitting.scatter import by_sensor
-from servotwin.identification.logs.log import ANGLES
-from servotwin.identification.logs.regular import made_regular, regular_times
+from servotwin.logs.log import ANGLES
+from servotwin.logs.regular import made_regular, regular_times
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.task import Task
@@ -173,8 +173,8 @@ def _is_more_than_noise(task: Task, point: Point) -> bool:
         case, residuals = forecast.cases[k], by_sensor(forecast, k, part)
         name = next(name for name in ANGLES if name in case.places)
         measured = case.values[name]
-        series.append(Series(case.log, case.log.start + case.times[case.places[name]], measured,
-                             measured + residuals[name]))
+        series.append(SensorSeries(case.log, case.log.start + case.times[case.places[name]], measured,
+                                   measured + residuals[name]))
     left = float(np.sqrt(np.mean(np.concatenate([one.residual for one in series]) ** 2)))
     return left > _MORE * noise_of(series).size
 

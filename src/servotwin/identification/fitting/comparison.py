@@ -18,7 +18,7 @@ from servotwin.identification.fitting.held_out import with_pulses_of
 from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
 from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.identification.fitting.task import Task
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
 
@@ -34,7 +34,7 @@ _VISCOUS = "motor.motor_viscous_friction"
 
 
 @dataclass(frozen=True)
-class Tables:
+class ErrorTables:
     """Errors of the fitted servo and of the models beside it."""
 
     training: ErrorTable
@@ -42,7 +42,7 @@ class Tables:
 
 
 def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo: Servo,
-            beside: tuple[str, ...], tell: Callable[[], object] = lambda: None) -> Tables:
+            beside: tuple[str, ...], tell: Callable[[], object] = lambda: None) -> ErrorTables:
     """Return the errors of the fitted servo, log by log, and of the models beside it.
 
     Parameters
@@ -72,8 +72,8 @@ def compare(task: Task, held_out: Sequence[int], traces: Sequence[Trace], servo:
         if simple:
             errors[M1] = simple
     models = tuple(errors)
-    return Tables(*(ErrorTable(models if which else (), {m: tuple(errors[m][k] for k in which) for m in models})
-                    for which in (fitted, held_out)))
+    return ErrorTables(*(ErrorTable(models if which else (), {m: tuple(errors[m][k] for k in which) for m in models})
+                         for which in (fitted, held_out)))
 
 
 def _of_slew(logs: Sequence[Log], fitted: Sequence[int], traces: Sequence[Trace], loss: float) -> dict[int, LogError]:

@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from servotwin.identification.fitting.arrow import Loss
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.frames import gap_of, near_edges
-from servotwin.identification.fitting.phases import Choice, Scan
+from servotwin.identification.fitting.phases import PulseChoice, Scan
 from servotwin.identification.fitting.point import DELAY_SCALE, LogPart
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
-from servotwin.identification.logs.log import Log
-from servotwin.identification.logs.regular import regular_times
+from servotwin.logs.log import Log
+from servotwin.logs.regular import regular_times
 
 Array = NDArray[np.float64]
 
 _SHOWN = 3  # times of a log that are named
 
 
-def delay_range(scan: Scan, credible: Mapping[int, Sequence[Choice]],
+def delay_range(scan: Scan, credible: Mapping[int, Sequence[PulseChoice]],
                 errors: Sequence[float]) -> tuple[float, float]:
     """Return between which values the delay lies [s]: what all logs allow, and where they do not agree what they say.
 
@@ -55,7 +55,7 @@ def delay_range(scan: Scan, credible: Mapping[int, Sequence[Choice]],
     return max(min(low, high), 0.0), max(low, high, 0.0)
 
 
-def unsure_commands(scan: Scan, credible: Mapping[int, Sequence[Choice]]) -> tuple[str, ...]:
+def unsure_commands(scan: Scan, credible: Mapping[int, Sequence[PulseChoice]]) -> tuple[str, ...]:
     """Return the commands of which it is not sure which pulse carries them, a line a log."""
     lines = []
     for k, choices in credible.items():

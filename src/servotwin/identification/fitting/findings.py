@@ -18,7 +18,7 @@ from servotwin.identification.fitting.suspicions.sign import turned
 from servotwin.identification.fitting.suspicions.span import spans
 from servotwin.identification.fitting.suspicions.stamps import missing_rows, wrong_stamps
 from servotwin.identification.fitting.suspicions.wrap import wraps
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import Model
 
 __all__ = ["KINDS", "MENDED", "Finding", "Mended", "explained", "findings", "first_looks", "mended"]

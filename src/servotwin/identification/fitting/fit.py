@@ -14,7 +14,7 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.holdout import ErrorTable, LogError, log_error
 from servotwin.identification.fitting.words import Unidentifiable
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
 

@@ -31,7 +31,7 @@ from servotwin.identification.fitting.point import (
     LogPart,
     Point,
 )
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters.output_side import output_value
 from servotwin.signals import Signal

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.point import Frames
-from servotwin.identification.logs.log import KINDS, Log
+from servotwin.logs.log import KINDS, Log
 from servotwin.signals.shapes import sampled
 
 if TYPE_CHECKING:

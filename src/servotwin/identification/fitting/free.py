@@ -236,7 +236,7 @@ def unit_of_free(name: str) -> str:
     if name in LUMPED:
         return LUMPED[name][2]
     if name in LOAD_NAMES:
-        from servotwin.simulation.sweep import dimension_of
+        from servotwin.studies import dimension_of
 
         return si_unit(dimension_of(name))
     return unit_of(name)

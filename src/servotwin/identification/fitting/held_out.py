@@ -11,10 +11,10 @@ from servotwin.identification.fitting.arrow import Loss
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.frames import latency, widest
-from servotwin.identification.fitting.phases import Choice, Scan, settled
+from servotwin.identification.fitting.phases import PulseChoice, Scan, settled
 from servotwin.identification.fitting.point import DELAY_SCALE, LogPart, Point
 from servotwin.identification.fitting.scatter import by_sensor
-from servotwin.identification.logs.log import ANGLES
+from servotwin.logs.log import ANGLES
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ def with_pulses_of(forecast: Forecast, loss: Loss, point: Point, held_out: Seque
         case = forecast.cases[k]
         frames = widest(case.log, period or case.period)
         usual = float(np.median(waits)) if waits else latency(case.log, frames)
-        choices[k] = Choice(frames, (frames.phase + usual - latency(case.log, frames)) / DELAY_SCALE)
+        choices[k] = PulseChoice(frames, (frames.phase + usual - latency(case.log, frames)) / DELAY_SCALE)
 
     def first_half(k: int) -> NDArray[np.bool_]:
         case = forecast.cases[k]

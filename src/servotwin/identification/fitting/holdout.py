@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 
 _FEW = 4  # logs of one kind, below which none of it is held out
 

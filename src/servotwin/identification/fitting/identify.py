@@ -36,11 +36,11 @@ from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
 from servotwin.identification.fitting.words import explain, simplest, vague_directions
 from servotwin.identification.fitting.yielding import Dropped, Yielded, settle, yielded
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
-from servotwin.simulation.crew import Crew
 from servotwin.simulation.start import accuracy_of
+from servotwin.simulation.workers import Crew
 
 Array = NDArray[np.float64]
 _VOLTAGE = "supply.open_circuit_voltage"

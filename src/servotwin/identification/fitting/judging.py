@@ -10,12 +10,12 @@ import numpy as np
 from servotwin.identification.fitting.arrow import Prior
 from servotwin.identification.fitting.diagnosis import diagnose
 from servotwin.identification.fitting.fit import Fit, Trace
-from servotwin.identification.fitting.noise import Series, noise_of
+from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.uncertainty import Rows, rows_of
 from servotwin.identification.fitting.verdict import Cause, Verdict, judge, shown
-from servotwin.identification.logs.log import ANGLES
+from servotwin.logs.log import ANGLES
 
 _OUTLIERS = 0.005  # of the samples: then they are told
 _EFFORT = 3.0  # times that of the fit, for all trials: the verdict itself and their start are not counted
@@ -97,12 +97,12 @@ def _others(task: Task) -> dict[str, float]:
         if name in ANGLES:
             continue
         cases = [case for case in (task.forecast.cases[k] for k in task.fitted) if name in case.places]
-        flat = [Series(case.log, case.times[case.places[name]] + case.log.start, case.values[name],
-                       np.zeros(len(case.values[name]))) for case in cases]
+        flat = [SensorSeries(case.log, case.times[case.places[name]] + case.log.start, case.values[name],
+                             np.zeros(len(case.values[name]))) for case in cases]
         if flat:
             found[name] = noise_of(flat).size
     return found
 
 
-def _series(trace: Trace) -> Series:
-    return Series(trace.log, trace.time, trace.measured, trace.simulated)
+def _series(trace: Trace) -> SensorSeries:
+    return SensorSeries(trace.log, trace.time, trace.measured, trace.simulated)

@@ -19,7 +19,7 @@ from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.holdout import LogError, pooled
 from servotwin.identification.fitting.identify import identify
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models.base import Model
 from servotwin.parameters import Servo
 

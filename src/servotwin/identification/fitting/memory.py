@@ -21,7 +21,7 @@ _GRID = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 
 _LEAST = 0.2  # of the noise's power is left at least: beyond that the numbers follow the noise itself
 
 
-class Memory(NamedTuple):
+class NoiseMemory(NamedTuple):
     """First-order autoregressive noise behind residuals.
 
     Parameters
@@ -42,7 +42,7 @@ class Memory(NamedTuple):
     plain: float
 
 
-def memory_of(rows: Sequence[Rows], directions: Array) -> Memory:
+def memory_of(rows: Sequence[Rows], directions: Array) -> NoiseMemory:
     """Return the noise that leaves such residuals.
 
     Parameters
@@ -63,14 +63,14 @@ def memory_of(rows: Sequence[Rows], directions: Array) -> Memory:
     """
     power = sum(float(r.residual @ r.residual) for r in rows)
     if power == 0.0:
-        return Memory(0.0, 0.0, 0.0, 0.0)
+        return NoiseMemory(0.0, 0.0, 0.0, 0.0)
     seen = sum(float(r.residual[1:] @ r.residual[:-1]) for r in rows) / power
     bases = _bases(rows, directions)
     left = np.array([_left(bases, rho) for rho in _GRID])
     expected = np.maximum.accumulate(left[:, 1] / left[:, 0])
     rho = float(np.interp(seen, expected, _GRID))
     behind = power / np.interp([rho, 0.0], _GRID, left[:, 0])
-    return Memory(rho, float(behind[0]), seen - float(expected[0]), float(behind[1]))
+    return NoiseMemory(rho, float(behind[0]), seen - float(expected[0]), float(behind[1]))
 
 
 def _bases(rows: Sequence[Rows], directions: Array) -> list[tuple[Array, Array]]:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ _BY_BENDS = 0.2  # how surely second differences tell the noise's power, in its 
 
 
 @dataclass(frozen=True)
-class Series:
+class SensorSeries:
     """What one sensor measured in one log, where it counts.
 
     Parameters
@@ -68,7 +68,7 @@ class Series:
         return np.gradient(self.simulated, self.time) if len(self.time) > 1 else np.zeros(len(self.time))
 
 
-class Guess(NamedTuple):
+class NoiseGuess(NamedTuple):
     """One of several equally likely noises: standard deviation (SI) and correlation of neighbours."""
 
     size: float
@@ -87,7 +87,7 @@ class Noise:
         Correlation of neighbouring samples, known from where the shaft stands; nan where it hardly does.
     white : float
         From second differences alone, which noise that remembers itself hides from.
-    guesses : tuple of Guess
+    guesses : tuple of NoiseGuess
         How sure that is: noises that what stands makes equally likely; none where it hardly does.
     repeats : float
         How far logs of the same command are apart, as of one sample; nan where there are none.
@@ -100,7 +100,7 @@ class Noise:
     size: float
     memory: float
     white: float
-    guesses: tuple[Guess, ...]
+    guesses: tuple[NoiseGuess, ...]
     repeats: float
     count: float
     jitter: float
@@ -110,12 +110,12 @@ class Noise:
         """Whether the noise's memory is known."""
         return bool(self.guesses)
 
-    def of(self, one: Series, size: float | None = None) -> Array:
+    def of(self, one: SensorSeries, size: float | None = None) -> Array:
         """Return the noise of each sample of a log: stamps that are off make it larger while the shaft moves."""
         return np.asarray(np.hypot(self.size if size is None else size, one.speed * self.jitter))
 
 
-def noise_of(series: Sequence[Series]) -> Noise:
+def noise_of(series: Sequence[SensorSeries]) -> Noise:
     """Return the noise of one sensor in several logs.
 
     Examples
@@ -124,7 +124,7 @@ def noise_of(series: Sequence[Series]) -> Noise:
     >>> angle = 1e-3 * np.random.default_rng(0).normal(size=400)
     >>> log = Log(name="stands", time=time, command=np.full(400, 1.5e-3), command_kind="pulse_width",
     ...           measured={"output_angle": angle})
-    >>> found = noise_of([Series(log, time, angle, np.zeros(400))])
+    >>> found = noise_of([SensorSeries(log, time, angle, np.zeros(400))])
     >>> round(1e3 * found.size, 1), abs(found.memory) < 0.1, found.count
     (1.0, True, 0.0)
     """
@@ -135,13 +135,13 @@ def noise_of(series: Sequence[Series]) -> Noise:
         size = next((value for value in (repeats, white) if math.isfinite(value)), 0.0)
         return Noise(max(size, floor), math.nan, white, (), repeats, count, _jitter(series))
     # What stands is counted off by the same each time
-    found = tuple(Guess(max(g.size, floor), g.memory if g.size > 0.5 * count else max(g.memory, _COUNTED))
+    found = tuple(NoiseGuess(max(g.size, floor), g.memory if g.size > 0.5 * count else max(g.memory, _COUNTED))
                   for g in guesses)
     middle = found[len(found) // 2]
     return Noise(middle.size, middle.memory, white, found, repeats, count, _jitter(series))
 
 
-def _jitter(series: Sequence[Series]) -> float:
+def _jitter(series: Sequence[SensorSeries]) -> float:
     """Return how far stamps are off: as they scatter about their neighbours' middle, and as fast samples do [s]."""
     uneven, seen = [], []
     for one in series:
@@ -158,7 +158,7 @@ def _jitter(series: Sequence[Series]) -> float:
     return min(stamps, shaft)
 
 
-def _count(series: Sequence[Series]) -> float:
+def _count(series: Sequence[SensorSeries]) -> float:
     """Return the step of an instrument that counts: all values are multiples of it, and many are the same."""
     values = np.concatenate([one.measured for one in series])
     apart = np.diff(np.unique(values))
@@ -170,13 +170,13 @@ def _count(series: Sequence[Series]) -> float:
     return step if float(np.quantile(off, 0.98)) < 0.02 * max(1.0, float(np.median(apart / step))) else 0.0
 
 
-def _white(series: Sequence[Series]) -> float:
+def _white(series: Sequence[SensorSeries]) -> float:
     """Return white noise from second differences; nan of too few samples."""
     every = np.concatenate([bends(one) for one in series if len(one.time) >= 5] or [np.zeros(0)])
     return _NORMAL * float(np.median(np.abs(every))) if len(every) >= _LEAST else math.nan
 
 
-def bends(one: Series) -> Array:
+def bends(one: SensorSeries) -> Array:
     """Return each sample less the line between its neighbours, as large as one sample's noise."""
     t, y = one.time, one.residual
     first = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
@@ -184,7 +184,7 @@ def bends(one: Series) -> Array:
     return np.asarray((bend / np.sqrt(1.0 + first**2 + (1.0 - first)**2))[one.joined[1:-1] & one.joined[2:]])
 
 
-def _windows(one: Series) -> list[Array]:
+def _windows(one: SensorSeries) -> list[Array]:
     """Return the scatter while the shaft stood, in stretches of some samples: the command has been the same long."""
     at = np.searchsorted(one.log.time, one.time)
     command = one.log.command[np.minimum(at, len(one.log.command) - 1)]
@@ -213,7 +213,7 @@ def _windows(one: Series) -> list[Array]:
     return found
 
 
-def _quiet(one: Series, piece: NDArray[np.int64], near: NDArray[np.bool_]) -> Array | None:
+def _quiet(one: SensorSeries, piece: NDArray[np.int64], near: NDArray[np.bool_]) -> Array | None:
     """Return the scatter about a line of a stretch in which the shaft stands, creeps or dithers evenly.
 
     None if the simulation goes somewhere. Of a servo that dithers from frame to frame, what the simulation leaves.
@@ -229,7 +229,7 @@ def _quiet(one: Series, piece: NDArray[np.int64], near: NDArray[np.bool_]) -> Ar
     return less if np.ptp(one.simulated[piece]) < _DITHER else None
 
 
-def isolated(one: Series, jitter: float = 0.0) -> NDArray[np.bool_]:
+def isolated(one: SensorSeries, jitter: float = 0.0) -> NDArray[np.bool_]:
     """Return which samples are outliers: far from the four around them, which are near each other.
 
     Examples
@@ -237,7 +237,7 @@ def isolated(one: Series, jitter: float = 0.0) -> NDArray[np.bool_]:
     >>> time, values = np.arange(40) * 0.02, np.random.default_rng(0).normal(size=40)
     >>> values[7] += 50.0
     >>> log = Log(name="one", time=time, command=time, command_kind="angle", measured={"output_angle": values})
-    >>> np.flatnonzero(isolated(Series(log, time, values, np.zeros(40)))).tolist()
+    >>> np.flatnonzero(isolated(SensorSeries(log, time, values, np.zeros(40)))).tolist()
     [7]
     """
     r = one.residual
@@ -263,7 +263,7 @@ def _line(m: int) -> Array:
     return np.full((m, m), 1.0 / m) + np.outer(x, x) / float(x @ x)
 
 
-def _at_rest(windows: Sequence[Array], white: float) -> tuple[Guess, ...]:
+def _at_rest(windows: Sequence[Array], white: float) -> tuple[NoiseGuess, ...]:
     """Return noises that are equally likely, first-order autoregressive ones, the smaller ones first; none if unknown.
 
     As likely as they make stretches whose lines were taken away (Patterson & Thompson 1971), and second differences.
@@ -276,7 +276,7 @@ def _at_rest(windows: Sequence[Array], white: float) -> tuple[Guess, ...]:
     squares, volumes = _forms(kept)
     usual = squares[0] / free
     if usual == 0.0:
-        return (Guess(0.0, 0.0),)
+        return (NoiseGuess(0.0, 0.0),)
     power = usual * np.geomspace(0.2, 20.0, 80)[None, :]
     rho = _RHO[:, None]
     likely = -0.5 * (free * np.log(power) + volumes[:, None] + squares[:, None] / power)
@@ -288,7 +288,7 @@ def _at_rest(windows: Sequence[Array], white: float) -> tuple[Guess, ...]:
     by_power = weight.sum(axis=0)
     memory = (weight * rho).sum(axis=0) / np.maximum(by_power, 1e-300)
     middle = np.interp((np.arange(_GUESSES) + 0.5) / _GUESSES, np.cumsum(by_power) - 0.5 * by_power, power[0])
-    return tuple(Guess(math.sqrt(p), float(np.interp(p, power[0], memory))) for p in middle.tolist())
+    return tuple(NoiseGuess(math.sqrt(p), float(np.interp(p, power[0], memory))) for p in middle.tolist())
 
 
 def _forms(windows: Sequence[Array]) -> tuple[Array, Array]:
@@ -305,9 +305,9 @@ def _forms(windows: Sequence[Array]) -> tuple[Array, Array]:
     return squares, volumes
 
 
-def _repeats(series: Sequence[Series]) -> float:
+def _repeats(series: Sequence[SensorSeries]) -> float:
     """Return how far logs of the same command under the same load are apart, as of one sample."""
-    groups: dict[tuple[object, ...], list[Series]] = {}
+    groups: dict[tuple[object, ...], list[SensorSeries]] = {}
     for one in series:
         log = one.log
         key = (log.command.tobytes(), np.round(one.time - log.start, 6).tobytes(), repr(log.load),

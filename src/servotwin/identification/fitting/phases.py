@@ -36,21 +36,21 @@ _UNLIKELY = 100.0  # times the weight of the best: pulses that count no more
 _DRIFTS = 1e-2  # how often pulses that do not drift would look as if
 
 
-class Choice(NamedTuple):
+class PulseChoice(NamedTuple):
     """A trial of one log: the assignment, and when its first pulse comes (scaled, as its own number)."""
 
     frames: Frames
     first: float
 
 
-class Trial(NamedTuple):
+class PulseTrial(NamedTuple):
     """What a trial found: its cost, and the time of the first pulse at which that was.
 
     The cost counts how narrow the gap is in which the phase has to lie: less the logarithm of its share of a frame.
     """
 
     cost: float
-    choice: Choice
+    choice: PulseChoice
 
 
 class Scan:
@@ -76,24 +76,24 @@ class Scan:
         """Return where a log's own numbers hold the time of its first pulse."""
         return self.forecast.names_of_own(self.forecast.cases[k]).index("frame_phase")
 
-    def now(self, k: int) -> Choice:
+    def now(self, k: int) -> PulseChoice:
         """Return what the point has for a log."""
-        return Choice(self.forecast.frames_of(self.point, k), float(self.point.own[k][self.place(k)]))
+        return PulseChoice(self.forecast.frames_of(self.point, k), float(self.point.own[k][self.place(k)]))
 
-    def like(self, k: int, gap: Gap, period: float | None = None) -> Choice:
+    def like(self, k: int, gap: Gap, period: float | None = None) -> PulseChoice:
         """Return a trial of other phases whose commands wait as long in the mean as they do now."""
         now, log = self.now(k), self.forecast.cases[k].log
         frames = Frames(gap.middle, now.frames.period if period is None else period)
         waits = now.first * DELAY_SCALE - now.frames.phase + latency(log, now.frames)
-        return Choice(frames, (frames.phase + waits - latency(log, frames)) / DELAY_SCALE)
+        return PulseChoice(frames, (frames.phase + waits - latency(log, frames)) / DELAY_SCALE)
 
-    def later(self, k: int, steps: int) -> list[Choice]:
+    def later(self, k: int, steps: int) -> list[PulseChoice]:
         """Return trials of the present assignment whose pulses come earlier and later, up to a frame."""
         now = self.now(k)
         step = now.frames.period / steps / DELAY_SCALE
-        return [now, *(Choice(now.frames, now.first + i * step) for i in range(-steps, steps + 1) if i)]
+        return [now, *(PulseChoice(now.frames, now.first + i * step) for i in range(-steps, steps + 1) if i)]
 
-    def moved(self, choices: Mapping[int, Choice]) -> Point:
+    def moved(self, choices: Mapping[int, PulseChoice]) -> Point:
         """Return the point with other pulses of some logs."""
         own = list(self.point.own)
         frames = [self.forecast.frames_of(self.point, k) for k in range(len(own))]
@@ -103,7 +103,7 @@ class Scan:
             frames[k] = choice.frames
         return self.point._replace(own=tuple(own), frames=tuple(frames))
 
-    def tried(self, choices: Mapping[int, Sequence[Choice]], *, moves: bool = True) -> dict[int, list[Trial]]:
+    def tried(self, choices: Mapping[int, Sequence[PulseChoice]], *, moves: bool = True) -> dict[int, list[PulseTrial]]:
         """Run all trials of some logs in one batch; each comes back with its pulses moved to where they fit best.
 
         `moves=False` leaves them where they are.
@@ -114,7 +114,7 @@ class Scan:
         return {k: [self._corrected(k, choice, parts[i][j], 6 * moves) for i, choice in enumerate(some)]
                 for j, (k, some) in enumerate(choices.items())}
 
-    def best(self, choices: Mapping[int, Sequence[Choice]], rounds: int = 2) -> dict[int, list[Trial]]:
+    def best(self, choices: Mapping[int, Sequence[PulseChoice]], rounds: int = 2) -> dict[int, list[PulseTrial]]:
         """Run all trials, and the best of them again where they then fit best; return the latter, the best first."""
         found = {k: sorted(some, key=lambda trial: trial.cost)[:_BEST] for k, some in self.tried(choices).items()}
         for _ in range(rounds):
@@ -122,13 +122,13 @@ class Scan:
             found = {k: sorted(some, key=lambda trial: trial.cost) for k, some in again.items()}
         return found
 
-    def _corrected(self, k: int, choice: Choice, part: LogPart, rounds: int) -> Trial:
+    def _corrected(self, k: int, choice: PulseChoice, part: LogPart, rounds: int) -> PulseTrial:
         """Return the cost that a trial would have with its pulses moved, to first order, at most half a frame."""
         r, g = part.residual, part.later
         if self.mask is not None:
             r, g = r[self.mask(k)], g[self.mask(k)]
         if not np.isfinite(r).all():
-            return Trial(math.inf, choice)
+            return PulseTrial(math.inf, choice)
         step, most = 0.0, 0.5 * choice.frames.period / DELAY_SCALE
         for _ in range(rounds):
             w = self.loss.weight(r + g * step)
@@ -139,7 +139,7 @@ class Scan:
         cost, moved = min((self.loss.cost(r + g * s), s) for s in (0.0, step))
         width = max(gap_of(self.forecast.cases[k].log, choice.frames).width, 1e-12)
         cost -= self.widening * math.log(width / choice.frames.period)
-        return Trial(cost, Choice(choice.frames, choice.first + moved))
+        return PulseTrial(cost, PulseChoice(choice.frames, choice.first + moved))
 
 
 def settled(scan: Scan, cases: Sequence[int]) -> Point:
@@ -156,7 +156,7 @@ def settled(scan: Scan, cases: Sequence[int]) -> Point:
     return scan.moved(found)
 
 
-def credible(scan: Scan, cases: Sequence[int]) -> dict[int, list[Choice]]:
+def credible(scan: Scan, cases: Sequence[int]) -> dict[int, list[PulseChoice]]:
     """Return the pulses that each log allows: of at least a hundredth of the weight of the best.
 
     Where the shaft rests at all samples about which pulses come earlier or later, the cost has a plateau; so they are
@@ -214,7 +214,7 @@ def likely_periods(scan: Scan, cases: Sequence[int]) -> list[float]:
     pulses = np.cumsum([forecast.cases[k].log.duration / nominal for k in order])
     rich = [k for k, before in zip(order, [0.0, *pulses], strict=False) if before < _FIRST_PULSES][:_FIRST_LOGS]
     longest = max(forecast.cases[k].log.duration for k in rich)
-    choices: dict[int, list[Choice]] = {k: [] for k in rich}
+    choices: dict[int, list[PulseChoice]] = {k: [] for k in rich}
     of_period: dict[int, list[float]] = {k: [] for k in rich}
     for period in _periods(nominal, longest):
         for k in rich:

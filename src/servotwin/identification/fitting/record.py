@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.fit import LEAST_SHARE
 from servotwin.identification.fitting.free import LUMPED, FreeParameter, Space
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.parameters import Servo
 from servotwin.parameters.output_side import N
 from servotwin.parameters.quantity import Quantity

@@ -12,8 +12,8 @@ from servotwin.errors import InputError
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.words import Unidentifiable
-from servotwin.identification.logs.log import Log
 from servotwin.loads import Inertia, Pendulum
+from servotwin.logs.log import Log
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.units import is_finite
 
 Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ class SlewLag:
             raise InputError(f"log {log.name!r}: command_kind", got=log.command_kind, allowed=self.command_kind)
         start = first_angle(log, self.signal) if start_angle is None else float(start_angle)
         course = Courses([Course.of(log, np.ones(len(log), np.bool_), start)])
-        angle: Array = course.angles(Numbers(*(np.array([[getattr(self, name)]]) for name in NUMBERS)))[0][0]
+        angle: Array = course.angles(LagNumbers(*(np.array([[getattr(self, name)]]) for name in NUMBERS)))[0][0]
         return angle
 
     def rms(self, log: Log) -> float:
@@ -135,7 +135,7 @@ def first_angle(log: Log, signal: str) -> float:
     return float(log.measured[signal][np.argmax(used)])
 
 
-class Numbers(NamedTuple):
+class LagNumbers(NamedTuple):
     """The numbers of some models, each a column (C, 1), in the order of `NUMBERS`."""
 
     delay: Array
@@ -176,7 +176,7 @@ class Courses:
         self.log_of = np.repeat(np.arange(len(courses)), [len(times) for times in self.times])
         self.time = np.concatenate(self.times)
 
-    def angles(self, numbers: Numbers) -> tuple[Array, Array]:
+    def angles(self, numbers: LagNumbers) -> tuple[Array, Array]:
         """Return angle and speed at all wanted times, shape (C, N); the delay is that of the first model."""
         delay = float(numbers.delay[0, 0])
         place = np.concatenate([np.searchsorted(events, times - delay, side="right") - 1
@@ -187,7 +187,7 @@ class Courses:
         angle, speed = _advance(self._at_changes(numbers)[place, :, self.log_of].T, target, since, numbers)
         return angle, np.where(before, 0.0, speed)
 
-    def _at_changes(self, numbers: Numbers) -> Array:
+    def _at_changes(self, numbers: LagNumbers) -> Array:
         """Return the angles where the commands change, shape (K, C, L); the delay shifts them all alike."""
         found = np.empty((self.events.shape[1], len(numbers.lag), len(self.start)))
         found[0] = self.start
@@ -201,7 +201,7 @@ def _padded(values: Array, most: int) -> Array:
     return np.append(values, np.full(most - len(values), values[-1]))
 
 
-def _advance(angle: Array, target: Array, span: Array, numbers: Numbers) -> tuple[Array, Array]:
+def _advance(angle: Array, target: Array, span: Array, numbers: LagNumbers) -> tuple[Array, Array]:
     """Return angle and speed after a span of time under a constant target: first at the slew rate, then by the lag."""
     error = target - angle
     half = 0.5 * numbers.deadband

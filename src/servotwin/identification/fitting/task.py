@@ -27,7 +27,7 @@ from servotwin.identification.fitting.point import (
     Point,
 )
 from servotwin.identification.fitting.scatter import scatter_of
-from servotwin.identification.logs.log import ANGLES
+from servotwin.logs.log import ANGLES
 from servotwin.models import Model
 
 Array = NDArray[np.float64]

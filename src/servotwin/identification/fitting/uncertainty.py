@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Loss, Prior
-from servotwin.identification.fitting.memory import Memory, memory_of
+from servotwin.identification.fitting.memory import NoiseMemory, memory_of
 from servotwin.identification.fitting.point import LogPart
 
 Array = NDArray[np.float64]
@@ -251,7 +251,7 @@ def _varying(held: NDArray[np.bool_], vague: Array | None) -> Array:
     return np.asarray(Q @ vectors[:, int((sizes > 1e-9).sum()):])
 
 
-def _first_order(rows: Sequence[Rows], memory: Memory) -> Array:
+def _first_order(rows: Sequence[Rows], memory: NoiseMemory) -> Array:
     """Return the covariance of the gradient if residuals are first-order autoregressive."""
     from scipy.signal import lfilter
 
@@ -264,7 +264,7 @@ def _first_order(rows: Sequence[Rows], memory: Memory) -> Array:
     return total
 
 
-def _independent(rows: Sequence[Rows], memory: Memory) -> float:
+def _independent(rows: Sequence[Rows], memory: NoiseMemory) -> float:
     """Return how many independent residuals there are, less the numbers that were fitted."""
     count = sum(len(r.residual) for r in rows) * (1.0 - memory.correlation) / (1.0 + memory.correlation)
     return float(max(count - rows[0].slope.shape[1] - sum(r.own for r in rows), 3.0))

@@ -22,7 +22,7 @@ from servotwin.identification.fitting.holdout import ErrorTable
 from servotwin.identification.fitting.point import NUISANCES, SHARED, LogPart, Point
 from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.identification.fitting.task import HUBER, Task
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import MODELS, Model
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.noise import Guess, Noise, Series, isolated, noise_of
+from servotwin.identification.fitting.noise import Noise, NoiseGuess, SensorSeries, isolated, noise_of
 from servotwin.identification.fitting.uncertainty import Rows
 
 Array = NDArray[np.float64]
@@ -115,12 +115,12 @@ class Excess:
         return self.size > _SMALL and self.odds < FALSE_ALARM
 
 
-def judge(series: Sequence[Series], sensor: str, rows: Sequence[Rows] = (), numbers: int = 0) -> Verdict:
+def judge(series: Sequence[SensorSeries], sensor: str, rows: Sequence[Rows] = (), numbers: int = 0) -> Verdict:
     """Return the verdict on a fit, without causes.
 
     Parameters
     ----------
-    series : sequence of Series
+    series : sequence of SensorSeries
         The angle in every fitted log.
     sensor : str
         Its name, for the words.
@@ -202,18 +202,18 @@ def _test(parts: Sequence[Array], expected: float, sure: float) -> Excess | None
     return Excess(more, float(stdtr(len(sums) - 1.0, -more / spread)))
 
 
-def _size(series: Sequence[Series], inner: Sequence[NDArray[np.bool_]], noise: Noise) -> Excess | None:
+def _size(series: Sequence[SensorSeries], inner: Sequence[NDArray[np.bool_]], noise: Noise) -> Excess | None:
     """Test whether residuals are larger than the noise; nothing counts more than three times it."""
-    def more(guess: Guess) -> Array:
+    def more(guess: NoiseGuess) -> Array:
         parts = [np.minimum((one.residual / noise.of(one, guess.size))[keep]**2, _CLIP**2)
                  for one, keep in zip(series, inner, strict=True)]
         return np.concatenate(parts) - _CLIPPED
     return _over(noise, more)
 
 
-def _memory(series: Sequence[Series], inner: Sequence[NDArray[np.bool_]], noise: Noise) -> Excess | None:
+def _memory(series: Sequence[SensorSeries], inner: Sequence[NDArray[np.bool_]], noise: Noise) -> Excess | None:
     """Test whether neighbouring residuals are more alike than noise at rest is."""
-    def more(guess: Guess) -> Array:
+    def more(guess: NoiseGuess) -> Array:
         parts = []
         for one, keep in zip(series, inner, strict=True):
             v = np.clip(one.residual / noise.of(one, guess.size), -_CLIP, _CLIP)
@@ -222,7 +222,7 @@ def _memory(series: Sequence[Series], inner: Sequence[NDArray[np.bool_]], noise:
     return _over(noise, more)
 
 
-def _over(noise: Noise, more: Callable[[Guess], Array]) -> Excess | None:
+def _over(noise: Noise, more: Callable[[NoiseGuess], Array]) -> Excess | None:
     """Test whether a mean is above 0, which it is at most of true noise; all likely noises are asked in turn."""
     from scipy.special import ndtr
 
@@ -241,7 +241,8 @@ def _over(noise: Noise, more: Callable[[Guess], Array]) -> Excess | None:
     return Excess(sizes[len(sizes) // 2], float(np.mean(odds)))
 
 
-def _motion(series: Sequence[Series], scaled: Sequence[Array], inner: Sequence[NDArray[np.bool_]]) -> Excess | None:
+def _motion(series: Sequence[SensorSeries], scaled: Sequence[Array],
+            inner: Sequence[NDArray[np.bool_]]) -> Excess | None:
     """Test whether residuals are larger while the shaft moves or has just moved, of whatever noise."""
     power = [np.minimum(u[keep]**2, _CLIP**2) for u, keep in zip(scaled, inner, strict=True)]
     moves = [_moves(one)[keep] for one, keep in zip(series, inner, strict=True)]
@@ -251,7 +252,7 @@ def _motion(series: Sequence[Series], scaled: Sequence[Array], inner: Sequence[N
     return _test([rank * (p / mean - 1.0) for rank, p in zip(ranks, power, strict=True)], 0.0, 0.0)
 
 
-def _moves(one: Series) -> Array:
+def _moves(one: SensorSeries) -> Array:
     """Return how much the shaft moves in the simulation at each sample and shortly before."""
     speed = np.abs(one.speed)
     step = float(np.median(np.diff(one.time))) if len(one.time) > 1 else _SHORTLY

@@ -11,8 +11,8 @@ from servotwin.identification.report import pictures as report_pictures
 from servotwin.identification.report import tables as report_tables
 from servotwin.identification.report.parts import STYLE, figure, space
 from servotwin.identification.report.shown import error_shown, error_unit, estimate_lines, share_text, tables_of
+from servotwin.look import document, escape, number
 from servotwin.parameters import write_file
-from servotwin.units.look import document, escape, number
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.fit import Fit
@@ -37,7 +37,7 @@ def write_report(fit: Fit, path: Path, *, overwrite: bool = False) -> Path:
     OutputExistsError, OutputError
         If the file exists and `overwrite` is false, or it cannot be written.
     """
-    write_file(path, lambda file: file.write_text(page(fit), encoding="utf-8", newline="\n"), overwrite=overwrite)
+    write_file(path, page(fit).encode(), overwrite=overwrite)
     return Path(path)
 
 

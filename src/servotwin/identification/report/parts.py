@@ -10,7 +10,7 @@ from servotwin.identification.report import pictures as report_pictures
 from servotwin.identification.report import tables as report_tables
 from servotwin.identification.report import traces as report_traces
 from servotwin.identification.report.shown import error_shown, error_unit
-from servotwin.units.look import escape, number, picture, to_bytes
+from servotwin.look import escape, number, picture, to_bytes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from servotwin.identification.report.shown import MODELS, error_rows, nominal_of
-from servotwin.units.look import COLOURS, WIDTH, context, finished, new_figure
+from servotwin.look import COLOURS, WIDTH, context, finished, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

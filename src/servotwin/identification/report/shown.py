@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin import units
 from servotwin.identification.fitting.free import LUMPED, nominal
-from servotwin.simulation.sweep import dimension_of
-from servotwin.units.look import figure_in, label_of, readable, unit_for
+from servotwin.look import figure_in, label_of, readable, unit_for
+from servotwin.studies import dimension_of
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.fit import Fit, Interval, Trace

@@ -14,7 +14,7 @@ from servotwin.identification.report.shown import (
     estimate_lines,
     sensor_dimension,
 )
-from servotwin.units.look import MINUS, escape, figure_in, label_of, number, readable, table, unit_for
+from servotwin.look import MINUS, escape, figure_in, label_of, number, readable, table, unit_for
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.fit import Fit, Trace

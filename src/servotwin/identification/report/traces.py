@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.report.shown import sensor_shown
-from servotwin.units.look import COLOURS, WIDTH, context, finished, new_figure
+from servotwin.look import COLOURS, WIDTH, context, finished, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

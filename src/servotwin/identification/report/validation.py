@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from servotwin.identification.report import parts as report_parts
 from servotwin.identification.report.parts import STYLE, space
 from servotwin.identification.report.shown import error_shown, rig_text
+from servotwin.look import document, escape, number
 from servotwin.parameters import write_file
-from servotwin.units.look import document, escape, number
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.validate import Validation
@@ -23,7 +23,7 @@ def write_validation(found: Validation, path: Path, *, overwrite: bool = False) 
     OutputExistsError, OutputError
         If the file exists and `overwrite` is false, or it cannot be written.
     """
-    write_file(path, lambda file: file.write_text(page(found), encoding="utf-8", newline="\n"), overwrite=overwrite)
+    write_file(path, page(found).encode(), overwrite=overwrite)
     return Path(path)
 
 

@@ -148,7 +148,7 @@ def write_servo_text(servo: Servo, path: str | Path, *, overwrite: bool = False)
         If the file exists and `overwrite` is false, or it cannot be written.
     """
     content = servo_file_text(servo).encode()
-    write_file(path, lambda file: file.write_bytes(content), overwrite=overwrite)
+    write_file(path, content, overwrite=overwrite)
 
 
 def _sheet_lines(table: Mapping[str, Any]) -> list[str]:

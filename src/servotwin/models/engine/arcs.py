@@ -94,8 +94,8 @@ def arc_numbers(numbers: Numbers, torque: float) -> ArcNumbers:
 def loading(inertia: float, pull: float, hold_forward: float, hold_backward: float, torque: float) -> Loading:
     """Return what a constant external torque [N m] does to a shaft."""
     return Loading(
-        shaft_acceleration(torque, 0.0, 0.0, 0.0, 0.0, inertia), _start(hold_forward, hold_backward, pull - torque),
-        _start(hold_forward, hold_backward, -pull - torque), _start(hold_forward, hold_backward, -torque))
+        shaft_acceleration(torque, 0.0, 0.0, 0.0, 0.0, inertia), starting(hold_forward, hold_backward, pull - torque),
+        starting(hold_forward, hold_backward, -pull - torque), starting(hold_forward, hold_backward, -torque))
 
 
 def _torque(numbers: Numbers, voltage: float, R: float) -> float:
@@ -108,7 +108,7 @@ def _inverse(x: float) -> float:
     return 1.0 / x if x > 0.0 else 0.0
 
 
-def _start(forward: float, backward: float, torque: float) -> float:
+def starting(forward: float, backward: float, torque: float) -> float:
     """Return which way a shaft at rest starts under a torque [N m]: −1, 0, +1."""
     if friction.sticks(torque, forward, backward):
         return 0.0
@@ -172,12 +172,21 @@ def within_stops(numbers: ArcNumbers, q: float) -> bool:
     return numbers.lower < q < numbers.upper
 
 
-def slide(numbers: ArcNumbers, drive: float, q: float, w: float, time: float) -> tuple[float, float, float]:
-    """Return angle and speed after `time` [s] under one drive (−1, 0, +1), and 1.0, or 0.0 where this gave up.
+class Slid(NamedTuple):
+    """Where a slide has led: angle, speed, the angle at which it stopped or began, and 1, or 0 where it gave up."""
+
+    q: float
+    w: float
+    turned: float
+    done: float
+
+
+def slide(numbers: ArcNumbers, drive: float, q: float, w: float, time: float) -> Slid:
+    """Return where a shaft slides to within `time` [s] under one drive (−1, 0, +1).
 
     It gives up at a stop and after too many arcs.
     """
-    arcs = 0
+    arcs, turned = 0, q
     while moves(numbers, drive, w):
         arc = arc_of(numbers, drive, w)
         once, twice = decay(arc.rate, arc.per_rate, time)
@@ -186,11 +195,12 @@ def slide(numbers: ArcNumbers, drive: float, q: float, w: float, time: float) ->
         if ends:
             t, turn = way_to_edge(w, arc.edge, arc.pull_there, arc.rate, arc.per_rate)
             q, w, time = q + turn, arc.edge, max(time - t, 0.0)
+            turned = q if w == 0.0 else turned
         else:
             q, w = fma(arc.pull, twice, fma(w, time, q)), after
         arcs += 1
         if not within_stops(numbers, q) or arcs > MOST_ARCS:
-            return q, w, 0.0
+            return Slid(q, w, turned, 0.0)
         if not ends:
             break
-    return q, w, 1.0
+    return Slid(q, w, turned, 1.0)

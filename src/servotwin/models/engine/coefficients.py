@@ -33,7 +33,8 @@ def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau:
     stiffness += of_load * torque_on_gear(stiffness, 0.0, numbers.shaft.b_out)
     sinusoid = per_volt = 0.0
     if constant_current(mode.zone):
-        torque += (1.0 - of_motor) * motor.electromagnetic_torque(currents.current(numbers, mode.zone, u[0], q, w), numbers.motor.K)
+        i = currents.current(numbers, mode.zone, u[0], q, w)
+        torque += (1.0 - of_motor) * motor.electromagnetic_torque(i, numbers.motor.K)
     elif mode.zone >= CONDUCTING:
         v, R = currents.loop(numbers, mode.zone, u[0])
         per_volt = (1.0 - of_motor) * currents.torque_per_volt(numbers, R)

@@ -76,6 +76,19 @@ def _remainder(r: float) -> float:
     return fma(r4, fma(r4, c, b), a)
 
 
+def exp(x: float) -> float:
+    """Return e^x; beyond what the type holds, its largest or smallest power about.
+
+    Examples
+    --------
+    >>> exp(0.0), round(exp(1.0), 12)
+    (1.0, 2.718281828459)
+    """
+    most = _LARGEST_SINGLE if SINGLE else _LARGEST
+    k, r = _reduced(min(max(x, -most), most))
+    return two_power(k) * fma(r * r, _remainder(-r), 1.0 + r)
+
+
 def decay(rate: float, inverse: float, t: float) -> tuple[float, float]:
     """Return ∫ e^-λs ds and ∫∫ e^-λs ds² from 0 to t, without cancellation for λ t near zero.
 

@@ -10,10 +10,9 @@ from typing import NamedTuple
 
 
 class Mode(NamedTuple):
-    """Zone of the voltage law, contact of the shaft, place in the play, contact of the motor inside it; and the share.
+    """Zone of the voltage law, contact of the shaft, place in the play, contact of the motor inside the play, share.
 
-    That is which sign the torques through a sliding gear have where its friction takes their magnitude; 0 where there is
-    none.
+    The share is the sign of the torques through a sliding gear of whose magnitude friction is made; 0 where it is not.
     """
 
     zone: int

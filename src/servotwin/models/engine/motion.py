@@ -75,7 +75,8 @@ class Motion(NamedTuple):
 
 def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
     """Return a motion that is none yet."""
-    return _closed(IMPOSSIBLE, numbers, Mode(0, 0, 0, 0, 0), u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
+    nowhere = Mode(0, 0, 0, 0, 0)
+    return _closed(IMPOSSIBLE, numbers, nowhere, u, tau, math.inf, NOWHERE, _NO_COEFFICIENTS, (0.0, 0.0), 0.0)
 
 
 def is_step(motion: Motion) -> bool:

@@ -66,8 +66,15 @@ def _row(kind: Any, place: str, kinds: dict[str, type[Any]]) -> str:
 
 def writer(name: str, kind: type[Kind]) -> Callable[[Any, int, Kind], None]:
     """Return the function `name(tile, j, values)` that puts a named tuple into a tile."""
-    lines = "".join(f"    tile.{field}[j] = values.{field}\n" for field in kind._fields)  # type: ignore[attr-defined]
-    return _made(name, f"def {name}(tile, j, values):\n{lines}", {})
+    return _made(name, f"def {name}(tile, j, values):\n{''.join(_filling(kind, 'tile', 'values'))}", {})
+
+
+def _filling(kind: Any, to: str, of: str) -> Iterator[str]:
+    for field, hint in fields_of(kind):
+        if hasattr(hint, "_fields"):
+            yield from _filling(hint, f"{to}.{field}", f"{of}.{field}")
+        else:
+            yield f"    {to}.{field}[j] = {of}.{field}\n"
 
 
 def mapped(change: Callable[[Any], Any], values: Any) -> Any:

@@ -104,8 +104,8 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
     """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
 
     What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (14, n): angle, speed,
-    contact, drive, error, and what only few servos have: current, temperatures of winding and housing, angle and speed
-    of the motor at the output shaft, angle of the potentiometer, place in the play and contact of the motor there,
+    contact, drive, error, angle of the potentiometer, and what only few servos have: current, temperatures of winding
+    and housing, angle and speed of the motor at the output shaft, place in the play and contact of the motor there,
     silence of the chip.
     """
     pulsed = pulsed_chip(chip)
@@ -132,9 +132,9 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
             y = motion.state(m, min(times[done] - origin, until) - m.t0)
             outputs[0, done], outputs[1, done], outputs[2, done] = y[0], y[1], m.mode.contact
             outputs[3, done], outputs[4, done] = memory.chip.drive, memory.chip.error
+            outputs[5, done] = wiper_at(numbers.sensor, wiper, y[0])
             for k in range(5):
-                outputs[5 + k, done] = y[2 + k]
-            outputs[10, done] = wiper_at(numbers.sensor, wiper, y[0])
+                outputs[6 + k, done] = y[2 + k]
             outputs[11, done], outputs[12, done], outputs[13, done] = m.mode.mesh, m.mode.motor, memory.chip.silent
             done += 1
     return memory, COMPLETED

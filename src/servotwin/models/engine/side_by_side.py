@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import arcs, phases, tiles, windows
+from servotwin.models.engine import arcs, bands, phases, tiles, windows
 from servotwin.models.engine.arcs import ArcNumbers
 from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, STUCK
 from servotwin.models.engine.noise import gaussian
@@ -18,64 +18,64 @@ if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats, Indices, Lanes, Outputs
 
 
-def go_on(pieces: Floats, listed: Floats, braked: bool, which: Indices, duration: float, times: Floats,
+def go_on(pieces: Floats, listed: Floats, form: int, slack: bool, which: Indices, duration: float, times: Floats,
           outputs: Outputs, tile_rows: Any, plans: Any) -> int:
-    """Let all lanes go on for a duration [s], all of them `braked` or none; return how many were given up.
+    """Let all lanes go on for a duration [s], all of them in one form; return how many were given up.
 
     `tile_rows` are the tiles with the lanes `which`, and `plans` has room for one.
     """
     lost = 0
     for k in range(len(tile_rows)):
         first = k * tiles.TILE
-        lost += _go_on(pieces, listed, braked, which[first:first + tiles.TILE], duration, times, outputs, tile_rows[k],
-                       plans[0].of, plans[0].clock)
+        lost += _go_on(pieces, listed, form, slack, which[first:first + tiles.TILE], duration, times, outputs,
+                       tile_rows[k], plans[0].of, plans[0].clock)
     return lost
 
 
-def start(lanes: Lanes, first_output: float, tile_rows: Any) -> None:
+def start(lanes: Lanes, form: int, first_output: float, tile_rows: Any) -> None:
     """Put all lanes into tiles, as they start; `first_output` is when their first output is due [s]."""
     total = lanes.torque.size
     for k in range(len(tile_rows)):
         first = k * tiles.TILE
-        tiles.start(lanes, first, min(tiles.TILE, total - first), first_output, tile_rows[k])
+        tiles.start(lanes, form, first, min(tiles.TILE, total - first), first_output, tile_rows[k])
 
 
-def refit(lanes: Lanes, which: Indices, places: Indices, tile_rows: Any) -> None:
+def refit(lanes: Lanes, form: int, which: Indices, places: Indices, tile_rows: Any) -> None:
     """Take the numbers of the lanes `which` anew, which stand at these places of the tiles."""
     for k in range(which.size):
-        tiles.set_numbers(lanes, which[k], 1, tile_rows[places[k] // tiles.TILE], places[k] % tiles.TILE)
+        tiles.set_numbers(lanes, form, which[k], 1, tile_rows[places[k] // tiles.TILE], places[k] % tiles.TILE)
 
 
-def advance(which: Indices, braked: bool, first: int, last: int, duration: float, widths: Floats, torques: Floats,
-            loads_change: bool, tile_rows: Any, plans: Any) -> int:
+def advance(which: Indices, form: int, slack: bool, first: int, last: int, duration: float, widths: Floats,
+            torques: Floats, loads_change: bool, tile_rows: Any, plans: Any) -> int:
     """Let the lanes `which` of the tiles from `first` to before `last` go on under constant pulses [s] and torques.
 
     The torques [N m] are read where `loads_change`. Return how many lanes were given up.
     """
     lost = 0
     for k in range(first, last):
-        lost += _advance(which[k * tiles.TILE:(k + 1) * tiles.TILE], braked, duration, widths, torques, loads_change,
-                         tile_rows[k], plans[0].of, plans[0].clock)
+        lost += _advance(which[k * tiles.TILE:(k + 1) * tiles.TILE], form, slack, duration, widths, torques,
+                         loads_change, tile_rows[k], plans[0].of, plans[0].clock)
     return lost
 
 
-def _advance(which: Indices, braked: bool, duration: float, widths: Floats, torques: Floats, loads_change: bool,
-             tile: Any, plan: Any, before: Any) -> int:
+def _advance(which: Indices, form: int, slack: bool, duration: float, widths: Floats, torques: Floats,
+             loads_change: bool, tile: Any, plan: Any, before: Any) -> int:
     size = which.size
     for j in range(size):
         tile.servo.width[j] = widths[which[j]]
         tile.clock.remaining[j] = duration
     if loads_change:
-        _hang(which, torques, tile)
+        _hang(which, form, torques, tile)
     full, noisy = _needs_all(size, tile)
     lost = 0
     while windows.begin(widths, size, False, tile, plan, before) > 0:
-        _through(size, full, noisy, braked, False, tile, plan)
+        _through(size, full, noisy, form, slack, False, tile, plan)
         lost += windows.give_up(size, tile, plan, before)
     return lost
 
 
-def _go_on(pieces: Floats, listed: Floats, braked: bool, which: Indices, duration: float, times: Floats,
+def _go_on(pieces: Floats, listed: Floats, form: int, slack: bool, which: Indices, duration: float, times: Floats,
            outputs: Outputs, tile: Any, plan: Any, before: Any) -> int:
     size = which.size
     own = False
@@ -87,14 +87,14 @@ def _go_on(pieces: Floats, listed: Floats, braked: bool, which: Indices, duratio
     while windows.begin(listed, size, own, tile, plan, before) > 0:
         windows.commands(pieces, size, tile, plan)
         wanted = _wanted(size, tile, plan, before)
-        _through(size, full, noisy, braked, wanted > 0, tile, plan)
+        _through(size, full, noisy, form, slack, wanted > 0, tile, plan)
         if wanted > 0:
-            _write(which, times, outputs, tile, plan, before)
+            _write(which, form, slack, times, outputs, tile, plan, before)
         lost += windows.give_up(size, tile, plan, before)
     return lost
 
 
-def _through(size: int, full: bool, noisy: bool, braked: bool, keep: bool, tile: Any, plan: Any) -> None:
+def _through(size: int, full: bool, noisy: bool, form: int, slack: bool, keep: bool, tile: Any, plan: Any) -> None:
     """Go through a window that has begun."""
     if noisy:
         for j in range(size):
@@ -103,9 +103,9 @@ def _through(size: int, full: bool, noisy: bool, braked: bool, keep: bool, tile:
         for j in range(size):
             plan.draw[j] = 0.0
     if full:
-        windows.measure(size, tile, plan)
-    windows.divide(size, full, tile, plan)
-    phases.phases(size, keep, braked, tile, plan)
+        windows.measure(size, form, tile, plan)
+    windows.divide(size, full, slack, tile, plan)
+    phases.phases(size, keep, form, slack, tile, plan)
 
 
 def _needs_all(size: int, tile: Any) -> tuple[bool, bool]:
@@ -118,9 +118,13 @@ def _needs_all(size: int, tile: Any) -> tuple[bool, bool]:
     return full or noisy, noisy
 
 
-def _hang(which: Indices, torques: Floats, tile: Any) -> None:
+def _hang(which: Indices, form: int, torques: Floats, tile: Any) -> None:
     """Hang constant external torques [N m] on the shafts of a tile."""
     numbers = tile.arc
+    if form == tiles.BANDS:
+        for j in range(which.size):
+            tiles.hang(tiles.numbers_at(tile.own, j), torques[which[j]], tile, j)
+        return
     for j in range(which.size):
         load = arcs.loading(numbers.inertia[j], numbers.pull[j], numbers.hold_forward[j], numbers.hold_backward[j],
                             torques[which[j]])
@@ -144,44 +148,54 @@ def _is_wanted(tile: Any, plan: Any, before: Any, j: int) -> bool:
     return bool(plan.window[j] > 0.0 and (x < plan.window[j] or (plan.last[j] > 0.0 and x < math.inf)))
 
 
-def _write(which: Indices, times: Floats, outputs: Outputs, tile: Any, plan: Any, before: Any) -> None:
+def _write(which: Indices, form: int, slack: bool, times: Floats, outputs: Outputs, tile: Any, plan: Any,
+           before: Any) -> None:
     """Write the outputs of this window, each from the arc that holds it."""
     for j in range(which.size):
         while plan.lost[j] == 0.0 and _is_wanted(tile, plan, before, j):
             o = tile.count.output[j]
             x = tile.clock.output[j] - before.now[j]
             plan.time[j] = min(max(x, 0.0), plan.window[j])
-            _write_one(which[j], o, j, outputs, tile, plan)
+            _write_one(which[j], o, j, form, slack, outputs, tile, plan)
             tile.count.output[j] = o + 1
             tile.clock.output[j] = times[o + 1] if o + 1 < times.size else math.inf
 
 
-def _write_one(lane: int, o: int, j: int, outputs: Outputs, tile: Any, plan: Any) -> None:
+def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> None:
     x, end = plan.time[j], plan.window[j]  # what happens at the very end is not yet so
     drive, error, q, w, begin = plan.drive1[j], plan.error_before[j], plan.q1[j], plan.w1[j], 0.0
+    wiper = plan.wiper1[j]
     if plan.decides[j] > 0.0 and plan.end2[j] <= x and plan.end2[j] < end:
         drive, error, q, w, begin = plan.drive3[j], tile.servo.error[j], plan.q3[j], plan.w3[j], plan.end2[j]
+        wiper = plan.wiper3[j]
         if plan.end3[j] <= x and plan.end3[j] < end:
-            drive, q, w, begin = 0.0, plan.q4[j], plan.w4[j], plan.end3[j]
+            drive, q, w, begin, wiper = 0.0, plan.q4[j], plan.w4[j], plan.end3[j], plan.wiper4[j]
     elif plan.end1[j] <= x and plan.end1[j] < end:
-        drive, q, w, begin = 0.0, plan.q2[j], plan.w2[j], plan.end1[j]
+        drive, q, w, begin, wiper = 0.0, plan.q2[j], plan.w2[j], plan.end1[j], plan.wiper2[j]
     numbers = tiles.arc_numbers_at(tile.arc, j)
-    q, w, _ = arcs.slide(numbers, drive, q, w, x - begin)
+    if form == tiles.BANDS:
+        begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
+        q, w, turned, _ = bands.slide(
+            tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x - begin)
+    else:
+        q, w, turned, _ = arcs.slide(numbers, drive, q, w, x - begin)
+    if outputs.wiper.size > 0:
+        outputs.wiper[lane, o] = tiles.dragged(tile.hung.half_slack[j], wiper, turned, q) if slack else q
     if outputs.angle.size > 0:
         outputs.angle[lane, o] = q
     if outputs.speed.size > 0:
         outputs.speed[lane, o] = w
     if outputs.contact.size > 0:
-        outputs.contact[lane, o] = contact_of(numbers, drive, w)
+        outputs.contact[lane, o] = contact_of(tile.hung.dry[j] > 0.0, numbers, drive, w)
     if outputs.drive.size > 0:
         outputs.drive[lane, o] = 1 if drive > 0.0 else (-1 if drive < 0.0 else 0)
     if outputs.error.size > 0:
         outputs.error[lane, o] = error
 
 
-def contact_of(numbers: ArcNumbers, drive: float, w: float) -> int:
+def contact_of(dry: bool, numbers: ArcNumbers, drive: float, w: float) -> int:
     """Return the contact of a shaft that has this speed [rad/s] under this drive."""
-    if numbers.friction_forward == 0.0 and numbers.friction_backward == 0.0:
+    if not dry:
         return FREE
     way = w if w != 0.0 else arcs.start_of(numbers, drive)
     if way == 0.0:

@@ -14,6 +14,7 @@ from servotwin.models.engine.step import at_pulses
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import warm
+from servotwin.models.terms.sensor import slack
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
@@ -42,10 +43,11 @@ def side_by_side(lanes: Lanes, curve: Floats, which: Indices, tiles: Any, seen: 
         lane, servo, j = which[k], tiles[k // TILE].servo, k % TILE
         numbers, tau = numbers_of(lanes, lane), lanes.torque[lane]
         q, w, drive, error = 1.0 * servo.q[j], 1.0 * servo.w[j], 1.0 * servo.drive[j], 1.0 * servo.error[j]  # float64
+        wiper = 1.0 * servo.wiper[j] if slack(numbers.sensor) else q
         y = (q, w, 0.0, lanes.start[3, lane], lanes.start[4, lane], q, w)
         u = drive * numbers.source.V
         mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, q, w, 0.0), u, tau, y, RIGID, False)
-        put(seen, lane, observed(numbers, curve, mode, u, tau, y, q, drive, error))
+        put(seen, lane, observed(numbers, curve, mode, u, tau, y, wiper, drive, error))
 
 
 def put(seen: Floats, lane: int, values: Observed) -> None:

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from servotwin.models.engine import arcs
+from servotwin.models.engine import arcs, bands, contacts
 from servotwin.models.engine.arcs import ArcNumbers
 from servotwin.models.engine.records import TILE, reader, rows_of, tile_of, writer
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import Numbers
+from servotwin.physics.backlash import play
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     Smalls = NDArray[np.int8]
 
 FEW = 2  # lanes that are not worth going together
+ONE_FORMULA, ARCS, BANDS = range(3)  # how lanes go through a phase: `braked_rounds`, `arc_rounds`, `band_rounds`
 
 
 class Meter(NamedTuple):
@@ -62,6 +64,7 @@ class Servo(NamedTuple):
     later_sign: float
     later_duration: float
     later_decided: float
+    wiper: float  # angle of the potentiometer, where that has play
 
 
 class Clock(NamedTuple):
@@ -88,6 +91,9 @@ class Count(NamedTuple):
     output: int
     first_edge: int
     edges: int  # −1: they come regularly
+    zone: int  # of the current, within a phase
+    share: int  # sign of the torques through the gear
+    ends_at: int  # what ends a band
     which: int  # a list of lanes, written without branches: a wrong guess costs more than an entry
 
 
@@ -114,14 +120,21 @@ class Plan(NamedTuple):
     time: float  # of a phase
     power: float
     ends: float
+    way: float  # −1 or +1: which way it slides
+    start: float  # −1, 0, +1: which way it starts from rest
+    turned: float  # where it stopped last
     q1: float  # angle and speed at the start of each phase
     w1: float
+    wiper1: float
     q2: float
     w2: float
+    wiper2: float
     q3: float
     w3: float
+    wiper3: float
     q4: float
     w4: float
+    wiper4: float
     edge_speed: float  # of a arc
     pull_there: float
     rate: float
@@ -130,6 +143,7 @@ class Plan(NamedTuple):
     way_time: float
     way_angle: float
     q_before: float  # what was so before the window
+    wiper_before: float
     w_before: float
     left_before: float
     silence_before: float
@@ -138,6 +152,14 @@ class Plan(NamedTuple):
     sign_before: float
     duration_before: float
     decided_before: float
+
+
+class Hung(NamedTuple):
+    """What hangs on the shafts of lanes that read their own numbers."""
+
+    torque: float  # constant, external [N m]
+    half_slack: float  # half of the play of the potentiometer
+    dry: float  # 1: there is friction of some kind, or what counts as such
 
 
 class Times(NamedTuple):
@@ -149,11 +171,13 @@ class Times(NamedTuple):
 
 
 @cache
-def tile_type(real: str) -> np.dtype[Any]:
-    """Return the type of a tile whose servos have numbers of this type."""
-    return tile_of({"arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real), "meter": rows_of(Meter, real),
-                    "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
-                    "count": rows_of(Count, np.int64)})
+def tile_type(real: str, form: int) -> np.dtype[Any]:
+    """Return the type of a tile whose servos have numbers of this type and go through phases in this form."""
+    own = {"own": rows_of(Numbers, real)} if form == BANDS else {}
+    return tile_of({
+        **own, "hung": rows_of(Hung, real), "arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real),
+        "meter": rows_of(Meter, real), "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
+        "count": rows_of(Count, np.int64)})
 
 
 @cache
@@ -164,6 +188,7 @@ def plan_type(real: str) -> np.dtype[Any]:
 
 chip_at = reader("chip_at", Chip)
 numbers_at = reader("numbers_at", Numbers)
+put_numbers = writer("put_numbers", Numbers)
 put_chip = writer("put_chip", Chip)
 arc_numbers_at = reader("arc_numbers_at", ArcNumbers)
 put_arc_numbers = writer("put_arc_numbers", ArcNumbers)
@@ -199,6 +224,7 @@ class Outputs(NamedTuple):
     contact: Smalls
     drive: Smalls
     error: Floats
+    wiper: Floats
 
 
 def numbers_of(lanes: Lanes, lane: int) -> Numbers:
@@ -211,7 +237,7 @@ def chip_of(lanes: Lanes, lane: int) -> Chip:
     return chip_at(lanes.chips[lane // TILE], lane % TILE)
 
 
-def set_numbers(lanes: Lanes, first: int, size: int, tile: Any, place: int) -> None:
+def set_numbers(lanes: Lanes, form: int, first: int, size: int, tile: Any, place: int) -> None:
     """Put what servos are into a tile, from the lane `first` and the place `place` on."""
     for j in range(size):
         put_arc_numbers(tile.arc, place + j, arcs.arc_numbers(numbers_of(lanes, first + j), lanes.torque[first + j]))
@@ -225,22 +251,49 @@ def set_numbers(lanes: Lanes, first: int, size: int, tile: Any, place: int) -> N
         put_meter(tile.meter, place + j, Meter(
             source.V, source.R_b, motor.K_b, motor.R, path.V_br, path.off.coast, path.D_drive, path.R_drive, path.off.D,
             path.off.R, sensor.p, sensor.b_o))
+    for j in range(size):
+        numbers = numbers_of(lanes, first + j)
+        tile.hung.half_slack[place + j] = numbers.sensor.half_slack
+        tile.hung.dry[place + j] = 1.0 if contacts.has_friction(numbers) else 0.0
+    if form == BANDS:
+        for j in range(size):
+            put_numbers(tile.own, place + j, numbers_of(lanes, first + j))
+            hang(numbers_of(lanes, first + j), lanes.torque[first + j], tile, place + j)
 
 
-def start(lanes: Lanes, first: int, size: int, first_output: float, tile: Any) -> None:
+def hang(numbers: Numbers, torque: float, tile: Any, j: int) -> None:
+    """Hang a constant external torque [N m] on the shaft of a lane that reads its own numbers."""
+    begins = bands.starts(numbers, torque)
+    tile.hung.torque[j] = torque
+    tile.arc.start_forward[j] = begins.forward
+    tile.arc.start_backward[j] = begins.backward
+    tile.arc.start_off[j] = begins.off
+
+
+def drag(tile: Any, q: float, j: int) -> None:
+    """Let the potentiometer of a lane follow its shaft, which has gone one way to q [rad]."""
+    tile.servo.wiper[j] = play(tile.servo.wiper[j], q, 2.0 * tile.hung.half_slack[j])
+
+
+def dragged(half_slack: float, wiper: float, turned: float, q: float) -> float:
+    """Return the angle of a potentiometer after its shaft has turned back, and gone to q [rad]."""
+    return play(play(wiper, turned, 2.0 * half_slack), q, 2.0 * half_slack)
+
+
+def start(lanes: Lanes, form: int, first: int, size: int, first_output: float, tile: Any) -> None:
     """Put lanes as they start into a tile, from the column `first` on."""
-    set_numbers(lanes, first, size, tile, 0)
+    set_numbers(lanes, form, first, size, tile, 0)
     for j in range(size):
         q, w = lanes.start[0, first + j], lanes.start[1, first + j]
         put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, -math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
-                                       0.0))
+                                       0.0, q))
     for j in range(size):
         own = lanes.edge_count[first + j]
         late = lanes.edges[lanes.edge_first[first + j]] if own > 0 else math.inf if own == 0 else 0.0
         put_clock(tile.clock, j, Clock(tile.clock.period[j], 0.0, 0.0, late, 0.0, 0.0, -math.inf, first_output))
         begin, count = lanes.piece_first[first + j], lanes.piece_count[first + j]
         put_count(tile.count, j, Count(0, 0, lanes.seeds[first + j], begin, begin + count - 1, 0,
-                                       lanes.edge_first[first + j], own, 0))
+                                       lanes.edge_first[first + j], own, 0, 0, 0, 0))
 
 
 def driven_numbers_at(rows: Any, j: int) -> ArcNumbers:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import tiles
 from servotwin.models.engine.memory import SAME
+from servotwin.models.engine.step import voltages
 from servotwin.models.terms import frame
 from servotwin.models.terms.chip import Chip
 from servotwin.physics import bridge, motor, potentiometer, supply
@@ -89,8 +90,16 @@ def commands(r: Floats, size: int, tile: Any, plan: Any) -> None:
                 clock.piece_end[j] = r[i + 1, 0] if i < last else math.inf
 
 
-def measure(size: int, tile: Any, plan: Any) -> None:
+def measure(size: int, form: int, tile: Any, plan: Any) -> None:
     """Set what the motor's voltage and the supply's sag add to the one-shot's measure."""
+    if form == tiles.BANDS:
+        for j in range(size):
+            numbers, w = tiles.numbers_at(tile.own, j), tile.servo.w[j]
+            y = (0.0, w, 0.0, 0.0, 0.0, 0.0, w)
+            v_m, V_bus = voltages(numbers, tile.servo.drive[j] * numbers.source.V, y)
+            plan.v_m[j] = v_m
+            plan.V_bus[j] = V_bus
+        return
     for j in range(size):
         meter = tiles.meter_at(tile.meter, j)
         drive, w = tile.servo.drive[j], tile.servo.w[j]
@@ -108,8 +117,11 @@ def measure(size: int, tile: Any, plan: Any) -> None:
         plan.V_bus[j] = supply.source_voltage(taken, meter.V, meter.R_b) if taken != 0.0 else meter.V
 
 
-def divide(size: int, full: bool, tile: Any, plan: Any) -> None:
-    """Decide and divide the windows of all lanes; `full` where a chip has noise, a coupling or an RC stretcher."""
+def divide(size: int, full: bool, slack: bool, tile: Any, plan: Any) -> None:
+    """Decide and divide the windows of all lanes.
+
+    `full` where a chip has noise, a coupling or an RC stretcher, `slack` where potentiometers have play.
+    """
     rising = 0
     for j in range(size):
         rising += 1 if plan.at_edge[j] > 0.0 else 0
@@ -120,17 +132,19 @@ def divide(size: int, full: bool, tile: Any, plan: Any) -> None:
                     tile, plan, j)
     elif full:
         for j in range(size):
-            _decide(tiles.chip_at(tile.chip, j), plan.v_m[j], plan.V_bus[j], plan.draw[j], tile, plan, j)
+            _decide(tiles.chip_at(tile.chip, j), plan.v_m[j], plan.V_bus[j], plan.draw[j], slack, tile, plan, j)
     else:
         for j in range(size):
-            _decide(tiles.plain_chip_at(tile.chip, j), 0.0, 0.0, 0.0, tile, plan, j)
+            _decide(tiles.plain_chip_at(tile.chip, j), 0.0, 0.0, 0.0, slack, tile, plan, j)
 
 
-def _decide(chip: Chip, v_m: float, V_bus: float, draw: float, tile: Any, plan: Any, j: int) -> None:
+def _decide(chip: Chip, v_m: float, V_bus: float, draw: float, slack: bool, tile: Any, plan: Any,
+            j: int) -> None:
     """Measure and decide where a pulse rises, and divide the window."""
     servo = tile.servo
     width, due = servo.width[j], servo.due[j]
-    v_o = potentiometer.feedback_voltage(servo.q[j], tile.meter.p[j], tile.meter.b_o[j])
+    at = servo.wiper[j] if slack else servo.q[j]
+    v_o = potentiometer.feedback_voltage(at, tile.meter.p[j], tile.meter.b_o[j])
     new = frame.decide(chip, 0.0, width, v_o, v_m, V_bus, draw)
     valid = frame.accepted(chip, width) and plan.at_edge[j] != 0.0
     replaces = valid and new.time <= due
@@ -163,6 +177,7 @@ def _divide(second: float, due: float, sign: float, duration: float, decided: fl
     plan.drive3[j] = sign if decides else 0.0
     plan.lost[j] = 1.0 if window > 0.0 and min(second, servo.later_due[j]) < math.inf else 0.0
     plan.q_before[j] = servo.q[j]
+    plan.wiper_before[j] = servo.wiper[j]
     plan.w_before[j] = servo.w[j]
     plan.left_before[j] = left
     plan.silence_before[j] = servo.silence[j]
@@ -193,6 +208,7 @@ def give_up(size: int, tile: Any, plan: Any, before: Any) -> int:
         for j in range(size):
             if plan.lost[j] > 0.0:
                 servo.q[j], servo.w[j], servo.drive[j] = plan.q_before[j], plan.w_before[j], plan.drive1[j]
+                servo.wiper[j] = plan.wiper_before[j]
                 servo.left[j], servo.silence[j] = plan.left_before[j], plan.silence_before[j]
                 servo.error[j], servo.due[j] = plan.error_before[j], plan.due_before[j]
                 servo.sign[j], servo.duration[j] = plan.sign_before[j], plan.duration_before[j]

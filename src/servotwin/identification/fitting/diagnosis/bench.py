@@ -17,7 +17,7 @@ from servotwin.identification.fitting.phases import settled
 from servotwin.identification.fitting.point import LogPart, Point
 from servotwin.identification.fitting.scatter import by_sensor
 from servotwin.identification.fitting.task import Task
-from servotwin.identification.logs.log import ANGLES, Log
+from servotwin.logs.log import ANGLES, Log
 from servotwin.models import Model
 
 Array = NDArray[np.float64]
@@ -127,7 +127,7 @@ class Trial:
     residuals: tuple[Array, ...]
 
 
-class Bench:
+class TrialBench:
     """Some logs of a fit, and where trials begin.
 
     Parameters

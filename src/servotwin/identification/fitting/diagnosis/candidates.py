@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.diagnosis.bench import Bench, Setting
+from servotwin.identification.fitting.diagnosis.bench import Setting, TrialBench
 from servotwin.identification.fitting.free import LUMPED, nominal
-from servotwin.identification.logs.log import Log
 from servotwin.loads import Load
+from servotwin.logs.log import Log
 from servotwin.models import BoundedServo, Model
 from servotwin.parameters import Servo
 
@@ -36,16 +36,16 @@ class Candidate:
     name: str
     words: str
     remedy: str
-    settings: Callable[[Bench], Sequence[Setting]]
+    settings: Callable[[TrialBench], Sequence[Setting]]
 
 
 def numbers(values: Sequence[Mapping[str, float]], fixed: Mapping[str, float | str] | None = None, *,
-            price: float = 1.0) -> Callable[[Bench], Sequence[Setting]]:
+            price: float = 1.0) -> Callable[[TrialBench], Sequence[Setting]]:
     """Return settings that search numbers of the servo which it leaves out, from several values (SI).
 
     What the servo gives already, other than the value that changes nothing, or what is searched already, is not tried.
     """
-    def settings(bench: Bench) -> Sequence[Setting]:
+    def settings(bench: TrialBench) -> Sequence[Setting]:
         old = bench.setting.model
         if any(name not in (*old.requires, *old.optional) or name in bench.old.space.names
                or _matters(old.servo, name) for start in values for name in start):
@@ -64,9 +64,9 @@ def _matters(servo: Servo, name: str) -> bool:
     return value is not None and value != _NEUTRAL.get(name, 0.0)
 
 
-def scaled(name: str, factors: Sequence[float]) -> Callable[[Bench], Sequence[Setting]]:
+def scaled(name: str, factors: Sequence[float]) -> Callable[[TrialBench], Sequence[Setting]]:
     """Return settings that search a number which the servo gives, from several shares of it."""
-    def settings(bench: Bench) -> Sequence[Setting]:
+    def settings(bench: TrialBench) -> Sequence[Setting]:
         old = bench.setting.model
         value = nominal(old.servo, name)
         if not value or name in bench.old.space.names:
@@ -82,7 +82,7 @@ def scaled(name: str, factors: Sequence[float]) -> Callable[[Bench], Sequence[Se
     return settings
 
 
-def turned(bench: Bench) -> Sequence[Setting]:
+def turned(bench: TrialBench) -> Sequence[Setting]:
     """Return the setting in which the bridge opens between pulses where it brakes, and the other way round."""
     old = bench.setting.model
     if "electronics.off_state" not in old.optional:
@@ -92,7 +92,7 @@ def turned(bench: Bench) -> Sequence[Setting]:
                                                                     source="a trial")))]
 
 
-def directed(bench: Bench) -> Sequence[Setting]:
+def directed(bench: TrialBench) -> Sequence[Setting]:
     """Return the setting in which Coulomb friction is another one each way."""
     old, names = bench.setting.model, bench.old.space.names
     forward, backward = LUMPED["output_coulomb_torque"][0]
@@ -108,7 +108,7 @@ def directed(bench: Bench) -> Sequence[Setting]:
     return [Setting(bench.setting.logs, old, {forward: each, backward: each}, ("output_coulomb_torque",))]
 
 
-def heavier(bench: Bench) -> Sequence[Setting]:
+def heavier(bench: TrialBench) -> Sequence[Setting]:
     """Return settings in which all loads are some shares of what the logs say."""
     if not any(log.load != Load() for log in bench.setting.logs) or any(
             name.startswith("load.") for name in bench.old.space.names):
@@ -124,7 +124,7 @@ def _times(load: Load, factor: float) -> Load:
     return replace(load, inertia=factor * load.inertia, torque=factor * load.torque, pendulums=pendulums)
 
 
-def like_digital(bench: Bench) -> Sequence[Setting]:
+def like_digital(bench: TrialBench) -> Sequence[Setting]:
     """Return settings of a servo without pulses and deadband that multiplies its error by a gain."""
     old = bench.setting.model
     if isinstance(old, BoundedServo):
@@ -148,9 +148,9 @@ def like_digital(bench: Bench) -> Sequence[Setting]:
             for factor in (0.3, 1.0, 3.0)]
 
 
-def clocks(more: Sequence[str]) -> Callable[[Bench], Sequence[Setting]]:
+def clocks(more: Sequence[str]) -> Callable[[TrialBench], Sequence[Setting]]:
     """Return the setting with further nuisances of pulses."""
-    def settings(bench: Bench) -> Sequence[Setting]:
+    def settings(bench: TrialBench) -> Sequence[Setting]:
         nuisance = tuple(dict.fromkeys((*bench.old.nuisance, *more)))
         if set(more) <= set(bench.old.nuisance) or isinstance(bench.setting.model, BoundedServo):
             return ()
@@ -158,7 +158,7 @@ def clocks(more: Sequence[str]) -> Callable[[Bench], Sequence[Setting]]:
     return settings
 
 
-def stretched(bench: Bench) -> Sequence[Setting]:
+def stretched(bench: TrialBench) -> Sequence[Setting]:
     """Return the setting whose samples are as far apart as pulses, or a whole multiple, where they nearly are."""
     period = bench.cases[0].period
     if not period:
@@ -173,7 +173,7 @@ def stretched(bench: Bench) -> Sequence[Setting]:
     return [replace(bench.setting, logs=logs, nuisance=nuisance, afresh=True)]
 
 
-def backlash(bench: Bench) -> Sequence[Setting]:
+def backlash(bench: TrialBench) -> Sequence[Setting]:
     """Return settings with play between motor and output, whose own inertia is a small share."""
     inertia = nominal(bench.setting.model.servo, "output_inertia")
     if not inertia:
@@ -214,7 +214,7 @@ TABLE: tuple[Candidate, ...] = (
 """What is tried, the cheap first; of candidates that gain alike the earlier one is named first."""
 
 
-def possible(candidate: Candidate, bench: Bench) -> Sequence[Setting]:
+def possible(candidate: Candidate, bench: TrialBench) -> Sequence[Setting]:
     """Return the settings of a candidate; none where the servo does not allow it."""
     try:
         return candidate.settings(bench)
@@ -222,7 +222,7 @@ def possible(candidate: Candidate, bench: Bench) -> Sequence[Setting]:
         return ()
 
 
-def mended_logs(bench: Bench, mended: Mapping[str, Log]) -> Sequence[Setting]:
+def mended_logs(bench: TrialBench, mended: Mapping[str, Log]) -> Sequence[Setting]:
     """Return the setting with the logs that a finding has mended."""
     logs = tuple(mended.get(log.name, log) for log in bench.setting.logs)
     if all(a is b for a, b in zip(logs, bench.setting.logs, strict=True)):

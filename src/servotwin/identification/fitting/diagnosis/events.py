@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.diagnosis.bench import Bench, Gain, Told, gain, teaching
+from servotwin.identification.fitting.diagnosis.bench import Gain, Told, TrialBench, gain, teaching
 from servotwin.identification.fitting.point import Point
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import BoundedServo
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ class _Kind:
     put: Callable[[Log, Sequence[int]], Log]
 
 
-def lost_pulses(bench: Bench) -> Told | None:
+def lost_pulses(bench: TrialBench) -> Told | None:
     """Return what pulses that are left out gain."""
     if isinstance(bench.setting.model, BoundedServo):
         return None
@@ -58,7 +58,7 @@ def lost_pulses(bench: Bench) -> Told | None:
         "or a generator that skips; mark them with torque_on", gained)
 
 
-def dropped_samples(bench: Bench) -> Told | None:
+def dropped_samples(bench: TrialBench) -> Told | None:
     """Return what gaps of one sample gain, where stamps say that there is none.
 
     Where the command changes, the row that is missing had the old one, or the new one (its place is then negative).
@@ -91,7 +91,7 @@ def _with_rows(log: Log, places: Sequence[int]) -> Log:
         torque_on=None if log.torque_on is None else np.insert(log.torque_on, at, log.torque_on[at]))
 
 
-def _tried(bench: Bench, kind: _Kind) -> tuple[int, Gain | None]:
+def _tried(bench: TrialBench, kind: _Kind) -> tuple[int, Gain | None]:
     """Return how many events were found, and what they gain."""
     base = bench.searched(bench.setting, bench.base.point, alternate=True)
     found: list[list[int]] = [[] for _ in bench.setting.logs]
@@ -108,7 +108,7 @@ def _tried(bench: Bench, kind: _Kind) -> tuple[int, Gain | None]:
     return sum(map(len, found)), gain(base.residuals, trial.residuals, bench.noise, alternate=True)
 
 
-def _settled(bench: Bench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
+def _settled(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
     """Return the events of one log, chosen until they stay: only then do numbers move that could make up for some."""
     for _ in range(_TIMES):
         chosen = _chosen(bench, point, k, kind, already)
@@ -118,7 +118,7 @@ def _settled(bench: Bench, point: Point, k: int, kind: _Kind, already: list[int]
     return already
 
 
-def _chosen(bench: Bench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
+def _chosen(bench: TrialBench, point: Point, k: int, kind: _Kind, already: list[int]) -> list[int]:
     """Return the events of one log: those that are known, less those that pay no more, and further ones."""
     log = bench.setting.logs[k]
     every = [place for place in kind.places(log) if abs(place) not in [abs(one) for one in already]]
@@ -139,7 +139,7 @@ def _chosen(bench: Bench, point: Point, k: int, kind: _Kind, already: list[int])
     return sorted(chosen)
 
 
-def _worth(bench: Bench, before: Array, after: Array, first: int) -> float:
+def _worth(bench: TrialBench, before: Array, after: Array, first: int) -> float:
     """Return by how much an event lowers the cost of the samples soon after it: later ones may be of others."""
     soon = slice(first, first + _SOON)
     teaches = teaching(np.arange(len(before), dtype=np.float64), alternate=True)[soon]

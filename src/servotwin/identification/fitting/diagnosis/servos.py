@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.arrow import Prior
-from servotwin.identification.fitting.diagnosis.bench import Bench, Told, gain
+from servotwin.identification.fitting.diagnosis.bench import Told, TrialBench, gain
 from servotwin.identification.fitting.uncertainty import rows_of
 
 Array = NDArray[np.float64]
@@ -16,13 +16,13 @@ Array = NDArray[np.float64]
 _LOGS = 8  # among which two groups are sought
 
 
-def two_servos(bench: Bench) -> Told | None:
+def two_servos(bench: TrialBench) -> Told | None:
     """Return what two sets of numbers gain over one, for the two groups of logs that differ most."""
     if len(bench.task.fitted) < 4:
         return None
     every = bench.task.fitted
     spread = [every[i * len(every) // min(len(every), _LOGS)] for i in range(min(len(every), _LOGS))]
-    bench = Bench(bench.task, bench.whole, spread, bench.purse, bench.noise)
+    bench = TrialBench(bench.task, bench.whole, spread, bench.purse, bench.noise)
     logs = bench.setting.logs
     one, other = _groups(bench)
     residuals: list[Array] = [np.zeros(0)] * len(logs)
@@ -37,7 +37,7 @@ def two_servos(bench: Bench) -> Told | None:
                 "fit these logs apart", gain(bench.base.residuals, residuals, bench.noise))
 
 
-def _groups(bench: Bench) -> tuple[list[int], list[int]]:
+def _groups(bench: TrialBench) -> tuple[list[int], list[int]]:
     """Return the two groups, of two logs at least, whose own one-step estimates explain most."""
     forecast, point = bench.base.forecast, bench.base.point
     search = bench.search(forecast)

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.fitting.diagnosis.bench import DEAR, Bench, Purse, Setting, Spent, Told, gain
+from servotwin.identification.fitting.diagnosis.bench import DEAR, Purse, Setting, Spent, Told, TrialBench, gain
 from servotwin.identification.fitting.diagnosis.candidates import TABLE, Candidate, mended_logs, possible
 from servotwin.identification.fitting.diagnosis.events import dropped_samples, lost_pulses
 from servotwin.identification.fitting.diagnosis.servos import two_servos
@@ -18,7 +18,7 @@ from servotwin.identification.fitting.point import Point
 from servotwin.identification.fitting.task import Task
 from servotwin.identification.fitting.verdict import Cause, Verdict, shown
 
-Try = Callable[[Bench], Told | None]
+Try = Callable[[TrialBench], Told | None]
 
 _LOGS = 4  # that are tried
 _EXPLAINED = 1.2  # times the sensor's noise: then nothing else is tried
@@ -59,7 +59,7 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
     noise = verdict.noise[sensor]
     purse = Purse(budget)
     try:
-        bench = Bench(task, point, _chosen(task, traces), purse, noise)
+        bench = TrialBench(task, point, _chosen(task, traces), purse, noise)
     except (Spent, ServotwinError):
         return ()
     found: list[tuple[Cause, int]] = []
@@ -81,7 +81,7 @@ def diagnose(task: Task, point: Point, traces: Sequence[Trace], verdict: Verdict
     return _ranked(found)
 
 
-def _told(bench: Bench, try_it: Try) -> Told | None:
+def _told(bench: TrialBench, try_it: Try) -> Told | None:
     """Return what a candidate gains; None of one that cannot be tried, or not to its end."""
     try:
         return try_it(bench)
@@ -89,7 +89,7 @@ def _told(bench: Bench, try_it: Try) -> Told | None:
         return None
 
 
-def _ordered(bench: Bench, traces: Sequence[Trace]) -> list[list[tuple[str, Try]]]:
+def _ordered(bench: TrialBench, traces: Sequence[Trace]) -> list[list[tuple[str, Try]]]:
     """Return all candidates with what tries them: what the checks suggest and what is cheap, what is dear, events."""
     cheap: list[tuple[str, Try]] = []
     dear: list[tuple[str, Try]] = []
@@ -111,7 +111,7 @@ def _chosen(task: Task, traces: Sequence[Trace]) -> list[int]:
     return sorted([*chosen, *(k for k in fitted if k not in chosen)][:_LOGS])
 
 
-def _of_findings(bench: Bench, traces: Sequence[Trace]) -> list[Candidate]:
+def _of_findings(bench: TrialBench, traces: Sequence[Trace]) -> list[Candidate]:
     """Return the candidates that the checks of the logs suggest."""
     seen = findings([trace.log for trace in traces], bench.setting.model)
     made = []
@@ -122,7 +122,7 @@ def _of_findings(bench: Bench, traces: Sequence[Trace]) -> list[Candidate]:
     return made
 
 
-def _tried(bench: Bench, candidate: Candidate, settings: Sequence[Setting]) -> Told | None:
+def _tried(bench: TrialBench, candidate: Candidate, settings: Sequence[Setting]) -> Told | None:
     """Return what a candidate gains, searched from the most promising of its settings."""
     trials = [bench.searched(setting, bench.base.point) for setting in _promising(bench, settings)]
     trials += [bench.afresh(setting) for setting in settings if setting.afresh]
@@ -133,7 +133,7 @@ def _tried(bench: Bench, candidate: Candidate, settings: Sequence[Setting]) -> T
     return Told(candidate.name, candidate.words, candidate.remedy, gained)
 
 
-def _promising(bench: Bench, settings: Sequence[Setting]) -> Sequence[Setting]:
+def _promising(bench: TrialBench, settings: Sequence[Setting]) -> Sequence[Setting]:
     if len(settings) < 2:
         return settings
     costs = [bench.promise(setting) for setting in settings]

@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
-from servotwin.identification.logs.log import Log
+from servotwin.logs.log import Log
 from servotwin.models import BoundedServo, Model
 
 Array = NDArray[np.float64]

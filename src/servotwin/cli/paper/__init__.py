@@ -1,5 +1,0 @@
-"""The report that `servotwin paper` writes: a study of the paper's servo, its tables, pictures and page."""
-
-from servotwin.cli.paper.report import PaperReport, write_paper_report
-
-__all__ = ["PaperReport", "write_paper_report"]

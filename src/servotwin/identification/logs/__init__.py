@@ -1,1 +1,0 @@
-"""Logs of measured runs: what one is, and how files of several formats are read and written."""

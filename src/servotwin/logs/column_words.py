@@ -1,0 +1,127 @@
+"""The words of `--columns`: which column is which signal, in which unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from servotwin.errors import InputError, UnitError, UnknownNameError
+from servotwin.logs.columns import COMMANDS, NAMES, SWITCH, Column, dimension_of_signal
+from servotwin.logs.stamps import CLOCKS
+from servotwin.units.words import scaled_unit, units_written
+
+COMMAND = "command"  # its kind is told by its unit
+SHORT = {"pulse": "pulse_width", "angle": "output_angle", "feedback": "feedback_voltage", "current": "supply_current",
+         "voltage": "bus_voltage", "speed": "output_speed"}
+SIGNALS = ("time", COMMAND, *SHORT, *(name for name in NAMES if name != "time"))
+_FORM = 'SIGNAL=COLUMN:UNIT, such as "time=t:ms angle=pos:deg-90"'
+_KINDS = {dimension_of_signal(name): name for name in COMMANDS}
+_WORD = re.compile(r"""\s*(?P<signal>[^\s=:'"]+)\s*=\s*
+                       (?:"(?P<double>[^"]*)"|'(?P<single>[^']*)'|(?P<bare>[^"'\s].*?))
+                       \s*(?::(?P<unit>[^:=]*?))?\s*(?=$|\s[^\s=:'"]+\s*=)""", re.VERBOSE)
+
+
+class Wanted(NamedTuple):
+    """What is said of one signal.
+
+    Parameters
+    ----------
+    signal : str
+        Name of a signal, or "command".
+    column : str
+    unit : str
+        With scale and offset, as it was written; empty where none was said.
+    """
+
+    signal: str
+    column: str
+    unit: str
+
+
+def wanted_columns(words: str | Mapping[str, str] | None, option: str = "--columns") -> dict[str, Wanted]:
+    """Return what words such as ``"time=t:ms angle=pos:deg-90"`` say, or a mapping such as ``{"time": "t:ms"}``.
+
+    Raises
+    ------
+    InputError
+        If the words have another form, or name a signal twice or one that does not exist.
+
+    Examples
+    --------
+    >>> wanted_columns("time=t:ms angle=Pot 1:0.3deg-90 command='a=b'")["output_angle"]
+    Wanted(signal='output_angle', column='Pot 1', unit='0.3deg-90')
+    """
+    if words is None:
+        return {}
+    if isinstance(words, Mapping):
+        given = [_one(option, f"{name}={text}") for name, text in words.items()]
+    elif isinstance(words, str):
+        given = _all(option, words)
+    else:
+        raise InputError(option, got=words, allowed=_FORM)
+    found: dict[str, Wanted] = {}
+    for one in given:
+        if one.signal in found:
+            raise InputError(option, got=f"{one.signal} twice", allowed="once")
+        found[one.signal] = one
+    commands = [name for name in (COMMAND, *COMMANDS) if name in found]
+    if len(commands) > 1:
+        raise InputError(option, got=" and ".join(commands), allowed="one command")
+    return found
+
+
+def _all(option: str, words: str) -> list[Wanted]:
+    given, place = [], 0
+    while words[place:].strip():
+        match = _WORD.match(words, place)
+        if match is None:
+            raise InputError(option, got=words[place:].strip(), allowed=_FORM)
+        given.append(_wanted(option, match))
+        place = match.end()
+    if not given:
+        raise InputError(option, got="nothing", allowed=_FORM)
+    return given
+
+
+def _one(option: str, word: str) -> Wanted:
+    match = _WORD.fullmatch(word)
+    if match is None:
+        raise InputError(option, got=word, allowed=_FORM)
+    return _wanted(option, match)
+
+
+def _wanted(option: str, match: re.Match[str]) -> Wanted:
+    signal = SHORT.get(match["signal"], match["signal"])
+    if signal not in SIGNALS:
+        raise UnknownNameError(f"signal of {option}", match["signal"], SIGNALS)
+    column = next((match[group] for group in ("double", "single", "bare") if match[group] is not None), "").strip()
+    if not column:
+        raise InputError(option, got=match[0].strip(), allowed=_FORM)
+    return Wanted(signal, column, (match["unit"] or "").strip())
+
+
+def column_said(one: Wanted, column: str, option: str = "--columns") -> tuple[str, Column]:
+    """Return the signal and the column of words that say a unit; `column` is the name in the header.
+
+    Raises
+    ------
+    UnitError
+        If the unit does not exist, or does not measure the signal.
+    """
+    what = f"{option} {one.signal}={one.column}"
+    if one.signal == "time" and one.unit in CLOCKS:
+        return one.signal, Column(column, one.unit, from_first=True)
+    if one.signal == SWITCH:
+        raise UnitError(what, got=one.unit, allowed="no unit")
+    unit, dimension, scale, offset = scaled_unit(what, one.unit)
+    signal = one.signal
+    if signal == COMMAND:
+        if dimension not in _KINDS:
+            raise UnitError(what, got=one.unit, allowed="us, ms, s (pulse width), deg, rad (angle) or V, mV (voltage)")
+        signal = _KINDS[dimension]
+    if dimension_of_signal(signal) != dimension:
+        raise UnitError(what, got=one.unit, allowed=units_written(dimension_of_signal(signal)) + (
+            ", iso, clock" if signal == "time" else ""))
+    return signal, Column(column, unit, scale, offset)
+

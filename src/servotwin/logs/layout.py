@@ -1,0 +1,307 @@
+"""Which column of a table is which signal: as its name says, as the user says, or guessed and shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+from servotwin.errors import InputError, UnitError
+from servotwin.logs import column_names as names
+from servotwin.logs.column_values import Guess, guess, is_increasing, range_of
+from servotwin.logs.column_words import COMMAND, SHORT, Wanted, column_said
+from servotwin.logs.columns import COMMANDS, SWITCH, TIME, Column, columns_of, dimension_of_signal, si_unit_of
+from servotwin.logs.log import ANGLES
+from servotwin.logs.reading import ReadColumn
+from servotwin.tables import TextTable
+from servotwin.units.words import COUNTS, unit_shown, units_written
+
+NAMED, SAID, SIDECAR = "named", "--columns", "sidecar"
+_SHORT = {**{name: short for short, name in SHORT.items()}, TIME: TIME}
+_DIMENSIONS = {names.PULSE: "time", names.COMMAND_ANGLE: "angle", names.ANGLE: "angle", names.TIME: "time",
+               names.SOME_TIME: "time", names.FEEDBACK: "voltage", names.VOLTAGE: "voltage", names.SPEED: "speed",
+               names.SUPPLY_CURRENT: "current", names.ARMATURE_CURRENT: "current"}
+_SIGNALS = {names.PULSE: "pulse_width", names.COMMAND_ANGLE: "command_angle", names.ANGLE: "output_angle",
+            names.TIME: TIME, names.SOME_TIME: TIME, names.FEEDBACK: "feedback_voltage"}
+_OPTIONAL = (names.SUPPLY_CURRENT, names.ARMATURE_CURRENT, names.VOLTAGE, names.SPEED)
+_COMMAND_OF = {"time": "pulse_width", "angle": "command_angle", "voltage": "command_voltage"}
+
+
+class Layout(NamedTuple):
+    """The columns of a table: by signal, and as they are shown."""
+
+    columns: dict[str, Column]
+    shown: tuple[ReadColumn, ...]
+
+
+class _Candidate(NamedTuple):
+    column: str
+    meaning: names.Meaning
+    found: Guess | None
+
+    @property
+    def rank(self) -> int:
+        """How well it is known: 2 by a unit in its name, 1 by its values, 0 hardly."""
+        if self.found is None:
+            return 0
+        return 2 if self.found.why == names.UNIT_IN_NAME else 1
+
+
+def is_known_name(column: str) -> bool:
+    """Return whether a name says what its column is."""
+    try:
+        return bool(columns_of([column], "")) or names.meaning_of(column) is not None
+    except InputError:  # nearly the name of a signal
+        return True
+
+
+def layout_of(table: TextTable, sidecar: Mapping[str, Column] | None, wanted: Mapping[str, Wanted]) -> Layout:
+    """Return which column of a table is which signal.
+
+    What `wanted` says counts before the sidecar, that before the names of `servotwin`; what these leave out is guessed
+    from names, units and values: time, a command and an angle where they lack, currents, voltage and speed if there is
+    one of each.
+
+    Raises
+    ------
+    InputError
+        If time, command or angle cannot be told, or not without doubt: says how to say it.
+    """
+    made: dict[str, tuple[Column, str]] = {}
+    if sidecar is not None:
+        made = {signal: (replace(column, column=_in_header(table, signal, column.column)), SIDECAR)
+                for signal, column in sidecar.items()}
+    for one in wanted.values():
+        signal, column = _said(table, one)
+        for other in COMMANDS if signal in COMMANDS else (signal,):
+            made.pop(other, None)
+        made[signal] = (column, SAID)
+    if sidecar is None:
+        taken = {column.column for column, _ in made.values()}
+        others = [name for name in table.header if name not in taken]
+        told = any(name in made for name in COMMANDS)
+        for signal, column in (_named(table, others, made) if table.has_header else {}).items():
+            if signal not in made and not (told and signal in COMMANDS):
+                made[signal] = (column, NAMED)
+        if made.get(TIME, (None, ""))[1] == NAMED and made[TIME][0].column == TIME and not table.units and not (
+                any(name in made for name in COMMANDS) and any(name in made for name in ANGLES)):
+            del made[TIME]  # among foreign names it is one of them, and need not be in seconds
+        _guess_rest(table, made)
+    _check(table, made)
+    shown = tuple(ReadColumn(column.column, signal, "" if signal == SWITCH else unit_shown(
+        column.unit, column.scale, column.offset), known)
+        for signal, (column, known) in sorted(made.items(), key=lambda one: table.header.index(one[1][0].column)))
+    return Layout({signal: column for signal, (column, _) in made.items()}, shown)
+
+
+def _named(table: TextTable, others: list[str], made: Mapping[str, object]) -> dict[str, Column]:
+    found = {}
+    for signal, column in columns_of(others, table.path, taken=made, says_more=names.meaning_of).items():
+        below = table.units[table.header.index(column.column)] if table.units else ""
+        meaning = names.meaning_of("time" if signal == TIME else signal, below) if below else None
+        if meaning is not None and column.column == signal and meaning.dimension:
+            if meaning.dimension != dimension_of_signal(signal):
+                raise UnitError(f"{table.path}: unit of column {signal}", got=below,
+                                allowed=units_written(dimension_of_signal(signal)))
+            column = Column(column.column, meaning.unit)
+        found[signal] = column
+    return found
+
+
+def _in_header(table: TextTable, signal: str, name: str) -> str:
+    own = table.name_of(name)
+    if own is None and name.isdigit() and 1 <= int(name) <= len(table.header):
+        own = table.header[int(name) - 1]
+    if own is None:
+        raise InputError(f"{table.path}: column of {signal}", got=name, allowed=", ".join(table.header))
+    return own
+
+
+def _said(table: TextTable, one: Wanted) -> tuple[str, Column]:
+    """Return the signal and the column of words; a unit that they do not say is that of the name, or of the values."""
+    own = _in_header(table, one.signal, one.column)
+    if one.signal == SWITCH and not one.unit:
+        return SWITCH, Column(own, si_unit_of(SWITCH))
+    if one.unit:
+        signal, column = column_said(one, own)
+        return signal, replace(column, from_first=is_since_1970(table, column)) if signal == TIME else column
+    if table.has_header and (named := columns_of([own], table.path, says_more=names.meaning_of).get(one.signal)):
+        return one.signal, named
+    roles = {signal: role for role, signal in _SIGNALS.items() if role != names.SOME_TIME}
+    role = names.COMMAND if one.signal == COMMAND else roles.get(one.signal, one.signal)
+    meaning = names.meaning_of(own, _below(table, own)) if table.has_header else None
+    found = _guessed(table, own, names.Meaning(role, *(meaning[1:] if meaning else ("", ""))))
+    if found is None:
+        raise _no_unit(table, one.signal, own, meaning)
+    signal = _COMMAND_OF[found.dimension] if one.signal == COMMAND else one.signal
+    return signal, Column(own, found.unit, from_first=found.from_first)
+
+
+def is_since_1970(table: TextTable, column: Column) -> bool:
+    """Return whether the times of a column count from 1970 or so, and not from a start."""
+    if column.from_first:
+        return True
+    first = table.rows[0]
+    k = table.header.index(column.column)
+    value = table.number(first.line, column.column, first.cells[k] if k < len(first.cells) else "")
+    return abs(column.scale * value) * {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}.get(column.unit, 1.0) > 1e8
+
+
+def _below(table: TextTable, column: str) -> str:
+    return table.units[table.header.index(column)] if table.units else ""
+
+
+def _guess_rest(table: TextTable, made: dict[str, tuple[Column, str]]) -> None:
+    """Add what is not known yet and can be guessed."""
+    taken = {column.column for column, _ in made.values()}
+    found: list[tuple[str, names.Meaning]] = []
+    for name in dict.fromkeys(table.header if table.has_header else ()):
+        meaning = names.meaning_of(name, _below(table, name))
+        if name not in taken and meaning is not None:
+            table.cells(name)  # raises where the header has it twice
+            found.append((name, meaning))
+    needs = {TIME: TIME not in made, COMMAND: not any(name in made for name in COMMANDS),
+             "angle": not any(name in made for name in ANGLES)}
+    lacking = []
+    for what, roles in ((TIME, (names.TIME, names.SOME_TIME)),
+                        (COMMAND, (names.PULSE, names.COMMAND, names.COMMAND_ANGLE)),
+                        ("angle", (names.ANGLE, names.FEEDBACK, COUNTS))):
+        if needs[what]:
+            chosen = _chosen(table, what, _candidates(table, found, roles))
+            if chosen is None:
+                lacking.append(what)
+                continue
+            signal = _signal_of(chosen)
+            made[signal] = (_column(chosen), f"guessed from {chosen.found.why}" if chosen.found else "")
+            found = [(name, meaning) for name, meaning in found if name != chosen.column]
+    if lacking:
+        raise _unknown(table, lacking, made)
+    for role in _OPTIONAL:
+        some = [one for one in _candidates(table, found, (role,)) if one.found is not None]
+        if role not in made and len(some) == 1 and some[0].found is not None:
+            made[role] = (_column(some[0]), f"guessed from {some[0].found.why}")
+
+
+def _candidates(table: TextTable, found: Iterable[tuple[str, names.Meaning]], roles: tuple[str, ...],
+                ) -> list[_Candidate]:
+    made = []
+    for name, meaning in found:
+        increasing = meaning.role in (names.TIME, names.SOME_TIME) and is_increasing(table, name)
+        if meaning.role == names.SOME_TIME and not increasing:
+            continue
+        if meaning.role not in roles:
+            continue
+        made.append(_Candidate(name, meaning, _guessed(table, name, meaning)))
+    if names.PULSE in roles:  # "us" may be the time, or the pulse
+        made += [_Candidate(name, meaning._replace(role=names.PULSE), one) for name, meaning in found
+                 if meaning.role == names.TIME and meaning.unit == "us" and not is_increasing(table, name)
+                 and (one := guess(table, name, names.PULSE)) is not None]
+    if names.TIME in roles:
+        made = [one for one in made if is_increasing(table, one.column)] or made
+        made = [one for one in made if one.meaning.role == names.TIME] or made
+    return made
+
+
+def _guessed(table: TextTable, name: str, meaning: names.Meaning) -> Guess | None:
+    """Return the unit of a column: by its name if that has one that fits, else by its values."""
+    dimension = _DIMENSIONS.get(meaning.role, "")
+    if meaning.role == names.COMMAND and meaning.dimension in _COMMAND_OF:
+        dimension = meaning.dimension
+    if meaning.unit:
+        if meaning.dimension != dimension:
+            return None
+        known = Guess(meaning.unit, dimension, names.UNIT_IN_NAME)
+        since = dimension == "time" and meaning.role in (names.TIME, names.SOME_TIME) and is_since_1970(
+            table, Column(name, meaning.unit))
+        return known._replace(from_first=since)
+    return guess(table, name, meaning.role)
+
+
+def _chosen(table: TextTable, what: str, candidates: list[_Candidate]) -> _Candidate | None:
+    """Return the column that is known best; raise where two are known equally well, or its unit is not."""
+    if not candidates:
+        return None
+    if what == "angle":  # the horn's angle before a potentiometer's voltage
+        candidates = [one for one in candidates if one.meaning.role == names.ANGLE and one.found] or candidates
+    best = [one for one in candidates if one.rank == max(other.rank for other in candidates)]
+    if what == COMMAND:  # as among the names of servotwin
+        order = list(COMMANDS)
+        first = min((order.index(_signal_of(one)) for one in best if one.found is not None), default=0)
+        best = [one for one in best if one.found is None or order.index(_signal_of(one)) == first]
+    if len(best) > 1:
+        said = f"{what}={best[0].column}" + (f":{best[0].found.unit}" if best[0].found else "")
+        raise InputError(f"{table.path}: column of {'the ' * (what != TIME)}{what}", allowed=f'one, said by {SAID} '
+                         f'"{said}"', got=" and ".join(one.column for one in best))
+    if best[0].found is None:
+        signal = COMMAND if best[0].meaning.role == names.COMMAND else _SIGNALS.get(best[0].meaning.role, ANGLES[0])
+        raise _no_unit(table, signal, best[0].column, best[0].meaning)
+    return best[0]
+
+
+def _signal_of(one: _Candidate) -> str:
+    if one.meaning.role == names.COMMAND and one.found is not None:
+        return _COMMAND_OF[one.found.dimension]
+    return _SIGNALS.get(one.meaning.role, one.meaning.role)
+
+
+def _column(one: _Candidate) -> Column:
+    if one.found is None:  # never: what has no unit is refused before
+        raise UnitError(one.column)
+    return Column(one.column, one.found.unit, from_first=one.found.from_first)
+
+
+def _no_unit(table: TextTable, signal: str, column: str, meaning: names.Meaning | None) -> InputError:
+    """Return the error of a column whose unit is not known, or cannot be."""
+    short = _SHORT.get(signal, signal)
+    short = "command" if signal in (*COMMANDS, COMMAND) else short
+    if short == "command":
+        units = {"command_angle": "deg", "command_voltage": "V"}.get(signal, "us")
+        others = {"command_angle": "deg or rad", "command_voltage": "V or mV", COMMAND: "us, ms, deg or rad"}
+        example, more = units, others.get(signal, "us or ms, or a scale such as 4.88us")
+    else:
+        example, more = {TIME: ("ms", "s, ms or us"), "output_angle": ("deg", "deg or rad")}.get(
+            signal, (si_unit_of(signal), units_written(dimension_of_signal(signal))))
+    values = range_of(table, column)  # raises where they are no numbers
+    if meaning is not None and COUNTS in (meaning.role, meaning.dimension):
+        example = "0.3deg-90" if short == "angle" else f"0.3{example}"
+        return InputError(f"{table.path}: column {column} holds counts ({values})",
+                          allowed=f'{SAID} "{short}={column}:{example}", with what one of them is')
+    said = f'{SAID} "{short}={column}:{example}"' if ":" not in column and "=" not in column else (
+        f'{SAID} "{short}=\'{column}\':{example}"')
+    if meaning is not None and meaning.unit:
+        return UnitError(f"{table.path}: unit of column {column}", got=meaning.unit, allowed=f"{more}, said by {said}")
+    return InputError(f"{table.path}: unit of column {column} is not known ({values})",
+                      allowed=f"{more}, said by {said}")
+
+
+def _unknown(table: TextTable, lacking: list[str], made: Mapping[str, tuple[Column, str]], *, sidecar: bool = False,
+             ) -> InputError:
+    """Return the error of a table without a time, a command or an angle that could be told."""
+    taken = {column.column for column, _ in made.values()}
+    free = [name for name in table.header if name not in taken]
+    units = {TIME: "s", COMMAND: "us", "angle": "deg"}
+    words = " ".join(f"{what}={name}:{units[what]}" for what, name in zip(
+        lacking, [*free, *["COLUMN"] * len(lacking)], strict=False))
+    usual = {TIME: "time_s", COMMAND: "pulse_width_us, command_angle_deg or command_voltage_V",
+             "angle": "output_angle_deg or feedback_voltage_V"}
+    text = {TIME: "time", COMMAND: "command", "angle": "measured angle"}
+    nothing = " and no ".join(", no ".join(text[one] for one in some) for some in (lacking[:-1], lacking[-1:]) if some)
+    what = f"no {nothing} among the columns{' of the sidecar' * sidecar}"
+    got = ", ".join(table.header) if table.has_header else f"no header, {len(table.header)} columns"
+    return InputError(f"{table.path}: {what}", got=got,
+                      allowed=f'names such as {", ".join(usual[one] for one in lacking)}, or {SAID} "{words}"')
+
+
+def _check(table: TextTable, made: Mapping[str, tuple[Column, str]]) -> None:
+    lacking = [what for what, some in ((TIME, (TIME,)), (COMMAND, tuple(COMMANDS)), ("angle", ANGLES))
+               if not any(name in made for name in some)]
+    if lacking:
+        raise _unknown(table, lacking, made, sidecar=any(known == SIDECAR for _, known in made.values()) or not made)
+    seen: dict[str, str] = {}
+    for signal, (column, _) in made.items():
+        if table.header.count(column.column) > 1:
+            raise InputError(f"{table.path}: column", allowed="once",
+                             got=f"{column.column} {table.header.count(column.column)} times")
+        if seen.setdefault(column.column, signal) != signal and SAID in (made[signal][1], made[seen[column.column]][1]):
+            raise InputError(f"{table.path}: column {column.column}", got=f"{seen[column.column]} and {signal}",
+                             allowed="one of both")

@@ -1,0 +1,226 @@
+"""A log: what one servo was told, what it did, and under which load and conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.loads import Load, Recorded, as_load
+from servotwin.logs import log_checks as check
+from servotwin.signals.shapes import sampled
+
+if TYPE_CHECKING:
+    from servotwin.logs.reading import Reading
+    from servotwin.signals import Signal
+
+ANGLES = ("output_angle", "feedback_voltage")  # of the signals that tell where the shaft is, the better one first
+KINDS = {"angle": "rad", "pulse_width": "s", "voltage": "V"}  # kind of command -> its SI unit
+_FRAME_PERIOD = "electronics.frame_period"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Log:
+    """One run of one servo; everything in SI, arrays read-only.
+
+    Parameters
+    ----------
+    name : str
+        Of the run; unique within a list of logs.
+    time : ndarray, shape (n,)
+        Strictly increasing, n ≥ 3; need not start at 0, may be uneven and have gaps [s].
+    command : ndarray, shape (n,)
+        In SI: rad, s or V.
+    command_kind : {"angle", "pulse_width", "voltage"}
+    measured : mapping of str to ndarray, shape (n,)
+        Signal name to values in SI, nan where nothing was measured; has `output_angle` or `feedback_voltage`.
+    command_hold : {"previous", "linear"}
+        What the command is between samples.
+    torque_on : ndarray of bool, shape (n,), optional
+        False: from this sample to the next the servo gets no pulses. None: it always gets them.
+    load : Load or Part
+        What hangs on the shaft; recorded torques count their time from the first sample.
+    parameters : mapping of str to float
+        Servo parameters that hold during this log, such as ``{"supply.open_circuit_voltage": 6.0}``.
+    motion : str
+        Kind of motion, such as "step" or "prbs", for tables of errors.
+    conditions : mapping of str to float or str
+        Further labels for tables of errors.
+    left_out : tuple of (float, float)
+        Windows start ≤ time < stop that say nothing about the servo [s].
+    source : str
+        Where it was read.
+    reading : Reading, optional
+        How: which column of a file was taken as what.
+
+    Raises
+    ------
+    InputError
+        If time stands still or runs backwards, there are fewer than three samples, lengths differ, the command is not
+        finite, no angle was measured, or a value is so large that its unit must be another one.
+    UnknownNameError
+        If there is no such signal or parameter.
+
+    Examples
+    --------
+    >>> log = Log(name="run", time=[0.0, 0.02, 0.04], command=[1.5e-3, 1.6e-3, 1.6e-3], command_kind="pulse_width",
+    ...           measured={"output_angle": [0.0, 0.01, float("nan")]}, left_out=[(0.0, 0.01)])
+    >>> log.duration, log.used("output_angle").tolist()
+    (0.04, [False, True, False])
+    """
+
+    name: str
+    time: NDArray[np.float64] = field(repr=False)
+    command: NDArray[np.float64] = field(repr=False)
+    command_kind: str
+    measured: Mapping[str, NDArray[np.float64]] = field(repr=False)
+    command_hold: str = "previous"
+    torque_on: NDArray[np.bool_] | None = field(default=None, repr=False)
+    load: Load = field(default_factory=Load, repr=False)
+    parameters: Mapping[str, float] = field(default_factory=dict, repr=False)
+    motion: str = ""
+    conditions: Mapping[str, float | str] = field(default_factory=dict)
+    left_out: tuple[tuple[float, float], ...] = ()
+    source: str = ""
+    reading: Reading | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        where = check.texts(self.name, self.motion, self.source)
+        check.choice(f"{where}: command_kind", self.command_kind, tuple(KINDS))
+        check.choice(f"{where}: command_hold", self.command_hold, ("previous", "linear"))
+        time = check.times(where, self.time)
+        n = time.size
+        made: dict[str, object] = {
+            "time": time,
+            "command": check.command(where, self.command, self.command_kind, n),
+            "measured": MappingProxyType(check.measured(where, self.measured, n, ANGLES)),
+            "torque_on": None if self.torque_on is None else check.switch(where, self.torque_on, n),
+            "load": as_load(self.load),
+            "parameters": MappingProxyType(check.parameters(where, self.parameters)),
+            "conditions": MappingProxyType(check.conditions(where, self.conditions)),
+            "left_out": check.windows(where, self.left_out),
+        }
+        for key, value in made.items():
+            object.__setattr__(self, key, value)
+        if not any(self.used(name).any() for name in ANGLES if name in self.measured):
+            raise InputError(f"{where}: {' and '.join(name for name in ANGLES if name in self.measured)}",
+                             got="no value outside the windows that are left out", allowed="at least one value")
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return int(self.time.size)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by plain mappings."""
+        state = {f.name: getattr(self, f.name) for f in fields(self)}
+        return _rebuild, ({k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in state.items()},)
+
+    @property
+    def start(self) -> float:
+        """Time of the first sample [s]; t = 0 of the command that `signal` returns."""
+        return float(self.time[0])
+
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def angle_name(self) -> str:
+        """The signal that tells best where the shaft is: `output_angle`, else `feedback_voltage`."""
+        return next(name for name in ANGLES if name in self.measured and self.used(name).any())
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the shaft was never seen to move: one value only, or nothing but noise under one command."""
+        values = self.measured[self.angle_name][self.used(self.angle_name)]
+        if np.ptp(values) == 0.0:
+            return True
+        if np.ptp(self.command) != 0.0 or (self.torque_on is not None and np.ptp(self.torque_on.astype(int))):
+            return False
+        # Of white noise the mean square of differences is twice the variance; of a motion it is far less
+        return bool(np.mean(np.diff(values)**2) > np.var(values))
+
+    def used(self, name: str) -> NDArray[np.bool_]:
+        """Return where a measured signal counts, shape (n,): it is finite, and inside no window that is left out.
+
+        Raises
+        ------
+        UnknownNameError
+            If it was not measured.
+        """
+        if name not in self.measured:
+            raise check.not_measured(self.name, name, self.measured)
+        here = np.isfinite(self.measured[name])
+        for start, stop in self.left_out:
+            here &= (self.time < start) | (self.time >= stop)
+        return here
+
+    def signal(self, frame_period: float | None = None) -> Signal:
+        """Return the command; its t = 0 is the first sample.
+
+        Where torque is off pulses are missing: frames start at regular edges, and there are no edges while it is off.
+        A servo without pulses then ends its drive by its `pulse_timeout`; the averaged models know no pulses.
+
+        Parameters
+        ----------
+        frame_period : float, optional
+            Of the edges of a log with torque off [s]; unless given that of `parameters`, or 20 ms.
+
+        Raises
+        ------
+        InputError
+            If the frame period is not positive.
+        """
+        unit = KINDS[self.command_kind]
+        made = sampled(self.time - self.time[0], self.command, unit=unit, hold=self.command_hold)
+        if self.torque_on is None or self.torque_on.all():
+            return made
+        period = self.parameters.get(_FRAME_PERIOD, 0.02) if frame_period is None else frame_period
+        edges = check.frame_edges(self.time, self.torque_on, period)
+        return replace(made, edges=tuple(edges.tolist()))
+
+    def part(self, start: float, stop: float, name: str | None = None) -> Log:
+        """Return the samples with start ≤ time < stop [s] as a log of its own.
+
+        Raises
+        ------
+        InputError
+            If fewer than three samples, or none of the angle, remain.
+        """
+        keep = (self.time >= start) & (self.time < stop)
+        return self._cut(keep, self.name if name is None else name)
+
+    def without_torque_off(self) -> tuple[Log, ...]:
+        """Return the stretches with torque on, each a log of its own; those too short or without an angle are left out.
+
+        Names get " (1)", " (2)", … where there are several.
+        """
+        if self.torque_on is None or self.torque_on.all():
+            return (self,)
+        ends = np.flatnonzero(np.diff(np.concatenate(([0], self.torque_on.astype(int), [0]))))
+        seen = np.any([self.used(name) for name in ANGLES if name in self.measured], axis=0)
+        spans = [(a, b) for a, b in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)
+                 if b - a >= check.FEWEST and seen[a:b].any()]
+        index = np.arange(self.time.size)
+        return tuple(self._cut((index >= a) & (index < b), f"{self.name} ({k})" if len(spans) > 1 else self.name)
+                     for k, (a, b) in enumerate(spans, 1))
+
+    def _cut(self, keep: NDArray[np.bool_], name: str) -> Log:
+        if keep.sum() < check.FEWEST:
+            raise check.too_few(f"part of log {self.name!r}", int(keep.sum()))
+        shift = float(self.time[keep][0] - self.time[0])
+        load = replace(self.load, recorded=tuple(Recorded([t - shift for t in r.time], r.torque)
+                                                 for r in self.load.recorded))
+        return replace(self, name=name, time=self.time[keep], command=self.command[keep], load=load,
+                       measured={key: values[keep] for key, values in self.measured.items()},
+                       torque_on=None if self.torque_on is None else self.torque_on[keep])
+
+
+def _rebuild(state: dict[str, Any]) -> Log:
+    return Log(**state)

@@ -1,0 +1,137 @@
+"""Logs from files and folders, whichever known format they are in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.logs.formats import FORMATS, LOG_FORMATS, formats_that_hold
+from servotwin.logs.json_file import read_json
+from servotwin.logs.log import Log
+from servotwin.logs.sidecar import FOLDER_FILE, FORMAT
+from servotwin.signals.time_base import warn_of_time_base
+
+_CSV_ENDINGS = (".csv", ".tsv")
+
+
+def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | None = None,
+              columns: str | Mapping[str, str] | None = None, joints: str | Mapping[str, str] | None = None,
+              ) -> list[Log]:
+    r"""Return the logs in a file or folder, in the order of the file names.
+
+    Parameters
+    ----------
+    path : str or Path
+        A table, whose sidecar says more; a JSON file of a known format; a folder of such files; or a dataset.
+    format : str
+        A name of `LOG_FORMATS`, or "auto", which tells by the content; JSON files of a folder that are no logs are
+        then passed over.
+    sidecar : str or Path, optional
+        What holds for all CSV files, in place of a `logs.json` in their folder.
+    columns : str or mapping, optional
+        Which column of the CSV files is which signal, in which unit: ``"time=t:ms angle=pos:deg-90"``. What it leaves
+        out is known by name or guessed; `Log.reading` shows it.
+    joints : str or mapping, optional
+        Which joints of a LeRobot dataset, and their unit: ``"shoulder_pan:deg"``.
+
+    Raises
+    ------
+    InputError
+        If there is no log, one cannot be read, or two have one name: one line that names the file.
+    MissingExtraError
+        If it is a LeRobot dataset, and pyarrow is not installed.
+
+    Warns
+    -----
+    UserWarning
+        If the times of a log look as if they were a thousand times too long or too short.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> for name in ("a", "b"):
+    ...     _ = (folder / f"{name}.csv").write_text("time,pulse_width_us,output_angle\n0,1500,0\n1,1600,2\n2,1600,3\n")
+    >>> [log.name for log in read_logs(folder)]
+    ['a', 'b']
+    """
+    if format not in FORMATS:
+        raise UnknownNameError("format of logs", str(format), FORMATS)
+    path = Path(path)
+    for name, dataset in formats_that_hold("dataset").items():
+        if format == name or (format == "auto" and dataset.room.recognises(path)):
+            if columns is not None:
+                raise InputError(f"--columns for {path}", got=f"a dataset ({name})",
+                                 allowed="--joint (joints=), which says the units of its joints")
+            return list(dataset.room.logs_of(path, joints=joints))
+    if joints is not None:
+        raise InputError(f"--joint for {path}", got="no dataset", allowed="--columns (columns=) for tables")
+    files = _files(path, format) if _is_folder(path) else [path]
+    given = {"sidecar": sidecar, "columns": columns}
+    logs = [log for file in files for log in _logs(file, format, given, alone=file is path)]
+    if not logs:
+        raise InputError(f"{path}", got="a folder without logs", allowed="*.csv, *.json of a known format ("
+                         + ", ".join(formats_that_hold("json")) + "), or a dataset")
+    seen: dict[str, str] = {}
+    for log in logs:
+        if log.name in seen:
+            raise InputError(f"{path}: name of a log", allowed="a name for each log",
+                             got=f"{log.name} in {seen[log.name]} and in {Path(log.source).name}")
+        seen[log.name] = Path(log.source).name
+        warn_of_time_base(log.time, log.command, log.command_kind, f"log {log.name!r}")
+    return logs
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # reading says what is wrong with the name
+        return False
+
+
+def _files(folder: Path, format: str) -> list[Path]:
+    try:
+        files = sorted(file for file in folder.iterdir() if file.is_file() and not file.name.startswith("."))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror})") from None
+    tables = [file for file in files if file.suffix.lower() in _CSV_ENDINGS]
+    beside = {file.stem for file in tables}
+    others = [file for file in files if file.suffix.lower() == ".json" and file.name != FOLDER_FILE
+              and file.stem not in beside]
+    asked = ("table", "json") if format == "auto" else (LOG_FORMATS[format].holds,)
+    return sorted((tables if "table" in asked else []) + (others if "json" in asked else []))
+
+
+def _logs(file: Path, format: str, given: Mapping[str, Any], *, alone: bool) -> list[Log]:
+    name = "csv" if format == "auto" and not _is_json(file) else format
+    if name != "auto" and LOG_FORMATS[name].holds == "table":
+        return list(LOG_FORMATS[name].room.logs_of(file, **given))
+    if alone and given["columns"] is not None:
+        raise InputError(f"--columns for {file}", got="JSON", allowed="tables; JSON says what it holds")
+    content: Any = read_json(file)
+    if name != "auto":
+        return list(LOG_FORMATS[name].room.logs_of(file, content))
+    if isinstance(content, dict) and content.get("format") == FORMAT:
+        if not alone:
+            return []
+        raise InputError(f"{file}", got="a sidecar", allowed="the CSV file that it describes, or its folder")
+    rooms = [known.room for known in formats_that_hold("json").values()]
+    known = next((room for room in rooms if room.recognises(content)), None)
+    if known is None:
+        if not alone:
+            return []
+        raise InputError(f"{file}", got="JSON that is no known log", allowed="one of the formats "
+                         + ", ".join(formats_that_hold("json")))
+    return list(known.logs_of(file, content))
+
+
+def _is_json(file: Path) -> bool:
+    """Return whether a file begins as JSON does."""
+    try:
+        with file.open("rb") as stream:
+            head = stream.read(256)
+    except (OSError, ValueError):
+        return file.suffix.lower() == ".json"
+    return head.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")

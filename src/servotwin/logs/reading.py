@@ -1,0 +1,78 @@
+"""How a file was read: which of its columns is what, and what was passed over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from servotwin.logs.columns import Column
+
+
+@dataclass(frozen=True)
+class ReadColumn:
+    """How one column of a file was read.
+
+    Parameters
+    ----------
+    column : str
+        As the header has it.
+    signal : str
+    unit : str
+        Of its numbers, with scale and offset.
+    known : str
+        How this was known: "named" by a name of `servotwin`, "--columns", "sidecar", or "guessed" and from what.
+    """
+
+    column: str
+    signal: str
+    unit: str
+    known: str
+
+    @property
+    def guessed(self) -> bool:
+        """Whether it was guessed."""
+        return self.known.startswith("guessed")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How a log was read from its file.
+
+    Parameters
+    ----------
+    file : str
+    columns : tuple of ReadColumn
+    remarks : tuple of str
+        What was passed over, each in one line.
+    unread : tuple of str
+        Columns that are none of these.
+    layout : mapping of str to Column
+        Of a CSV file: what its sidecar would say.
+
+    Examples
+    --------
+    >>> print(Reading(columns=(ReadColumn("ms", "time", "ms", "guessed from its name"),), unread=("note",)))
+    column  signal  unit  known
+    ms      time    ms    guessed from its name
+    not read: note
+    """
+
+    file: str = ""
+    columns: tuple[ReadColumn, ...] = ()
+    remarks: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
+    layout: Mapping[str, Column] = field(default_factory=dict, repr=False)
+
+    def __str__(self) -> str:
+        rows = [("column", "signal", "unit", "known"),
+                *((one.column, one.signal, one.unit, one.known) for one in self.columns)]
+        widths = [max(len(row[k]) for row in rows) for k in range(4)]
+        lines = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+        return "\n".join([*lines, *self.notes()])
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what is said below the table: remarks, and what was not read."""
+        unread = (f"not read: {', '.join(self.unread)}",) if self.unread else ()
+        return (*self.remarks, *unread)

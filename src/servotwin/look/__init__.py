@@ -1,0 +1,36 @@
+"""One look for pictures and pages: colours, lines, units that people read, and HTML that needs nothing but itself.
+
+What plotting, reports and the command line share. matplotlib is loaded when a picture is made.
+"""
+
+from servotwin.look.files import FORMATS, to_bytes
+from servotwin.look.numbers import figure_in, label_of, readable, unit_for
+from servotwin.look.page import document
+from servotwin.look.style import COLOURS, LINES, WIDTH, axes_grid, context, finished, new_figure
+from servotwin.look.words import MINUS, TIMES, escape, fixed, number, picture, plain, table, with_error
+
+__all__ = [
+    "COLOURS",
+    "FORMATS",
+    "LINES",
+    "MINUS",
+    "TIMES",
+    "WIDTH",
+    "axes_grid",
+    "context",
+    "document",
+    "escape",
+    "figure_in",
+    "finished",
+    "fixed",
+    "label_of",
+    "new_figure",
+    "number",
+    "picture",
+    "plain",
+    "readable",
+    "table",
+    "to_bytes",
+    "unit_for",
+    "with_error",
+]

@@ -1,0 +1,24 @@
+"""Tolerance studies: parameters drawn from distributions, many servos, a few metrics of each, and what moves them."""
+
+from servotwin.studies import distributions
+from servotwin.studies.api import sweep
+from servotwin.studies.distributions import (
+    Choice,
+    Distribution,
+    LogNormal,
+    Normal,
+    Offset,
+    Relative,
+    Triangular,
+    Uniform,
+    stated,
+)
+from servotwin.studies.metrics import METRICS
+from servotwin.studies.names import dimension_of
+from servotwin.studies.study import LaneFailure, Study
+from servotwin.studies.tornado import Bar, Tornado, variance_share
+from servotwin.tables.columns import read_columns
+
+__all__ = ["METRICS", "Bar", "Choice", "Distribution", "LaneFailure", "LogNormal", "Normal", "Offset", "Relative",
+           "Study", "Tornado", "Triangular", "Uniform", "dimension_of", "distributions", "read_columns", "stated",
+           "sweep", "variance_share"]

@@ -1,0 +1,18 @@
+"""Distributions that parameters are drawn from, and those that a servo file states."""
+
+from servotwin.studies.kinds import (
+    Affine,
+    Choice,
+    Distribution,
+    LogNormal,
+    Normal,
+    Offset,
+    Relative,
+    Triangular,
+    Truncated,
+    Uniform,
+)
+from servotwin.studies.stated import stated
+
+__all__ = ["Affine", "Choice", "Distribution", "LogNormal", "Normal", "Offset", "Relative", "Triangular", "Truncated",
+           "Uniform", "stated"]

@@ -1,0 +1,264 @@
+"""A study before it runs: everything checked, every number drawn, and all that defines it as one mapping."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError
+from servotwin.loads import Load, as_load
+from servotwin.simulation.lane_inputs import lanes_of
+from servotwin.simulation.many import memory_limit
+from servotwin.simulation.packing import Chunk, Commands, groups
+from servotwin.studies.draws import (
+    SAMPLINGS,
+    check_ranges,
+    checked_table,
+    distributions_of,
+    drawn,
+    noise_seeds,
+)
+from servotwin.studies.jobs import Job
+from servotwin.studies.kinds import ENDS, Distribution
+from servotwin.studies.metrics import checked_metrics, decision_times, output_times, step_time
+from servotwin.studies.names import parameter
+from servotwin.studies.stated import Together
+from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.signals import Signal
+
+Column = NDArray[Any]
+
+_USUAL_LANES = 1000
+_CHUNK_NUMBERS = 2**20  # of one signal in a chunk
+_MOST_CHUNK, _LEAST_CHUNK = 8192, 64  # lanes of a chunk
+_LEAST_CHUNKS = 16  # so that many cores have something to do
+_MOST_TIMES = 2**22  # samples of a lane
+_ADVICE = "; truncate=True (--truncate) draws inside the range"
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A study that can run.
+
+    Parameters
+    ----------
+    job : Job
+        What all chunks share.
+    columns : mapping of str to ndarray, shape (lanes,)
+        What is drawn, of all lanes, by dotted name (SI).
+    followed : mapping of str to ndarray, shape (lanes,)
+        Parameters that follow from it, by dotted name (SI).
+    together : Together
+        How they follow.
+    seeds : ndarray of int64, shape (lanes,)
+        Of each lane's noise.
+    ends : mapping of str to tuple
+        Of each parameter, its 5 % and 95 % value, or all options.
+    nominal : mapping of str to float or str
+        What each parameter is while another one is moved.
+    chunk : int
+        Lanes that are worked on, and written, together.
+    definition : mapping
+        All that defines the study, ready for JSON.
+    """
+
+    job: Job
+    columns: Mapping[str, Column]
+    followed: Mapping[str, Column]
+    together: Together
+    seeds: NDArray[np.int64]
+    ends: Mapping[str, tuple[Any, ...]]
+    nominal: Mapping[str, Any]
+    chunk: int
+    definition: Mapping[str, Any]
+
+    @property
+    def lanes(self) -> int:
+        """How many lanes there are."""
+        return len(self.seeds)
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks there are."""
+        return math.ceil(self.lanes / self.chunk)
+
+    def part(self, k: int) -> tuple[dict[str, Column], NDArray[np.int64]]:
+        """Return parameters and seeds of a chunk."""
+        which = slice(k * self.chunk, (k + 1) * self.chunk)
+        columns = {**self.together.read(self.columns), **self.followed}
+        return {name: column[which] for name, column in columns.items()}, self.seeds[which]
+
+    def one_at_a_time(self) -> tuple[dict[str, Column], NDArray[np.int64]]:
+        """Return the lanes of the tornado: the nominal one, then each end of each parameter in turn."""
+        moved: list[tuple[str, Any]] = [(name, end) for name, ends in self.ends.items() for end in ends]
+        columns = {name: np.array([self.nominal[name], *(
+            end if which == name else self.nominal[name] for which, end in moved)]) for name in self.columns}
+        parameters = {**self.together.read(columns), **self.together.follow(columns)}
+        return parameters, np.repeat(self.seeds[:1], len(moved) + 1)
+
+
+def planned(model: Model, command: Signal, *, duration: float, vary: Mapping[str, Distribution | str] | None,
+            draws: Mapping[str, Any] | None, lanes: int | None, load: Any, seed: int, sampling: str, truncate: bool,
+            metrics: Sequence[str] | None, output_step: float, chunk: int | None) -> Plan:
+    """Check everything, draw everything, and return the plan.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds.
+    """
+    _check_scalars(duration=duration, output_step=output_step, seed=seed, sampling=sampling, chunk=chunk, lanes=lanes)
+    if not isinstance(vary or {}, Mapping):
+        raise InputError("vary", got=type(vary).__name__, allowed="a mapping of dotted names to distributions")
+    lanes_of(model, command, load, None, None, None)
+    job = _job(model, command, as_load(load), duration, metrics, output_step)
+    drawing, advice = vary or {}, "" if truncate else _ADVICE
+    table = checked_table(draws or {}, model, job.load)
+    count = _count(lanes, drawing, table)
+    _check_memory(count, len(drawing) + len(table) + len(job.metrics) + 3)
+    distributions = distributions_of(drawing, model, job.load, truncate=truncate)
+    columns = dict(sorted({**drawn(distributions, count, seed, sampling),
+                           **{name: column[:count] for name, column in table.items()}}.items()))
+    size = chunk or _chunk_size(count, len(job.times))
+    check_ranges(columns, model, job.load, advice=advice)
+    together = Together(model)
+    followed = together.follow(columns)
+    plan = Plan(
+        job=job, columns=columns, followed=followed, together=together, seeds=noise_seeds(count, seed), chunk=size,
+        ends=_ends(columns, distributions),
+        nominal=_nominal(columns, model, job.load), definition={
+            **_of_job(job), "output_step": float(output_step), "lanes": count, "seed": int(seed),
+            "sampling": sampling, "truncate": bool(truncate), "chunk": size,
+            "vary": {name: _described(drawing[name]) for name in sorted(drawing)}, "draws": sorted(table),
+            "follow": list(followed), "parameters_sha256": _digest({**columns, **followed})})
+    _check_lanes(job, {**together.read(columns), **followed}, plan.seeds, advice=advice)
+    try:
+        _check_lanes(job, *plan.one_at_a_time(), advice="")
+    except InputError as error:
+        raise InputError(f"one at a time: {error.what}", got=error.got, allowed=error.allowed) from None
+    return plan
+
+
+def _job(model: Model, command: Signal, load: Load, duration: float, metrics: Sequence[str] | None,
+         output_step: float) -> Job:
+    if duration / output_step > _MOST_TIMES:
+        raise InputError("duration / output_step", got=f"{duration / output_step:.3g} samples",
+                         allowed=f"at most {_MOST_TIMES} of a lane")
+    names, start = checked_metrics(metrics, model, command, duration), step_time(command)
+    times = output_times(duration, output_step, start, decision_times(model, command, duration))
+    return Job(model=model, command=command, load=load, duration=float(duration), start=start, times=times,
+               metrics=names)
+
+
+def _chunk_size(lanes: int, times: int) -> int:
+    """Return how many lanes are worked on together: the same on every machine, so that it can go on elsewhere."""
+    usual = min(_CHUNK_NUMBERS // times, max(_LEAST_CHUNK, lanes // _LEAST_CHUNKS), _MOST_CHUNK)
+    return 1 << (max(1, usual).bit_length() - 1)
+
+
+def _check_scalars(*, duration: object, output_step: object, seed: object, sampling: object, chunk: object,
+                   lanes: object) -> None:
+    for name, value in (("duration", duration), ("output_step", output_step)):
+        if not (is_finite(value) and value > 0.0):
+            raise InputError(name, got=value, allowed="a positive number of seconds")
+    for name, value, least in (("lanes", lanes, 1), ("chunk", chunk, 1), ("seed", seed, 0)):
+        if value is None and name != "seed":
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value < 2**63:
+            raise InputError(name, got=value, allowed=f"a whole number of at least {least}")
+    if sampling not in SAMPLINGS:
+        raise InputError("sampling", got=sampling, allowed=", ".join(SAMPLINGS))
+
+
+def _count(lanes: int | None, drawing: Mapping[str, Any], table: Mapping[str, Column]) -> int:
+    twice = [name for name in drawing if name in table]
+    if twice:
+        raise InputError(f"vary {twice[0]}", got="a distribution and a column of draws", allowed="one of them")
+    if not (drawing or table):
+        raise InputError("vary", got="nothing", allowed="at least one parameter that differs from lane to lane")
+    rows = len(next(iter(table.values()))) if table else None
+    if rows is None:
+        return _USUAL_LANES if lanes is None else int(lanes)
+    if lanes is not None and lanes > rows:
+        raise InputError("lanes", got=lanes, allowed=f"at most {rows}, the rows of the draws")
+    return rows if lanes is None else int(lanes)
+
+
+def _check_memory(lanes: int, columns: int) -> None:
+    size, memory = 3.0 * 8.0 * lanes * columns, memory_limit()
+    if size > 0.8 * memory:
+        raise InputError("lanes", got=f"{lanes}, which take {size / 1e9:.3g} GB",
+                         allowed=f"what fits into memory ({memory / 1e9:.3g} GB)")
+
+
+def _ends(columns: Mapping[str, Column], distributions: Mapping[str, Distribution]) -> dict[str, tuple[Any, ...]]:
+    found: dict[str, tuple[Any, ...]] = {}
+    for name, column in columns.items():
+        if name in distributions:
+            found[name] = distributions[name].ends
+        elif column.dtype.kind == "U":
+            found[name] = tuple(np.unique(column).tolist())
+        else:
+            found[name] = tuple(np.quantile(column, ENDS, method="inverted_cdf").tolist())
+    return found
+
+
+def _nominal(columns: Mapping[str, Column], model: Model, load: Load) -> dict[str, Any]:
+    """Return what servo and load say, or, where they say nothing, the middle one of the draws."""
+    found = {}
+    for name, column in columns.items():
+        known = parameter(name, model, load).nominal
+        found[name] = np.sort(column)[(len(column) - 1) // 2].item() if known is None else known
+    return found
+
+
+def _check_lanes(job: Job, columns: Mapping[str, Column], seeds: NDArray[np.int64], *, advice: str) -> None:
+    """Raise where a lane cannot run; names the lane."""
+    check_ranges(columns, job.model, job.load, advice=advice)
+    lanes = lanes_of(job.model, job.command, job.load, columns, None, seeds)
+    commands = Commands(lanes)
+    for group in groups(lanes, commands):
+        Chunk(lanes, commands, group).check(job.duration)
+
+
+def _of_job(job: Job) -> dict[str, Any]:
+    servo, command = job.model.servo, job.command
+    load: dict[str, Any] = {name: value for name, value in asdict(job.load).items() if value}
+    return {
+        "model": type(job.model).__name__, "servo": servo.name,
+        "parameters": {name: _plain(servo.get(name)) for name in servo.names()},
+        "command": {"unit": command.unit, "initial": command.initial, "frame_period": command.frame_period,
+                    "edges": _plain(command.edges), "pieces": [list(piece) for piece in command.pieces.table]},
+        "load": json.loads(json.dumps(load, default=_plain)), "duration": job.duration,
+        "metrics": list(job.metrics),
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(x) for x in value]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def _described(given: Distribution | str) -> Any:
+    return given if isinstance(given, str) else given.described()
+
+
+def _digest(columns: Mapping[str, Column]) -> str:
+    """Return the fingerprint of all parameters: they are the same to the last bit, or it differs."""
+    found = hashlib.sha256()
+    for name, column in columns.items():
+        found.update(name.encode())
+        found.update(np.ascontiguousarray(column).tobytes())
+    return found.hexdigest()
+
