@@ -99,7 +99,7 @@ def fit(
         "--json", help="Print JSON, in SI units.", rich_help_panel=shared.OUTPUT)] = False,
 ) -> None:
     """Find the parameters of a servo, with intervals."""
-    _check_words(logs, servo, table, report, advise=advise)
+    _check_words(logs, servo, table, report, scheduler, advise=advise)
     if table is not None:
         from servotwin.cli.fit_table import show_table_calibration
 
@@ -144,12 +144,13 @@ class _Found:
     advice: Advice | None = None
 
 
-def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None, report: Path | None, *,
-                 advise: bool) -> None:
+def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None, report: Path | None,
+                 scheduler: str | None, *, advise: bool) -> None:
     from servotwin.errors import InputError
 
     if table is not None:
-        for given, what in ((bool(logs), "logs"), (report is not None, "--report"), (advise, "--advise")):
+        for given, what in ((bool(logs), "logs"), (report is not None, "--report"), (advise, "--advise"),
+                            (scheduler is not None, "--scheduler")):
             if given:
                 raise InputError("--table", got=f"also {what}", allowed="a table alone; it is calibrated, not fitted")
         return
