@@ -1,17 +1,20 @@
 """Fits to measured servos: errors on runs that were not fitted, beside simpler models, and what each physics earns.
 
 Needs the measurements, which are not part of the repository: give their folder, or have it at ../shared/data.
-    python benchmarks/measured/run.py [--data FOLDER] [miuzei] [bam] [maccepa]
+    python benchmarks/measured/run.py [--data FOLDER] [miuzei] [bam] [maccepa] [ladder [RUNS]]
+The ladder of friction laws takes far longer than the others, and only runs where it is named.
 """
 
 import sys
 from pathlib import Path
 
 import bam
+import ladder
 import maccepa
 import miuzei
 
-PARTS = {"miuzei": miuzei.main, "bam": bam.main, "maccepa": maccepa.main}
+USUAL = {"miuzei": miuzei.main, "bam": bam.main, "maccepa": maccepa.main}
+PARTS = {**USUAL, "ladder": ladder.main}
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 
 
@@ -24,8 +27,12 @@ def main(arguments: list[str]) -> None:
     if not folder.is_dir():
         print(f"measured servos: left out, because there is no {folder}")
         return
-    for name in arguments or PARTS:
-        PARTS[name](folder)
+    for place, name in enumerate(arguments or USUAL):
+        if name in PARTS:
+            number = [int(word) for word in arguments[place + 1:place + 2] if word.isdecimal()]
+            PARTS[name](folder, *number)
+        elif not name.isdecimal():
+            sys.exit(f"run.py: {name!r} is not one of {', '.join(PARTS)}")
 
 
 if __name__ == "__main__":

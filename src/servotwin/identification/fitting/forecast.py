@@ -7,7 +7,7 @@ little more than a simulation, and it is that of the same exact solution.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
 from typing import Any
 
@@ -195,18 +195,21 @@ class Forecast:
         """
         return self.at_all([point], derivatives=derivatives, central=central, step=step, cases=cases)[0]
 
-    def at_all(self, points: Sequence[Point], *, derivatives: bool = False, central: bool = False,
-               step: float = STEP, cases: Sequence[int] | None = None, rates: bool = False) -> list[list[LogPart]]:
+    def at_all(self, points: Sequence[Point], *, derivatives: bool | Sequence[bool] = False, central: bool = False,
+               step: float = STEP, cases: Sequence[int] | None = None, rates: bool = False,
+               noises: Sequence[Mapping[str, float]] | None = None) -> list[list[LogPart]]:
         """Return what the logs say at several points, in one batch; for each point, log by log.
 
-        `rates` gives what a delay changes without derivatives, for all signals.
+        `derivatives` may differ from point to point, and so may the noise; `rates` gives what a delay changes without
+        derivatives, for all signals.
         """
         which = range(len(self.cases)) if cases is None else cases
-        sides = (1 + central) * derivatives
-        lanes = [LogLanes(self, k, at, point, sides=sides, step=step, rates=rates)
+        sloped = [derivatives] * len(points) if isinstance(derivatives, bool) else derivatives
+        lanes = [LogLanes(self, k, at, point, sides=(1 + central) * sloped[at], step=step, rates=rates,
+                          noise=self.noise if noises is None else noises[at])
                  for k in which for at, point in enumerate(points)]
         self.work += sum(lane.cost for lane in lanes)
-        self._simulate(lanes, step if sides else STEP)
+        self._simulate(lanes, step if any(sloped) else STEP)
         found: list[list[LogPart]] = [[] for _ in points]
         for lane in lanes:
             found[lane.at].append(lane.part)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,8 +37,8 @@ class LogLanes:
     """The lanes of one log at one point: the nominal one, and one for each number that is varied."""
 
     def __init__(self, forecast: Forecast, k: int, at: int, point: Point, *, sides: int, step: float,
-                 rates: bool = False) -> None:
-        self.forecast, self.case, self.at, self.sides = forecast, forecast.cases[k], at, sides
+                 rates: bool, noise: Mapping[str, float]) -> None:
+        self.forecast, self.case, self.at, self.sides, self.noise = forecast, forecast.cases[k], at, sides, noise
         p, names = len(forecast.space), forecast.names_of_own(self.case)
         self.names, own = names, dict(zip(names, point.own[k], strict=True))
         self.delay = forecast.nuisance_of(point.shared, "delay") + own.get("log_delay", 0.0) * DELAY_SCALE
@@ -138,7 +139,7 @@ class LogLanes:
                     values = values + self.sag * signals["sag"][:, :k]
             elif self.later:
                 rate = (signals[name][0, k:] - values[0]) / self.later
-            sigma = forecast.noise[name]
+            sigma = self.noise[name]
             y = values[:, place] / sigma
             residuals.append(y[0] - case.values[name] / sigma)
             of_delay = -rate[place] * DELAY_SCALE / sigma

@@ -6,13 +6,14 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
+from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search, together
 from servotwin.identification.fitting.case import Case
 from servotwin.identification.fitting.clocks import with_clocks
 from servotwin.identification.fitting.forecast import Forecast
@@ -220,15 +221,19 @@ class Task:
     def _rough(self, nominal: Point, tell: Told) -> list[Outcome]:
         """Search from several starts on some logs; return where that ended, the best first."""
         few = self.few()
-        for k, start in enumerate(self._candidates(nominal, few)):
-            text, share = f"start {k + 1} of {self.starts}", _STARTS / self.starts
-            tell(k * share, text)
-            self._set_noise(self.forecast.at(start, derivatives=False, cases=few), few, rough=True)
-            search = self._search(few)
-            first = search.costs([start])[0]
-            self._ended.append(search.run(start, most=_MOST["rough"], least_gain=_ROUGH * first,
-                                          tell=self._kept(tell, k * share, (k + 1) * share, "rough", text)))
-            self._best = None
+        starts = self._candidates(nominal, few)
+        text, search, steps = f"{len(starts)} starts", self._search(few), [0] * len(starts)
+        tell(0.0, text)
+        noises = [self._noise_of(parts, few, rough=True) for parts in self.forecast.at_all(starts, cases=few)]
+        self._ended = [Outcome(start, math.inf, False, 0) for start in starts]
+
+        def keep(k: int, step: int, outcome: Outcome) -> None:
+            self._ended[k], steps[k] = outcome, step
+            tell(_STARTS * sum(steps) / (len(starts) * _MOST["rough"]), text)
+
+        self._ended = together(self.forecast, few, [
+            search.steps(start, most=_MOST["rough"], least_share=_ROUGH, tell=partial(keep, k))
+            for k, start in enumerate(starts)], noises)
         ended, self._ended = self._on_one_scale(self._ended, few), []
         self._best = ended[0]
         return ended
@@ -318,6 +323,13 @@ class Task:
 
     def _set_noise(self, parts: Sequence[LogPart], cases: Sequence[int], *, rough: bool = False) -> float:
         """Take the noise of each sensor from its residuals; return by which share it changed."""
+        new = self._noise_of(parts, cases, rough=rough)
+        change = max(abs(math.log(new[name] / self.forecast.noise[name])) for name in new)
+        self.forecast.noise = new
+        return change
+
+    def _noise_of(self, parts: Sequence[LogPart], cases: Sequence[int], *, rough: bool = False) -> dict[str, float]:
+        """Return the noise of each sensor by its residuals, which are in units of the noise that it has."""
         if self.noise is not None:
             new = {name: self.noise.get(name, self.forecast.noise[name]) for name in self.forecast.sensors}
         else:
@@ -325,9 +337,7 @@ class Task:
         if rough and len(new) > 1:
             # Sampled between pulses a current is jagged over the delay: the angle alone leads near first
             new = {name: value if name in ANGLES else _BLIND * value for name, value in new.items()}
-        change = max(abs(math.log(new[name] / self.forecast.noise[name])) for name in new)
-        self.forecast.noise = self.forecast.noise | new
-        return change
+        return self.forecast.noise | new
 
     def at_bound(self, outcome: Outcome) -> NDArray[np.bool_]:
         """Tell which shared numbers stand at a bound."""
