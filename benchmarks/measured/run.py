@@ -14,7 +14,6 @@ import maccepa
 import miuzei
 
 USUAL = {"miuzei": miuzei.main, "bam": bam.main, "maccepa": maccepa.main}
-PARTS = {**USUAL, "ladder": ladder.main}
 DATA = Path(__file__).resolve().parents[2].parent / "shared" / "data"
 
 
@@ -28,11 +27,12 @@ def main(arguments: list[str]) -> None:
         print(f"measured servos: left out, because there is no {folder}")
         return
     for place, name in enumerate(arguments or USUAL):
-        if name in PARTS:
-            number = [int(word) for word in arguments[place + 1:place + 2] if word.isdecimal()]
-            PARTS[name](folder, *number)
-        elif not name.isdecimal():
-            sys.exit(f"run.py: {name!r} is not one of {', '.join(PARTS)}")
+        if name == "ladder":
+            ladder.main(folder, *(int(word) for word in arguments[place + 1:place + 2] if word.isdecimal()))
+        elif name in USUAL:
+            USUAL[name](folder)
+        elif not (name.isdecimal() and arguments[place - 1] == "ladder"):
+            sys.exit(f"run.py: {name!r} is not one of {', '.join(USUAL)}, ladder, ladder RUNS")
 
 
 if __name__ == "__main__":
