@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,11 +131,12 @@ class Ask(NamedTuple):
 
 
 Steps = Generator[Ask, list[LogPart], Outcome]
+Found = TypeVar("Found")
 
 
-def together(forecast: Forecast, cases: Sequence[int], searches: Sequence[Steps],
-             noises: Sequence[Mapping[str, float]] | None = None) -> list[Outcome]:
-    """Run searches side by side: what all of them have to know next is simulated in one batch.
+def together(forecast: Forecast, cases: Sequence[int], searches: Sequence[Generator[Ask, list[LogPart], Found]],
+             noises: Sequence[Mapping[str, float]] | None = None) -> list[Found]:
+    """Run searches side by side, and return their ends: what all have to know next is simulated in one batch.
 
     Each takes the steps that it would take alone, to the last bit.
 
@@ -145,12 +146,12 @@ def together(forecast: Forecast, cases: Sequence[int], searches: Sequence[Steps]
     cases : sequence of int
         The logs that count for all of them.
     searches : sequence of generator
-        As of `Search.steps`.
+        As of `Search.steps`, or longer ways of such steps.
     noises : sequence of mapping, optional
         The noise of each search; that of the forecast unless given.
     """
     asks: dict[int, Ask] = {}
-    ended: dict[int, Outcome] = {}
+    ended: dict[int, Found] = {}
 
     def go_on(k: int, parts: list[LogPart] | None) -> None:
         try:
