@@ -24,9 +24,11 @@ class Begun:
             print(f"  {rung} begins after {time.perf_counter() - self.began:.0f} s", flush=True)
 
 
-def main(folder: Path, most: int | None = None) -> None:
-    """Fit all laws to all runs but three, which are predicted, or to some runs alone."""
+def main(folder: Path, most: int | None = None, seconds: float | None = None) -> None:
+    """Fit all laws to all runs but three, which are predicted, or to some runs alone, perhaps to their beginnings."""
     runs = bam.logs(folder, bam.TOLD)
+    if seconds is not None:
+        runs = [run.part(0.0, min(seconds, run.duration)) for run in runs]
     held_out = [runs[k].name for k in bam.HELD_OUT]
     if most is not None and most < len(runs):
         runs, held_out = [runs[k * len(runs) // most] for k in range(most)], []

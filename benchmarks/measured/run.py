@@ -1,7 +1,7 @@
 """Fits to measured servos: errors on runs that were not fitted, beside simpler models, and what each physics earns.
 
 Needs the measurements, which are not part of the repository: give their folder, or have it at ../shared/data.
-    python benchmarks/measured/run.py [--data FOLDER] [miuzei] [bam] [maccepa] [ladder [RUNS]]
+    python benchmarks/measured/run.py [--data FOLDER] [miuzei] [bam] [maccepa] [ladder [RUNS [SECONDS]]]
 The ladder of friction laws takes far longer than the others, and only runs where it is named.
 """
 
@@ -26,13 +26,23 @@ def main(arguments: list[str]) -> None:
     if not folder.is_dir():
         print(f"measured servos: left out, because there is no {folder}")
         return
-    for place, name in enumerate(arguments or USUAL):
+    words = list(arguments or USUAL)
+    while words:
+        name = words.pop(0)
         if name == "ladder":
-            ladder.main(folder, *(int(word) for word in arguments[place + 1:place + 2] if word.isdecimal()))
+            ladder.main(folder, *numbers(words))
         elif name in USUAL:
             USUAL[name](folder)
-        elif not (name.isdecimal() and arguments[place - 1] == "ladder"):
-            sys.exit(f"run.py: {name!r} is not one of {', '.join(USUAL)}, ladder, ladder RUNS")
+        else:
+            sys.exit(f"run.py: {name!r} is not one of {', '.join(USUAL)}, ladder [RUNS [SECONDS]]")
+
+
+def numbers(words: list[str]) -> list[int]:
+    """Take the whole numbers that words begin with out of them."""
+    found = []
+    while words and words[0].isdecimal():
+        found.append(int(words.pop(0)))
+    return found
 
 
 if __name__ == "__main__":

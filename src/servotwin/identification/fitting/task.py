@@ -176,9 +176,15 @@ class Task:
 
     def ran(self, start: Point, tell: Told, began: float) -> Outcome:
         """Search from a point on all logs that are fitted, as closely as is needed to choose between points."""
+        return self.ran_all([start], tell, began)[0]
+
+    def ran_all(self, starts: Sequence[Point], tell: Told, began: float) -> list[Outcome]:
+        """Search from several points, side by side."""
         keep = self._kept(tell, began, began, "all", "all logs")
         least = _CLOSELY * sum(self.forecast.cases[k].count for k in self.fitted)
-        return self._search(self.fitted).run(start, most=_MOST["all"], tell=keep, least_gain=least)
+        search = self._search(self.fitted)
+        return together(self.forecast, self.fitted, [
+            search.steps(start, most=_MOST["all"], tell=keep, least_gain=least) for start in starts])
 
     def measure(self, point: Point) -> None:
         """Take the noise of each sensor from its residuals at a point."""
