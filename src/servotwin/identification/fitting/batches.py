@@ -181,7 +181,7 @@ def batches(bundles: Sequence[Bundle], pace: float, crew: Crew) -> list[list[int
     share = max(sum(seconds) / (2 * crew.workers), _CALL * (_WORTH if crew.is_here else _WORTH_AWAY))
     calls: list[_Call] = []
     for k in sorted(range(len(bundles)), key=lambda k: (-bundles[k].duration, bundles[k].key)):
-        alone = not calls or calls[-1].seconds + seconds[k] > share
+        alone = not calls or calls[-1].seconds + 0.5 * seconds[k] > share
         if alone or calls[-1].in_vain(bundles[k]) * pace > _CALL:
             calls.append(_Call(bundles[k].duration))
         calls[-1].add(k, bundles[k], seconds[k])
