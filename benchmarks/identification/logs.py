@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 import servotwin as st
-from servotwin.identification import Log
+from servotwin.logs import Log
 from servotwin.models import Model
 
 LOGS, DURATION, SAMPLE = 48, 6.0, 0.005  # s

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 import servotwin as st
-from servotwin.identification import write_log
-from servotwin.studies import read_columns
+from servotwin.logs import write_log
+from servotwin.tables import read_columns
 
 SERVO = "hitec-hs-755hb"
 PROGRAM = str(Path(sys.executable).with_name("servotwin"))

@@ -1,7 +1,7 @@
 """Servos that stop and go on at every tick, beside MuJoCo's own step of a hinge; and whole calls of 4096 signals.
 
-`run.py` does all parts; `run.py ticks`, `run.py between` or `run.py calls` one of them. MuJoCo is the peer; without it
-ratios are left out.
+`run.py` does all parts; `run.py ticks`, `run.py between`, `run.py c` or `run.py calls` one of them. MuJoCo is the
+peer; without it ratios are left out.
 """
 
 import sys
@@ -14,6 +14,7 @@ import servotwin as st
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "pulse_servo"))
+import from_c
 import peer_mujoco
 from common import best
 from fleet import random_fleet
@@ -114,6 +115,12 @@ def between() -> None:
                 print(f"{f'{lanes} lanes, {name}: {what}':36} {1e6 * time:9.2f} {1e6 * time / lanes:10.4f} {ratio}")
 
 
+def c() -> None:
+    """Print what a tick costs where compiled code calls the entry for C."""
+    from_c.table({"plain": MODEL, "play": st.PulseServo(MODEL.servo.replace(WORN["play"]))}, lanes_tick(1, 1e-3),
+                 mujoco_tick())
+
+
 def calls() -> None:
     """Print what a whole call of `simulate_many` costs beside `mujoco.rollout`, which takes a lane after the other."""
     fleet = random_fleet(LANES, duration=DURATION)
@@ -141,7 +148,7 @@ def calls() -> None:
 
 
 def main() -> None:
-    parts = {"ticks": ticks, "between": between, "calls": calls}
+    parts = {"ticks": ticks, "between": between, "c": c, "calls": calls}
     for part in sys.argv[1:] or parts:
         if part not in parts:
             sys.exit(f"run.py: {part!r} is not one of {', '.join(parts)}")

@@ -159,7 +159,9 @@ def api(module: str) -> str:
         item = getattr(found, name)
         described = inspect.isclass(item) or inspect.isroutine(item)
         summary = (inspect.getdoc(item) or "").splitlines()[0] if described else ""
-        rows.append((f"{{py:obj}}`~{module}.{name}`", summary))
+        defined = str(getattr(item, "__module__", None) or module)
+        home = module if defined.startswith(module) else ".".join(defined.split(".")[:2])  # where it is described
+        rows.append((f"{{py:obj}}`~{home}.{name}`", summary))
     return markdown(("name", "what it is"), rows)
 
 

@@ -72,6 +72,6 @@ def test_a_parabola_needs_three_places():
         curvature_test([1.0, 1.0, 2.0, 2.0], [1.0, 2.0, 3.0, 4.0])
 
 
-def test_a_missing_column_is_named():
-    with pytest.raises(InputError, match="V_i_V"):
-        table_fits({"q_deg": [0.0, 1.0]})
+def test_columns_that_allow_no_line_are_named(table):
+    with pytest.raises(InputError, match=r"at least two of output_angle_deg"):
+        table_fits({"q_deg": table["q_deg"]})

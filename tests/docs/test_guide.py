@@ -4,8 +4,10 @@ import contextlib
 import io
 import re
 import shlex
+import shutil
 import subprocess
 import sys
+from importlib.resources import files
 
 import pytest
 
@@ -24,6 +26,20 @@ def test_python(page, tmp_path, monkeypatch):
         with contextlib.redirect_stdout(io.StringIO()) as printed:
             exec(compile("\n" * block.line + block.code, str(page), "exec"), names)
         assert printed.getvalue().splitlines() == promised(block.code), f"{name_of(page)}, line {block.line}"
+
+
+@pytest.mark.parametrize("page", with_code("c"), ids=name_of)
+def test_programs_in_c(page, tmp_path):
+    """What includes the header compiles with it."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        pytest.skip("no C compiler: cc is not found")
+    (tmp_path / "servotwin.h").write_bytes(files("servotwin.simulation").joinpath("servotwin.h").read_bytes())
+    programs = [block.code for block in blocks(page, "c") if "#include" in block.code]
+    assert programs
+    for text in programs:
+        subprocess.run([compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-I", tmp_path, "-x",
+                        "c", "-"], input=text, text=True, check=True)
 
 
 def commands():

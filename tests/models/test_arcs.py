@@ -83,6 +83,7 @@ def test_a_free_shaft_has_no_cancellation(time):
 
 
 OPEN = {"bridge.off.coast": 1.0, "bridge.silence.coast": 1.0, "bridge.off.D": 6.7, "bridge.off.R": 3.2}
+STRIBECK = {"friction.varies": 1.0, "friction.w_s": 0.05, "friction.alpha": 1.5, "friction.breakaway": 1.4}
 FEATURES = {
     "plain": {}, "coast": OPEN, "RC stretcher": {"chip.tau_s": 0.02},
     "couplings": {"chip.beta": 0.01, "chip.c_s": 0.02}, "noise": {"chip.noise": 1e-3},
@@ -96,6 +97,10 @@ FEATURES = {
     "M3": {"friction.varies": 1.0, "friction.K_m": 0.1, "friction.K_e": 0.1},
     "M5": {"friction.varies": 1.0, "friction.K_m": 0.3, "friction.K_e": 0.8, "friction.K_ms": 0.1, "shaft.b_out": 2e-3},
     "M5 of the load alone": {"friction.varies": 1.0, "friction.K_e": 0.8, "shaft.b_out": 2e-3},
+    "Stribeck": STRIBECK, "Stribeck, steep": STRIBECK | {"friction.alpha": 0.6, "chip.frame_period": 0.008},
+    "M4": STRIBECK | {"friction.K_m": 0.1, "friction.K_e": 0.1, "friction.K_ms": 0.05, "friction.K_es": 0.05},
+    "M6": STRIBECK | {"friction.K_m": 0.1, "friction.K_e": 0.2, "friction.K_ms": 0.05, "friction.K_es": 0.1,
+                      "friction.K_mq": 0.2, "friction.K_eq": 0.1, "shaft.b_out": 2e-3, "source.I_max": 0.9},
     "all bands": OPEN | {"friction.varies": 1.0, "friction.K_m": 0.1, "friction.K_e": 0.2, "source.I_max": 0.9,
                          "sensor.half_slack": 2e-3, "stops.lower": 0.1, "stops.upper": 2.0, "friction.F_forward": 0.0,
                          "friction.F_backward": 0.0},

@@ -59,13 +59,14 @@ def test_the_vector_form_has_polynomials():
 @pytest.mark.slow
 def test_float32_stays_float32(folder):
     recipe = Recipe("single", ("servotwin.models.engine.phases:phases",
-                               "servotwin.models.engine.windows:divide"), vector=True, single=True)
+                               "servotwin.models.engine.windows:divide"), vector=True, single=True, never=("BANDS",))
     module = kernels(recipe)
     from numba import from_dtype, types
 
-    tile, plan = from_dtype(tiles.tile_type("float32")), from_dtype(tiles.plan_type("float32")["of"])
-    module.phases.compile((types.int64, types.boolean, types.boolean, tile, plan))
-    module.divide.compile((types.int64, types.boolean, tile, plan))
+    tile = from_dtype(tiles.tile_type("float32", tiles.ARCS))
+    plan = from_dtype(tiles.plan_type("float32")["of"])
+    module.phases.compile((types.int64, types.boolean, types.int64, types.boolean, tile, plan))
+    module.divide.compile((types.int64, types.boolean, types.boolean, tile, plan))
     for entry in (module.phases, module.divide):
         (code,) = entry.inspect_llvm().values()
         assert "float" in code
@@ -96,7 +97,8 @@ def test_a_cache_that_cannot_be_written(tmp_path):
     assert "Traceback" not in errors
 
 
-@pytest.mark.parametrize("module", ["servotwin.simulation.lane_runs", "servotwin.simulation.compile"])
+@pytest.mark.parametrize("module", ["servotwin.simulation.lane_runs", "servotwin.simulation.compile",
+                                    "servotwin.simulation.c_entry"])
 def test_numba_comes_late(module):
     code = f"import sys, {module}; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

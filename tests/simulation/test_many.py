@@ -17,7 +17,7 @@ from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.lane_loads import LOAD_NAMES, with_numbers
 from servotwin.simulation.lane_runs import run as run_lanes
 from servotwin.simulation.packing import Commands
-from servotwin.studies import read_columns
+from servotwin.tables import read_columns
 
 SERVO = st.load_servo("hitec-hs-755hb")
 MODELS = (st.BoundedServo, st.PulseServo)

@@ -10,30 +10,7 @@ from conftest import EVERYTHING
 from servotwin.errors import CommandError, InputError, ServotwinError, UnknownNameError
 from servotwin.models.engine.memory import memory_of, time_of
 from servotwin.simulation.engine import State
-
-WIDTHS = (1100e-6, 1900e-6, 1500e-6)  # s, one after the other
-CASES = {  # what leads to each way in which lanes run
-    "plain": ({}, None),
-    "coasting, with noise": ({"electronics.off_state": "coast", "potentiometer.noise": 1e-3}, st.loads.Inertia(1e-3)),
-    "couplings": ({"electronics.back_emf_injection": 0.02, "electronics.supply_coupling": 0.02,
-                   "supply.internal_resistance": 0.3, "electronics.stretcher_time_constant": 0.02}, None),
-    "limp after a while": ({"electronics.pulse_timeout": 0.013}, st.loads.Constant(0.1)),
-    "frames as short as pulses": ({"electronics.frame_period": 3e-3}, None),
-    "stops": ({"stops.lower_angle": 1.2, "stops.upper_angle": 1.9, "stops.restitution": 0.5}, None),
-    "spring": ({}, st.loads.Spring(0.1, 0.5)),
-    "pendulum": ({}, st.loads.Pendulum(mass=0.1, length=0.1)),
-    "recorded": ({}, st.loads.Recorded([0.0, 0.2, 10.0], [0.0, 0.1, -0.1])),
-    "play": ({"gear.backlash": 0.02, "gear.output_inertia": 1e-3}, None),
-    "limp in another way": ({"electronics.silence_state": "coast", "electronics.pulse_timeout": 0.013}, None),
-    "dry load": ({"supply.internal_resistance": 0.3}, st.loads.Inertia(1e-3) + st.loads.Coulomb(0.1)),
-    "everything": (EVERYTHING, st.loads.Recorded([0.0, 0.2, 10.0], [0.0, 0.1, -0.1])),
-}
-
-
-def model_of(servo, changes, kind=st.PulseServo):
-    if kind is st.PulseServoInductive:
-        changes = {"motor.armature_inductance": 5e-4, **changes}
-    return kind(servo.replace(changes))
+from vector_cases import CASES, WIDTHS, model_of
 
 
 def one(model, load, seed, cuts, widths, torques=None):
@@ -257,6 +234,16 @@ def test_a_speed_that_is_set_is_an_impulse(servo, changes):
         np.testing.assert_array_equal(sims["motor_speed"], before)
     sims.advance(0.005)
     assert sims["output_angle"][1] > sims["output_angle"][0]
+
+
+@pytest.mark.parametrize("load", [None, st.loads.Spring(1e-3)], ids=["side by side", "one by one"])
+def test_an_angle_that_is_set_carries_the_potentiometer_along(servo, load):
+    model = st.PulseServo(servo.replace({"potentiometer.backlash": 0.02}))
+    sims = st.VectorSimulator(model, 3, load=load)
+    sims.reset(output_angle=1.5)
+    sims.set(output_angle=[1.2, 1.505, 1.9])
+    p, b_o = servo.potentiometer.feedback_gain, servo.potentiometer.feedback_offset or 0.0
+    np.testing.assert_allclose(sims["feedback_voltage"], p * np.array([1.21, 1.5, 1.89]) + b_o, rtol=1e-12)
 
 
 def test_an_inertia_that_is_set_is_that_of_the_load(servo):

@@ -12,7 +12,7 @@ import pytest
 import servotwin as st
 from servotwin.errors import InputError, MissingExtraError, OutputError
 from servotwin.simulation.workers import Here
-from servotwin.studies import read_columns
+from servotwin.tables import read_columns
 
 STEP = st.signals.step(0.0, 60.0, at=0.1, unit="deg")
 OPTIONS = {"duration": 0.5, "lanes": 40, "chunk": 10, "seed": 3,

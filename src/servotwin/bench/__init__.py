@@ -8,7 +8,7 @@ from servotwin.bench.bench import Bench, BenchRun, bench_servo
 from servotwin.bench.calibration import Interval, command_voltage_interval, zero_offset_interval
 from servotwin.bench.control_supply import ControlSupply, run_on_one_supply
 from servotwin.bench.converter import FEEDBACK_CONVERTER, INPUT_CONVERTER, Converter
-from servotwin.bench.fits import CurvatureTest, LineFit, TableFit, curvature_test, fit_line, table_fit, table_fits
+from servotwin.bench.fits import CurvatureTest, LineFit, TableFit, curvature_test, fit_line, table_fits
 from servotwin.bench.generator import PulseGenerator
 from servotwin.bench.instruments import InstrumentPair, instrument_pairs
 from servotwin.bench.reading import Reading, TableRow
@@ -61,7 +61,6 @@ __all__ = [
     "row_findings",
     "run_on_one_supply",
     "standing",
-    "table_fit",
     "table_fits",
     "zero_offset_interval",
 ]

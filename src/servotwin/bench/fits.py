@@ -1,15 +1,17 @@
-"""Straight lines through the paper's table, with standard errors, and a test for curvature."""
+"""Straight lines through the columns of a bench table, with standard errors, and a test for curvature."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from servotwin.bench.table_columns import BenchTable, TableColumn, bench_table
 from servotwin.errors import InputError
 
 
@@ -46,6 +48,12 @@ class LineFit:
     def max_residual(self) -> float:
         """The largest magnitude of a residual."""
         return max(abs(r) for r in self.residuals)
+
+    def scaled(self, x: float, y: float) -> LineFit:
+        """Return the same line where abscissas are `x` and ordinates `y` times as large numbers."""
+        return LineFit(slope=self.slope * y / x, intercept=self.intercept * y, slope_error=self.slope_error * y / x,
+                       intercept_error=self.intercept_error * y, covariance=self.covariance * y**2 / x,
+                       residuals=tuple(r * y for r in self.residuals))
 
     @overload
     def __call__(self, x: float) -> float: ...
@@ -86,33 +94,61 @@ class CurvatureTest:
     sagitta: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class TableFit:
-    """A named fit of one column of a bench table over another.
+    """The straight line of one column of a bench table over another, in the table's units.
 
     Parameters
     ----------
-    name : str
-        Such as ``"q(V_i)"``.
-    abscissa, ordinate : str
-        Columns of the table.
-    slope_unit, unit : str
-        Of the slope, and of intercept and residuals.
-    line : LineFit
-    curvature : CurvatureTest
-    x, y : tuple of float
-        The points.
+    x_column, y_column : TableColumn
     """
 
-    name: str
-    abscissa: str
-    ordinate: str
-    slope_unit: str
-    unit: str
-    line: LineFit
-    curvature: CurvatureTest
-    x: tuple[float, ...] = field(repr=False)
-    y: tuple[float, ...] = field(repr=False)
+    x_column: TableColumn = field(repr=False)
+    y_column: TableColumn = field(repr=False)
+
+    @cached_property
+    def line(self) -> LineFit:
+        """The line."""
+        return fit_line(self.x, self.y)
+
+    @cached_property
+    def curvature(self) -> CurvatureTest:
+        """Whether a parabola fits better."""
+        return curvature_test(self.x, self.y)
+
+    @property
+    def name(self) -> str:
+        """Such as ``"q(V_i)"``."""
+        return f"{self.y_column.symbol}({self.x_column.symbol})"
+
+    @property
+    def unit(self) -> str:
+        """Unit of intercept and residuals."""
+        return self.y_column.unit
+
+    @property
+    def slope_unit(self) -> str:
+        """Unit of the slope."""
+        return f"{self.unit}/{self.x_column.unit.replace('counts', 'count')}"
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Abscissas of the points, shape (n,)."""
+        return self.x_column.values
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Ordinates of the points, shape (n,)."""
+        return self.y_column.values
+
+    @property
+    def rounding(self) -> float:
+        """Variance of a point from the last places of both columns: a few may lie on a line by chance."""
+        return (self.y_column.resolution**2 + (self.line.slope * self.x_column.resolution) ** 2) / 12.0
+
+    def has(self, column: TableColumn) -> bool:
+        """Return whether it is a line through this column."""
+        return column is self.x_column or column is self.y_column
 
 
 def fit_line(x: ArrayLike, y: ArrayLike) -> LineFit:
@@ -173,36 +209,24 @@ def curvature_test(x: ArrayLike, y: ArrayLike) -> CurvatureTest:
         p_value=2.0 * float(stdtr(free, -abs(t))), sagitta=abs(float(solution[0])))
 
 
-# name, abscissa, ordinate, unit of the slope, unit of the ordinate
-_FITS = (
-    ("q(V_i)", "V_i_V", "q_deg", "°/V", "°"),
-    ("q(t_a)", "t_a_us", "q_deg", "°/µs", "°"),
-    ("V_o(q)", "q_deg", "V_o_V", "V/°", "V"),
-    ("V_o(V_i)", "V_i_V", "V_o_V", "V/V", "V"),
-    ("V_o(t_a)", "t_a_us", "V_o_V", "V/µs", "V"),
-    ("t_a(V_i)", "V_i_V", "t_a_us", "µs/V", "µs"),
-    ("ADC_i(V_i)", "V_i_V", "ADC_i", "counts/V", "counts"),
-    ("ADC_o(V_o)", "V_o_V", "ADC_o", "counts/V", "counts"),
-)
+# ordinate and abscissa of each line; a count stands for its voltage where the table has none
+_LINES = (("output_angle", "command"), ("output_angle", "pulse_width"), ("feedback", "output_angle"),
+          ("feedback", "command"), ("feedback", "pulse_width"), ("pulse_width", "command"))
 
 
-def table_fits(columns: Mapping[str, ArrayLike]) -> dict[str, TableFit]:
-    """Return the straight lines through the paper's Table II, in the table's own units.
+def table_fits(table: BenchTable | Mapping[str, ArrayLike]) -> dict[str, TableFit]:
+    """Return every straight line that the columns of a table allow, in its units, by name.
 
     Parameters
     ----------
-    columns : mapping
-        The columns q_deg, V_i_V, ADC_i, t_a_us, V_o_V, ADC_o of equal length.
-
-    Returns
-    -------
-    dict
-        By name: q(V_i), q(t_a), V_o(q), V_o(V_i), V_o(t_a), t_a(V_i), ADC_i(V_i), ADC_o(V_o).
+    table : BenchTable or mapping
+        What `bench_table` gives, or takes. The paper's Table II has q(V_i), q(t_a), V_o(q), V_o(V_i), V_o(t_a),
+        t_a(V_i), ADC_i(V_i) and ADC_o(V_o).
 
     Raises
     ------
     InputError
-        If a column is missing or not usable.
+        If the columns are not usable, or allow no line.
 
     Examples
     --------
@@ -211,46 +235,20 @@ def table_fits(columns: Mapping[str, ArrayLike]) -> dict[str, TableFit]:
     >>> round(fits["q(V_i)"].line.slope, 2), round(fits["q(V_i)"].line.slope_error, 2)
     (109.77, 0.69)
     """
-    fits = {}
-    for name, abscissa, ordinate, slope_unit, unit in _FITS:
-        for column in (abscissa, ordinate):
-            if column not in columns:
-                raise InputError("columns of the table", got=", ".join(columns), allowed=f"a column {column}")
-        fits[name] = table_fit(name, columns, abscissa, ordinate, slope_unit=slope_unit, unit=unit)
-    return fits
+    read = table if isinstance(table, BenchTable) else bench_table(table)
+    pairs = [(_reading(read, abscissa), _reading(read, ordinate)) for ordinate, abscissa in _LINES]
+    for side in ("command", "feedback"):
+        pairs.append((read.first(f"{side}_voltage"), read.first(f"{side}_count")))
+    fits = [TableFit(x, y) for x, y in pairs if x is not None and y is not None]
+    if not fits:
+        raise InputError("lines of the table", got=", ".join(column.name for column in read.columns),
+                         allowed="two columns of different quantities")
+    return {fit.name: fit for fit in fits}
 
 
-def table_fit(name: str, columns: Mapping[str, ArrayLike], abscissa: str, ordinate: str, *, slope_unit: str,
-              unit: str) -> TableFit:
-    """Return the straight line of one column over another.
-
-    Parameters
-    ----------
-    name : str
-        Of the fit.
-    columns : mapping
-        Has both columns, of one length, at least 4.
-    abscissa, ordinate : str
-        Names of the columns.
-    slope_unit, unit : str
-        Of the slope, and of the ordinate.
-
-    Raises
-    ------
-    InputError
-        If a column is not usable.
-
-    Examples
-    --------
-    >>> columns = {"V_i_V": [1.0, 2.0, 3.0, 4.0], "q_deg": [10.0, 20.0, 30.5, 40.0]}
-    >>> fit = table_fit("q(V_i)", columns, "V_i_V", "q_deg", slope_unit="°/V", unit="°")
-    >>> f"{fit.line.slope:.2f} ± {fit.line.slope_error:.2f} {fit.slope_unit}"
-    '10.05 ± 0.13 °/V'
-    """
-    x, y = _points(columns[abscissa], columns[ordinate], 4)
-    return TableFit(name=name, abscissa=abscissa, ordinate=ordinate, slope_unit=slope_unit, unit=unit,
-                    line=fit_line(x, y), curvature=curvature_test(x, y),
-                    x=tuple(x.tolist()), y=tuple(y.tolist()))
+def _reading(table: BenchTable, what: str) -> TableColumn | None:
+    """Return the column of a quantity, or the voltage of a side and, where there is none, its count."""
+    return table.first(what) or table.first(f"{what}_voltage") or table.first(f"{what}_count")
 
 
 def _points(x: ArrayLike, y: ArrayLike, least: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from servotwin.bench.fits import LineFit, fit_line
+from servotwin.bench.fits import LineFit, TableFit
 from servotwin.bench.table_columns import BenchTable, TableColumn
 from servotwin.bench.table_words import plus_minus
 
@@ -119,13 +119,18 @@ class InstrumentPair:
 
 
 class _Pair(NamedTuple):
-    first: TableColumn
-    second: TableColumn
-    line: LineFit
-    spread: float  # of a point, at least that of rounding
+    fit: TableFit
     gain_error: float
     zero_error: float
     without: int | None = None
+
+    @property
+    def is_converter(self) -> bool:
+        return (self.fit.x_column.unit, self.fit.unit) == ("V", "counts")
+
+    @property
+    def freedom(self) -> float:
+        return self.fit.x.size - 2.0
 
 
 class _Test(NamedTuple):
@@ -171,145 +176,131 @@ def _candidates(table: BenchTable) -> list[tuple[TableColumn, TableColumn]]:
         found += [(readings[0], column) for column in readings[1:]]
     electrical = [column for column in table.columns if column.unit in ("V", "counts")]
     for other in table.others:
-        near = [pair for known in electrical if known.values.size == other.values.size
-                and _fine(pair := _pair(*sorted((known, other), key=lambda c: c.unit == "counts")))]
+        near = [fit for known in electrical if known.values.size == other.values.size
+                and _fine(fit := TableFit(*sorted((known, other), key=lambda c: c.unit == "counts")))]
         if near:
-            best = min(near, key=lambda pair: pair.line.max_residual / float(np.ptp(pair.second.values)))
-            found.append((best.first, best.second))
+            best = min(near, key=lambda fit: fit.line.max_residual / float(np.ptp(fit.y)))
+            found.append((best.x_column, best.y_column))
     return found
 
 
 def _pair(first: TableColumn, second: TableColumn) -> _Pair:
-    line = fit_line(first.values, second.values)
-    rounding = (second.resolution**2 + (line.slope * first.resolution) ** 2) / 12.0
-    variance = sum(r * r for r in line.residuals) / (first.values.size - 2)
-    # At least the rounding: a few points may lie on a line by chance.
-    ratio = math.sqrt(max(rounding / variance, 1.0)) if variance > 0.0 else math.nan
-    if math.isnan(ratio):
-        x = first.values
-        spread = float(((x - x.mean()) ** 2).sum())
-        slope = math.sqrt(rounding / spread)
-        return _Pair(first, second, line, math.sqrt(rounding), slope,
-                     math.sqrt(rounding / x.size + (slope * float(x.mean())) ** 2))
-    return _Pair(first, second, line, math.sqrt(variance) * ratio, line.slope_error * ratio,
-                 line.intercept_error * ratio)
+    fit = TableFit(first, second)
+    x = fit.x
+    spread = float(((x - x.mean()) ** 2).sum())
+    variance = max(sum(r * r for r in fit.line.residuals) / (x.size - 2), fit.rounding)
+    return _Pair(fit, math.sqrt(variance / spread), math.sqrt(variance * (1.0 / x.size + x.mean() ** 2 / spread)))
 
 
 def _mended(pair: _Pair) -> _Pair:
     """Return the pair without one row, where it reads one thing only then; a slip of the pen is no disagreement."""
-    n = pair.first.values.size
+    n = pair.fit.x.size
     if _same(pair) or n < _LEAST_ROWS + 1:
         return pair
-    rest = [_pair(*(replace(column, values=np.delete(column.values, row)) for column in (pair.first, pair.second)))
-            for row in range(n)]
-    row = min(range(n), key=lambda k: rest[k].line.max_residual)
+    both = pair.fit.x_column, pair.fit.y_column
+    rest = [_pair(*(replace(column, values=np.delete(column.values, row)) for column in both)) for row in range(n)]
+    row = min(range(n), key=lambda k: rest[k].fit.line.max_residual)
     return rest[row]._replace(without=row) if _same(rest[row]) else pair
 
 
-def _quanta(pair: _Pair) -> float:
-    return pair.second.resolution + abs(pair.line.slope) * pair.first.resolution
+def _quanta(fit: TableFit) -> float:
+    return fit.y_column.resolution + abs(fit.line.slope) * fit.x_column.resolution
 
 
 def _same(pair: _Pair) -> bool:
-    allowed = max(_QUANTA * _quanta(pair), _SHARE * float(np.ptp(pair.second.values)))
-    return pair.line.slope > 0.0 and pair.line.max_residual <= allowed
+    line, allowed = pair.fit.line, max(_QUANTA * _quanta(pair.fit), _SHARE * float(np.ptp(pair.fit.y)))
+    return line.slope > 0.0 and line.max_residual <= allowed
 
 
-def _fine(pair: _Pair) -> bool:
+def _fine(fit: TableFit) -> bool:
     """Say whether the numbers alone show that two columns read one thing."""
-    quanta, span = _quanta(pair), float(np.ptp(pair.second.values))
-    return (pair.line.slope > 0.0 and span > _FINE * quanta > 0.0
-            and pair.line.max_residual <= _QUANTA * quanta)
-
-
-def _is_converter(pair: _Pair) -> bool:
-    return pair.second.unit == "counts" and pair.first.unit == "V"
+    quanta = _quanta(fit)
+    return (fit.line.slope > 0.0 and float(np.ptp(fit.y)) > _FINE * quanta > 0.0
+            and fit.line.max_residual <= _QUANTA * quanta)
 
 
 def _expected_gains(pairs: list[_Pair]) -> list[tuple[str, float | None, _Test | None]]:
     """Return for every pair where its gain is known from, that gain, and the difference to be tested."""
-    converters = [pair for pair in pairs if _is_converter(pair)]
+    converters = [pair for pair in pairs if pair.is_converter]
     # The one whose gain is nearest to a usual converter's is what the others are compared with.
     trusted = min(converters, key=lambda pair: abs(_misfit(pair)), default=None)
     found: list[tuple[str, float | None, _Test | None]] = []
     for pair in pairs:
-        freedom = pair.first.values.size - 2.0
-        if _is_converter(pair) and trusted is not None:
+        slope = pair.fit.line.slope
+        if pair.is_converter and trusted is not None:
             found.append(_of_converter(pair, trusted, alone=len(converters) == 1))
-        elif pair.first.unit == "counts":
-            gain = 2.0 ** round(math.log2(pair.line.slope))
-            alike = abs(math.log2(pair.line.slope / gain)) < _ALIKE
-            test = _Test(pair.line.slope - gain, pair.gain_error, freedom)
-            found.append(("a power of two", gain, test) if alike else ("", None, None))
+        elif pair.fit.x_column.unit == "counts":
+            gain = 2.0 ** round(math.log2(slope))
+            test = _Test(slope - gain, pair.gain_error, pair.freedom)
+            found.append(("a power of two", gain, test) if _alike(slope, gain) else ("", None, None))
         else:
-            found.append(("one scale", 1.0, _Test(pair.line.slope - 1.0, pair.gain_error, freedom)))
+            found.append(("one scale", 1.0, _Test(slope - 1.0, pair.gain_error, pair.freedom)))
     return found
 
 
+def _alike(slope: float, gain: float) -> bool:
+    return abs(math.log2(slope / gain)) < _ALIKE
+
+
 def _of_converter(pair: _Pair, trusted: _Pair, *, alone: bool) -> tuple[str, float | None, _Test | None]:
-    freedom = pair.first.values.size - 2.0
+    slope = pair.fit.line.slope
     if pair is not trusted:
-        steps = round(math.log2(pair.line.slope / trusted.line.slope))
-        gain = trusted.line.slope * 2.0**steps
-        if abs(math.log2(pair.line.slope / gain)) < _ALIKE:
-            other = trusted.gain_error * 2.0**steps
-            a, b = pair.gain_error**2, other**2
+        times = 2.0 ** round(math.log2(slope / trusted.fit.line.slope))
+        gain = trusted.fit.line.slope * times
+        if _alike(slope, gain):
+            a, b = pair.gain_error**2, (trusted.gain_error * times) ** 2
             # Welch and Satterthwaite: two variances, each with its own freedom
-            parts = a**2 / freedom + b**2 / (trusted.first.values.size - 2.0)
-            both = (a + b) ** 2 / parts if parts > 0.0 else freedom
-            name = trusted.second.symbol if steps == 0 else f"{2.0**steps:g} times {trusted.second.symbol}"
-            return name, gain, _Test(pair.line.slope - gain, math.sqrt(a + b), both)
+            parts = a**2 / pair.freedom + b**2 / trusted.freedom
+            both = (a + b) ** 2 / parts if parts > 0.0 else pair.freedom
+            symbol = trusted.fit.y_column.symbol
+            return (symbol if times == 1.0 else f"{times:g} times {symbol}", gain,
+                    _Test(slope - gain, math.sqrt(a + b), both))
     nominal = _nominal(pair)
     if nominal is None:
         return "", None, None
     bits, reference = nominal
     gain = 2.0**bits / reference
-    difference = pair.line.slope - gain
-    beyond = max(abs(difference) - _TOLERANCE * gain, 0.0)
-    name = f"{2**bits} counts over {reference:g} V"
+    beyond = max(abs(slope - gain) - _TOLERANCE * gain, 0.0)
     if not alone and pair is trusted and beyond > 0.0:
         return "", None, None  # of an unusual reference; the others are compared with this one
-    return name, gain, _Test(math.copysign(beyond, difference), pair.gain_error, freedom)
+    return (f"{2**bits} counts over {reference:g} V", gain,
+            _Test(math.copysign(beyond, slope - gain), pair.gain_error, pair.freedom))
 
 
 def _nominal(pair: _Pair) -> tuple[int, float] | None:
     """Return bits and reference of the usual converter whose gain is nearest."""
-    top = float(pair.second.values.max())
+    top = float(pair.fit.y.max())
     bits = next((bits for bits in _BITS if 2.0**bits > top), None)
     if bits is None:
         return None
-    reference = min(_REFERENCES, key=lambda volts: abs(math.log(2.0**bits / volts / pair.line.slope)))
-    return bits, reference
+    return bits, min(_REFERENCES, key=lambda volts: abs(math.log(2.0**bits / volts / pair.fit.line.slope)))
 
 
 def _misfit(pair: _Pair) -> float:
     nominal = _nominal(pair)
-    return math.inf if nominal is None else math.log(pair.line.slope * nominal[1] / 2.0 ** nominal[0])
+    return math.inf if nominal is None else math.log(pair.fit.line.slope * nominal[1] / 2.0 ** nominal[0])
 
 
 def _judged(pair: _Pair, gain: float | None, origin: str, test: _Test | None, tests: int) -> InstrumentPair:
     from scipy.special import stdtrit
 
-    n = pair.first.values.size
-    low = -0.5 * pair.second.resolution if _is_converter(pair) else 0.0
-    zero = pair.line.intercept
-    off = max(zero, 0.0) + min(zero - low, 0.0)
-    zero_p = min(tests * _p_value(_Test(off, pair.zero_error, n - 2.0)), 1.0)
+    line, second = pair.fit.line, pair.fit.y_column
+    low = -0.5 * second.resolution if pair.is_converter else 0.0
+    off = max(line.intercept, 0.0) + min(line.intercept - low, 0.0)
+    zero_p = min(tests * _p_value(_Test(off, pair.zero_error, pair.freedom)), 1.0)
     gain_p = 1.0 if test is None else min(tests * _p_value(test), 1.0)
     wrong = tuple(name for name, p in (("zero", zero_p), ("gain", gain_p)) if p < LEVEL)
-    scale = gain or pair.line.slope
-    restored = tuple((pair.second.values / scale).tolist()) if wrong and _is_converter(pair) else ()
-    least = float(stdtrit(n - 2.0, 1.0 - 0.5 * LEVEL / tests)) * pair.zero_error
+    restored = second.values / (gain or line.slope) if wrong and pair.is_converter else np.empty(0)
     return replace(
         _described(pair, same=True), expected_gain=gain, expected_from=origin, gain_p=gain_p, zero_p=zero_p,
-        gain_error=pair.gain_error, zero_error=pair.zero_error, disagrees_in=wrong,
-        seen_from=least, restored=restored)
+        gain_error=pair.gain_error, zero_error=pair.zero_error, disagrees_in=wrong, restored=tuple(restored.tolist()),
+        seen_from=float(stdtrit(pair.freedom, 1.0 - 0.5 * LEVEL / tests)) * pair.zero_error)
 
 
 def _described(pair: _Pair, *, same: bool) -> InstrumentPair:
-    unit = pair.second.unit
-    return InstrumentPair(first=pair.first.symbol, second=pair.second.symbol, line=pair.line, unit=unit,
-                          gain_unit="" if unit == pair.first.unit else f"{unit}/{pair.first.unit}", same=same,
+    first, second = pair.fit.x_column, pair.fit.y_column
+    return InstrumentPair(first=first.symbol, second=second.symbol, line=pair.fit.line, unit=second.unit, same=same,
+                          gain_unit="" if second.unit == first.unit else f"{second.unit}/{first.unit}",
                           without=pair.without)
 
 

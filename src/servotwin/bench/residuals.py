@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +14,7 @@ from servotwin.bench.reading import TableRow
 from servotwin.errors import InputError
 
 
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
+class Comparison(NamedTuple):
     """Simulated less measured, one row of the table.
 
     Parameters
@@ -37,8 +36,7 @@ class Comparison:
     feedback_count: int
 
 
-@dataclass(frozen=True, kw_only=True)
-class Shares:
+class Shares(NamedTuple):
     """Why a measured angle lies off the straight line q(V_i); the shares add up to `total` [rad].
 
     Parameters
@@ -59,8 +57,7 @@ class Shares:
     rest: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class ModelShares:
+class ModelShares(NamedTuple):
     """Why a simulated value differs from the measured one; the shares add up to `total` [rad] or [V].
 
     Parameters
@@ -107,16 +104,12 @@ def compare(rows: Sequence[TableRow], columns: Mapping[str, ArrayLike]) -> tuple
     >>> max(abs(row.pulse_width) for row in compare(bench.measure(table["V_i_V"]), table)) < 1e-6
     True
     """
-    q, v_o, t_a, n_i, n_o = (_column(columns, name, len(rows)) for name in
-                             ("q_deg", "V_o_V", "t_a_us", "ADC_i", "ADC_o"))
+    measured = zip(*(_column(columns, name, len(rows)) for name in ("q_deg", "V_o_V", "t_a_us", "ADC_i", "ADC_o")),
+                   strict=True)
     return tuple(
-        Comparison(
-            output_angle=row.reading.output_angle - math.radians(q[k]),
-            feedback_voltage=row.reading.feedback_voltage - v_o[k],
-            pulse_width=row.reading.pulse_width - 1e-6 * t_a[k],
-            command_count=row.reading.command_count - round(n_i[k]),
-            feedback_count=row.reading.feedback_count - round(n_o[k]))
-        for k, row in enumerate(rows))
+        Comparison(one.output_angle - math.radians(q), one.feedback_voltage - v_o, one.pulse_width - 1e-6 * t_a,
+                   one.command_count - round(n_i), one.feedback_count - round(n_o))
+        for one, (q, v_o, t_a, n_i, n_o) in zip((row.reading for row in rows), measured, strict=True))
 
 
 def measured_shares(fits: Mapping[str, TableFit]) -> tuple[Shares, ...]:
@@ -135,16 +128,11 @@ def measured_shares(fits: Mapping[str, TableFit]) -> tuple[Shares, ...]:
     >>> all(abs(s.total - s.quantum - s.curvature - s.rest) < 1e-12 for s in shares)
     True
     """
-    by_voltage, by_width, widths = fits["q(V_i)"], fits["q(t_a)"], fits["t_a(V_i)"]
-    shares = []
-    for k, volt in enumerate(widths.x):
-        quantum = by_width.line.slope * widths.line.residuals[k]
-        curvature = by_width.line.residuals[k]
-        total = by_voltage.line.residuals[k]
-        rest = by_width.line(widths.line(volt)) - by_voltage.line(volt)
-        shares.append(Shares(total=math.radians(total), quantum=math.radians(quantum),
-                             curvature=math.radians(curvature), rest=math.radians(rest)))
-    return tuple(shares)
+    by_voltage, by_width, widths = fits["q(V_i)"].line, fits["q(t_a)"].line, fits["t_a(V_i)"].line
+    volts = fits["t_a(V_i)"].x
+    parts = (by_voltage.residuals, by_width.slope * np.array(widths.residuals), by_width.residuals,
+             by_width(widths(volts)) - by_voltage(volts))
+    return tuple(Shares(*row) for row in np.radians(np.array(parts).T).tolist())
 
 
 def model_shares(rows: Sequence[TableRow], fits: Mapping[str, TableFit], *,

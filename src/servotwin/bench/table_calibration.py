@@ -9,21 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from servotwin.bench.fits import TableFit, table_fit
+from servotwin.bench.fits import TableFit, table_fits
 from servotwin.bench.instruments import InstrumentPair, instrument_pairs
-from servotwin.bench.table_columns import BenchTable, TableColumn, bench_table
+from servotwin.bench.table_columns import BenchTable, bench_table
 from servotwin.bench.table_parameters import estimates
 from servotwin.bench.table_rows import RowFinding, row_findings, smallest_p_value
 from servotwin.bench.table_words import plus_minus, residual_pattern
-from servotwin.errors import InputError
 from servotwin.parameters import Quantity, Servo
 
 CURVED = 0.05
 """P-value of the F-test of a parabola below which a line counts as visibly curved."""
 
-# ordinate and abscissa of each line; a count stands for its voltage where the table has none
-_LINES = (("output_angle", "command"), ("output_angle", "pulse_width"), ("feedback", "output_angle"),
-          ("feedback", "command"), ("feedback", "pulse_width"), ("pulse_width", "command"))
 _ROUNDING = 1e-9  # of the ordinate: numbers without noise bend by less
 _MOVED = 0.01  # of pulse_to_voltage_gain: from here on what was computed with the old one is named
 
@@ -70,7 +66,7 @@ class TableCalibration:
     def curved(self) -> tuple[str, ...]:
         """Names of the lines that are visibly curved."""
         return tuple(name for name, fit in self.lines.items() if fit.curvature.p_value < CURVED
-                     and fit.curvature.sagitta > _ROUNDING * max(map(abs, fit.y)))
+                     and fit.curvature.sagitta > _ROUNDING * np.abs(fit.y).max())
 
     def findings(self) -> tuple[str, ...]:
         """Return all that is worth a sentence: curvature, instruments, rows, remarks."""
@@ -109,42 +105,13 @@ def calibrate_table(table: str | Path | Mapping[str, ArrayLike], servo: Servo | 
     ('0.4197 ± 0.0023 V/rad', ('q(t_a)',), ['ADC_o'])
     """
     read = bench_table(table, source=source)
-    lines = _lines(read)
+    lines = table_fits(read)
     found = {name: one.quantity(name, read.source) for name, one in estimates(lines, servo).items()}
     instruments, rows = instrument_pairs(read), row_findings(read, lines)
     return TableCalibration(
         source=read.source, table=read, lines=lines, parameters=found, instruments=instruments, rows=rows,
         servo=_with(servo or Servo(name="bench-table"), found),
         remarks=tuple(_remarks(read, lines, found, instruments, rows, servo)))
-
-
-def _lines(table: BenchTable) -> dict[str, TableFit]:
-    found: dict[str, TableFit] = {}
-    for ordinate, abscissa in _LINES:
-        y, x = _reading(table, ordinate), _reading(table, abscissa)
-        if x is not None and y is not None:
-            found |= _line(x, y)
-    for side in ("command", "feedback"):
-        volts, counts = table.of(f"{side}_voltage"), table.of(f"{side}_count")
-        if volts and counts:
-            found |= _line(volts[0], counts[0])
-    if not found:
-        raise InputError("lines of the table", got=", ".join(column.name for column in table.columns),
-                         allowed="two columns of different quantities")
-    return found
-
-
-def _reading(table: BenchTable, what: str) -> TableColumn | None:
-    """Return the column of a quantity, or the voltage of a side and, where there is none, its count."""
-    columns = table.of(what) or table.of(f"{what}_voltage") or table.of(f"{what}_count")
-    return columns[0] if columns else None
-
-
-def _line(x: TableColumn, y: TableColumn) -> dict[str, TableFit]:
-    name = f"{y.symbol}({x.symbol})"
-    unit = {"counts": "count"}.get(x.unit, x.unit)
-    return {name: table_fit(name, {x.name: x.values, y.name: y.values}, x.name, y.name,
-                            slope_unit=f"{y.unit}/{unit}", unit=y.unit)}
 
 
 def _with(servo: Servo, found: Mapping[str, Quantity]) -> Servo:
@@ -156,20 +123,16 @@ def _curvature(fit: TableFit, lines: int) -> str:
     test = fit.curvature
     return (f"{fit.name} is visibly curved: a parabola fits better with p = {test.p_value:.2g} (of {lines} straight "
             f"lines {CURVED * lines:.1g} would look so by chance) and bends by {test.sagitta:.2g} {fit.unit}; "
-            f"{residual_pattern(fit.x, fit.line.residuals)}")
+            f"{residual_pattern(fit.x.tolist(), fit.line.residuals)}")
 
 
 def _remarks(table: BenchTable, lines: Mapping[str, TableFit], found: Mapping[str, Quantity],
              instruments: tuple[InstrumentPair, ...], rows: tuple[RowFinding, ...], servo: Servo | None) -> list[str]:
-    remarks = []
-    if not any(row.certain for row in rows):
-        remarks.append("no row is certain to fit badly: the worst has p = "
-                       f"{smallest_p_value(table, lines):.2g} for all rows and lines")
-    else:
-        remarks.append("rows that fit badly are left in all lines")
-    remarks += _by_counts(lines, instruments)
-    if rates := table.of("pulse_rate"):
-        rate = float(np.mean(rates[0].values))
+    remarks = ["rows that fit badly are left in all lines" if any(row.certain for row in rows) else
+               f"no row is certain to fit badly: the worst has p = {smallest_p_value(lines):.2g} for all rows and "
+               "lines", *_by_counts(lines, instruments)]
+    if (rates := table.first("pulse_rate")) is not None:
+        rate = float(np.mean(rates.values))
         remarks.append(f"the pulses came at {rate:.5g} Hz, a frame of {1e3 / rate:.3g} ms; that belongs to the "
                        "transmitter, so the servo's frame_period stays")
     if "electronics.one_shot_slope" not in found and "q(t_a)" in lines:
@@ -186,13 +149,12 @@ def _remarks(table: BenchTable, lines: Mapping[str, TableFit], found: Mapping[st
 
 def _by_counts(lines: Mapping[str, TableFit], instruments: tuple[InstrumentPair, ...]) -> list[str]:
     """Return what the potentiometer would be by the counts, where they disagree with the voltmeter."""
-    pair = next((one for one in instruments if one.second == "ADC_o" and one.first == "V_o" and one.disagrees_in
-                 and one.expected_gain is not None), None)
+    pair = next((one for one in instruments if (one.first, one.second) == ("V_o", "ADC_o") and one.disagrees_in), None)
     if pair is None or pair.expected_gain is None or "V_o(q)" not in lines:
         return []
     line = lines["V_o(q)"].line
     gain = np.degrees(line.slope * pair.line.slope / pair.expected_gain)
-    offset = (line.intercept * pair.line.slope + pair.line.intercept) / pair.expected_gain
+    offset = pair.line(line.intercept) / pair.expected_gain
     return [f"the parameters are those of the voltages; by the counts feedback_gain would be {gain:.4f} V/rad instead "
             f"of {np.degrees(line.slope):.4f}, and feedback_offset {offset:.4f} V instead of {line.intercept:.4f}"]
 

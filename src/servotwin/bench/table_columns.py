@@ -34,20 +34,11 @@ QUANTITIES: dict[str, _Quantity] = {
     "feedback_count": _Quantity("ADC_o", "feedback count", "counts", 0.0, 2.0**24),
 }
 _DEG = 180.0 / math.pi
-# name of a column -> quantity, and the factor to the unit of the table; a name without unit is in SI
-_NAMES: dict[str, tuple[str, float]] = {
-    "output_angle_deg": ("output_angle", 1.0), "output_angle_rad": ("output_angle", _DEG),
-    "output_angle": ("output_angle", _DEG), "q_deg": ("output_angle", 1.0),
-    "pulse_width_us": ("pulse_width", 1.0), "pulse_width_ms": ("pulse_width", 1e3),
-    "pulse_width_s": ("pulse_width", 1e6), "pulse_width": ("pulse_width", 1e6), "t_a_us": ("pulse_width", 1.0),
-    "pulse_rate_Hz": ("pulse_rate", 1.0), "pulse_rate": ("pulse_rate", 1.0), "f_Hz": ("pulse_rate", 1.0),
-    "command_count": ("command_count", 1.0), "ADC_i": ("command_count", 1.0),
-    "feedback_count": ("feedback_count", 1.0), "ADC_o": ("feedback_count", 1.0),
-    **{f"{name}{end}": (quantity, factor)
-       for quantity, names in (("command_voltage", ("command_voltage", "V_i")),
-                               ("feedback_voltage", ("feedback_voltage", "V_o")))
-       for name in names for end, factor in (("_V", 1.0), ("_mV", 1e-3), ("", 1.0))},
-}
+# unit of the table -> what the name of a column ends in, and the factor; without a unit it is in SI
+_ENDS = {"°": {"_deg": 1.0, "_rad": _DEG, "": _DEG}, "V": {"_V": 1.0, "_mV": 1e-3, "": 1.0},
+         "µs": {"_us": 1.0, "_ms": 1e3, "_s": 1e6, "": 1e6}, "Hz": {"_Hz": 1.0, "": 1.0}, "counts": {"": 1.0}}
+_NAMES = {f"{name}{end}": (quantity, factor) for quantity, known in QUANTITIES.items()
+          for name in (quantity, known.symbol) for end, factor in _ENDS[known.unit].items()}
 _NUMBER = re.compile(r"_(\d+)(?=(?:_[A-Za-z]+)?$)")  # the 2 of feedback_voltage_2_V: another instrument
 _LEAST_ROWS = 4
 
@@ -116,8 +107,12 @@ class BenchTable:
         return int(self.columns[0].values.size)
 
     def of(self, quantity: str) -> tuple[TableColumn, ...]:
-        """Return all columns of a quantity; the first is the one that lines go through."""
+        """Return all columns of a quantity."""
         return tuple(column for column in self.columns if column.quantity == quantity)
+
+    def first(self, quantity: str) -> TableColumn | None:
+        """Return the column of a quantity that lines go through; None where there is none."""
+        return next((column for column in self.columns if column.quantity == quantity), None)
 
     def label(self, row: int) -> str:
         """Return how to call a row, counted from 0.
@@ -128,7 +123,7 @@ class BenchTable:
         >>> table.label(2)
         'row 3 (q = 90 °)'
         """
-        key = next(iter(self.of("output_angle") or self.columns))
+        key = self.first("output_angle") or self.columns[0]
         return f"row {row + 1} ({key.symbol} = {key.values[row]:g} {key.unit})"
 
 
@@ -239,8 +234,8 @@ def _other(name: str, values: NDArray[np.float64] | InputError) -> TableColumn |
         return None
     if np.ptp(values) == 0.0:
         return None
-    for end, factor in (("_V", 1.0), ("_mV", 1e-3)):
-        if name.endswith(end):
+    for end, factor in _ENDS["V"].items():
+        if end and name.endswith(end):
             return TableColumn(name=name, quantity="", symbol=name, unit="V", values=factor * values)
     if np.all(values >= 0.0) and np.all(values == np.round(values)):
         return TableColumn(name=name, quantity="", symbol=name, unit="counts", values=values)

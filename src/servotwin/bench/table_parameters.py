@@ -6,14 +6,13 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from servotwin.bench.fits import TableFit
+from servotwin.bench.fits import LineFit, TableFit
 from servotwin.errors import InputError
 from servotwin.parameters import Quantity, Servo, unit_of
 
 _P, _B_O = "potentiometer.feedback_gain", "potentiometer.feedback_offset"
 _TITLES = {"V_o": "feedback voltage", "q": "output angle", "t_a": "pulse width", "V_i": "command voltage"}
-_DEG = math.pi / 180.0
-_MICRO = 1e-6
+_SI = {"°": math.pi / 180.0, "µs": 1e-6}  # units of a table that are not SI
 
 
 class Estimate(NamedTuple):
@@ -55,69 +54,56 @@ def estimates(lines: Mapping[str, TableFit], servo: Servo | None) -> dict[str, E
     (0.4197, 1.29e-05)
     """
     _check_signs(lines)
+    in_si = {name: fit.line.scaled(_SI.get(fit.x_column.unit, 1.0), _SI.get(fit.unit, 1.0))
+             for name, fit in lines.items()}
     found: dict[str, Estimate] = {}
-    if (fit := lines.get("V_o(q)")) is not None:
-        found[_P] = Estimate(fit.line.slope / _DEG, fit.line.slope_error / _DEG, "V_o over q")
-        found[_B_O] = Estimate(fit.line.intercept, fit.line.intercept_error, "V_o over q")
-    if (fit := lines.get("t_a(V_i)")) is not None:
-        found["electronics.voltage_to_pulse_gain"] = Estimate(
-            _MICRO * fit.line.slope, _MICRO * fit.line.slope_error, "t_a over V_i")
-        found["electronics.command_pulse_offset"] = Estimate(
-            _MICRO * fit.line.intercept, _MICRO * fit.line.intercept_error, "t_a over V_i")
-    found |= _of_voltages(lines)
+    if (line := in_si.get("V_o(q)")) is not None:
+        found |= _of_line(line, _P, _B_O, "V_o over q")
+    if (line := in_si.get("t_a(V_i)")) is not None:
+        found |= _of_line(line, "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset", "t_a over V_i")
+    read, more = "V_o", ""
     if "V_o(t_a)" not in lines and "V_o(V_i)" not in lines and servo is not None:
-        found |= _of_angles(lines, servo)
-    return found
+        p, b_o = servo.get(_P), servo.get(_B_O)
+        if isinstance(p, float) and isinstance(b_o, float):
+            error_p, error_b = (servo.source(name).std or 0.0 for name in (_P, _B_O))
+            in_si |= {name.replace("q", "V_o"): _voltage(in_si[name], p, error_p, b_o, error_b)
+                      for name in ("q(t_a)", "q(V_i)") if name in in_si}
+            read, more = "q", f" with feedback_gain {p:.5g} V/rad of the servo"
+    return found | _of_voltages(in_si, f"{read} over t_a{more}", f"{read} over V_i{more}")
 
 
 def _check_signs(lines: Mapping[str, TableFit]) -> None:
-    for name in ("V_o(q)", "q(t_a)", "V_o(t_a)", "t_a(V_i)", "q(V_i)", "V_o(V_i)"):
-        if name in lines and not lines[name].line.slope > 0.0:
-            fit = lines[name]
-            over = f"{_TITLES[name.partition('(')[0]]} over {_TITLES[name.partition('(')[2][:-1]]}"
-            raise InputError(f"{over}, {fit.ordinate} over {fit.abscissa}",
+    for fit in lines.values():
+        what = [_TITLES.get(column.symbol) for column in (fit.x_column, fit.y_column)]
+        if None not in what and not fit.line.slope > 0.0:
+            raise InputError(f"{what[1]} over {what[0]}, {fit.y_column.name} over {fit.x_column.name}",
                              got=f"a slope of {fit.line.slope:.4g} {fit.slope_unit}",
                              allowed="a rising line (count angles the other way round where they fall)")
 
 
-def _of_voltages(lines: Mapping[str, TableFit]) -> dict[str, Estimate]:
-    found: dict[str, Estimate] = {}
-    if (fit := lines.get("V_o(t_a)")) is not None:
-        s_r, b_t = fit.line.slope / _MICRO, fit.line.intercept
-        error_s, error_b, covariance = fit.line.slope_error / _MICRO, fit.line.intercept_error, \
-            fit.line.covariance / _MICRO
-        found["electronics.pulse_to_voltage_gain"] = Estimate(s_r, error_s, "V_o over t_a")
-        found["electronics.one_shot_slope"] = Estimate(1.0 / s_r, error_s / s_r**2, "1/s_r of V_o over t_a")
-        variance = (error_b**2 + (b_t / s_r * error_s) ** 2 - 2.0 * b_t / s_r * covariance) / s_r**2
-        found["electronics.one_shot_offset"] = Estimate(-b_t / s_r, math.sqrt(variance), "-b_t/s_r of V_o over t_a")
-    if (fit := lines.get("V_o(V_i)")) is not None:
-        found["electronics.command_offset"] = Estimate(fit.line.intercept, fit.line.intercept_error, "V_o over V_i")
-    return found
+def _of_line(line: LineFit, gain: str, offset: str, how: str) -> dict[str, Estimate]:
+    return {gain: Estimate(line.slope, line.slope_error, how),
+            offset: Estimate(line.intercept, line.intercept_error, how)}
 
 
-def _of_angles(lines: Mapping[str, TableFit], servo: Servo) -> dict[str, Estimate]:
-    """Return the same with v_o = p q + b_o of a servo; its errors enter as those of the table's own do."""
-    p, b_o = servo.get(_P), servo.get(_B_O)
-    if not isinstance(p, float) or not isinstance(b_o, float):
-        return {}
-    error_p, error_b = (servo.source(name).std or 0.0 for name in (_P, _B_O))
+def _voltage(angle: LineFit, p: float, error_p: float, b_o: float, error_b: float) -> LineFit:
+    """Return the line of v_o = p q + b_o for one of q; the errors of p and b_o enter as its own do."""
+    a, c = angle.slope, angle.intercept
+    return LineFit(
+        slope=p * a, intercept=p * c + b_o, slope_error=math.hypot(p * angle.slope_error, a * error_p),
+        intercept_error=math.sqrt((p * angle.intercept_error) ** 2 + (c * error_p) ** 2 + error_b**2),
+        covariance=p**2 * angle.covariance + a * c * error_p**2, residuals=())
+
+
+def _of_voltages(lines: Mapping[str, LineFit], over_t_a: str, over_v_i: str) -> dict[str, Estimate]:
     found: dict[str, Estimate] = {}
-    if (fit := lines.get("q(t_a)")) is not None:
-        a, c = fit.line.slope * _DEG / _MICRO, fit.line.intercept * _DEG
-        error_a, error_c, both = fit.line.slope_error * _DEG / _MICRO, fit.line.intercept_error * _DEG, \
-            fit.line.covariance * _DEG**2 / _MICRO
-        how = f"q over t_a with feedback_gain {p:.5g} V/rad of the servo"
-        slope = 1.0 / (p * a)
-        found["electronics.pulse_to_voltage_gain"] = Estimate(p * a, math.hypot(p * error_a, a * error_p), how)
-        found["electronics.one_shot_slope"] = Estimate(slope, slope * math.hypot(error_a / a, error_p / p), how)
-        # T_0 = −c/a − b_o/(p a)
-        of_a, of_c, of_p, of_b = c / a**2 + b_o * slope / a, -1.0 / a, b_o * slope / p, -slope
-        variance = ((of_a * error_a) ** 2 + (of_c * error_c) ** 2 + 2.0 * of_a * of_c * both
-                    + (of_p * error_p) ** 2 + (of_b * error_b) ** 2)
-        found["electronics.one_shot_offset"] = Estimate(-c / a - b_o * slope, math.sqrt(variance), how)
-    if (fit := lines.get("q(V_i)")) is not None:
-        c, error_c = fit.line.intercept * _DEG, fit.line.intercept_error * _DEG
-        found["electronics.command_offset"] = Estimate(
-            p * c + b_o, math.sqrt((p * error_c) ** 2 + (c * error_p) ** 2 + error_b**2),
-            f"q over V_i with feedback_gain {p:.5g} V/rad of the servo")
+    if (line := lines.get("V_o(t_a)")) is not None:
+        s_r, b_t, error_s = line.slope, line.intercept, line.slope_error
+        variance = (line.intercept_error**2 + (b_t / s_r * error_s) ** 2 - 2.0 * b_t / s_r * line.covariance) / s_r**2
+        found |= {
+            "electronics.pulse_to_voltage_gain": Estimate(s_r, error_s, over_t_a),
+            "electronics.one_shot_slope": Estimate(1.0 / s_r, error_s / s_r**2, f"1/s_r of {over_t_a}"),
+            "electronics.one_shot_offset": Estimate(-b_t / s_r, math.sqrt(variance), f"-b_t/s_r of {over_t_a}")}
+    if (line := lines.get("V_o(V_i)")) is not None:
+        found["electronics.command_offset"] = Estimate(line.intercept, line.intercept_error, over_v_i)
     return found

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.bench.fits import LineFit, TableFit, fit_line
+from servotwin.bench.fits import TableFit, fit_line
 from servotwin.bench.table_columns import BenchTable, TableColumn
 
 ROW_LEVEL = 0.05
@@ -91,6 +92,14 @@ def generator_step(widths: TableColumn) -> float | None:
     return step * place if step >= _LEAST_STEP and step * place <= _MOST_STEP else None
 
 
+class _Tested(NamedTuple):
+    """A line; and for each row the t-value of its residual by the line through the others, and its p-value."""
+
+    fit: TableFit
+    t: NDArray[np.float64]
+    p: NDArray[np.float64]
+
+
 def row_findings(table: BenchTable, lines: Mapping[str, TableFit]) -> tuple[RowFinding, ...]:
     """Return the rows that fit badly, and the row that a step of the generator would make fit.
 
@@ -108,140 +117,113 @@ def row_findings(table: BenchTable, lines: Mapping[str, TableFit]) -> tuple[RowF
     >>> hint.label, hint.line, hint.better, hint.certain
     ('row 3 (q = 90 °)', 'V_o(t_a)', 1542.0, False)
     """
-    if not lines:
-        return ()
-    columns = {column.name: column for column in table.columns}
-    values = {name: _t_values(fit, columns) for name, fit in lines.items()}
-    single = {name: _p_values(t, t.size - 3) for name, t in values.items()}
-    tests = table.rows * len(lines)
+    tested = [_tested(fit) for fit in lines.values()]
     found = []
-    for row in range(table.rows):
-        name = min(lines, key=lambda key: single[key][row])
-        if tests * single[name][row] < ROW_LEVEL:
-            off = {key for key in lines if single[key][row] < ROW_LEVEL / table.rows}
-            found.append(_certain(table, lines, row, name, float(values[name][row]), tests * single[name][row],
-                                  _common(lines, off, columns)))
+    for row in range(table.rows if tested else 0):
+        one = min(tested, key=lambda each: each.p[row])
+        if table.rows * len(tested) * one.p[row] < ROW_LEVEL:
+            found.append(_certain(_found(table, tested, one, row), tested, one.fit))
     if not any(finding.steps for finding in found):
-        hint = _hint(table, lines, values, single)
+        hint = _hint(table, tested)
         found += [] if hint is None or any(finding.row == hint.row for finding in found) else [hint]
     return tuple(found)
 
 
-def smallest_p_value(table: BenchTable, lines: Mapping[str, TableFit]) -> float:
+def smallest_p_value(lines: Mapping[str, TableFit]) -> float:
     """Return the p-value of the worst row, corrected for all rows and lines."""
-    columns = {column.name: column for column in table.columns}
-    single = [_p_values(_t_values(fit, columns), table.rows - 3).min() for fit in lines.values()]
-    return min(1.0, table.rows * len(lines) * float(min(single, default=1.0)))
+    p = np.array([_tested(fit).p for fit in lines.values()])
+    return min(1.0, p.size * float(p.min()))
 
 
-def _t_values(fit: TableFit, columns: Mapping[str, TableColumn]) -> NDArray[np.float64]:
-    """Return residuals over their standard errors by the line through the other rows, shape (n,)."""
-    x, r = np.asarray(fit.x), np.asarray(fit.line.residuals)
-    leverage = 1.0 / x.size + (x - x.mean()) ** 2 / ((x - x.mean()) ** 2).sum()
-    rounding = (columns[fit.ordinate].resolution**2
-                + (fit.line.slope * columns[fit.abscissa].resolution) ** 2) / 12.0
-    free = np.maximum(1.0 - leverage, 1e-12)
-    # Points may lie on a line by chance, closer than they were read.
-    variance = np.maximum(((r**2).sum() - r**2 / free) / (x.size - 3), rounding)
-    scale = 1e-12 * float(np.abs(fit.y).max())
-    return np.asarray(r / np.sqrt(np.maximum(variance * free, scale**2)), dtype=np.float64)
-
-
-def _p_values(t: NDArray[np.float64], freedom: int) -> NDArray[np.float64]:
+def _tested(fit: TableFit) -> _Tested:
     from scipy.special import stdtr
 
-    return np.asarray(2.0 * stdtr(freedom, -np.abs(t)), dtype=np.float64)
+    x, r = fit.x, np.asarray(fit.line.residuals)
+    leverage = 1.0 / x.size + (x - x.mean()) ** 2 / ((x - x.mean()) ** 2).sum()
+    free = np.maximum(1.0 - leverage, 1e-12)
+    variance = np.maximum(((r**2).sum() - r**2 / free) / (x.size - 3), fit.rounding)
+    scale = 1e-12 * float(np.abs(fit.y).max())
+    t = r / np.sqrt(np.maximum(variance * free, scale**2))
+    return _Tested(fit, t, 2.0 * stdtr(x.size - 3, -np.abs(t)))
 
 
-def _common(lines: Mapping[str, TableFit], off: set[str], columns: Mapping[str, TableColumn]) -> str:
-    """Return the column that just those lines have in common; empty where there is none or several."""
-    found = [name for name in columns
-             if any(_uses(fit, name) for fit in lines.values())
-             and {key for key, fit in lines.items() if _uses(fit, name)} == off]
-    return found[0] if len(found) == 1 and len(off) > 1 else ""
+def _found(table: BenchTable, tested: Sequence[_Tested], one: _Tested, row: int) -> RowFinding:
+    """Return what the line on which a row is farthest off says of it."""
+    p = min(1.0, table.rows * len(tested) * float(one.p[row]))
+    return RowFinding(row=row, label=table.label(row), line=one.fit.name, residual=one.fit.line.residuals[row],
+                      t_value=float(one.t[row]), p_value=p, certain=p < ROW_LEVEL)
 
 
-def _uses(fit: TableFit, column: str) -> bool:
-    return column in (fit.abscissa, fit.ordinate)
-
-
-def _without(fit: TableFit, row: int) -> LineFit:
-    return fit_line(np.delete(fit.x, row), np.delete(fit.y, row))
-
-
-def _changed(fit: TableFit, column: str, row: int, value: float) -> float:
+def _changed(fit: TableFit, column: TableColumn, row: int, value: float) -> float:
     """Return the largest residual with another value in a row."""
-    x, y = np.array(fit.x), np.array(fit.y)
-    (x if fit.abscissa == column else y)[row] = value
+    x, y = fit.x.copy(), fit.y.copy()
+    (x if fit.x_column is column else y)[row] = value
     return fit_line(x, y).max_residual
 
 
-def _certain(table: BenchTable, lines: Mapping[str, TableFit], row: int, name: str, t: float, p: float,
-             column: str) -> RowFinding:
-    fit = lines[name]
-    symbols = {c.name: c for c in table.columns}
-    label = table.label(row)
-    residual = fit.line.residuals[row]
-    words = f"{label} fits badly: {_off(fit, residual)} (leave-one-out t = {t:.1f}, p = {p:.1g} for all rows and lines)"
-    if not column:
-        return RowFinding(row=row, label=label, line=name, residual=residual, t_value=t, p_value=p, certain=True,
-                          words=words)
-    best = min((fit for fit in lines.values() if _uses(fit, column)),
-               key=lambda fit: _without(fit, row).max_residual / float(np.ptp(fit.y)))
-    rest = _without(best, row)
-    better = (best.y[row] - rest.intercept) / rest.slope if best.abscissa == column else rest(best.x[row])
-    steps = 0
-    key = symbols[column]
-    step = generator_step(key) if key.quantity == "pulse_width" else None
-    if step is not None and 0 < abs(round((better - best.x[row]) / step)) <= max(_STEPS):
-        steps = round((better - _value(best, column, row)) / step)
-        better = _value(best, column, row) + steps * step
-    after = _changed(best, column, row, better)
-    words += (f"; the lines without {key.symbol} do not show it, so {key.symbol} is wrong there: "
-              f"{_value(best, column, row):.5g} {key.unit}, where the other rows ask for {better:.5g} {key.unit}")
-    return RowFinding(row=row, label=label, line=name, residual=residual, t_value=t, p_value=p, certain=True,
-                      column=key.symbol, better=better, steps=steps, largest=best.line.max_residual,
-                      largest_after=after, words=words)
+def _certain(found: RowFinding, tested: Sequence[_Tested], fit: TableFit) -> RowFinding:
+    """Return a finding with words, and with the column that just the lines which it is off have in common, if one."""
+    row = found.row
+    words = (f"{found.label} fits badly: {_off(fit, found.residual)} (leave-one-out t = {found.t_value:.1f}, "
+             f"p = {found.p_value:.1g} for all rows and lines)")
+    off = {one.fit.name for one in tested if one.p[row] < ROW_LEVEL / one.p.size}
+    columns = {column for one in tested for column in (one.fit.x_column, one.fit.y_column)}
+    common = [column for column in columns if {one.fit.name for one in tested if one.fit.has(column)} == off]
+    if len(common) != 1 or len(off) < 2:
+        return replace(found, words=words)
+    column = common[0]
+    better, best = _asked(tested, column, row)
+    now, step = float(column.values[row]), generator_step(column) if column.quantity == "pulse_width" else None
+    steps = 0 if step is None else round((better - now) / step)
+    if step is not None and 0 < abs(steps) <= max(_STEPS):
+        better = now + steps * step
+    else:
+        steps = 0
+    words += (f"; the lines without {column.symbol} do not show it, so {column.symbol} is wrong there: "
+              f"{now:.5g} {column.unit}, where the other rows ask for {better:.5g} {column.unit}")
+    return replace(found, column=column.symbol, better=better, steps=steps, words=words,
+                   largest=best.line.max_residual, largest_after=_changed(best, column, row, better))
 
 
-def _value(fit: TableFit, column: str, row: int) -> float:
-    return fit.x[row] if fit.abscissa == column else fit.y[row]
+def _asked(tested: Sequence[_Tested], column: TableColumn, row: int) -> tuple[float, TableFit]:
+    """Return the value that the other rows ask for in a column, by the line that they lie on best, and that line."""
+    rests = [(fit_line(np.delete(one.fit.x, row), np.delete(one.fit.y, row)), one.fit)
+             for one in tested if one.fit.has(column)]
+    rest, best = min(rests, key=lambda pair: pair[0].max_residual / float(np.ptp(pair[1].y)))
+    x, y = float(best.x[row]), float(best.y[row])
+    return (y - rest.intercept) / rest.slope if best.x_column is column else rest(x), best
 
 
-def _hint(table: BenchTable, lines: Mapping[str, TableFit], values: Mapping[str, NDArray[np.float64]],
-          single: Mapping[str, NDArray[np.float64]]) -> RowFinding | None:
+def _hint(table: BenchTable, tested: Sequence[_Tested]) -> RowFinding | None:
     """Return the row whose pulse width, a step or two away, at least halves the largest residual of two lines.
 
     One line alone would do so in a third of all tables without errors, and the lines without it must not show the row.
     """
-    widths = table.of("pulse_width")
-    step = generator_step(widths[0]) if widths else None
-    if step is None:
+    column = table.first("pulse_width")
+    step = None if column is None else generator_step(column)
+    if column is None or step is None:
         return None
-    column = widths[0].name
-    found: dict[tuple[int, int], dict[str, float]] = {}
-    for name, fit in lines.items():
-        row = int(np.argmin(single[name]))
-        if not _uses(fit, column) or single[name][row] > _DOUBT:
+    helped: dict[tuple[int, int], list[tuple[float, _Tested]]] = {}
+    for one in tested:
+        row = int(np.argmin(one.p))
+        if not one.fit.has(column) or one.p[row] > _DOUBT:
             continue
         for steps in _STEPS:
-            after = _changed(fit, column, row, _value(fit, column, row) + steps * step)
-            if after < _HALVED * fit.line.max_residual:
-                found.setdefault((row, steps), {})[name] = after
-    alike = {key: by_line for key, by_line in found.items() if len(by_line) >= _LINES_ALIKE and not any(
-        single[name][key[0]] < _DOUBT / table.rows for name, fit in lines.items() if not _uses(fit, column))}
+            after = _changed(one.fit, column, row, column.values[row] + steps * step)
+            if after < _HALVED * one.fit.line.max_residual:
+                helped.setdefault((row, steps), []).append((after, one))
+    without = [one for one in tested if not one.fit.has(column)]
+    alike = {key: by_line for key, by_line in helped.items() if len(by_line) >= _LINES_ALIKE
+             and not any(one.p[key[0]] < _DOUBT / table.rows for one in without)}
     if not alike:
         return None
     row, steps = max(alike, key=lambda key: len(alike[key]))
-    by_line = alike[row, steps]
-    name = min(by_line, key=lambda key: by_line[key] / lines[key].line.max_residual)
-    fit, single_p = lines[name], float(single[name][row])
-    finding = RowFinding(
-        row=row, label=table.label(row), line=name, residual=fit.line.residuals[row], t_value=float(values[name][row]),
-        p_value=min(1.0, table.rows * len(lines) * single_p), certain=False, column=widths[0].symbol,
-        better=_value(fit, column, row) + steps * step, steps=steps, largest=fit.line.max_residual,
-        largest_after=by_line[name])
-    return replace(finding, words=_hint_words(finding, fit, step, single_p, [key for key in by_line if key != name]))
+    after, one = min(alike[row, steps], key=lambda pair: pair[0] / pair[1].fit.line.max_residual)
+    found = replace(_found(table, tested, one, row), certain=False, column=column.symbol, steps=steps,
+                    better=float(column.values[row]) + steps * step, largest=one.fit.line.max_residual,
+                    largest_after=after)
+    more = [other.fit.name for _, other in alike[row, steps] if other is not one]
+    return replace(found, words=_hint_words(found, one.fit, step, float(one.p[row]), more))
 
 
 def _hint_words(found: RowFinding, fit: TableFit, step: float, single_p: float, more: list[str]) -> str:

@@ -67,7 +67,7 @@ def calibration_facts(found: TableCalibration, out: Path | None = None) -> dict[
         "source": found.source, "servo": found.servo.name, "rows": found.table.rows,
         "columns": [column.name for column in found.table.columns], "ignored_columns": list(found.table.ignored),
         "lines": {name: {
-            "abscissa": fit.abscissa, "ordinate": fit.ordinate, "slope": fit.line.slope,
+            "abscissa": fit.x_column.name, "ordinate": fit.y_column.name, "slope": fit.line.slope,
             "slope_error": fit.line.slope_error, "slope_unit": fit.slope_unit, "intercept": fit.line.intercept,
             "intercept_error": fit.line.intercept_error, "covariance": fit.line.covariance, "unit": fit.unit,
             "residuals": list(fit.line.residuals), "largest_residual": fit.line.max_residual,

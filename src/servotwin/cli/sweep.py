@@ -128,7 +128,7 @@ def _varied(model: Model, words: list[str], *, from_file: bool) -> dict[str, Any
 
 
 def _draws(path: Path | None) -> dict[str, Any] | None:
-    from servotwin.studies import read_columns
+    from servotwin.tables import read_columns
 
     return None if path is None else dict(read_columns(path))
 

@@ -72,7 +72,7 @@ def dimension_of_signal(name: str) -> str:
 
     Examples
     --------
-    >>> dimension_of("time"), dimension_of("output_angle")
+    >>> dimension_of_signal("time"), dimension_of_signal("output_angle")
     ('time', 'angle')
     """
     return "time" if name == TIME else "number" if name == SWITCH else _OF_SI[SIGNALS[name].unit]

@@ -9,6 +9,7 @@ from typing import Any
 
 from servotwin.errors import InputError
 from servotwin.parameters import write_file
+from servotwin.tables.text import read_bytes
 
 
 def read_json(path: str | Path) -> Any:
@@ -28,12 +29,8 @@ def read_json(path: str | Path) -> Any:
     {'mass': 0.5}
     """
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except ValueError as error:  # not UTF-8, a NUL in the path
+        text = read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
         raise InputError(f"{path}: not readable as text ({error})") from None
     if not text.strip():
         raise InputError(f"{path}", got="an empty file", allowed="JSON")

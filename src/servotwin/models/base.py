@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 KINDS = {"command_voltage": "voltage", "command_angle": "angle", "pulse_width": "pulse_width"}
 """The kind of command that a signal stands for."""
 
+TRAVEL_SLACK = 1e-9  # rad: so far beyond a stop a command may be, for rounding
 PULSE_RANGE = (3e-4, 2.7e-3)  # s, of what chips accept where the servo does not say; no source
 
 
@@ -243,11 +244,10 @@ def check_travel(signal: Signal | LaneSignal, servo: Servo) -> None:
     low = -math.inf if lower is None else lower
     high = math.inf if upper is None else upper
     lowest, highest = signal.pieces.extremes
-    slack = 1e-9
-    bad = _First((lowest < low - slack) | (highest > high + slack))
+    bad = _First((lowest < low - TRAVEL_SLACK) | (highest > high + TRAVEL_SLACK))
     if bad:
         low, high = bad.of(low), bad.of(high)
-        angle = bad.of(lowest) if bad.of(lowest) < low - slack else bad.of(highest)
+        angle = bad.of(lowest) if bad.of(lowest) < low - TRAVEL_SLACK else bad.of(highest)
         raise CommandError(
             f"angle command{bad.lane(signal)}", got=f"{math.degrees(angle):.6g} deg",
             allowed=f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg, the travel of {servo.name}")

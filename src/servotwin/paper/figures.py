@@ -214,18 +214,19 @@ def _comparison(study: PaperStudy, name: str, title: str, fit_name: str, quantit
     """Draw measured points, their line and both simulated tables, and below all less the line."""
     fit = study.fits[fit_name]
     is_angle = quantity == "output_angle"
-    x, y = np.asarray(fit.x), np.asarray(fit.y)
+    x, y = fit.x, fit.y
     scale, unit = (1.0, "°") if is_angle else (1e3, "mV")
     ends = np.array([x.min(), x.max()])
     drawn = [Curve("line through the measured points", ends, fit.line(ends), style=0)]
     below = []
-    columns: dict[str, Column] = {fit.abscissa: list(fit.x), f"measured_{fit.ordinate}": list(fit.y),
-                                  f"line_{fit.ordinate}": fit.line(x).tolist()}
+    across_name, up_name = fit.x_column.name, fit.y_column.name
+    columns: dict[str, Column] = {across_name: x.tolist(), f"measured_{up_name}": y.tolist(),
+                                  f"line_{up_name}": fit.line(x).tolist()}
     for style, (model, one) in enumerate(study.on_bench.items(), start=1):
-        across = _across(fit.abscissa, one)
+        across = _across(across_name, one)
         values = plotting.shown(quantity, [getattr(row.reading, quantity) for row in one.rows])
         bands = [math.degrees(row.standing_band) for row in one.rows] if is_angle else None
-        columns |= {f"{model}_{fit.abscissa}": across.tolist(), f"{model}_{fit.ordinate}": values.tolist()}
+        columns |= {f"{model}_{across_name}": across.tolist(), f"{model}_{up_name}": values.tolist()}
         if bands is not None:
             columns[f"{model}_standing_band_deg"] = bands
         drawn.append(Curve(f"simulated, {LABELS[model]}", across, values, points=True, style=style))

@@ -13,15 +13,17 @@ from servotwin.simulation.status import Status
 if TYPE_CHECKING:
     from servotwin.simulation.batch import Batch, Failure
     from servotwin.simulation.bus import Fleet, simulate_bus
+    from servotwin.simulation.c_entry import CEntry, CTick
     from servotwin.simulation.many import grid, simulate_many
     from servotwin.simulation.vector import VectorSimulator
     from servotwin.simulation.vector_memory import VectorMemory
 
-_LAZY = {"Batch": "batch", "Failure": "batch", "Fleet": "bus", "grid": "many", "simulate_bus": "bus",
-         "simulate_many": "many", "VectorMemory": "vector_memory", "VectorSimulator": "vector"}
+_LAZY = {"Batch": "batch", "CEntry": "c_entry", "CTick": "c_entry", "Failure": "batch", "Fleet": "bus", "grid": "many",
+         "simulate_bus": "bus", "simulate_many": "many", "VectorMemory": "vector_memory", "VectorSimulator": "vector"}
 
-__all__ = ["Batch", "Energy", "Event", "Failure", "Fleet", "Result", "Simulator", "State", "Stats", "Status",
-           "StepMetrics", "VectorMemory", "VectorSimulator", "grid", "simulate", "simulate_bus", "simulate_many"]
+__all__ = ["Batch", "CEntry", "CTick", "Energy", "Event", "Failure", "Fleet", "Result", "Simulator", "State", "Stats",
+           "Status", "StepMetrics", "VectorMemory", "VectorSimulator", "grid", "simulate", "simulate_bus",
+           "simulate_many"]
 
 
 def __getattr__(name: str) -> Any:

@@ -31,9 +31,10 @@ _GENERAL = ("friction.kappa", "play", "heat", "motor.L")  # what only lanes one 
 _BANDED = ("friction.varies", "source.I_max")
 _RARE = (*_BANDED, *_GENERAL, "sensor.half_slack")
 _PENDULUM = "load.gravity"
-_BY_BANDS = Recipe("by_bands", _SIDE, vector=True, absent=(
-    *_GENERAL, _PENDULUM, "load.stiffness", "friction.w_s", "follower", "sweep"),
-                   never=("ONE_FORMULA", "ARCS", "CORE"))
+_NOT_IN_BANDS = (*_GENERAL, _PENDULUM, "load.stiffness", "follower", "sweep")
+_BY_BANDS = {creeps: Recipe("by_bands" + "_and_creep" * creeps, _SIDE, vector=True, absent=(
+    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), never=("ONE_FORMULA", "ARCS", "CORE"))
+    for creeps in (False, True)}
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep"),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
@@ -130,17 +131,18 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
 
 
 class SideBySide(NamedTuple):
-    """Lanes that run side by side, all of them in one form, and whether some have a potentiometer with play."""
+    """Lanes that run side by side in one form, whether some have a potentiometer with play, and whether some creep."""
 
     which: Indices
     form: int
     slack: bool
     dtype: str
+    creeps: bool = False
 
     @property
     def recipe(self) -> Recipe:
         """Their kernels."""
-        return _BY_BANDS if self.form == tiles.BANDS else _BY_ARCS[self.dtype]
+        return _BY_BANDS[self.creeps] if self.form == tiles.BANDS else _BY_ARCS[self.dtype]
 
     @property
     def general(self) -> Recipe:
@@ -186,7 +188,8 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
                        (tiles.ARCS, np.logical_not(braked) & np.logical_not(banded)), (tiles.BANDS, banded)):
         which = _where(side, some, lanes)
         lagging = bool(np.any(np.broadcast_to(slack, lanes)[which])) if np.any(slack) else False
-        found.append(SideBySide(which, form, lagging, dtype if form != tiles.BANDS else "float64"))
+        creeping = form == tiles.BANDS and bool(np.any(np.broadcast_to(own.varies * own.w_s > 0.0, lanes)[which]))
+        found.append(SideBySide(which, form, lagging, dtype if form != tiles.BANDS else "float64", creeping))
     found += [OneByOne(_where(some, np.logical_not(side), lanes), recipe) for recipe, some in (
         (PLAIN_RUNS, np.logical_not(_either(rare, swinging))), (PENDULUM_RUNS, swinging & np.logical_not(rare)),
         (ALL_RUNS, rare))]

@@ -15,11 +15,13 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.base import KINDS, PULSE_RANGE, Model
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.observe import Observed
+from servotwin.models.engine.ticks import LONGEST
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.lane_inputs import lanes_of, pick
 from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
+from servotwin.simulation.vector_calls import Room
 from servotwin.simulation.vector_commands import Translator
 from servotwin.simulation.vector_memory import VectorMemory
 from servotwin.simulation.vector_numbers import LaneNumbers
@@ -30,13 +32,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
 
     from servotwin import loads
+    from servotwin.simulation.c_entry import CEntry, Parts
 
 Array = NDArray[np.float64]
 _BYTES = 4000  # of a lane, and of what is made of it now and then
 _COLUMNS = {name: k for k, name in enumerate(Observed._fields)}
 _AT_MOTOR = {"motor_angle": physics.motor_from_output, "motor_speed": physics.motor_from_output,
              "motor_torque": lambda torque, reduction: torque / reduction}
-_LONGEST = 1e5  # s: nothing stops a kernel, and millions of frames take seconds
 
 
 class VectorSimulator:
@@ -106,7 +108,9 @@ class VectorSimulator:
         self._translate = Translator(self._numbers)
         self._command = self._numbers.neutral.copy()  # as the engine follows it: pulse width [s], control voltage [V]
         self._torque = np.zeros(count)
-        self._seen: Array | None = None  # what shows, until anything changes
+        self._room = Room.of(count)
+        self._fresh = np.zeros(1, np.int64)  # 1 while what was seen still shows; compiled code ends that too
+        self._entry: CEntry | None = None
         self.reset()
 
     def __len__(self) -> int:
@@ -150,11 +154,11 @@ class VectorSimulator:
         InputError
             On bad input, before any lane moves; names lane and argument. A lane that fails later says so in `status`.
         """
-        if not (type(duration) is float or is_finite(duration)) or not 0.0 <= duration <= _LONGEST:
+        if not (type(duration) is float or is_finite(duration)) or not 0.0 <= duration <= LONGEST:
             raise InputError("advance(duration)", got=duration,
-                             allowed=f"a number of seconds, from 0 to {_LONGEST:.0e} in one call")
+                             allowed=f"a number of seconds, from 0 to {LONGEST:.0e} in one call")
         self._numbers.check_recorded(lambda: self.time, float(duration))
-        self._seen = None
+        self._fresh[0] = 0
         torque = self._torque_of(external_torque) if external_torque is not None else None
         self._take_command(pulse_width, command_angle, command_voltage)
         if torque is not None and not np.array_equal(torque, self._torque):
@@ -177,14 +181,15 @@ class VectorSimulator:
         lanes : array of bool, shape (lanes,), or of int, optional
             Which; all unless given.
         """
-        which, self._seen = pick(lanes, len(self)), None
+        which = pick(lanes, len(self))
+        self._fresh[0] = 0
         angle = None if output_angle is None else numbers_of("output_angle", output_angle, which)
         command = self._command.copy()
         found = self._translate.command(pulse_width, command_angle, command_voltage, which)
         if found is not None:
             command[which] = found
         self._store.start(which, self._numbers.start(which, command, angle))
-        self._command = command
+        self._command[:] = command
 
     # --- what can be seen and set -------------------------------------------------------------------------------------
 
@@ -199,9 +204,10 @@ class VectorSimulator:
             raise UnknownNameError(f"signal of {type(numbers.model).__name__}", name, ("time", *numbers.available))
         if name in KINDS:
             return np.where(self._store.status != 0, math.nan, numbers.commanded(name, self._command))
-        if self._seen is None:
-            self._seen = self._store.look(self._command)
-        values = self._seen[:, _COLUMNS[name]]
+        if not self._fresh[0]:
+            self._store.look(self._command, self._room.seen)
+            self._fresh[0] = 1
+        values = self._room.seen[:, _COLUMNS[name]]
         return np.asarray(_AT_MOTOR[name](values, numbers.reduction)) if name in _AT_MOTOR else values.copy()
 
     @property
@@ -234,7 +240,8 @@ class VectorSimulator:
         InputError
             On bad input, before anything changes; names lane and argument.
         """
-        which, self._seen = pick(lanes, len(self)), None
+        which = pick(lanes, len(self))
+        self._fresh[0] = 0
         if torque_enable is not None:
             raise InputError(f"torque_enable of {type(self._numbers.model).__name__}", got=torque_enable,
                              allowed="nothing: an analog servo has no such switch")
@@ -252,11 +259,12 @@ class VectorSimulator:
             self._numbers = self._numbers.changed(which, parameters)
             self._store.renew(self._numbers, which, self._torque)
             self._translate = Translator(self._numbers)
-        if inertia is not None:
-            self._numbers.hang(which, inertia)
-        otherwise = bus is not None and self._numbers.feed(which, bus)
+        otherwise = False
         if inertia is not None or bus is not None:
+            otherwise = self._numbers.impose(which, inertia, bus)
             self._store.refit(which, otherwise, self._torque)
+        if self._entry is not None and (parameters or otherwise):
+            self._entry.refresh()
         if angle is not None or speed is not None:
             self._store.impose(which, angle, speed)
 
@@ -285,9 +293,27 @@ class VectorSimulator:
         if memory.model != kind or len(memory.records) != len(self):
             raise InputError("restore(memory)", got=f"{len(memory.records)} lanes of {memory.model}",
                              allowed=f"{len(self)} lanes of {kind}")
-        self._seen = None
-        self._command, self._torque = memory.command.copy(), memory.torque.copy()
+        self._fresh[0] = 0
+        self._command[:], self._torque[:] = memory.command, memory.torque
         self._store.restore(memory, self._torque)
+
+    # --- from C -------------------------------------------------------------------------------------------------------
+
+    def c_entry(self) -> CEntry:
+        """Return what a program in C needs to go on with this simulator: an address, a struct and its header.
+
+        All that its lanes may need is compiled now, once on a machine.
+        """
+        if self._entry is None:
+            from servotwin.simulation.c_entry import CEntry
+
+            self._entry = CEntry(self._parts)
+        return self._entry
+
+    def _parts(self) -> Parts:
+        from servotwin.simulation.c_entry import Parts
+
+        return Parts(self._numbers, self._store, self._translate, self._command, self._torque, self._room, self._fresh)
 
     # --- arguments ----------------------------------------------------------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import CommandError, InputError
 from servotwin.models import BoundedServo
-from servotwin.models.base import PULSE_RANGE
+from servotwin.models.base import PULSE_RANGE, TRAVEL_SLACK
 from servotwin.models.columns import LanePieces, LaneSignal
 from servotwin.simulation.packing import Chunk, flat
 
@@ -29,6 +30,15 @@ class _Scale(NamedTuple):
     offset: Any
     low: float
     high: float
+
+
+class _Bounds(NamedTuple):
+    """What each lane takes: given from low to high, as the engine follows it between least and most; (lanes,)."""
+
+    low: Any
+    high: Any
+    least: Any
+    most: Any
 
 
 class Translator:
@@ -79,23 +89,36 @@ class Translator:
             gain, offset = (x[which] if isinstance(x, np.ndarray) else x for x in (gain, offset))
         return gain * given + offset
 
+    def table(self) -> Array:
+        """Return gain, offset and bounds of each kind of command and lane, shape (3, lanes, 6); nan: not possible."""
+        found = np.full((len(_KINDS), self._numbers.count, 6), math.nan)
+        for rows, name in zip(found, _KINDS, strict=True):
+            with contextlib.suppress(InputError):  # a servo may lack what a kind of command needs
+                for k, column in enumerate(self._columns(name)):
+                    rows[:, k] = column
+        return found
+
     def _scale(self, name: str) -> _Scale:
         """Find out how the models take this kind of command."""
-        numbers = self._numbers
-        gain, offset = np.empty(numbers.count), np.empty(numbers.count)
-        low, high = -math.inf, math.inf
-        for chunk in numbers.chunks:
-            rows = np.zeros((1, 7))
-            pieces = cast("LanePieces", chunk.model.command(
-                cast("Any", _signal(name, rows, chunk.which, math.nan, math.nan))))
-            gain[chunk.which], offset[chunk.which] = flat(pieces.gain), flat(pieces.offset)
-            own_low, own_high = _sure(name, chunk.model, gain[chunk.which], offset[chunk.which])
-            low, high = max(low, own_low), min(high, own_high)
+        gain, offset, low, high, least, most = self._columns(name)
+        ends = np.sort([(least - offset) / gain, (most - offset) / gain], axis=0)
+        low, high = float(np.maximum(low, ends[0]).max()), float(np.minimum(high, ends[1]).min())
         if np.ptp(gain) == 0.0 and np.ptp(offset) == 0.0:
             found = _Scale(float(gain[0]), float(offset[0]), low, high)
         else:
             found = _Scale(gain, offset, low, high)
         self._scales[name] = found
+        return found
+
+    def _columns(self, name: str) -> Array:
+        """Return gain, offset and bounds of each lane, shape (6, lanes)."""
+        found = np.empty((6, self._numbers.count))
+        for chunk in self._numbers.chunks:
+            rows = np.zeros((1, 7))
+            pieces = cast("LanePieces", chunk.model.command(
+                cast("Any", _signal(name, rows, chunk.which, math.nan, math.nan))))
+            for column, values in zip(found, (pieces.gain, pieces.offset, *_bounds(name, chunk.model)), strict=True):
+                column[chunk.which] = flat(values)
         return found
 
     def _look(self, name: str, given: Any, which: Any) -> None:
@@ -115,21 +138,19 @@ class Translator:
                 cast("Any", _signal(name, rows, lanes[own], values[own, None], values[own, None])))
 
 
-def _sure(name: str, model: Model, gain: Array, offset: Array) -> tuple[float, float]:
-    """Return bounds between which every lane takes a command, to be sure; beyond, one has to look."""
+def _bounds(name: str, model: Model) -> _Bounds:
+    """Return what a model takes, as `models.base` checks it; numbers or columns."""
+    low, high, least, most = -math.inf, math.inf, -math.inf, math.inf
     if name == "command_angle":
-        lower, upper = (model.value_or(f"stops.{end}_angle", limit) for end, limit in (
-            ("lower", -math.inf), ("upper", math.inf)))
-        return float(np.max(lower)), float(np.min(upper))
+        low, high = (model.value_or(f"stops.{end}_angle", limit) + slack for end, limit, slack in (
+            ("lower", -math.inf, -TRAVEL_SLACK), ("upper", math.inf, TRAVEL_SLACK)))
     if isinstance(model, BoundedServo):
-        if name == "command_voltage":
-            return -math.inf, math.inf
-        shortest, longest = (model.value_or(f"electronics.pulse_width_{end}", usual)
-                             for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
-        return float(np.max(shortest)), float(np.min(longest))
-    frame = np.ravel(cast("Any", model).frame_period)  # the other models have pulses
-    ends = np.array([(0.0 - offset) / gain, (frame - offset) / gain])
-    return float(ends.min(axis=0).max()), float(ends.max(axis=0).min())
+        if name == "pulse_width":
+            low, high = (model.value_or(f"electronics.pulse_width_{end}", usual)
+                         for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
+    else:
+        least, most = 0.0, cast("Any", model).frame_period  # the other models have pulses
+    return _Bounds(low, high, least, most)
 
 
 def _signal(name: str, rows: Array, lanes: Any, low: Any, high: Any) -> LaneSignal:

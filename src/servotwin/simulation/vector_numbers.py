@@ -12,24 +12,22 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, LoadError
 from servotwin.models.engine.memory import put_memory, started
 from servotwin.models.engine.modes import INSIDE, RIGID
-from servotwin.models.engine.observe import on_bus
 from servotwin.models.engine.records import columns_of, put_columns, tiles_with
+from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.tiles import Lanes as Columns
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
-from servotwin.models.terms.shaft import Shaft
-from servotwin.physics.laws import array_form
 from servotwin.simulation import lane_runs
+from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
 from servotwin.simulation.lane_memory import RECORD
 from servotwin.simulation.lanes import Tables
 from servotwin.simulation.packing import Asked, Chunk, Commands, flat, groups
 from servotwin.simulation.start import start_vector
+from servotwin.simulation.vector_calls import TICKS, asked
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-_on_bus = array_form(on_bus, __name__)
-_SLACK = 1e-9  # rad: another simulator's stop may give way so much
 
 
 class Imposed(NamedTuple):
@@ -53,6 +51,10 @@ class LaneNumbers:
         Recorded torque over time; a lane without one has no row.
     curve : ndarray, shape (2, n)
         Angles [rad] and errors [V] of the potentiometers.
+    given : ndarray
+        Tiles of the numbers as servo and load say them, without what is imposed.
+    load_total, V_oc : ndarray, shape (lanes,)
+        Inertia of each load [kg m²], and voltage of each supply without a current [V].
     accuracy : float
         Of what is integrated [rad].
     """
@@ -70,16 +72,18 @@ class LaneNumbers:
         self.neutral = np.empty(self.count)
         self.columns, self.torque = self._packed()
         self.frame_period = self.columns.chips["frame_period"].ravel()[:self.count]
-        self.load_total, self.reduction, self._V_oc = np.empty((3, self.count))
+        self.load_total, self.reduction, self.V_oc = np.empty((3, self.count))
         for chunk in self.chunks:
             self.load_total[chunk.which] = flat(chunk.load.total_inertia)
             self.reduction[chunk.which] = flat(chunk.model.value("gear.gear_reduction"))
-            self._V_oc[chunk.which] = flat(chunk.model.value("supply.open_circuit_voltage"))
-        self._given = self.columns.numbers.copy()
+            self.V_oc[chunk.which] = flat(chunk.model.value("supply.open_circuit_voltage"))
+        self.given = self.columns.numbers.copy()
         if imposed is not None:
-            for put, values in ((self.hang, imposed.load_inertia), (self.feed, imposed.bus_voltage)):
-                which = np.flatnonzero(~np.isnan(values))
-                put(which, values[which])
+            hung, fed = (np.flatnonzero(~np.isnan(values)) for values in imposed)
+            if len(hung):
+                self.impose(hung, imposed.load_inertia[hung], None)
+            if len(fed):
+                self.impose(fed, None, imposed.bus_voltage[fed])
 
     def _packed(self) -> tuple[Columns, Tables]:
         B = self.count
@@ -108,32 +112,14 @@ class LaneNumbers:
         return columns_of(type(getattr(NEUTRAL, room)), self.columns.numbers[room],
                           slice(self.count) if which is None else which)
 
-    def hang(self, which: Indices, J_L: Array) -> None:
-        """Put inertias [kg m²] in the place of those of some lanes' loads."""
-        self.imposed.load_inertia[which] = J_L
-        given: Any = columns_of(Shaft, self._given["shaft"], which)
-        J_out = J_L + (given.J_out - self.load_total[which])
-        put_columns(self.columns.numbers["shaft"], which,
-                    given._replace(J=given.J + (J_out - given.J_out), J_out=J_out))
-
-    def feed(self, which: Indices, V: Array) -> bool:
-        """Put voltages [V] in the place of what some lanes' supplies would leave.
+    def impose(self, which: Indices, J_L: Array | None, V: Array | None) -> bool:
+        """Put inertias [kg m²] and bus voltages [V] in the place of those of some lanes' loads and supplies.
 
         Return whether the lanes may have to run in another way than before.
         """
-        self.imposed.bus_voltage[which] = V
-        given: Any = {room: columns_of(type(getattr(NEUTRAL, room)), self._given[room], which)
-                      for room in ("bridge", "source", "follower")}
-        before, drop = self.now("source", which), given["bridge"].D_drive
-        otherwise = self.pulsed and ((before.V > drop) != (V > drop)) | np.isfinite(before.I_max)
-        if self.pulsed:
-            given |= _on_bus(NEUTRAL._replace(**given), V)._asdict()
-        else:
-            own = given["follower"]
-            given["follower"] = own._replace(V_max=np.maximum(own.V_max + V - self._V_oc[which], 0.0))
-        for room in ("bridge", "source", "follower"):
-            put_columns(self.columns.numbers[room], which, given[room])
-        return bool(np.any(otherwise))
+        has, given = asked({INERTIA: J_L, VOLTAGE: V}, which, self.count)
+        return bool(kernels(TICKS).change(has, given, which, self.given, self.load_total, self.V_oc, self.pulsed,
+                                          *self.imposed, self.columns.numbers))
 
     def changed(self, which: Indices, parameters: Mapping[str, Any]) -> LaneNumbers:
         """Return these lanes with other parameters in some of them.
@@ -220,7 +206,7 @@ class LaneNumbers:
     def check_angles(self, angle: Array, which: Indices) -> None:
         """Raise InputError if an angle [rad] is beyond a stop; names the lane."""
         lower, upper, _ = self.now("stops", which)
-        good = (angle >= lower - _SLACK) & (angle <= upper + _SLACK)
+        good = (angle >= lower - SLACK) & (angle <= upper + SLACK)
         if not good.all():
             k = int(np.argmin(good))
             raise InputError(f"output_angle of lane {which[k]}", got=float(angle[k]),
@@ -237,6 +223,14 @@ class LaneNumbers:
                 load.check_span(0.0, float(now[lane]) + duration)
             except LoadError as error:
                 raise LoadError(f"{error.what} of lane {lane}", got=error.got, allowed=error.allowed) from None
+
+    def record_ends(self) -> Array:
+        """Return when the recorded torque of each lane ends [s]: inf without one, −inf where it begins late."""
+        ends = np.full(self.count, math.inf)
+        for lane in np.flatnonzero(self.torque.count).tolist():
+            first, last = self.inputs.loads[self.inputs.load_of[lane]].time_span
+            ends[lane] = last if first <= 0.0 else -math.inf
+        return ends
 
     # --- what shows ---------------------------------------------------------------------------------------------------
 

@@ -12,14 +12,15 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
 from servotwin.models.engine.modes import INSIDE, RIGID
-from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.records import TILE, columns_of, room
+from servotwin.models.engine.ticks import ANGLE, SPEED
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
 from servotwin.simulation.lane_runs import OneByOne, SideBySide, some_of
+from servotwin.simulation.vector_calls import TICKS, asked, calls_in_records, calls_in_tiles
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_memory import VectorMemory
@@ -48,27 +49,28 @@ class Store:
         count = numbers.count
         self.status, self.ended = np.zeros(count, np.int8), np.zeros(count)
         self.work = np.zeros(count)
-        self._total = np.zeros(count)  # of torque
+        self.total = np.zeros(count)  # of torque
+        self.now = np.zeros(2)  # what compiled code reads: the duration of a tick, and whether torques are others
         self._build(numbers)
 
     def _build(self, numbers: LaneNumbers) -> None:
-        self._numbers = numbers
+        self.numbers = numbers
         columns = numbers.columns
-        self._base = columns.torque.copy()
-        self._total[:] = self._base
-        self._columns = columns._replace(torque=self._total)
+        self.base = columns.torque.copy()
+        self.total[:] = self.base
+        self.columns = columns._replace(torque=self.total)
         self._kinds = self._kinds_now()
-        self._sets: list[_Tiles | _Records] = [
-            _Tiles(kind, some_of(self._columns, kind.which), self._threads)
+        self.sets: list[_Tiles | _Records] = [
+            _Tiles(kind, some_of(self.columns, kind.which), self._threads)
             if isinstance(kind, SideBySide) else _Records(kind) for kind in self._kinds]
         self._set_of, self._place = np.empty((2, numbers.count), np.int64)
-        for k, some in enumerate(self._sets):
+        for k, some in enumerate(self.sets):
             self._set_of[some.which], self._place[some.which] = k, np.arange(len(some.which))
-        self._inputs = (numbers.curve, numbers.torque.rows, numbers.torque.first, numbers.torque.count)
-        self._loads_change = True
+        self.inputs = (numbers.curve, numbers.torque.rows, numbers.torque.first, numbers.torque.count)
+        self.now[1] = 1.0
 
     def _kinds_now(self) -> list[SideBySide | OneByOne]:
-        numbers, lanes = self._numbers, slice(self._numbers.count)
+        numbers, lanes = self.numbers, slice(self.numbers.count)
         own = columns_of(Numbers, numbers.columns.numbers, lanes), columns_of(Chip, numbers.columns.chips, lanes)
         return lane_runs.kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
                                   numbers.torque.count > 0, bool(numbers.curve.size))
@@ -76,23 +78,23 @@ class Store:
     def _parts(self, which: Indices) -> Iterator[tuple[_Tiles | _Records, Indices, Indices]]:
         """Return the sets that hold some lanes, where in the set they are, and where in `which`."""
         set_of, place = self._set_of[which], self._place[which]
-        for k, some in enumerate(self._sets):
+        for k, some in enumerate(self.sets):
             of = np.flatnonzero(set_of == k)
             if len(of):
                 yield some, place[of], of
 
     def hang(self, torque: Array) -> None:
         """Hang external torques beside the loads [N m]."""
-        np.add(self._base, torque, out=self._total)
-        self._loads_change = True
+        np.add(self.base, torque, out=self.total)
+        self.now[1] = 1.0
 
     def refit(self, which: Indices, otherwise: bool, torque: Array) -> None:
         """Take what another simulator has imposed on some lanes, which may run `otherwise` then; memories go on."""
         if otherwise and not _same(self._kinds_now(), self._kinds):
-            self.renew(self._numbers, which, torque)
+            self.renew(self.numbers, which, torque)
             return
         for some, places, of in self._parts(which):
-            some.refit(self._columns, which[of], places)
+            some.refit(self.columns, which[of], places)
 
     def renew(self, numbers: LaneNumbers, which: Indices, torque: Array) -> None:
         """Take other numbers of some lanes; memories go on."""
@@ -103,17 +105,17 @@ class Store:
 
     def restore(self, memory: VectorMemory, torque: Array) -> None:
         """Go back to what was saved."""
-        self.status, self.ended, self.work = memory.status.copy(), memory.ended.copy(), memory.work.copy()
+        self.status[:], self.ended[:], self.work[:] = memory.status, memory.ended, memory.work
         self.hang(torque)
         count = len(self.status)
         before, now = (x.view(np.float64).reshape(len(x), -1, TILE)
-                       for x in (memory.numbers, self._numbers.columns.numbers))
+                       for x in (memory.numbers, self.numbers.columns.numbers))
         others = np.flatnonzero((before != now).any(axis=1).ravel()[:count])
         self._go_on_from(memory.records.copy(), others)
 
     def _go_on_from(self, memory: NDArray[Any], others: Indices) -> None:
         """Take the memories of all lanes, of which some have other numbers than when they were made."""
-        play = self._numbers.now("play").half > 0.0
+        play = self.numbers.now("play").half > 0.0
         point = memory["point"]
         point["anchor_time"][others] = math.inf
         mesh = point["mode"]["mesh"]
@@ -129,19 +131,19 @@ class Store:
 
     def _put(self, which: Indices, records: NDArray[Any]) -> None:
         for some, places, of in self._parts(which):
-            some.put(places, records[of], self._numbers)
+            some.put(places, records[of], self.numbers)
 
     def records(self) -> NDArray[Any]:
         """Return the memories of all lanes."""
         found = np.zeros(len(self.status), RECORD)
-        for some in self._sets:
-            found[some.which] = some.records(self._columns)
+        for some in self.sets:
+            found[some.which] = some.records(self.columns)
         return found
 
     def shaft(self, name: str) -> Array:
         """Return angle [rad] or speed [rad/s] of each shaft."""
         found = np.empty(len(self.status))
-        for some in self._sets:
+        for some in self.sets:
             found[some.which] = some.shaft(name)
         return found
 
@@ -149,7 +151,7 @@ class Store:
     def time(self) -> Array:
         """Time of each lane since its start [s]."""
         found = np.empty(len(self.status))
-        for some in self._sets:
+        for some in self.sets:
             found[some.which] = some.time
         failed = self.status != 0
         found[failed] = self.ended[failed]
@@ -159,11 +161,11 @@ class Store:
 
     def advance(self, duration: float, command: Array) -> None:
         """Let all lanes go on [s]."""
-        for some in self._sets:
+        for some in self.sets:
             if isinstance(some, _Tiles):
                 self._advance_tiles(some, duration, command)
             else:
-                self._columns.pieces[:, 1] = command
+                self.columns.pieces[:, 1] = command
                 own = np.flatnonzero(self.status[some.which] == 0)
                 if len(own) == len(some.which):
                     self._one_by_one(some.recipe, some.which, duration, some.rows)
@@ -171,11 +173,11 @@ class Store:
                     part = some.rows[own]
                     self._one_by_one(some.recipe, some.which[own], duration, part)
                     some.rows[own] = part
-        self._loads_change = False
+        self.now[1] = 0.0
 
     def _advance_tiles(self, some: _Tiles, duration: float, command: Array) -> None:
         count, workers = len(some.rows), some.workers
-        arguments: tuple[Any, ...] = (duration, command, self._total, self._loads_change, some.rows)
+        arguments: tuple[Any, ...] = (duration, command, self.total, bool(self.now[1]), some.rows)
         if workers == 1:
             lost = some.advance(some.which, *some.form, 0, count, *arguments, some.plans[0])
         else:
@@ -191,10 +193,10 @@ class Store:
             alive = self.status[some.which[places]] == 0
             places, durations = places[alive], durations[alive]
             if len(places):
-                self._columns.pieces[:, 1] = command
-                part = records_of(some.rows, places, self._columns.start[3:5, some.which[places]])
+                self.columns.pieces[:, 1] = command
+                part = records_of(some.rows, places, self.columns.start[3:5, some.which[places]])
                 self._one_by_one(some.general, some.which[places], durations, part)
-                put_records(some.rows, places, part, self._numbers.frame_period[some.which[places]])
+                put_records(some.rows, places, part, self.numbers.frame_period[some.which[places]])
 
     def _one_by_one(self, recipe: Any, which: Indices, duration: float | Array, records: NDArray[Any]) -> None:
         """Let some lanes go on one by one; their memories are changed in place."""
@@ -204,7 +206,7 @@ class Store:
 
         def go(part: slice) -> None:
             some = which[part]
-            go_on(self._columns, *self._inputs, some, durations[part], _NONE, np.zeros(len(some), np.int64),
+            go_on(self.columns, *self.inputs, some, durations[part], _NONE, np.zeros(len(some), np.int64),
                   np.zeros((len(some), 14, 0)), records[part], status[part], ended[part])
 
         workers = min(self._threads, len(which))
@@ -220,29 +222,18 @@ class Store:
 
     # --- what shows, and what is imposed ------------------------------------------------------------------------------
 
-    def look(self, command: Array) -> Array:
-        """Return what shows of all lanes under their commands, a row of `observe.Observed` for each."""
-        self._columns.pieces[:, 1] = command
-        seen = np.empty((len(self.status), len(Observed._fields)))
-        for some in self._sets:
-            some.look(self._columns, self._inputs, seen)
+    def look(self, command: Array, seen: Array) -> None:
+        """Put what shows of all lanes under their commands into `seen`, a row of `observe.Observed` for each."""
+        self.columns.pieces[:, 1] = command
+        for some in self.sets:
+            some.look(self.columns, self.inputs, seen)
         seen[self.status != 0] = math.nan
-        return seen
 
     def impose(self, which: Indices, angle: Array | None, speed: Array | None) -> None:
         """Set angles [rad] and speeds [rad/s] of the output; book the work of the impulses."""
-        if angle is not None:
-            lower, upper, _ = self._numbers.now("stops", which)
-            angle = np.clip(angle, lower, upper)
-        if speed is not None:
-            J, _, J_out, _ = self._numbers.now("shaft", which)
-            J = np.where(self._numbers.now("play", which).half > 0.0, J_out, J)
+        has, given = asked({ANGLE: angle, SPEED: speed}, which, len(self.status))
         for some, places, of in self._parts(which):
-            if speed is not None:
-                with np.errstate(over="ignore", invalid="ignore"):
-                    self.work[which[of]] += 0.5 * J[of] * (speed[of]**2 - some.shaft("output_speed")[places]**2)
-            some.impose(places, None if angle is None else angle[of], None if speed is None else speed[of],
-                        self._numbers)
+            some.impose(has, given, self.columns.numbers, which[of], places, self.work)
 
 
 _NONE = np.zeros(0)
@@ -263,6 +254,7 @@ class _Tiles:
         self.rows = room(-(-len(self.which) // TILE), tiles.tile_type(kind.dtype, kind.form))
         self.workers = max(1, min(threads, len(self.rows) // _WORTH))
         self.plans = [room(1, tiles.plan_type(kind.dtype)) for _ in range(self.workers)]
+        self.recipe = kind.recipe
         module = kernels(kind.recipe)
         self.advance, self._refit = module.advance, module.refit
         module.start(lanes, kind.form, math.inf, self.rows)
@@ -275,11 +267,9 @@ class _Tiles:
         """Take the numbers of lanes anew."""
         self._refit(columns, self.form[0], lanes, places, self.rows)
 
-    def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
-        """Set angles [rad] and speeds [rad/s]; none of these lanes has play."""
-        for name, values in (("q", angle), ("w", speed)):
-            if values is not None:
-                put(self.rows, "servo", name, places, values)
+    def impose(self, *imposed: Any) -> None:
+        """Set angles and speeds, as `engine.lane_ticks` does."""
+        kernels(TICKS).impose_on_tiles(*imposed, self.rows)
 
     def forget(self, places: Indices) -> None:
         """Let the general way finish the calls of these lanes."""
@@ -299,6 +289,10 @@ class _Tiles:
     def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
         kernels(lane_runs.LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
 
+    def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
+        """Return what compiled code calls at each stage of a tick."""
+        return calls_in_tiles(self, store, room, command)
+
 
 class _Records:
     """Lanes that run one by one."""
@@ -314,22 +308,9 @@ class _Records:
         """Let motions of lanes begin anew: their numbers are read at each step."""
         self.rows["point"]["anchor_time"][places] = math.inf
 
-    def impose(self, places: Indices, angle: Array | None, speed: Array | None, numbers: LaneNumbers) -> None:
-        """Set angles [rad] and speeds [rad/s] of the output; motor and potentiometer go along as far as their play."""
-        rows, lanes = self.rows[places], self.which[places]
-        half = numbers.now("play", lanes).half
-        point, y, play = rows["point"], rows["point"]["y"], half > 0.0
-        if angle is not None:
-            slack = numbers.now("sensor", lanes).half_slack
-            y[:, 0] = angle
-            y[:, 5] = np.where(play, np.clip(y[:, 5], angle - half, angle + half), angle)
-            point["wiper"] = np.clip(point["wiper"], angle - slack, angle + slack)
-        if speed is not None:
-            y[:, 1] = speed
-            y[:, 6] = np.where(play, y[:, 6], speed)
-        point["anchor_time"], point["anchor"] = math.inf, y
-        point["mode"]["mesh"] = np.where(play, INSIDE, RIGID)
-        self.rows[places] = rows
+    def impose(self, *imposed: Any) -> None:
+        """Set angles and speeds, as `engine.lane_ticks` does; motor and potentiometer go along as far as their play."""
+        kernels(TICKS).impose_on_records(*imposed, self.rows)
 
     def records(self, columns: tiles.Lanes) -> NDArray[Any]:
         return self.rows.copy()
@@ -343,3 +324,7 @@ class _Records:
 
     def look(self, columns: tiles.Lanes, inputs: Any, seen: Array) -> None:
         kernels(lane_runs.LOOK_ONE_BY_ONE).one_by_one(columns, *inputs, self.which, self.rows, seen)
+
+    def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
+        """Return what compiled code calls at each stage of a tick."""
+        return calls_in_records(self, store, room, command)

@@ -17,8 +17,7 @@ from servotwin.studies.metrics import METRICS
 from servotwin.studies.names import dimension_of
 from servotwin.studies.study import LaneFailure, Study
 from servotwin.studies.tornado import Bar, Tornado, variance_share
-from servotwin.tables.columns import read_columns
 
 __all__ = ["METRICS", "Bar", "Choice", "Distribution", "LaneFailure", "LogNormal", "Normal", "Offset", "Relative",
-           "Study", "Tornado", "Triangular", "Uniform", "dimension_of", "distributions", "read_columns", "stated",
+           "Study", "Tornado", "Triangular", "Uniform", "dimension_of", "distributions", "stated",
            "sweep", "variance_share"]

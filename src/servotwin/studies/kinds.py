@@ -71,8 +71,28 @@ def _checked(kind: Distribution, **rules: str) -> None:
         object.__setattr__(kind, f.name, float(value))
 
 
+class Continuous(Distribution):
+    """A distribution that SciPy has."""
+
+    @abstractmethod
+    def _law(self, stats: Any) -> Any:
+        """Return the frozen distribution of `scipy.stats`, which is slow to load."""
+
+    def quantile(self, p: Array) -> Array:
+        """Return the values at probabilities `p`."""
+        from scipy import stats
+
+        return np.asarray(self._law(stats).ppf(p), dtype=np.float64)
+
+    def cdf(self, x: float) -> float:
+        """Return the probability of a draw of at most `x`."""
+        from scipy import stats
+
+        return float(self._law(stats).cdf(x))
+
+
 @dataclass(frozen=True)
-class Uniform(Distribution):
+class Uniform(Continuous):
     """All values from `lower` to `upper` alike.
 
     Examples
@@ -89,17 +109,12 @@ class Uniform(Distribution):
         if not self.lower < self.upper:
             raise InputError("Uniform(lower, upper)", got=(self.lower, self.upper), allowed="lower less than upper")
 
-    def quantile(self, p: Array) -> Array:
-        """Return the values at probabilities `p`."""
-        return np.asarray(self.lower + (self.upper - self.lower) * p)
-
-    def cdf(self, x: float) -> float:
-        """Return the probability of a draw of at most `x`."""
-        return min(max((x - self.lower) / (self.upper - self.lower), 0.0), 1.0)
+    def _law(self, stats: Any) -> Any:
+        return stats.uniform(self.lower, self.upper - self.lower)
 
 
 @dataclass(frozen=True)
-class Normal(Distribution):
+class Normal(Continuous):
     """The bell curve with mean and standard deviation `std`.
 
     Examples
@@ -114,21 +129,12 @@ class Normal(Distribution):
     def __post_init__(self) -> None:
         _checked(self, std="positive")
 
-    def quantile(self, p: Array) -> Array:
-        """Return the values at probabilities `p`."""
-        from scipy.special import ndtri
-
-        return np.asarray(self.mean + self.std * ndtri(p))
-
-    def cdf(self, x: float) -> float:
-        """Return the probability of a draw of at most `x`."""
-        from scipy.special import ndtr
-
-        return float(ndtr((x - self.mean) / self.std))
+    def _law(self, stats: Any) -> Any:
+        return stats.norm(self.mean, self.std)
 
 
 @dataclass(frozen=True)
-class LogNormal(Distribution):
+class LogNormal(Continuous):
     """Positive values whose natural logarithm is normal: `median` times e to a normal draw of deviation `sigma`.
 
     Examples
@@ -143,21 +149,12 @@ class LogNormal(Distribution):
     def __post_init__(self) -> None:
         _checked(self, median="positive", sigma="positive")
 
-    def quantile(self, p: Array) -> Array:
-        """Return the values at probabilities `p`."""
-        from scipy.special import ndtri
-
-        return np.asarray(self.median * np.exp(self.sigma * ndtri(p)))
-
-    def cdf(self, x: float) -> float:
-        """Return the probability of a draw of at most `x`."""
-        from scipy.special import ndtr
-
-        return float(ndtr(math.log(x / self.median) / self.sigma)) if x > 0.0 else 0.0
+    def _law(self, stats: Any) -> Any:
+        return stats.lognorm(self.sigma, scale=self.median)
 
 
 @dataclass(frozen=True)
-class Triangular(Distribution):
+class Triangular(Continuous):
     """Likeliest at `mode`, impossible outside `lower` and `upper`.
 
     Examples
@@ -176,19 +173,9 @@ class Triangular(Distribution):
             raise InputError("Triangular(lower, mode, upper)", got=(self.lower, self.mode, self.upper),
                              allowed="numbers that increase")
 
-    def quantile(self, p: Array) -> Array:
-        """Return the values at probabilities `p`."""
-        a, m, b = self.lower, self.mode, self.upper
-        rising = a + np.sqrt(p * (b - a) * (m - a))
-        falling = b - np.sqrt((1.0 - p) * (b - a) * (b - m))
-        return np.where(p * (b - a) < m - a, rising, falling)
-
-    def cdf(self, x: float) -> float:
-        """Return the probability of a draw of at most `x`."""
-        a, m, b = self.lower, self.mode, self.upper
-        if x <= m:
-            return 0.0 if x <= a else (x - a)**2 / ((b - a) * (m - a))
-        return 1.0 if x >= b else 1.0 - (b - x)**2 / ((b - a) * (b - m))
+    def _law(self, stats: Any) -> Any:
+        width = self.upper - self.lower
+        return stats.triang((self.mode - self.lower) / width, self.lower, width)
 
 
 @dataclass(frozen=True)

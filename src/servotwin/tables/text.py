@@ -33,6 +33,24 @@ class Text(NamedTuple):
     encoding: str
 
 
+def read_bytes(path: str | Path) -> bytes:
+    """Return the contents of a file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    try:
+        return Path(path).read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except ValueError as error:  # a NUL in the path
+        raise InputError(f"{path}: cannot be read ({error})") from None
+
+
 def read_text(path: Path) -> Text:
     r"""Return the lines of a text file: UTF-8 with or without a mark, UTF-16, else Windows-1252 or Latin-1.
 
@@ -49,14 +67,7 @@ def read_text(path: Path) -> Text:
     >>> read_text(file)
     Text(lines=['t;Winkel (°)', '0;9'], rest='0.02;1', encoding='cp1252')
     """
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except ValueError as error:  # a NUL in the path
-        raise InputError(f"{path}: cannot be read ({error})") from None
+    data = read_bytes(path)
     for start, what in _NOT_TEXT.items():
         if data.startswith(start):
             raise InputError(str(path), got=what, allowed="a text, such as CSV")

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.fitting.counts import step_of
 from servotwin.logs.log import Log
 
 Array = NDArray[np.float64]
@@ -128,7 +129,7 @@ def noise_of(series: Sequence[SensorSeries]) -> Noise:
     >>> round(1e3 * found.size, 1), abs(found.memory) < 0.1, found.count
     (1.0, True, 0.0)
     """
-    count, repeats, white = _count(series), _repeats(series), _white(series)
+    count, repeats, white = step_of(np.concatenate([one.measured for one in series])), _repeats(series), _white(series)
     floor = max(count / math.sqrt(12.0), 1e-12)
     guesses = _at_rest([window for one in series for window in _windows(one)], white)
     if not guesses:
@@ -156,18 +157,6 @@ def _jitter(series: Sequence[SensorSeries]) -> float:
         return 0.0
     stamps, shaft = (_NORMAL * float(np.median(np.abs(np.concatenate(x)))) for x in (uneven, seen))
     return min(stamps, shaft)
-
-
-def _count(series: Sequence[SensorSeries]) -> float:
-    """Return the step of an instrument that counts: all values are multiples of it, and many are the same."""
-    values = np.concatenate([one.measured for one in series])
-    apart = np.diff(np.unique(values))
-    apart = apart[apart > 1e-9 * max(float(np.abs(values).max(initial=0.0)), 1e-12)]
-    if not len(apart) or len(apart) > 0.8 * len(values):
-        return 0.0
-    step = float(np.median(apart[apart < 1.5 * apart.min()]))
-    off = np.abs(apart / step - np.round(apart / step))
-    return step if float(np.quantile(off, 0.98)) < 0.02 * max(1.0, float(np.median(apart / step))) else 0.0
 
 
 def _white(series: Sequence[SensorSeries]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.models.engine import arc_rounds, arcs, bands, tiles
-from servotwin.models.engine.bands import STOP
+from servotwin.models.engine.guards import SPEED
 from servotwin.models.terms.numbers import Numbers
 
 _ROUNDS = 3  # that all lanes take together
@@ -52,8 +52,15 @@ def _round(size: int, slack: bool, tile: Any, plan: Any) -> int:
     """Move all lanes to the end of their band or of their time; return how many have time left."""
     for j in range(size):
         _find(tiles.numbers_at(tile.own, j), tile, plan, j)
+    creeping = 0
+    for j in range(size):
+        creeping += 1 if plan.creeps[j] > 0.0 else 0
     for j in range(size):
         arc_rounds.end_arc(tile, plan, j)
+    if creeping > 0:
+        for j in range(size):
+            if plan.creeps[j] > 0.0:
+                _creep(tiles.numbers_at(tile.own, j), tile, plan, j)
     if slack:
         for j in range(size):
             tiles.drag(tile, tile.servo.q[j], j)
@@ -65,8 +72,9 @@ def _round(size: int, slack: bool, tile: Any, plan: Any) -> int:
     for j in range(size):
         t, turn = arcs.way_to_edge(
             tile.servo.w[j], plan.edge_speed[j], plan.pull_there[j], plan.rate[j], plan.per_rate[j])
-        plan.way_time[j] = t
-        plan.way_angle[j] = turn
+        still = plan.creeps[j] > 0.0
+        plan.way_time[j] = 0.0 if still else t
+        plan.way_angle[j] = 0.0 if still else turn
     for j in range(size):
         _arrive(tile, plan, j)
     if slack:
@@ -79,7 +87,7 @@ def _round(size: int, slack: bool, tile: Any, plan: Any) -> int:
 
 
 def _find(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
-    """Set the arc that a lane is in."""
+    """Set the arc that a lane is in; one that creeps has no time for it."""
     band = bands.band_at(numbers, tile.hung.torque[j], plan.power[j] * numbers.source.V, plan.way[j] > 0.0,
                          tile.count.zone[j], tile.count.share[j], tile.servo.w[j])
     plan.edge_speed[j] = band.arc.edge
@@ -88,6 +96,23 @@ def _find(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
     plan.rate[j] = band.arc.rate
     plan.per_rate[j] = band.arc.per_rate
     tile.count.ends_at[j] = band.ends_at
+    creeps = band.creeps and plan.time[j] > 0.0
+    plan.creeps[j] = plan.time[j] if creeps else 0.0
+    plan.time[j] = 0.0 if creeps else plan.time[j]
+
+
+def _creep(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
+    """Let a lane creep, and mark it where it has time left: as at the edge of a band."""
+    q, w, left, ends_at, done = bands.leg(
+        numbers, tile.hung.torque[j], plan.power[j] * numbers.source.V, plan.way[j] > 0.0, tile.count.zone[j],
+        tile.count.share[j], tile.servo.q[j], tile.servo.w[j], plan.creeps[j], tile.hung.tolerance[j])
+    tile.servo.q[j] = q
+    tile.servo.w[j] = w
+    tile.count.ends_at[j] = ends_at
+    plan.edge_speed[j] = w
+    plan.time[j] = left
+    plan.ends[j] = 1.0 if left > 0.0 else 0.0
+    plan.lost[j] = plan.lost[j] if done > 0.0 and tile.arc.lower[j] < q < tile.arc.upper[j] else 1.0
 
 
 def _arrive(tile: Any, plan: Any, j: int) -> None:
@@ -96,12 +121,12 @@ def _arrive(tile: Any, plan: Any, j: int) -> None:
     q = tile.servo.q[j] + plan.way_angle[j]
     inside = tile.arc.lower[j] < q < tile.arc.upper[j]
     left = max(plan.time[j] - plan.way_time[j], 0.0)
-    stays = at == STOP and start == 0.0
+    stays = at == SPEED and start == 0.0
     zone, share = bands.beyond(at, tile.count.zone[j], tile.count.share[j])
     tile.count.zone[j] = zone
     tile.count.share[j] = share
     way = 1.0 if start > 0.0 else -1.0
-    plan.way[j] = way if at == STOP else plan.way[j]
+    plan.way[j] = way if at == SPEED else plan.way[j]
     tile.servo.q[j] = q if ends else tile.servo.q[j]
     tile.servo.w[j] = plan.edge_speed[j] if ends else tile.servo.w[j]
     plan.time[j] = left if ends and inside and not stays else 0.0
@@ -112,7 +137,8 @@ def _go_on(slack: bool, tile: Any, plan: Any, j: int) -> None:
     """Move one lane to the end of its time, band by band."""
     q, w, turned, done = bands.slide_on(
         tiles.numbers_at(tile.own, j), tile.hung.torque[j], plan.start[j], plan.power[j], plan.way[j] > 0.0,
-        tile.count.zone[j], tile.count.share[j], tile.servo.q[j], tile.servo.w[j], plan.time[j])
+        tile.count.zone[j], tile.count.share[j], tile.servo.q[j], tile.servo.w[j], plan.time[j],
+        tile.hung.tolerance[j])
     tile.servo.q[j] = q
     tile.servo.w[j] = w
     plan.lost[j] = plan.lost[j] if done > 0.0 else 1.0

@@ -14,6 +14,7 @@ from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Vector
 from servotwin.models.engine.motion import FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
 from servotwin.models.engine.rodas import not_constant
 from servotwin.models.terms import source
+from servotwin.models.terms.friction import creeping_speed
 from servotwin.physics.motor import back_emf
 from servotwin.physics.pieces import piece_rate, piece_value
 
@@ -51,11 +52,13 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
     low, high = currents.zone_limits(numbers, motion.mode.zone, u)
     w, x = after[1], u - back_emf(after[1], numbers.motor.K_b)
     first, found = math.inf, -1
+    way = 1.0 if motion.mode.contact == FORWARD else -1.0
+    slow = creeping_speed(numbers.friction)
     share, turn = guards.share_along(numbers, motion.mode, u, piece_value(motion.tau, motion.t0), after)
-    for kind, left, there in ((guards.SPEED, w if motion.mode.contact == FORWARD else -w, 0.0),
+    for kind, left, there in ((guards.SPEED, way * w, 0.0),
                               (guards.ZONE_UP, high - x, (u - high) / numbers.motor.K_b),
                               (guards.ZONE_DOWN, x - low, (u - low) / numbers.motor.K_b),
-                              (guards.SHARE, share, turn)):
+                              (guards.SHARE, share, turn), (guards.CREEPS, way * w - slow, way * slow)):
         if not kinds >> kind & 1 or left >= _BELOW:  # monotone: what holds at the end has held
             continue
         s = first_order.time_to(rate, f, w0, there)
@@ -76,14 +79,18 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
 def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b: Vector) -> tuple[float, int]:
     """Return when the first of several guards falls below zero in [a, b], and which; (inf, -1) where none does."""
     first, found = math.inf, -1
+    rates_a, rates_b = rates(motion, a, at_a), rates(motion, b, at_b)
     for kind in range(guards.KINDS):
         if kinds >> kind == 0:
             break
         if not kinds >> kind & 1:
             continue
-        begin, end = _guard(motion, kind, a, at_a), _guard(motion, kind, b, at_b)
-        if end[0] >= _BELOW and not begin[1] < 0.0 < end[1]:
-            continue  # it does not fall below zero, nor dip there
+        end = _guard(motion, kind, b, at_b, rates_b)
+        if end[0] >= _BELOW and not end[1] > 0.0:
+            continue  # it does not fall below zero, nor rises from there
+        begin = _guard(motion, kind, a, at_a, rates_a)
+        if end[0] >= _BELOW and not begin[1] < 0.0:
+            continue  # nor dips
         motion = prepared(motion)
         s = _crossing(motion, kind, a, begin, b, end)
         if s < first:
@@ -91,17 +98,18 @@ def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b
     return first, found
 
 
-def _guard(motion: Motion, kind: int, s: float, y: Vector) -> tuple[float, float]:
-    """Return a guard and its rate at s, where the state is y."""
+def _guard(motion: Motion, kind: int, s: float, y: Vector, dy: Vector) -> tuple[float, float]:
+    """Return a guard and its rate at s, where the state is y and its rates are dy."""
     t = motion.t0 + s
     u, tau = motion.u, motion.tau
     return guards.guard(motion.numbers, motion.mode, kind, piece_value(u, t), piece_rate(u, t), piece_value(tau, t),
-                        piece_rate(tau, t), y, rates(motion, s, y))
+                        piece_rate(tau, t), y, dy)
 
 
 def _at(motion: Motion, kind: int, s: float, rate: bool) -> tuple[float, float]:
     """Return a guard and its rate at s; with `rate` the rate alone, and nan for its own."""
-    value, slope = _guard(motion, kind, s, state(motion, s))
+    y = state(motion, s)
+    value, slope = _guard(motion, kind, s, y, rates(motion, s, y))
     return (slope, math.nan) if rate else (value, slope)
 
 

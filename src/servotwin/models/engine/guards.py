@@ -24,7 +24,7 @@ from servotwin.models.engine.modes import (
     at_rest,
 )
 from servotwin.models.terms import play, source
-from servotwin.models.terms.friction import core_speed, holding_friction, smoothed, varying
+from servotwin.models.terms.friction import core_speed, creeping_speed, fades, holding_friction, smoothed, varying
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
@@ -33,15 +33,16 @@ from servotwin.physics import motor
 # What can end a mode: first what a shaft and a zone of its own have, then what play adds.
 SPEED, CORE_FORWARD, CORE_BACKWARD, ZONE_UP, ZONE_DOWN, UPPER, LOWER, RELEASE_FORWARD, RELEASE_BACKWARD = range(9)
 MEET_FORWARD, MEET_BACKWARD, PART, PART_OUTPUT, PART_MOTOR = range(9, 14)
-MOTOR_SPEED, MOTOR_RELEASE_FORWARD, MOTOR_RELEASE_BACKWARD, SHARE = range(14, 18)
-KINDS = 18
+MOTOR_SPEED, MOTOR_RELEASE_FORWARD, MOTOR_RELEASE_BACKWARD, SHARE, CREEPS = range(14, 19)
+KINDS = 19
+IN_CLOSED_FORM = 1 << SHARE | 1 << CREEPS  # what a creep has looked at itself
 _CORE = 1 << CORE_FORWARD | 1 << CORE_BACKWARD
 _RELEASE = 1 << RELEASE_FORWARD | 1 << RELEASE_BACKWARD
 _MEET = 1 << MEET_FORWARD | 1 << MEET_BACKWARD
 _MOTOR_RELEASE = 1 << MOTOR_RELEASE_FORWARD | 1 << MOTOR_RELEASE_BACKWARD
 EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper stop", "lower stop",
                "release forward", "release backward", "gear meets", "gear meets", "gear parts", "gear parts",
-               "gear parts", "motor speed zero", "motor release", "motor release", "share turns")
+               "gear parts", "motor speed zero", "motor release", "motor release", "share turns", "creeps")
 
 
 def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
@@ -65,6 +66,7 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
     elif shaft != FREE:
         kinds |= 1 << SPEED
         kinds |= 1 << SHARE if mode.share != 0 else 0
+        kinds |= 1 << CREEPS if fades(numbers.friction) else 0
     low, high = currents.zone_limits(numbers, zone, u)
     if high < math.inf:
         kinds |= 1 << ZONE_UP
@@ -93,6 +95,9 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
     if kind == SPEED:
         sign = 1.0 if shaft == FORWARD else -1.0
         return sign * w - core_speed(numbers.friction), sign * dw
+    if kind == CREEPS:
+        sign = 1.0 if shaft == FORWARD else -1.0
+        return sign * w - creeping_speed(numbers.friction), sign * dw
     if kind == CORE_FORWARD:
         return core_speed(numbers.friction) - w, -dw
     if kind == CORE_BACKWARD:
@@ -178,6 +183,9 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
         return Mode(currents.neighbour(numbers, zone, kind == ZONE_UP), shaft, mesh, motor, share), y
     if kind == SHARE:
         return Mode(zone, shaft, mesh, motor, -share), y
+    if kind == CREEPS:
+        slow = creeping_speed(numbers.friction)
+        return mode, (y[0], slow if shaft == FORWARD else -slow, y[2], y[3], y[4], y[5], y[6])
     if kind == SPEED and smoothed(numbers.friction):
         return Mode(zone, CORE, mesh, motor, 0), y
     if kind == CORE_FORWARD or kind == CORE_BACKWARD:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine import contacts, currents, dormand_prince, first_order, rodas, second_order
+from servotwin.models.engine import contacts, creep, currents, dormand_prince, first_order, rodas, second_order
 from servotwin.models.engine.coefficients import linear_coefficients, speed_coefficients
 from servotwin.models.engine.modes import (
     CONDUCTING,
@@ -22,13 +22,14 @@ from servotwin.models.engine.modes import (
     in_linear_zone,
 )
 from servotwin.models.engine.rates import jacobian, rates_of
-from servotwin.models.engine.rodas import Triple
+from servotwin.models.engine.rodas import Triple, not_constant
 from servotwin.models.terms import follower, friction, heat, load, motor, play, sensor, source
 from servotwin.models.terms.dependence import (
     BY_SHARE,
     CURVED_Q,
     CURVED_T,
     CURVED_W,
+    FADING,
     ON_HEAT,
     ON_I,
     ON_Q,
@@ -40,11 +41,11 @@ from servotwin.models.terms.play import with_motor
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
-REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, IMPOSSIBLE = range(9)
+REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, CREEP, IMPOSSIBLE = range(10)
 
 _TURN = 2.0 * math.pi
 # Error of one implicit step, relative to 1 + |state|, and of an explicit one: parts of the accuracy asked for
-_TOLERANCE, _FINE_TOLERANCE = 0.3, 1e-3
+_TOLERANCE, FINE = 0.3, 1e-3
 _ORIGIN = (0.0, 0.0, 0.0)
 _NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
 _NO_DENSE = (_ORIGIN, _ORIGIN, _ORIGIN)
@@ -67,6 +68,7 @@ class Motion(NamedTuple):
     against: tuple[float, ...]  # WITH_CURRENT: value and slope of all torque that does not depend on speed
     end: Vector  # of a step, as all that follows
     next_step: float  # length to try next [s]
+    ends_by: int  # guard that is zero at the end; −1: none
     has_dense: bool
     stages: tuple[Triple, ...]
     dense: tuple[Triple, Triple, Triple]
@@ -80,8 +82,8 @@ def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
 
 
 def is_step(motion: Motion) -> bool:
-    """Tell whether a motion is one step of an integrator."""
-    return motion.kind == STEP or motion.kind == LONG_STEP
+    """Tell whether a motion is one step of an integrator, or a creep, which ends as one does."""
+    return motion.kind == STEP or motion.kind == LONG_STEP or motion.kind == CREEP
 
 
 def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
@@ -93,6 +95,14 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
         return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
     if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & (ON_Q | BY_SHARE)))):
         return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
+    if on & FADING:
+        steady = not (on & (ON_Q | ON_I | CURVED_T) or not_constant(tau))
+        if not steady or creep.creeps(numbers, mode, u.value, tau.value, y):
+            if steady:
+                m = _creep(numbers, mode, u, tau, t0, y, step, limit, accuracy)
+                if m.kind == CREEP:
+                    return m
+            return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
     if on & ON_I and still and mode.zone >= CONDUCTING:
         v, R = currents.loop(numbers, mode.zone, u.value)
         fading = (R / numbers.motor.L, v / R, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -123,21 +133,21 @@ def dependence(numbers: Numbers, mode: Mode, u: Piece, still: bool) -> int:
 
 def _closed(kind: int, numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
             coefficients: tuple[float, ...], against: tuple[float, ...], step: float) -> Motion:
-    return Motion(kind, numbers, mode, u, tau, t0, y, math.inf, coefficients, against, y, step, False, _NO_STAGES,
+    return Motion(kind, numbers, mode, u, tau, t0, y, math.inf, coefficients, against, y, step, -1, False, _NO_STAGES,
                   _NO_DENSE, _NO_LONG_DENSE)
 
 
 def by_series(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
               speed: tuple[float, ...], current: tuple[float, ...]) -> Motion:
     """Return a motion whose speed and current are given as powers of time."""
-    return Motion(SERIES, numbers, mode, u, tau, t0, y, length, speed, current, y, 0.0, False, _NO_STAGES, _NO_DENSE,
-                  _NO_LONG_DENSE)
+    return Motion(SERIES, numbers, mode, u, tau, t0, y, length, speed, current, y, 0.0, -1, False, _NO_STAGES,
+                  _NO_DENSE, _NO_LONG_DENSE)
 
 
 def by_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, length: float,
             dense: tuple[Vector, ...], end: Vector) -> Motion:
     """Return a motion whose dense output is given."""
-    return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, length, _NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, True,
+    return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, length, _NO_COEFFICIENTS, (0.0, 0.0), end, 0.0, -1, True,
                   _NO_STAGES, _NO_DENSE, dense)
 
 
@@ -154,7 +164,8 @@ def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y
             size = 1e6
         factor = min(5.0, max(0.1, 0.85 * size**-0.2)) if size > 0.0 else 5.0
         if size <= 1.0:
-            return Motion(STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, h * factor, False,
+            return Motion(STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, h * factor, -1,
+                          False,
                           stages, _NO_DENSE, _NO_LONG_DENSE)
         h *= factor
         if t0 + h == t0:
@@ -168,18 +179,29 @@ def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y:
     h = min(h, period(u, tau, t0, t0 + h) / 3.0)
     for _ in range(60):
         y1, error = dormand_prince.step(numbers, mode, u, tau, t0, y, h)
-        size = error / (_FINE_TOLERANCE * accuracy)
+        size = error / (FINE * accuracy)
         if not size < 1e12:
             size = 1e12
         factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
         if size <= 1.0:
             following = max(step, h * factor) if h == limit else h * factor  # a step that was cut short tells little
             return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, following,
-                          False, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
+                          -1, False, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
         h *= factor
         if t0 + h == t0:
             break
     return _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+
+
+def _creep(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float,
+           accuracy: float) -> Motion:
+    """Return a creep, or a motion that is none where its end cannot be told."""
+    time, q, w, ends_by, done = creep.creep(numbers, mode, u.value, tau.value, y, limit, FINE * accuracy)
+    none = _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+    if done == 0.0 or t0 + time == t0:
+        return none
+    return Motion(CREEP, numbers, mode, u, tau, t0, y, time, _NO_COEFFICIENTS, (0.0, 0.0),
+                  _moved(none, q, w, 0.0), step, ends_by, True, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
 
 
 def prepared(motion: Motion) -> Motion:
@@ -193,8 +215,8 @@ def prepared(motion: Motion) -> Motion:
         long_dense = dormand_prince.dense(motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
                                           motion.length)
     return Motion(motion.kind, motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
-                  motion.length, motion.coefficients, motion.against, motion.end, motion.next_step, True,
-                  motion.stages, dense, long_dense)
+                  motion.length, motion.coefficients, motion.against, motion.end, motion.next_step, motion.ends_by,
+                  True, motion.stages, dense, long_dense)
 
 
 def state(motion: Motion, s: float) -> Vector:
@@ -229,6 +251,10 @@ def state(motion: Motion, s: float) -> Vector:
         return motion.end
     if s == 0.0:
         return start
+    if kind == CREEP:
+        q, w = creep.at_time(motion.numbers, motion.mode, motion.u.value, motion.tau.value, start, motion.end,
+                             motion.length, s)
+        return _moved(motion, q, w, start[2])
     x = s / motion.length
     if kind == STEP:
         return rodas.interpolate(start, motion.end, motion.dense, x)

@@ -176,7 +176,8 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
     if form == tiles.BANDS:
         begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
         q, w, turned, _ = bands.slide(
-            tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x - begin)
+            tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x - begin,
+            tile.hung.tolerance[j])
     else:
         q, w, turned, _ = arcs.slide(numbers, drive, q, w, x - begin)
     if outputs.wiper.size > 0:

@@ -124,6 +124,7 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
     v = piece_value(m.u, point.time)
     kinds = guards.guards(m.numbers, m.mode, v, m.mode.contact == CORE and in_one_piece(m.numbers, m.u))
     if integrated:  # looked at as a whole, however a run is split
+        kinds &= ~(guards.IN_CLOSED_FORM if m.kind == motion.CREEP else 1 << guards.CREEPS)
         s, kind, y = events.first_event(m, kinds, 0.0, m.length)
         if kind < 0 or s > end - t0:
             kind, y = -1, motion.state(m, end - t0)
@@ -131,6 +132,9 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
         s, kind, y = events.first_event(m, kinds, point.time - t0, end - t0)
     if kind < 0:
         wiper = wiper_at(m.numbers.sensor, point.wiper, y[0])
+        if integrated and end == step_end and m.ends_by >= 0:
+            after, y = guards.cross(m.numbers, m.mode, m.ends_by, piece_value(m.u, end), piece_value(m.tau, end), y)
+            return Point(end, y, after, end, y, point.step, wiper), m.ends_by, status_of(y)
         if integrated and end == step_end:
             return Point(end, y, m.mode, end, y, m.next_step, wiper), -1, status_of(y)
         return Point(end, y, m.mode, t0, point.anchor, point.step, wiper), -1, status_of(y)

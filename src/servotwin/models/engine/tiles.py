@@ -13,6 +13,7 @@ import numpy as np
 
 from servotwin.models.engine import arcs, bands, contacts
 from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.motion import FINE
 from servotwin.models.engine.records import TILE, reader, rows_of, tile_of, writer
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import Numbers
@@ -123,6 +124,7 @@ class Plan(NamedTuple):
     way: float  # −1 or +1: which way it slides
     start: float  # −1, 0, +1: which way it starts from rest
     turned: float  # where it stopped last
+    creeps: float  # time for it to creep
     q1: float  # angle and speed at the start of each phase
     w1: float
     wiper1: float
@@ -159,6 +161,7 @@ class Hung(NamedTuple):
 
     torque: float  # constant, external [N m]
     half_slack: float  # half of the play of the potentiometer
+    tolerance: float  # of what is integrated
     dry: float  # 1: there is friction of some kind, or what counts as such
 
 
@@ -254,6 +257,7 @@ def set_numbers(lanes: Lanes, form: int, first: int, size: int, tile: Any, place
     for j in range(size):
         numbers = numbers_of(lanes, first + j)
         tile.hung.half_slack[place + j] = numbers.sensor.half_slack
+        tile.hung.tolerance[place + j] = FINE * lanes.accuracy
         tile.hung.dry[place + j] = 1.0 if contacts.has_friction(numbers) else 0.0
     if form == BANDS:
         for j in range(size):

@@ -13,7 +13,7 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.engine.modes import CORE, at_rest
-from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, STEEP_W
+from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, FADING, STEEP_W
 from servotwin.models.terms.given import Given
 from servotwin.physics.friction import breakaway_torque, coulomb_torque
 from servotwin.physics.load_friction import (
@@ -23,6 +23,7 @@ from servotwin.physics.load_friction import (
     static_gear_friction,
 )
 
+_FADED = 39.0  # exp(−39) is less than rounding: beyond (w/w_s)^α = 39 no static friction counts
 _SATURATED_TANH = 20.0  # tanh(20) is 1 to rounding: beyond it the smoothed friction is constant
 _SHARES = {"K_m": "motor", "K_e": "external", "K_ms": "motor_stribeck", "K_es": "external_stribeck",
            "K_mq": "motor_quad", "K_eq": "external_quad"}
@@ -74,21 +75,33 @@ def varying(friction: Friction) -> bool:
 
 def depends(friction: Friction, contact: int) -> int:
     """Return on what the acceleration depends through the friction of a shaft in a contact."""
-    if contact == CORE:
-        return STEEP_W
-    if friction.varies == 0.0 or at_rest(contact):
-        return 0
-    return BY_SHARE if straight(friction) else CURVED_W
+    return (STEEP_W if contact == CORE else 0 if friction.varies == 0.0 or at_rest(contact)
+            else CURVED_W if not straight(friction) else BY_SHARE | FADING if friction.w_s > 0.0 else BY_SHARE)
 
 
 def straight(friction: Friction) -> bool:
     """Tell whether sliding friction follows the torques in straight lines, and lets the motor turn the gear."""
-    return friction.w_s == 0.0 and friction.K_m < 1.0 and friction.K_e <= 1.0
+    return friction.K_m < 1.0 and friction.K_e <= 1.0
 
 
 def shared(friction: Friction) -> bool:
     """Tell whether the torques through the gear add to sliding friction."""
     return friction.K_m > 0.0 or friction.K_e > 0.0
+
+
+def fades(friction: Friction) -> bool:
+    """Tell whether friction fades as the shaft speeds up, and not at once."""
+    return friction.varies > 0.0 and friction.w_s > 0.0
+
+
+def creeping_speed(friction: Friction) -> float:
+    """Return the output speed [rad/s] up to which a shaft creeps: from there on no static friction is left."""
+    return friction.w_s * math.exp(math.log(_FADED) / friction.alpha) if fades(friction) else 0.0
+
+
+def static_share(friction: Friction, tau_m: float, tau_e: float) -> float:
+    """Return the torque through the gear [N m] whose magnitude adds to static friction."""
+    return share_balance(tau_m, tau_e, friction.K_ms, friction.K_es)
 
 
 def share(friction: Friction, tau_m: float, tau_e: float) -> float:

@@ -16,7 +16,7 @@ from servotwin.simulation.compile import derive as derive_module
 from servotwin.simulation.compile.derive import Recipe, derive, surroundings
 from servotwin.simulation.compile.storage import key_of, loaded, stored
 
-__all__ = ["Recipe", "kernels"]
+__all__ = ["Recipe", "kernels", "source_key"]
 
 _lock = threading.Lock()
 
@@ -39,9 +39,14 @@ def _sources() -> tuple[str, ...]:
     return tuple(file.read_text(encoding="utf-8") for file in files)
 
 
+def source_key() -> str:
+    """Return a short name for all that compiled code depends on, a recipe apart."""
+    return key_of(*_sources(), version("numba"), version("llvmlite"))
+
+
 @cache
 def _kernels(recipe: Recipe) -> ModuleType:
-    key = key_of(*_sources(), surroundings(recipe), version("numba"), version("llvmlite"))
+    key = key_of(source_key(), surroundings(recipe))
     path, known = stored(f"servotwin_{recipe.name}_{key}", lambda: derive(recipe))
     if not known:
         sys.stderr.write("servotwin: compiling the kernels for this machine, once (15 to 35 s)\n")

@@ -4,7 +4,7 @@ Starting from the entries, every function that is called is collected from its o
 `package_module__function`; constants come along by value, classes are imported from where they are. A kernel is changed
 in these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out; in the float32
 form every float literal gets that type; in the vector form `math.exp`, `math.log` and `math.log1p` become the
-polynomials of `engine.elementary`.
+polynomials of `engine.elementary`, and the sums of functions that a module names `IN_ANY_ORDER` are taken so.
 """
 
 from __future__ import annotations
@@ -77,7 +77,9 @@ def derive(recipe: Recipe) -> str:
     lines += ["", f"_f = np.{'float32' if recipe.single else 'float64'}", ""]
     lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
     for flat in work.order:
-        lines += ["", "", f"@njit({_options(recipe, flat in names, work.functions[flat])})", work.functions[flat]]
+        options = _options(recipe, flat in names, work.functions[flat])
+        options += ', fastmath={"reassoc"}' if recipe.vector and flat in work.in_any_order else ""
+        lines += ["", "", f"@njit({options})", work.functions[flat]]
     lines += ["", *(f"{entry.split(':')[1]} = {flat}" for entry, flat in zip(recipe.entries, names, strict=True)), ""]
     return "\n".join(lines)
 
@@ -100,12 +102,15 @@ class _Derivation:
     functions: dict[str, str] = field(default_factory=dict)
     constants: dict[str, str] = field(default_factory=dict)
     imports: dict[str, tuple[str, str]] = field(default_factory=dict)
+    in_any_order: set[str] = field(default_factory=set)
 
     def function(self, module: str, name: str) -> str:
         """Collect a function after those that it calls, and return its name in the derived module."""
         flat = _flat(module, name)
         if flat not in self.functions:
             self.functions[flat] = ""  # marks a call of itself
+            if name in getattr(import_module(module), "IN_ANY_ORDER", ()):
+                self.in_any_order.add(flat)
             node = _definition(module, name)
             rewritten = _Rewriting(self, module, _local_names(node)).visit(node)
             rewritten.name = flat

@@ -1,13 +1,15 @@
-"""The primitives of `engine.elementary` as single instructions; imported by derived modules alone."""
+"""What derived modules alone import: the primitives of `engine.elementary` as single instructions, and addresses."""
 
 # numba's and llvmlite's own types are not annotated
-# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped, call-overload"
 
 from __future__ import annotations
 
+import numpy as np
 from llvmlite import ir
-from numba import types
+from numba import from_dtype, types
 from numba.extending import intrinsic
+from numba.np.arrayobj import make_array, populate_array
 
 _MANTISSA = {"float": 23, "double": 52}
 _BIAS = {"float": 127, "double": 1023}
@@ -77,3 +79,48 @@ def binary_exponent(_typing, x):
         return builder.sitofp(builder.ashr(above, ir.Constant(whole, _MANTISSA[name])), x.type)
 
     return kind(kind), generate
+
+
+def array_maker(fields, dimensions, aligned):
+    """Return the function (address, shape) that takes what stands in memory for an array.
+
+    `fields` describe its elements, as `calls.described` tells them.
+    """
+    kind = types.Array(from_dtype(_dtype(fields)), dimensions, "C", aligned=aligned)
+
+    @intrinsic
+    def array_at(_typing, address, shape):
+        def generate(context, builder, signature, arguments):
+            place, lengths = arguments
+            size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+            shapes = [builder.extract_value(lengths, k) for k in range(dimensions)]
+            strides = [ir.Constant(place.type, size)]
+            for length in shapes[:0:-1]:
+                strides.insert(0, builder.mul(strides[0], length))
+            array = make_array(kind)(context, builder)
+            data = builder.inttoptr(place, context.get_data_type(kind.dtype).as_pointer())
+            populate_array(array, data=data, shape=shapes, strides=strides, itemsize=strides[-1], meminfo=None)
+            return array._getvalue()
+
+        return kind(types.int64, types.UniTuple(types.int64, dimensions)), generate
+
+    return array_at
+
+
+def _dtype(fields):
+    if isinstance(fields, str):
+        return np.dtype(fields)
+    return np.dtype((np.record, [(name, _dtype(kind), shape) for name, kind, shape in fields]))
+
+
+@intrinsic
+def called(_typing, function, words):
+    """Call the function at an address with the address of its words, and return its number."""
+    number = types.int64
+
+    def generate(_context, builder, signature, arguments):
+        function, words = arguments
+        kind = ir.FunctionType(words.type, [words.type])
+        return builder.call(builder.inttoptr(function, kind.as_pointer()), [words])
+
+    return number(number, number), generate

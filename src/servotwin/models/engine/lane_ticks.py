@@ -1,0 +1,149 @@
+"""The sets of lanes of which a tick consists, in tiles or in records: what is asked of each between its kernels.
+
+Lanes that have to go on one by one are put together in the first `count[0]` of some places, with their records.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from servotwin.models.engine.crossing import (
+    Side,
+    counted_at,
+    held_at,
+    hour_at,
+    put_counted,
+    put_held,
+    put_hour,
+    remembered,
+    side_of,
+)
+from servotwin.models.engine.imposing import carried, impulse_work, placed
+from servotwin.models.engine.memory import Memory, memory_of, put_memory, time_of
+from servotwin.models.engine.records import TILE
+from servotwin.models.engine.step import COMPLETED
+from servotwin.models.engine.ticks import ANGLE, SPEED, shaft_at, stops_at
+
+if TYPE_CHECKING:
+    from servotwin.models.engine.tiles import Floats, Indices
+
+
+def gather_lost(which: Indices, status: Any, start: Floats, tile_rows: Any, count: Indices, places: Indices,
+                lanes: Indices, durations: Floats, records: Any) -> int:
+    """Put together the lanes of tiles that were given up; return how many there are. They owe nothing any more."""
+    n = 0
+    for k in range(which.size):
+        tile, j, lane = tile_rows[k // TILE], k % TILE, which[k]
+        if tile.clock.owed[j] > 0.0:
+            if status[lane] == COMPLETED:
+                side = Side(held_at(tile.servo, j), hour_at(tile.clock, j), counted_at(tile.count, j))
+                put_memory(records[n], remembered(
+                    side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j], start[3, lane], start[4, lane]))
+                places[n], lanes[n], durations[n] = k, lane, tile.clock.owed[j]
+                n += 1
+            tile.clock.owed[j] = 0.0
+    count[0] = n
+    return n
+
+
+def put_lost(places: Indices, lanes: Indices, records: Any, periods: Floats, tile_rows: Any) -> None:
+    """Put lanes that have gone on one by one back into their tiles."""
+    for k in range(places.size):
+        tile, j = tile_rows[places[k] // TILE], places[k] % TILE
+        side = side_of(memory_of(records[k]), periods[lanes[k]])
+        put_held(tile.servo, j, side.held)
+        put_hour(tile.clock, j, side.hour)
+        put_counted(tile.count, j, side.counted)
+
+
+def gather(which: Indices, status: Any, now: Floats, rows: Any, count: Indices, places: Indices, lanes: Indices,
+           durations: Floats, records: Any) -> int:
+    """Put together the lanes of records that have not failed; return how many there are."""
+    n = 0
+    for k in range(which.size):
+        if status[which[k]] == COMPLETED:
+            places[n], lanes[n], durations[n] = k, which[k], now[0]
+            put_memory(records[n], memory_of(rows[k]))
+            n += 1
+    count[0] = n
+    return n
+
+
+def put(places: Indices, records: Any, rows: Any) -> None:
+    """Put lanes back into their records."""
+    for k in range(places.size):
+        put_memory(rows[places[k]], memory_of(records[k]))
+
+
+def note_failures(lanes: Indices, how: Indices, at: Floats, records: Any, status: Any, ended: Floats) -> None:
+    """Note which lanes have failed, and when; they are nan from there on."""
+    for k in range(lanes.size):
+        if how[k] != COMPLETED:
+            status[lanes[k]], ended[lanes[k]] = how[k], at[k]
+            for i in range(7):
+                records[k].point.y[i] = math.nan
+
+
+def forget_motions(rows: Any) -> None:
+    """Let the motions of all lanes in records begin anew: their numbers are others."""
+    for k in range(len(rows)):
+        rows[k].point.anchor_time = math.inf
+
+
+def impose_on_tiles(has: Indices, given: Floats, numbers: Any, which: Indices, places: Indices, work: Floats,
+                    tile_rows: Any) -> None:
+    """Set angles and speeds of lanes at these places of tiles, and book the work of the impulses [J]; none has play."""
+    for k in range(which.size):
+        lane, servo, j = which[k], tile_rows[places[k] // TILE].servo, places[k] % TILE
+        own, i = numbers[lane // TILE], lane % TILE
+        if has[SPEED] != 0:
+            after = given[SPEED, lane]
+            work[lane] += impulse_work(shaft_at(own.shaft, i), own.play.half[i], 1.0 * servo.w[j], after)
+            servo.w[j] = after
+        if has[ANGLE] != 0:
+            angle = within_stops(own, i, given[ANGLE, lane])
+            servo.q[j], servo.wiper[j] = angle, carried(1.0 * servo.wiper[j], angle, own.sensor.half_slack[i])
+
+
+def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices, places: Indices, work: Floats,
+                      rows: Any) -> None:
+    """Set angles and speeds of lanes at these places of records, and book the work of the impulses [J]."""
+    for k in range(which.size):
+        lane, memory = which[k], memory_of(rows[places[k]])
+        own, i = numbers[lane // TILE], lane % TILE
+        half, angle = own.play.half[i], 0.0
+        if has[SPEED] != 0:
+            work[lane] += impulse_work(shaft_at(own.shaft, i), half, memory.point.y[1], given[SPEED, lane])
+        if has[ANGLE] != 0:
+            angle = within_stops(own, i, given[ANGLE, lane])
+        point = placed(memory.point, angle, given[SPEED, lane], has[ANGLE] != 0, has[SPEED] != 0, half,
+                       own.sensor.half_slack[i])
+        put_memory(rows[places[k]], Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end,
+                                           memory.tau, memory.tau_end))
+
+
+def within_stops(numbers: Any, i: int, angle: float) -> float:
+    """Return an angle [rad], or the stop where another simulator's has given way, of a lane in a tile of numbers."""
+    stops = stops_at(numbers.stops, i)
+    return min(max(angle, stops.lower), stops.upper)
+
+
+def show_tiles(which: Indices, tile_rows: Any, shaft: Floats) -> None:
+    """Put angles [rad] and speeds [rad/s] of lanes in tiles into the rows of `shaft`."""
+    for k in range(which.size):
+        servo = tile_rows[k // TILE].servo
+        shaft[0, which[k]], shaft[1, which[k]] = servo.q[k % TILE], servo.w[k % TILE]
+
+
+def show_records(which: Indices, rows: Any, shaft: Floats) -> None:
+    """Put angles [rad] and speeds [rad/s] of lanes in records into the rows of `shaft`."""
+    for k in range(which.size):
+        shaft[0, which[k]], shaft[1, which[k]] = rows[k].point.y[0], rows[k].point.y[1]
+
+
+def read_clocks(which: Indices, status: Any, ended: Floats, rows: Any, clock: Floats) -> None:
+    """Put the times of lanes in records into `clock` [s]."""
+    for k in range(which.size):
+        lane = which[k]
+        clock[lane] = time_of(memory_of(rows[k])) if status[lane] == COMPLETED else ended[lane]

@@ -1,0 +1,38 @@
+"""The words of what a program in C hands over at a tick, and of the simulator behind it; each has eight bytes."""
+
+from __future__ import annotations
+
+from servotwin.models.engine import ticks
+
+VERSION = 1
+GIVEN = ("pulse_width", "command_angle", "command_voltage", "external_torque", "set_output_angle", "set_output_speed",
+         "set_load_inertia", "set_bus_voltage")
+"""Addresses of what comes in, in the order of `engine.ticks`."""
+SHOWN = ("output_angle", "output_speed", "load_torque", "armature_current", "bus_voltage", "supply_current")
+"""Addresses of what goes out, those of the shaft first."""
+TICK = ("version", "lanes", "duration", "simulator", *GIVEN, *SHOWN, "status")
+"""Members of `struct servotwin_tick`, in their order."""
+
+STAGES = ("clock", "accept", "change", "refit", "impose", "follow", "advance", "show", "look")
+"""What happens at a tick: programs, each a list of chains of calls."""
+HANDLE = ("lanes", "given", "has", "now", "status", "shaft", "seen", "fresh", "renew", *STAGES)
+"""Words of a simulator: a number, and addresses."""
+
+DONE = ticks.ACCEPTED
+NOTHING_GIVEN, OTHER_VERSION, OTHER_LANES = range(1, 4)
+NOT_RENEWED = 11
+MESSAGES = {
+    DONE: "done",
+    NOTHING_GIVEN: "no struct, or no simulator in it",
+    OTHER_VERSION: "the struct has another version",
+    OTHER_LANES: "the struct has another number of lanes",
+    ticks.BAD_DURATION: f"the duration is not a number of seconds from 0 to {ticks.LONGEST:.0e}",
+    ticks.BAD_NUMBER: "a number is not finite",
+    ticks.BAD_COMMAND: "a command is not possible, or more than one is given",
+    ticks.BAD_ANGLE: "an angle is beyond a stop",
+    ticks.BAD_INERTIA: "an inertia is negative",
+    ticks.BAD_VOLTAGE: "a bus voltage is not positive",
+    ticks.BEYOND_RECORD: "a recorded torque ends before",
+    NOT_RENEWED: "lanes that run in another way now could not be prepared",
+}
+"""What the numbers mean that a tick returns."""

@@ -1,0 +1,144 @@
+"""What a tick is, as programs of compiled calls: on the arrays of a store, set by set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.models.engine.observe import Observed
+from servotwin.simulation import lane_runs
+from servotwin.simulation.compile import Recipe
+from servotwin.simulation.compile.calls import Call, Now, Some, call_of
+from servotwin.simulation.compile.layout import GIVEN, STAGES
+from servotwin.simulation.lane_memory import RECORD
+
+if TYPE_CHECKING:
+    from servotwin.simulation.vector_numbers import LaneNumbers
+    from servotwin.simulation.vector_store import Store
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Programs = dict[str, list[list[Call]]]
+
+TICKS = Recipe("ticks", (
+    *(f"servotwin.models.engine.ticks:{name}" for name in ("accept", "change", "follow")),
+    *(f"servotwin.models.engine.lane_ticks:{name}" for name in (
+        "gather_lost", "put_lost", "gather", "put", "note_failures", "forget_motions", "impose_on_tiles",
+        "impose_on_records", "show_tiles", "show_records", "read_clocks"))))
+_NONE = np.zeros(0)
+
+
+class Room(NamedTuple):
+    """Where the programs of a simulator find what is given, and leave what is seen; arrays of all lanes."""
+
+    given: Array
+    has: Indices
+    wanted: Array
+    clock: Array
+    shaft: Array
+    seen: Array
+
+    @classmethod
+    def of(cls, lanes: int) -> Room:
+        """Return room for so many lanes."""
+        return cls(np.zeros((len(GIVEN), lanes)), np.zeros(len(GIVEN), np.int64), np.zeros(lanes), np.zeros(lanes),
+                   np.zeros((2, lanes)), np.zeros((lanes, len(Observed._fields))))
+
+
+def asked(rows: Mapping[int, Array | None], which: Indices, lanes: int) -> tuple[Indices, Array]:
+    """Return which rows are given of those of `engine.ticks`, and all of them with numbers of some lanes."""
+    has, given = np.zeros(len(GIVEN), np.int64), np.empty((len(GIVEN), lanes))
+    for row, values in rows.items():
+        if values is not None:
+            has[row], given[row, which] = 1, values
+    return has, given
+
+
+def programs_of(numbers: LaneNumbers, store: Store, room: Room, scales: Array, command: Array,
+                torque: Array) -> Programs:
+    """Return the programs of all stages; `scales` are those of `Translator.table`."""
+    columns = store.columns
+    accept = call_of(TICKS, "accept", store.now, room.has, room.given, scales, columns.numbers, room.clock,
+                     numbers.record_ends(), room.wanted, returns=True)
+    every = np.arange(numbers.count)
+    change = call_of(TICKS, "change", room.has, room.given, every, numbers.given, numbers.load_total, numbers.V_oc,
+                     numbers.pulsed, *numbers.imposed, columns.numbers, returns=True)
+    follow = call_of(TICKS, "follow", room.has, room.given, room.wanted, store.base, command, torque, store.total,
+                     columns.pieces, store.now)
+    found: Programs = {stage: [] for stage in STAGES}
+    found |= {"accept": [[accept]], "change": [[change]], "follow": [[follow]]}
+    for some in store.sets:
+        for stage, chain in some.calls(store, room, command).items():
+            found[stage].append(chain)
+    return found
+
+
+def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[str, list[Call]]:
+    """Return what is called for lanes in tiles at each stage; those that are given up go on one by one."""
+    kernels, rows, which = some.recipe, some.rows, some.which
+    places = np.arange(len(which))
+    advance = call_of(kernels, "advance", which, *some.form, 0, len(rows), Now(store.now, 0), command, store.total,
+                      Now(store.now, 1, True), rows, some.plans[0], returns=True)
+    alone = _Alone(len(which))
+    lost = [call_of(TICKS, "gather_lost", which, store.status, store.columns.start, rows, *alone.room, returns=True),
+            *alone.go_on(some.general, store),
+            call_of(TICKS, "put_lost", *alone.some("places", "lanes", "records"), store.numbers.frame_period, rows)]
+    return {
+        "refit": [call_of(kernels, "refit", store.columns, some.form[0], which, places, rows)],
+        "impose": [call_of(TICKS, "impose_on_tiles", room.has, room.given, store.columns.numbers, which, places,
+                           store.work, rows)],
+        "advance": [advance, *lost], "show": [call_of(TICKS, "show_tiles", which, rows, room.shaft)],
+        "look": [call_of(lane_runs.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns, store.inputs[0], which, rows,
+                         room.seen)]}
+
+
+def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dict[str, list[Call]]:
+    """Return what is called for lanes that run one by one at each stage."""
+    rows, which, alone = some.rows, some.which, _Alone(len(some.which))
+    advance = [call_of(TICKS, "gather", which, store.status, store.now, rows, *alone.room, returns=True),
+               *alone.go_on(some.recipe, store), call_of(TICKS, "put", *alone.some("places", "records"), rows)]
+    found = {
+        "refit": [call_of(TICKS, "forget_motions", rows)],
+        "impose": [call_of(TICKS, "impose_on_records", room.has, room.given, store.columns.numbers, which,
+                           np.arange(len(which)), store.work, rows)],
+        "advance": advance, "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
+        "look": [call_of(lane_runs.LOOK_ONE_BY_ONE, "one_by_one", store.columns, *store.inputs, which, rows,
+                         room.seen)]}
+    if store.numbers.torque.count[which].any():
+        found["clock"] = [call_of(TICKS, "read_clocks", which, store.status, store.ended, rows, room.clock)]
+    return found
+
+
+class _Gathered(NamedTuple):
+    """Lanes that have been put together: where they are in their set, who, how far they go, and their memories."""
+
+    number: Indices  # of them
+    places: Indices
+    lanes: Indices
+    durations: Array
+    records: NDArray[Any]
+
+
+class _Alone:
+    """Room for up to so many lanes of a set that go on one by one, and the calls for it."""
+
+    def __init__(self, most: int) -> None:
+        self.room = _Gathered(np.zeros(1, np.int64), np.zeros(most, np.int64), np.zeros(most, np.int64), np.zeros(most),
+                              np.zeros(most, RECORD))
+        self._how, self._at = np.zeros(most, np.int64), np.zeros(most)
+        self._first, self._outputs = np.zeros(most, np.int64), np.zeros((most, 14, 0))
+
+    def some(self, *names: str) -> list[Some]:
+        """Return of the room what is gathered now."""
+        return [Some(getattr(self.room, name), self.room.number) for name in names]
+
+    def go_on(self, recipe: Recipe, store: Store) -> list[Call]:
+        """Return the calls that let the lanes go on and note who has failed."""
+        lanes, durations, records = self.some("lanes", "durations", "records")
+        how, at = Some(self._how, self.room.number), Some(self._at, self.room.number)
+        return [call_of(recipe, "go_on", store.columns, *store.inputs, lanes, durations, _NONE, self._first,
+                        self._outputs, records, how, at),
+                call_of(TICKS, "note_failures", lanes, how, at, records, store.status, store.ended)]
