@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing
 from typing import Any
 
 from servotwin.errors import InputError, ServotwinError
 from servotwin.simulation.many import own_threads, workers_of
 
-_AHEAD = 64  # pieces that wait at an executor whose size is not known
+_MANY = 32  # workers of an executor that does not say
 _TRIES = 4  # of a piece whose worker is lost: more, and it is the piece that ends the worker
 
 
@@ -82,8 +83,9 @@ class Crew:
 
     @property
     def workers(self) -> int:
-        """How many pieces are done at once: what the executor says, else the cores of this process."""
-        return workers_of(self._given)
+        """How many pieces are done at once: as many as there are cores, or what an executor says; else many."""
+        known = self.is_here or isinstance(getattr(self._given, "_max_workers", None), int)
+        return workers_of(self._given) if known else _MANY
 
     def done(self, work: Callable[..., Any], pieces: Iterable[tuple[Any, ...]], *,
              finishing: str = "piece of work") -> Generator[Any]:
@@ -102,12 +104,22 @@ class Crew:
         InputError
             If the executor that was given fails. Errors of the work itself pass through.
         """
-        known = self.is_here or isinstance(getattr(self._given, "_max_workers", None), int)
-        ahead = 2 * self.workers if known else _AHEAD
-        waiting, flying, tries = iter(pieces), deque[tuple[tuple[Any, ...], Any]](), 0
+        try:
+            with closing(self._in_order(work, iter(pieces))) as running:
+                yield from running
+        except ServotwinError:
+            raise
+        except Exception as error:
+            if self.is_here:
+                raise
+            raise InputError("executor", got=f"{type(error).__name__}: {error}",
+                             allowed=f"one that finishes every {finishing}") from None
+
+    def _in_order(self, work: Callable[..., Any], waiting: Iterator[tuple[Any, ...]]) -> Generator[Any]:
+        flying, tries = deque[tuple[tuple[Any, ...], Any]](), 0
         try:
             while True:
-                while len(flying) < ahead and (piece := next(waiting, None)) is not None:
+                while len(flying) < 2 * self.workers and (piece := next(waiting, None)) is not None:
                     flying.append((piece, self._submit(work, piece)))
                 if not flying:
                     return
@@ -123,13 +135,6 @@ class Crew:
                 flying.popleft()
                 tries = 0
                 yield result
-        except ServotwinError:
-            raise
-        except Exception as error:
-            if self.is_here:
-                raise
-            raise InputError("executor", got=f"{type(error).__name__}: {error}",
-                             allowed=f"one that finishes every {finishing}") from None
         finally:
             for _, future in flying:  # only after an error or an interrupt are there any
                 future.cancel()
