@@ -212,6 +212,16 @@ def test_an_interrupt_before_the_first_step_leaves_nothing(fit, tmp_path, monkey
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_accuracy_is_that_of_the_words(fit, folder):
+    found = {words: fit(*QUICK, *words, "--json").data["estimates"]["output_inertia"]["value"]
+             for words in ((), ("--accuracy", "1e-7"), ("--accuracy", "1e-11"))}
+    usual, said, fine = found.values()
+    assert usual == said
+    expected = identify(read_logs(folder), st.load_servo(fit_logs.SERVO), st.BoundedServo, ["output_inertia"], (),
+                        None, starts=1, compare_with=(), accuracy=1e-11)
+    assert fine == expected.estimates["output_inertia"]
+
+
 @pytest.mark.parametrize(("words", "said"), [
     (["--bounds", "output_inertia=3..1"], "LOWEST..HIGHEST"),
     (["--bounds", "output_inertia=1ohm..2ohm"], "one of the units kg m2"),
@@ -227,6 +237,9 @@ def test_an_interrupt_before_the_first_step_leaves_nothing(fit, tmp_path, monkey
     (["--leave-out", "0..9"], "no value outside the windows"),
     (["--level", "2"], "--level: got '2'"),
     (["--loss", "l1"], "loss: got 'l1'"),
+    (["--accuracy", "0"], "accuracy: got 0.0, allowed: a number of radians, from 1e-13 to 0.0001"),
+    (["--accuracy", "nan"], "accuracy: got nan"),
+    (["--accuracy", "1mrad"], "--accuracy"),
     (["--nuisance", "fish"], "nuisance: got 'fish'"),
     (["--sensors", "fish"], "sensors: got 'fish'"),
     (["--format", "xml"], "unknown format of logs 'xml'"),

@@ -137,29 +137,13 @@ def test_truncation(sweep):
     (["--draws", "file"], "file: got 'no rows'"),
     (["--draws", "words.csv"], "draws of motor.torque_constant"),
     (["--draws", "ragged.csv"], "ragged.csv cannot be read (not a table of columns)"),
-    ([*VARY, "--scheduler", "nowhere"], "--scheduler: got 'nowhere (ValueError)'"),
 ])
 def test_bad_input(sweep, tmp_path, words, said):
-    if "--scheduler" in words:
-        pytest.importorskip("distributed")
     (tmp_path / "file").write_text("")
     (tmp_path / "words.csv").write_text("motor.torque_constant\nmuch\n")
     (tmp_path / "ragged.csv").write_text("motor.torque_constant,load.inertia\n1\n")
     assert said in sweep(*STEP, *words).error
     assert not (tmp_path / "study").exists()
-
-
-def test_a_scheduler_that_is_not_there_is_said_within_ten_seconds(sweep):
-    pytest.importorskip("distributed")
-    start = time.monotonic()
-    error = sweep(*STEP, *VARY, "--lanes", "5", "--scheduler", "tcp://127.0.0.1:9").error
-    assert "allowed: the address of a dask scheduler that answers" in error
-    assert time.monotonic() - start < 10.0
-
-
-def test_dask_that_is_not_installed_is_one_line(sweep, monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    assert "pip install 'servotwin[sweep]'" in sweep(*STEP, *VARY, "--scheduler", "tcp://127.0.0.1:9").error
 
 
 @pytest.mark.slow

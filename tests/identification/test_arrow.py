@@ -7,7 +7,16 @@ import pytest
 from scipy.optimize import least_squares
 
 from identification.toy_forecast import Toy
-from servotwin.identification.fitting.arrow import _LEAST_GAIN, Block, Loss, NormalEquations, Prior, Search, block
+from servotwin.identification.fitting.arrow import (
+    _LEAST_GAIN,
+    Block,
+    Loss,
+    NormalEquations,
+    Prior,
+    Search,
+    block,
+    together,
+)
 from servotwin.identification.fitting.point import LogPart, Point
 
 T = np.linspace(0.0, 4.0, 31)
@@ -260,3 +269,16 @@ def test_elimination_is_that_of_the_whole_matrix():
     reduced = NormalEquations(tuple(blocks), g, H).reduced()
     np.testing.assert_allclose(np.linalg.solve(reduced[1], reduced[0]), np.linalg.solve(whole, right)[:2], rtol=1e-8)
     assert isinstance(blocks[0], Block)
+
+
+def test_searches_side_by_side_take_the_steps_that_they_take_alone():
+    functions = decays()
+    starts = [start([0.5, 0.2, 0.0]), start([1.5, -0.4, 0.7]), start([0.1, 0.1, 0.1])]
+    alone = [search(functions).run(one, least_gain=1e-9) for one in starts]
+    s = search(functions)
+    found = together(s.forecast, s.cases, [s.steps(one, least_gain=1e-9) for one in starts])
+    assert [one.steps for one in found] == [one.steps for one in alone]
+    assert len({one.steps for one in found}) > 1  # they do not all end together
+    for one, other in zip(found, alone, strict=True):
+        assert one.cost == other.cost
+        assert (one.point.shared == other.point.shared).all()

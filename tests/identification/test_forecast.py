@@ -8,6 +8,7 @@ import pytest
 import servotwin as st
 from identification.synthetic_logs import PENDULUM, TRUTH, noisy, run
 from servotwin.errors import InputError
+from servotwin.identification.fitting.batches import Running
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.point import DELAY_SCALE, FINE, OFFSET_SCALE, SPEED_SCALE, Point
@@ -31,7 +32,7 @@ def moving(model=st.PulseServo, servo=TRUTH, sensors=("output_angle",), **more):
 
 def forecast(logs, free=FREE, model=st.PulseServo, servo=TRUTH, sensors=("output_angle",), nuisance=(
         "delay", "log_delay", "angle_offset", "initial_state")):
-    return Forecast(logs, model(servo), Space(model(servo), free, load=LOAD), nuisance, sensors)
+    return Forecast(logs, model(servo), Space(model(servo), free, load=LOAD), nuisance, sensors, Running(accuracy=1e-9))
 
 
 def point(f, delay=0.031, offset=0.02, own=(1.3, 0.4, 0.003)):

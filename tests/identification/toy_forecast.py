@@ -42,5 +42,7 @@ class Toy:
             found.append(LogPart(residual, shared, own))
         return found
 
-    def at_all(self, points: Sequence[Point], *, cases: Sequence[int] | None = None, **_: Any) -> list[list[LogPart]]:
-        return [self.at(point, derivatives=False, cases=cases) for point in points]
+    def at_all(self, points: Sequence[Point], *, cases: Sequence[int] | None = None,
+               derivatives: bool | Sequence[bool] = False, **_: Any) -> list[list[LogPart]]:
+        each = [derivatives] * len(points) if isinstance(derivatives, bool) else derivatives
+        return [self.at(point, derivatives=asked, cases=cases) for point, asked in zip(points, each, strict=True)]

@@ -160,6 +160,26 @@ def test_processes(coasting, study):
         np.testing.assert_array_equal(again.table[name], column, err_msg=name)
 
 
+@pytest.mark.slow
+def test_a_killed_process_loses_nothing(coasting, study):
+    import multiprocessing
+    import os
+    import signal
+
+    killed = []
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as executor:
+        def kill(done, total):
+            if not killed:
+                killed.extend(executor._processes)
+                os.kill(killed[0], signal.SIGKILL)
+
+        again = st.sweep(coasting, STEP, duration=1.0, lanes=50, vary=VARY, seed=1, metrics=study.metrics, chunk=2,
+                         executor=executor, progress=kill)
+    assert killed
+    for name, column in study.table.items():
+        np.testing.assert_array_equal(again.table[name], column, err_msg=name)
+
+
 def test_a_lost_executor_is_said_in_one_line(model):
     class Lost(Promise):
         def result(self):

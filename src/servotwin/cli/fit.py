@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import log_reading
+from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, patience, show
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from servotwin.identification import Advice, Fit, Ladder, Log
     from servotwin.models import Model
 
-_LOGS, _SEARCH, _OUTPUT = log_reading.PANEL, "What to search for, and how", "Output"
+_LOGS, _SEARCH = log_reading.PANEL, "What to search for, and how"
 
 
 def fit(
@@ -87,14 +88,18 @@ def fit(
         "--advise", help="Say which experiment to do next; without logs, which one to start with.",
         rich_help_panel=_SEARCH)] = False,
     out: Annotated[Path | None, typer.Option(
-        metavar="FILE.toml", help="Write the fitted servo.", rich_help_panel=_OUTPUT)] = None,
+        metavar="FILE.toml", help="Write the fitted servo.", rich_help_panel=shared.OUTPUT)] = None,
     report: Annotated[Path | None, typer.Option(
-        metavar="FILE.html", help="Write a page with pictures.", rich_help_panel=_OUTPUT)] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace existing files.", rich_help_panel=_OUTPUT)] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, in SI units.", rich_help_panel=_OUTPUT)] = False,
+        metavar="FILE.html", help="Write a page with pictures.", rich_help_panel=shared.OUTPUT)] = None,
+    accuracy: shared.AccuracyOption = 1e-7,
+    scheduler: shared.SchedulerOption = None,
+    force: Annotated[bool, typer.Option(
+        "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)] = False,
+    as_json: Annotated[bool, typer.Option(
+        "--json", help="Print JSON, in SI units.", rich_help_panel=shared.OUTPUT)] = False,
 ) -> None:
     """Find the parameters of a servo, with intervals."""
-    _check_words(logs, servo, table, report, advise=advise)
+    _check_words(logs, servo, table, report, scheduler, advise=advise)
     if table is not None:
         from servotwin.cli.fit_table import show_table_calibration
 
@@ -108,10 +113,10 @@ def fit(
     _check_ladder(search.model, ladder=ladder)
     options = {"holdout": holdout, "mend": mend, "nuisance": nuisance, "sensors": sensors, "starts": starts,
                "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
-               "diagnose": diagnose}
+               "diagnose": diagnose, "accuracy": accuracy}
     chosen = _options(options)
     given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json)
-    found = _run(search, given, chosen, ladder=ladder)
+    found = _run(search, given, chosen, scheduler, ladder=ladder)
     files = _write(found.fit, targets, force=force)
     if advise and not found.fit.interrupted and found.fit.doubt is not None:
         found = _Found(found.fit, found.ladder, _advice(found.fit))
@@ -139,12 +144,13 @@ class _Found:
     advice: Advice | None = None
 
 
-def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None, report: Path | None, *,
-                 advise: bool) -> None:
+def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None, report: Path | None,
+                 scheduler: str | None, *, advise: bool) -> None:
     from servotwin.errors import InputError
 
     if table is not None:
-        for given, what in ((bool(logs), "logs"), (report is not None, "--report"), (advise, "--advise")):
+        for given, what in ((bool(logs), "logs"), (report is not None, "--report"), (advise, "--advise"),
+                            (scheduler is not None, "--scheduler")):
             if given:
                 raise InputError("--table", got=f"also {what}", allowed="a table alone; it is calibrated, not fitted")
         return
@@ -199,22 +205,23 @@ def _options(given: dict[str, Any]) -> dict[str, Any]:
         "sensors": fit_words.names(given["sensors"]),
         "nuisance": fit_words.some_or_none("--nuisance", given["nuisance"], NUISANCE),
         "level": fit_words.share("--level", given["level"]), "starts": given["starts"], "loss": given["loss"],
-        "intervals": given["intervals"], "seed": given["seed"],
+        "intervals": given["intervals"], "seed": given["seed"], "accuracy": given["accuracy"],
         "diagnose": given["diagnose"], "compare_with": ("slew", "M1") if given["compare"] else ()}
 
 
-def _run(search: _Search, logs: list[Log], options: dict[str, Any], *, ladder: bool) -> _Found:
+def _run(search: _Search, logs: list[Log], options: dict[str, Any], scheduler: str | None, *, ladder: bool) -> _Found:
+    from servotwin.cli.scheduler import executor_at
     from servotwin.identification import friction_ladder, identify
 
     servo, kind = search.model.servo, type(search.model)
-    with _progress() as progress:
+    with executor_at(scheduler) as executor, _progress() as progress:
+        options = {**options, "bounds": search.bounds, "priors": search.priors, "executor": executor,
+                   "progress": progress}
         if ladder:
-            climbed = friction_ladder(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
-                                      progress=progress, **options)
+            climbed = friction_ladder(logs, servo, kind, search.free, **options)
             found = _Found(climbed.fit, climbed)
         else:
-            found = _Found(identify(logs, servo, kind, search.free, bounds=search.bounds, priors=search.priors,
-                                    progress=progress, **options))
+            found = _Found(identify(logs, servo, kind, search.free, **options))
     if found.fit.interrupted and found.fit.cost == float("inf"):
         raise KeyboardInterrupt  # before the first step: there is nothing to keep
     return found

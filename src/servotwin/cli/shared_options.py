@@ -43,5 +43,10 @@ ColumnOption = Annotated[str | None, typer.Option(
     rich_help_panel=COMMAND)]
 DurationOption = Annotated[float, typer.Option(
     metavar="SECONDS", help="Time to simulate.", rich_help_panel=OUTPUT)]
+SchedulerOption = Annotated[str | None, typer.Option(
+    metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.", rich_help_panel=OUTPUT)]
+AccuracyOption = Annotated[float, typer.Option(
+    metavar="RADIANS", help="Error that an angle may have where a motion is integrated, from 1e-13 to 1e-4 rad.",
+    rich_help_panel=OUTPUT)]
 JsonOption = Annotated[bool, typer.Option(
     "--json", help="Print the summary as JSON, in SI units.", rich_help_panel=OUTPUT)]

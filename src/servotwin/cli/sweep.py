@@ -81,9 +81,7 @@ def sweep(
         "--resume", help="Continue the unfinished study in --out.", rich_help_panel=shared.OUTPUT)] = False,
     plot: Annotated[bool, typer.Option(
         "--plot", help="Draw tornado.png in --out.", rich_help_panel=shared.OUTPUT)] = False,
-    scheduler: Annotated[str | None, typer.Option(
-        metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.",
-        rich_help_panel=shared.OUTPUT)] = None,
+    scheduler: shared.SchedulerOption = None,
     as_json: shared.JsonOption = False,
 ) -> None:
     """Draw the parameters of a servo, simulate all, and say what that does to a few metrics."""

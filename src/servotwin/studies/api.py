@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin.errors import InputError
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.progress import Progress, shown
+from servotwin.simulation.workers import Crew
 from servotwin.studies.folder import Folder
 from servotwin.studies.jobs import run_chunk
 from servotwin.studies.kinds import Distribution
@@ -97,8 +98,7 @@ def sweep(
     >>> study.tornado("rise_time").bars[0].name
     'motor.torque_constant'
     """
-    if executor is not None and (isinstance(executor, type) or not callable(getattr(executor, "submit", None))):
-        raise InputError("executor", got=executor, allowed="one with a submit method, as in concurrent.futures")
+    Crew(executor)  # raises what is wrong with it before anything runs
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     plan = planned(model, command, duration=duration, vary=vary, draws=draws, lanes=lanes, load=load, seed=seed,

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import os
-from collections import deque
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError, ServotwinError
-from servotwin.simulation.many import own_threads, workers_of
 from servotwin.simulation.remarks import COLUMNS
 from servotwin.simulation.status import Status
+from servotwin.simulation.workers import Crew
 from servotwin.studies.jobs import run_chunk
 
 if TYPE_CHECKING:
@@ -23,7 +20,7 @@ if TYPE_CHECKING:
 
 Columns = dict[str, NDArray[Any]]
 
-_AHEAD = 64  # chunks that wait at an executor whose size is not known
+_FINISHING = "chunk; those that it has finished are kept"
 _NAMES = np.array([status.name for status in Status])
 
 
@@ -58,8 +55,9 @@ def run_plan(plan: Plan, folder: Folder | None, executor: Any, show: Callable[[i
             table[name][part] = column
         done += part.stop - part.start
         show(done)
-    with closing(_finished(plan, missing, executor)) as running:
-        for k, found in running:
+    with Crew(executor) as crew, closing(crew.done(
+            run_chunk, ((plan.job, *plan.part(k)) for k in missing), finishing=_FINISHING)) as running:
+        for k, found in zip(missing, running, strict=True):
             part = _slice(plan, k)
             for name, column in found.items():
                 table[name][part] = column
@@ -78,28 +76,3 @@ def _place_of(codes: NDArray[np.int8]) -> NDArray[np.int64]:
 
 def _slice(plan: Plan, k: int) -> slice:
     return slice(k * plan.chunk, min((k + 1) * plan.chunk, plan.lanes))
-
-
-def _finished(plan: Plan, missing: list[int], given: Any) -> Generator[tuple[int, Mapping[str, Any]]]:
-    """Run chunks, some ahead; return number and columns of each, in order."""
-    executor = own_threads(os.getpid()) if given is None else given
-    known = isinstance(getattr(executor, "_max_workers", None), int)
-    ahead = 2 * workers_of(executor) if known else _AHEAD
-    waiting, flying = deque(missing), deque[tuple[int, Any]]()
-    try:
-        while waiting or flying:
-            while waiting and len(flying) < ahead:
-                k = waiting.popleft()
-                flying.append((k, executor.submit(run_chunk, plan.job, *plan.part(k))))
-            k, future = flying.popleft()
-            yield k, future.result()
-    except ServotwinError:
-        raise
-    except Exception as error:
-        if given is None:
-            raise
-        raise InputError("executor", got=f"{type(error).__name__}: {error}",
-                         allowed="one that finishes every chunk; those that it has finished are kept") from None
-    finally:
-        for _, future in flying:  # only after an error or an interrupt are there any
-            future.cancel()

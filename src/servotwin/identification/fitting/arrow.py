@@ -7,9 +7,9 @@ complement), so that memory and time grow with the number of logs and not with i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,6 +123,54 @@ class Outcome:
 Tell = Callable[[int, Outcome], None]
 
 
+class Ask(NamedTuple):
+    """What a search has to know next: what the logs say at a point, perhaps with derivatives."""
+
+    point: Point
+    derivatives: bool
+
+
+Steps = Generator[Ask, list[LogPart], Outcome]
+Found = TypeVar("Found")
+
+
+def together(forecast: Forecast, cases: Sequence[int], searches: Sequence[Generator[Ask, list[LogPart], Found]],
+             noises: Sequence[Mapping[str, float]] | None = None) -> list[Found]:
+    """Run searches side by side, and return their ends: what all have to know next is simulated in one batch.
+
+    Each takes the steps that it would take alone, to the last bit.
+
+    Parameters
+    ----------
+    forecast : Forecast
+    cases : sequence of int
+        The logs that count for all of them.
+    searches : sequence of generator
+        As of `Search.steps`, or longer ways of such steps.
+    noises : sequence of mapping, optional
+        The noise of each search; that of the forecast unless given.
+    """
+    asks: dict[int, Ask] = {}
+    ended: dict[int, Found] = {}
+
+    def go_on(k: int, parts: list[LogPart] | None) -> None:
+        try:
+            asks[k] = next(searches[k]) if parts is None else searches[k].send(parts)
+        except StopIteration as end:
+            asks.pop(k, None)
+            ended[k] = end.value
+
+    for k in range(len(searches)):
+        go_on(k, None)
+    while asks:
+        now = list(asks)
+        found = forecast.at_all([asks[k].point for k in now], derivatives=[asks[k].derivatives for k in now],
+                                cases=cases, noises=None if noises is None else [noises[k] for k in now])
+        for k, parts in zip(now, found, strict=True):
+            go_on(k, parts)
+    return [ended[k] for k in range(len(searches))]
+
+
 class Search:
     """A least-squares problem over a forecast.
 
@@ -171,11 +219,17 @@ class Search:
     def run(self, start: Point, *, most: int = 60, tell: Tell | None = None,
             least_gain: float = _LEAST_GAIN) -> Outcome:
         """Search from a point; the best so far is told after each step."""
+        return together(self.forecast, self.cases, [self.steps(start, most=most, tell=tell, least_gain=least_gain)])[0]
+
+    def steps(self, start: Point, *, most: int = 60, tell: Tell | None = None, least_gain: float = _LEAST_GAIN,
+              least_share: float = 0.0) -> Steps:
+        """Search from a point step by step, asking for what the logs say; `least_share` is that of the first cost."""
         point = start._replace(shared=np.clip(start.shared, self.lower, self.upper))
-        parts = self.forecast.at(point, cases=self.cases)
+        parts = yield Ask(point, True)
         best = Outcome(point, self.cost_of(point, parts), False, 0)
         if not math.isfinite(best.cost):
             return best
+        least_gain = max(least_gain, least_share * best.cost)
         damping, small = 1e-3, 0
         scale = np.zeros(self.forecast.size)
         for k in range(1, most + 1):
@@ -190,7 +244,7 @@ class Search:
                 trial, step = self._step(best.point, normal, damping, scale)
                 if step < _LEAST_STEP:
                     return Outcome(best.point, best.cost, True, k)
-                parts_there = self.forecast.at(trial, cases=self.cases, derivatives=False)
+                parts_there = yield Ask(trial, False)
                 cost = self.cost_of(trial, parts_there)
                 if cost <= best.cost:
                     break
@@ -204,7 +258,7 @@ class Search:
                 tell(k, best)
             if small > _PATIENCE:
                 return best
-            parts = self.forecast.at(trial, cases=self.cases)
+            parts = yield Ask(trial, True)
         return best
 
     def _stays(self, x: Array, g: Array) -> NDArray[np.bool_]:

@@ -47,7 +47,7 @@ class Case:
     moving : bool
         Whether the start speed differs from 0 visibly.
     key : tuple
-        Cases of one key run in one batch.
+        Cases of one key may be simulated together.
     period : float
         T_f that log or servo say [s]; 0 of a model without pulses.
     """
@@ -97,8 +97,7 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     values = {name: log.measured[name][mask] for name, mask in used.items()}
     times = time[any_used]
     overridden = tuple(sorted(name for name in log.parameters))
-    key = (times.tobytes(), log.duration, log.command_kind, overridden, tuple(sorted(places)),
-           log.torque_on is None or bool(log.torque_on.all()))
+    key = (log.command_kind, overridden, tuple(sorted(places)), log.torque_on is None or bool(log.torque_on.all()))
     return Case(log=log, signal=_signal(log, model), times=times, places=places, values=values, start=(angle, speed),
                 scatter=scatter, moving=moving, key=key, period=_period(log, model))
 

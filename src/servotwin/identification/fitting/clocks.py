@@ -150,7 +150,7 @@ def _at_likely_period(task: Task, wider: Task, point: Point, tell: Told, began: 
     scan = near.scan(here.point)
     likely = likely_periods(scan, few)
     near, free = wider.like(wider.forecast, wider.near_start(), few), wider.like(wider.forecast, wider.prior, few)
-    tried = [near.ran(_moved(scan, few, period, asked=asked), tell, began) for period in likely]
+    tried = near.ran_all([_moved(scan, few, period, asked=asked) for period in likely], tell, began)
     best = min(tried, key=lambda outcome: outcome.cost)
     if not asked and best.cost > _EXPLAINS * here.cost:
         return _with_its_period(point, task.period)

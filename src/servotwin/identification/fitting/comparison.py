@@ -112,7 +112,8 @@ def _of_m1(whole: Task, held_out: Sequence[int], traces: Sequence[Trace], model:
                if p.prior is not None and p.name in free and whole.prior.weight[k] > 0.0}  # those that did not yield
     load = {p.name: p.start for p in space.parameters if p.name.startswith("load.")}
     simple = Space(plain, [*free, *more], bounds=own_bounds, priors=beliefs or None, load=load)
-    forecast = Forecast(logs, plain, simple, whole.forecast.nuisance, whole.forecast.sensors)
+    forecast = Forecast(logs, plain, simple, whole.forecast.nuisance, whole.forecast.sensors,
+                        whole.forecast.running)
     task = Task(forecast, whole.loss, whole.fitted, whole.seed, 1, whole.noise)
     found, _ = task.search(lambda share, text: (tell(), None)[1])
     errors = {}

@@ -7,22 +7,21 @@ little more than a simulation, and it is that of the same exact solution.
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Sequence
-from time import perf_counter
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.batches import Batch, Done, Running, batches, simulated
 from servotwin.identification.fitting.case import Case, make_case
 from servotwin.identification.fitting.frames import gaps, signal, widest
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.lanes import LogLanes
 from servotwin.identification.fitting.point import (
     DELAY_SCALE,
-    LATER,
     NUISANCES,
     OFFSET_SCALE,
     SHARED,
@@ -36,20 +35,16 @@ from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters.output_side import output_value
 from servotwin.signals import Signal
-from servotwin.simulation.lane_inputs import lanes_of
-from servotwin.simulation.lane_loads import LOAD_NAMES
-from servotwin.simulation.many import own_threads, simulate_lanes, workers_of
-from servotwin.simulation.workers import HERE
 
 Array = NDArray[np.float64]
 
-_VOLTAGE = "supply.open_circuit_voltage"
 _PERIOD = "electronics.frame_period"
 _BEFORE = 5  # pulses: by then a servo hunts as it will
 _HOLDS = 0.5  # of the friction that a servo file says: what it surely holds without drives
 _HELD = 1e-6  # of its scale: how far a number moves that stays
 _KEPT = 500  # commands
-_WORTH = 4e-3  # s of simulation: three times what a call costs besides
+_PACE = 2e-5  # s that a second of one lane takes, until it is known
+_FINEST = 1e-11  # rad, unless a finer accuracy is asked for
 _POTENTIOMETER = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")
 
 
@@ -67,6 +62,8 @@ class Forecast:
         angle moves with the bus voltage) and "initial_state" (of each log).
     sensors : sequence of str
         Names of measured signals that are compared.
+    running : Running, optional
+        Who simulates, and how closely; threads of this process unless given.
 
     Raises
     ------
@@ -75,12 +72,12 @@ class Forecast:
     """
 
     def __init__(self, logs: Sequence[Log], model: Model, space: Space, nuisance: Sequence[str],
-                 sensors: Sequence[str]) -> None:
+                 sensors: Sequence[str], running: Running | None = None) -> None:
         for name in nuisance:
             if name not in NUISANCES:
                 raise InputError("nuisance", got=name, allowed=", ".join(NUISANCES))
         self.model, self.space, self.nuisance = model, space, tuple(nuisance)
-        self.sensors = tuple(sensors)
+        self.sensors, self.running = tuple(sensors), running or Running()
         if "angle_sag" in nuisance and ("bus_voltage" not in model.available
                                         or not model.value_or("supply.internal_resistance", 0.0) > 0.0):
             raise InputError("nuisance: angle_sag", got=f"{model!r} whose bus voltage stays",
@@ -90,7 +87,7 @@ class Forecast:
         self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
         self.strict = True
         self._commands: dict[tuple[Any, ...], Signal] = {}  # points of a search often differ in other numbers only
-        self._pace = 0.0  # seconds that a second of one lane takes, as far as is known
+        self._pace = math.inf  # seconds that a second of one lane takes, as far as is known
         self.work = 0.0  # seconds of one lane that were simulated
         self.phased = "frame_phase" in nuisance and _PERIOD not in space.names and all(c.period for c in self.cases)
         self.extra = tuple(name for name in SHARED if name in nuisance and (name != "frame_period" or self.phased))
@@ -106,8 +103,9 @@ class Forecast:
         return len(self.space) + len(self.extra)
 
     def goes_on_from(self, other: Forecast) -> None:
-        """Take over where the search of another forecast stands: its noise, and what it found out of clocks."""
+        """Take over where the search of another forecast stands: noise, what it found out of clocks, who simulates."""
         self.noise, self.strict, self.held = dict(other.noise), other.strict, other.held
+        self.running = other.running
         if self.phased and other.phased:
             self.own_phases = other.own_phases
 
@@ -197,92 +195,49 @@ class Forecast:
         """
         return self.at_all([point], derivatives=derivatives, central=central, step=step, cases=cases)[0]
 
-    def at_all(self, points: Sequence[Point], *, derivatives: bool = False, central: bool = False,
-               step: float = STEP, cases: Sequence[int] | None = None, rates: bool = False) -> list[list[LogPart]]:
+    def at_all(self, points: Sequence[Point], *, derivatives: bool | Sequence[bool] = False, central: bool = False,
+               step: float = STEP, cases: Sequence[int] | None = None, rates: bool = False,
+               noises: Sequence[Mapping[str, float]] | None = None) -> list[list[LogPart]]:
         """Return what the logs say at several points, in one batch; for each point, log by log.
 
-        `rates` gives what a delay changes without derivatives, for all signals.
+        `derivatives` may differ from point to point, and so may the noise; `rates` gives what a delay changes without
+        derivatives, for all signals.
         """
         which = range(len(self.cases)) if cases is None else cases
-        sides = (1 + central) * derivatives
-        lanes = [LogLanes(self, k, at, point, sides=sides, step=step, rates=rates)
+        sloped = [derivatives] * len(points) if isinstance(derivatives, bool) else derivatives
+        lanes = [LogLanes(self, k, at, point, sides=(1 + central) * sloped[at], step=step, rates=rates,
+                          noise=self.noise if noises is None else noises[at])
                  for k in which for at, point in enumerate(points)]
         self.work += sum(lane.cost for lane in lanes)
-        groups: dict[tuple[Any, ...], list[LogLanes]] = {}
-        for lane in lanes:
-            groups.setdefault((lane.case.key, lane.delay), []).append(lane)
-        jobs = [job for group in groups.values() for job in _split(group, self._pace)]
-        jobs.sort(key=lambda job: -sum(lane.cost for lane in job))
-        if len(jobs) == 1 or workers_of(None) == 1:
-            for job in jobs:
-                self._try(job)
-        else:
-            list(own_threads(os.getpid()).map(self._try, jobs))
+        self._simulate(lanes, step if any(sloped) else STEP)
         found: list[list[LogPart]] = [[] for _ in points]
         for lane in lanes:
             found[lane.at].append(lane.part)
         return found
 
-    def _try(self, job: list[LogLanes]) -> None:
-        """Run some lanes; where a search went to what no servo is, they count as failed."""
-        try:
-            self._run(job)
-        except InputError:
-            if self.strict:
-                raise
-            if len(job) == 1:
-                job[0].fail()
-                return
-            for lane in job:
-                self._try([lane])
+    def _simulate(self, lanes: Sequence[LogLanes], step: float) -> None:
+        """Simulate lanes, in as few calls as pay, and make the part of each log at each point."""
+        # Noise of a simulation counts over the step of a difference: of finer ones it has to be as much smaller
+        accuracy = min(self.running.accuracy, max(self.running.accuracy * step / STEP, _FINEST))
+        kinds: dict[tuple[Any, ...], list[int]] = {}
+        for k, lane in enumerate(lanes):
+            kinds.setdefault(lane.case.key, []).append(k)
+        bundles, pace = [lane.bundle() for lane in lanes], self._pace if math.isfinite(self._pace) else _PACE
+        calls = [[some[i] for i in call] for some in kinds.values()
+                 for call in batches([bundles[k] for k in some], pace, self.running.crew)]
+        work = [Batch(self.model, lanes[call[0]].outputs, accuracy, self.strict, tuple(bundles[k] for k in call))
+                for call in calls]
+        with closing(self._done(work)) as running:
+            for call, batch, done in zip(calls, work, running, strict=True):
+                self._pace = min(self._pace, done.seconds / batch.cost)
+                for k, signals in zip(call, done.signals, strict=True):
+                    lanes[k].take(signals)
 
-    def _run(self, job: list[LogLanes]) -> None:
-        case, delay = job[0].case, job[0].delay
-        x = np.concatenate([lane.x for lane in job])
-        columns: dict[str, Any] = dict(self.space.columns(x))
-        for name in case.log.parameters:
-            if name not in LOAD_NAMES and name not in (*self.model.requires, *self.model.optional):
-                continue
-            columns[name] = np.concatenate([np.full(lane.count, lane.case.log.parameters[name]) for lane in job])
-        if "potentiometer.noise" in self.model.optional and self.model.servo.get("potentiometer.noise"):
-            columns["potentiometer.noise"] = 0.0
-        initial = {}
-        if "initial_state" in self.nuisance:
-            initial = {"output_angle": np.concatenate([lane.angle for lane in job]),
-                       "output_speed": np.concatenate([lane.speed for lane in job])}
-        later = LATER if job[0].needs_rate else 0.0
-        times = case.times - delay
-        asked = np.maximum(times if not later else np.concatenate([times, times + later]), 0.0)
-        order = np.argsort(asked, kind="stable") if later else np.arange(len(asked))
-        sags = "angle_sag" in self.extra
-        names = dict.fromkeys((*(name for name in self.sensors if name in case.places), "output_speed",
-                               *(["bus_voltage"] if sags else [])))
-        lanes = sum(lane.count for lane in job)
-        began = perf_counter()
-        batch = simulate_lanes(
-            lanes_of(self.model, [signal for lane in job for signal in lane.signals],
-                     [load for lane in job for load in [lane.case.log.load] * lane.count], columns, initial or None,
-                     np.zeros(lanes, np.int64)),
-            duration=max(float(asked.max()), case.log.duration), output_times=asked[order], outputs=tuple(names),
-            executor=HERE)
-        pace = (perf_counter() - began) / sum(lane.cost for lane in job)
-        self._pace = min(pace, self._pace or pace)
-        back = np.empty_like(order)
-        back[order] = np.arange(len(order))
-        signals = {name: np.asarray(batch[name][:, back] if later else batch[name], np.float64) for name in names}
-        if sags:
-            open_circuit = np.asarray(columns.get(_VOLTAGE, self.model.value(_VOLTAGE)))
-            signals["sag"] = signals.pop("bus_voltage") - open_circuit.reshape(-1, 1)
-        early = np.minimum(times, 0.0)
-        first = 0
-        for lane in job:
-            rows = slice(first, first + lane.count)
-            lane.take({name: values[rows] for name, values in signals.items()}, early, later)
-            first += lane.count
-
-
-def _split(group: list[LogLanes], pace: float) -> list[list[LogLanes]]:
-    """Return the lanes of a group as jobs, at most two a core, and only as many as are worth the call of each."""
-    worth = sum(lane.cost for lane in group) * pace / _WORTH
-    parts = max(1, min(len(group), 2 * workers_of(None), round(worth)))
-    return [group[len(group) * k // parts:len(group) * (k + 1) // parts] for k in range(parts)]
+    def _done(self, work: Sequence[Batch]) -> Generator[Done]:
+        """Return what comes of each batch; a single one is simulated here and now, unless others are to do it."""
+        crew = self.running.crew
+        if crew.is_here and (len(work) == 1 or crew.workers == 1):
+            yield from map(simulated, work)
+            return
+        with closing(crew.done(simulated, ((batch,) for batch in work))) as running:
+            yield from running

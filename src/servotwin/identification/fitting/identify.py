@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
+from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
 from servotwin.identification.fitting.common_cause import common_cause
 from servotwin.identification.fitting.comparison import BESIDE, compare
 from servotwin.identification.fitting.counts import counts_of
@@ -38,6 +39,8 @@ from servotwin.identification.fitting.yielding import Dropped, Yielded, settle, 
 from servotwin.logs.log import Log
 from servotwin.models import Model
 from servotwin.parameters import Servo
+from servotwin.simulation.start import accuracy_of
+from servotwin.simulation.workers import Crew
 
 Array = NDArray[np.float64]
 _VOLTAGE = "supply.open_circuit_voltage"
@@ -53,7 +56,7 @@ def identify(
     sensors: Sequence[str] | None = None,
     starts: int = 3, loss: str = "huber", noise: Mapping[str, float] | None = None, level: float = 0.95,
     intervals: bool = True, compare_with: Sequence[str] = ("slew", "M1"), seed: int = 0, progress: Progress = False,
-    diagnose: bool = True,
+    diagnose: bool = True, executor: Any = None, accuracy: float = FIT_ACCURACY,
 ) -> Fit:
     """Fit parameters of a servo to logs.
 
@@ -109,6 +112,12 @@ def identify(
     diagnose : bool
         Where what is left is no noise, causes are tried: at most four times what the fit itself took. False leaves
         that out; the verdict stays.
+    executor : optional
+        Anything with the `submit` of `concurrent.futures`, such as a client of dask; threads on all cores unless
+        given. It is not shut down. The fit does not depend on it, to the last bit.
+    accuracy : float
+        What angles of simulations may be off by where motions are integrated, not solved in closed form [rad], from
+        1e-13 to 1e-4.
 
     Returns
     -------
@@ -143,12 +152,13 @@ def identify(
     seen = checks.checked_sensors(given, sensors, plain)
     space = Space(plain, names, bounds=bounds, priors=priors, load=checks.shared_load(given, names))
     fitted, held_out = split(given, holdout, seed)
-    forecast = Forecast(given, plain, space, checks.checked_words("nuisance", nuisance, NUISANCES), seen)
+    running = Running(Crew(executor), accuracy_of(accuracy))
+    forecast = Forecast(given, plain, space, checks.checked_words("nuisance", nuisance, NUISANCES), seen, running)
     checks.check_fitted(given, fitted, seen, len(names) + len(nuisance))
     trials = checks.checked_flag("diagnose", diagnose)
     task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed,
                 checks.checked_count("starts", starts, least=1), checks.checked_noise(noise, seen))
-    with checks.shown(progress) as show, explained(noticed):
+    with running.crew, checks.shown(progress) as show, explained(noticed):
         fit = _run(task, held_out, beside, level, show, intervals=intervals, trials=trials)
     fit = replace(fit, warnings=(*noticed, *fit.warnings), seconds=clock.monotonic() - began)
     return with_record(fit, read, fitted, mend)

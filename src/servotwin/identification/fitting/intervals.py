@@ -7,14 +7,14 @@ Moolgavkar 1988). Whether it is needed is seen from the cost at the two ends of 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.arrow import Outcome, Search
-from servotwin.identification.fitting.point import Point
+from servotwin.identification.fitting.arrow import Ask, Outcome, Search, together
+from servotwin.identification.fitting.point import LogPart, Point
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
     rows : sequence of Rows
         Of the fitted logs: how their own numbers follow.
     tell : callable, optional
-        Is told how many are done.
+        Is told how many are done, after each step.
     """
     reaches = {k: doubt.quantile(level, k) for k in which}
     both = [(k, side) for k in which for side in (-1.0, 1.0)]
@@ -71,8 +71,9 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
     beyond = [begins(search, best, doubt, k, far * side * reaches[k], rows)[1] for far in _FAR for k, side in both]
     costs = iter(search.costs([*points, *beyond]) if both else [])
     rises, near, far = ({one: next(costs) - best.cost for one in both} for _ in range(3))
-    found = {}
-    for done, k in enumerate(which, start=1):
+    found: dict[int, Ends] = {}
+    bent: list[int] = []
+    for k in which:
         reach = reaches[k]
         expected = {side: _expected(doubt, k, reach) for side in (-1.0, 1.0)}
         inside = all(search.lower[k] <= best.point.shared[k] + side * reach * doubt.std[k] <= search.upper[k]
@@ -81,12 +82,17 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
         flat = any(far[k, side] < _RISES * near[k, side] < _HIGH * expected[side] for side in (-1.0, 1.0))
         if inside and faithful and not flat:
             found[k] = Ends(-reach, reach, "normal")
+            tell(len(found))
         else:
-            (low, of_low), (high, of_high) = (_end(search, best, doubt, k, side, reach, rows) for side in (-1.0, 1.0))
-            share = (low * of_low + high * of_high) / max(low + high, 1e-300)
-            found[k] = Ends(-low, high, "profile", min(max(share, 0.0), 1.0))
-        tell(done)
-    return found
+            bent.append(k)
+    profiles = [_end(search, best, doubt, k, side, reaches[k], rows, tell=lambda: tell(len(found)))
+                for k in bent for side in (-1.0, 1.0)]
+    reached = together(search.forecast, search.cases, profiles)
+    for k, (low, of_low), (high, of_high) in zip(bent, reached[::2], reached[1::2], strict=True):
+        share = (low * of_low + high * of_high) / max(low + high, 1e-300)
+        found[k] = Ends(-low, high, "profile", min(max(share, 0.0), 1.0))
+        tell(len(found))
+    return {k: found[k] for k in which}
 
 
 def moved(search: Search, best: Outcome, doubt: Uncertainty, k: int, steps: float, rows: Sequence[Rows]) -> Point:
@@ -120,7 +126,7 @@ def _expected(doubt: Uncertainty, k: int, reach: float) -> float:
 
 
 def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float, reach: float,
-         rows: Sequence[Rows]) -> tuple[float, float]:
+         rows: Sequence[Rows], tell: Callable[[], None]) -> Generator[Ask, list[LogPart], tuple[float, float]]:
     """Return how far a profile of the cost reaches on one side [standard errors], and the share of the priors in that.
 
     A bound ends it.
@@ -134,9 +140,12 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
     low, of_low, high, of_high = 0.0, 0.0, math.inf, math.inf
     at, share = float(min(reach, farthest)), 0.0
     for _ in range(_ROUNDS):
-        starts = begins(search, best, doubt, k, side * at, rows)
-        costs = inner.costs(starts) if at > reach else [0.0]
-        there = inner.run(starts[int(np.argmin(costs))], most=3)
+        starts, costs = begins(search, best, doubt, k, side * at, rows), [0.0]
+        if at > reach:
+            costs = []
+            for start in starts:
+                costs.append(inner.cost_of(start, (yield Ask(start, False))))
+        there = yield from inner.steps(starts[int(np.argmin(costs))], most=3, tell=lambda *_: tell())
         rise = there.cost - best.cost
         of_priors = search.prior.cost(there.point.shared) - search.prior.cost(best.point.shared)
         share = of_priors / max(rise, wanted)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.identification.fitting.batches import Bundle
 from servotwin.identification.fitting.frames import signal
 from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.point import (
     DELAY_SCALE,
+    LATER,
     OFFSET_SCALE,
     PERIOD_SCALE,
     SAG_SCALE,
@@ -18,12 +21,15 @@ from servotwin.identification.fitting.point import (
     LogPart,
     Point,
 )
+from servotwin.simulation.lane_loads import LOAD_NAMES
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.forecast import Forecast
 
 Array = NDArray[np.float64]
 
+_VOLTAGE = "supply.open_circuit_voltage"
+_NOISE = "potentiometer.noise"
 _DELAYS = ("log_delay", "frame_phase")  # a log's own: what they change follows from the speed, without a lane
 
 
@@ -31,8 +37,8 @@ class LogLanes:
     """The lanes of one log at one point: the nominal one, and one for each number that is varied."""
 
     def __init__(self, forecast: Forecast, k: int, at: int, point: Point, *, sides: int, step: float,
-                 rates: bool = False) -> None:
-        self.forecast, self.case, self.at, self.sides = forecast, forecast.cases[k], at, sides
+                 rates: bool, noise: Mapping[str, float]) -> None:
+        self.forecast, self.case, self.at, self.sides, self.noise = forecast, forecast.cases[k], at, sides, noise
         p, names = len(forecast.space), forecast.names_of_own(self.case)
         self.names, own = names, dict(zip(names, point.own[k], strict=True))
         self.delay = forecast.nuisance_of(point.shared, "delay") + own.get("log_delay", 0.0) * DELAY_SCALE
@@ -58,7 +64,9 @@ class LogLanes:
         if forecast.phased:
             self._send_pulses(k, point, own["frame_phase"] * DELAY_SCALE, numbers)
         delayed = sides > 0 and ("delay" in forecast.extra or any(name in names for name in _DELAYS))
-        self.needs_rate = (delayed or rates) and any(name != "output_angle" for name in self.case.places)
+        needs_rate = (delayed or rates) and any(name != "output_angle" for name in self.case.places)
+        self.later = LATER if needs_rate else 0.0
+        self.times = self.case.times - self.delay
         self.part: LogPart
 
     def _send_pulses(self, k: int, point: Point, first: float, numbers: int) -> None:
@@ -72,15 +80,51 @@ class LogLanes:
             longer = period + self.steps[side, numbers - 1] * PERIOD_SCALE
             self.signals[(1 + side) * numbers] = signal(log, frames, first, longer, lead)
 
-    def fail(self) -> None:
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the signals that are asked for."""
+        measured = [name for name in self.forecast.sensors if name in self.case.places]
+        bus = ["bus_voltage"] if "angle_sag" in self.forecast.extra else []
+        return tuple(dict.fromkeys([*measured, "output_speed", *bus]))
+
+    def bundle(self) -> Bundle:
+        """Return what is simulated."""
+        forecast, log = self.forecast, self.case.log
+        read = (*forecast.model.requires, *forecast.model.optional)
+        own = {name: np.full(self.count, value) for name, value in log.parameters.items()
+               if name in LOAD_NAMES or name in read}
+        if _NOISE in forecast.model.optional and forecast.model.servo.get(_NOISE):
+            own[_NOISE] = np.zeros(self.count)
+        asked = np.maximum(np.concatenate([self.times, self.times + self.later]) if self.later else self.times, 0.0)
+        starts = "initial_state" in forecast.nuisance
+        return Bundle(times=asked, duration=max(float(asked.max()), log.duration), load=log.load, signals=self.signals,
+                      columns={**forecast.space.columns(self.x), **own},
+                      initial={"output_angle": self.angle, "output_speed": self.speed} if starts else {})
+
+    def _fail(self) -> None:
         """Make a part that is nan."""
         m, own = self.case.count, len(self.names)
         width = self.forecast.size if self.sides else 0
         self.part = LogPart(np.full(m, np.nan), np.full((m, width), np.nan),
                             np.full((m, own if self.sides else 0), np.nan), np.full(m, np.nan))
 
-    def take(self, signals: dict[str, Array], early: Array, later: float) -> None:
-        """Make the part of the log from the lanes' signals."""
+    def take(self, signals: dict[str, Array] | None) -> None:
+        """Make the part of the log from the lanes' signals at the times of the bundle; nan where there are none."""
+        if signals is None:
+            self._fail()
+            return
+        self._make(signals if "bus_voltage" not in self.outputs else {**signals, "sag": self._sag(signals)})
+
+    def _sag(self, signals: dict[str, Array]) -> Array:
+        """Return by how much the bus lies above the voltage without current [V], shape (n, T)."""
+        open_circuit = self.forecast.space.columns(self.x).get(_VOLTAGE)
+        if open_circuit is None:
+            open_circuit = np.full(self.count, self.case.log.parameters.get(
+                _VOLTAGE, self.forecast.model.value(_VOLTAGE)))
+        return np.asarray(signals["bus_voltage"] - open_circuit[:, None])
+
+    def _make(self, signals: dict[str, Array]) -> None:
+        early = np.minimum(self.times, 0.0)
         forecast, case, p = self.forecast, self.case, len(self.forecast.space)
         k = len(case.times)
         residuals, shared, own, delayed = [], [], [], []
@@ -93,9 +137,9 @@ class LogLanes:
                 values = values + self.speed[:, None] * early + self.offset
                 if "sag" in signals:
                     values = values + self.sag * signals["sag"][:, :k]
-            elif later:
-                rate = (signals[name][0, k:] - values[0]) / later
-            sigma = forecast.noise[name]
+            elif self.later:
+                rate = (signals[name][0, k:] - values[0]) / self.later
+            sigma = self.noise[name]
             y = values[:, place] / sigma
             residuals.append(y[0] - case.values[name] / sigma)
             of_delay = -rate[place] * DELAY_SCALE / sigma

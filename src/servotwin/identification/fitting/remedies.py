@@ -65,7 +65,7 @@ def _measuring(log: Log, sensor: str) -> Log:
 def _tells(forecast: Forecast, logs: Sequence[Log], sensor: str, point: Point, direction: Array) -> bool:
     """Tell whether a signal of some logs would change visibly along a direction."""
     try:
-        tried = Forecast(logs, forecast.model, forecast.space, forecast.nuisance, [sensor])
+        tried = Forecast(logs, forecast.model, forecast.space, forecast.nuisance, [sensor], forecast.running)
         tried.strict = False
         ends = [point._replace(shared=point.shared + side * _STEP * direction) for side in (1.0, -1.0)]
         ahead, behind = ([part.residual for part in parts] for parts in tried.at_all(ends))

@@ -6,12 +6,14 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
+from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search, together
 from servotwin.identification.fitting.case import Case
 from servotwin.identification.fitting.clocks import with_clocks
 from servotwin.identification.fitting.forecast import Forecast
@@ -121,9 +123,9 @@ class Task:
             place = case.places.get("output_angle", np.zeros(0, np.int64))
             model = self._model_of(case)
             drive = model.command(case.signal)
-            for i in range(0, len(place), max(1, len(place) // _LOOKS)):
-                asked = model.start_angle(float(drive(case.times[place[i]])))
-                gaps.append(float(case.values["output_angle"][i]) - asked)
+            some = np.arange(0, len(place), max(1, len(place) // _LOOKS))
+            asked = np.asarray(model.start_angle(cast("Any", drive(case.times[place[some]]))))
+            gaps += (case.values["output_angle"][some] - asked).tolist() if len(some) else []
         middle = float(np.median(gaps)) if gaps else 0.0
         return middle if abs(middle) > _NEAR else 0.0
 
@@ -174,9 +176,15 @@ class Task:
 
     def ran(self, start: Point, tell: Told, began: float) -> Outcome:
         """Search from a point on all logs that are fitted, as closely as is needed to choose between points."""
+        return self.ran_all([start], tell, began)[0]
+
+    def ran_all(self, starts: Sequence[Point], tell: Told, began: float) -> list[Outcome]:
+        """Search from several points, side by side."""
         keep = self._kept(tell, began, began, "all", "all logs")
         least = _CLOSELY * sum(self.forecast.cases[k].count for k in self.fitted)
-        return self._search(self.fitted).run(start, most=_MOST["all"], tell=keep, least_gain=least)
+        search = self._search(self.fitted)
+        return together(self.forecast, self.fitted, [
+            search.steps(start, most=_MOST["all"], tell=keep, least_gain=least) for start in starts])
 
     def measure(self, point: Point) -> None:
         """Take the noise of each sensor from its residuals at a point."""
@@ -219,15 +227,19 @@ class Task:
     def _rough(self, nominal: Point, tell: Told) -> list[Outcome]:
         """Search from several starts on some logs; return where that ended, the best first."""
         few = self.few()
-        for k, start in enumerate(self._candidates(nominal, few)):
-            text, share = f"start {k + 1} of {self.starts}", _STARTS / self.starts
-            tell(k * share, text)
-            self._set_noise(self.forecast.at(start, derivatives=False, cases=few), few, rough=True)
-            search = self._search(few)
-            first = search.costs([start])[0]
-            self._ended.append(search.run(start, most=_MOST["rough"], least_gain=_ROUGH * first,
-                                          tell=self._kept(tell, k * share, (k + 1) * share, "rough", text)))
-            self._best = None
+        starts = self._candidates(nominal, few)
+        text, search, steps = f"{len(starts)} starts", self._search(few), [0] * len(starts)
+        tell(0.0, text)
+        noises = [self._noise_of(parts, few, rough=True) for parts in self.forecast.at_all(starts, cases=few)]
+        self._ended = [Outcome(start, math.inf, False, 0) for start in starts]
+
+        def keep(k: int, step: int, outcome: Outcome) -> None:
+            self._ended[k], steps[k] = outcome, step
+            tell(_STARTS * sum(steps) / (len(starts) * _MOST["rough"]), text)
+
+        self._ended = together(self.forecast, few, [
+            search.steps(start, most=_MOST["rough"], least_share=_ROUGH, tell=partial(keep, k))
+            for k, start in enumerate(starts)], noises)
         ended, self._ended = self._on_one_scale(self._ended, few), []
         self._best = ended[0]
         return ended
@@ -317,6 +329,13 @@ class Task:
 
     def _set_noise(self, parts: Sequence[LogPart], cases: Sequence[int], *, rough: bool = False) -> float:
         """Take the noise of each sensor from its residuals; return by which share it changed."""
+        new = self._noise_of(parts, cases, rough=rough)
+        change = max(abs(math.log(new[name] / self.forecast.noise[name])) for name in new)
+        self.forecast.noise = new
+        return change
+
+    def _noise_of(self, parts: Sequence[LogPart], cases: Sequence[int], *, rough: bool = False) -> dict[str, float]:
+        """Return the noise of each sensor by its residuals, which are in units of the noise that it has."""
         if self.noise is not None:
             new = {name: self.noise.get(name, self.forecast.noise[name]) for name in self.forecast.sensors}
         else:
@@ -324,9 +343,7 @@ class Task:
         if rough and len(new) > 1:
             # Sampled between pulses a current is jagged over the delay: the angle alone leads near first
             new = {name: value if name in ANGLES else _BLIND * value for name, value in new.items()}
-        change = max(abs(math.log(new[name] / self.forecast.noise[name])) for name in new)
-        self.forecast.noise = self.forecast.noise | new
-        return change
+        return self.forecast.noise | new
 
     def at_bound(self, outcome: Outcome) -> NDArray[np.bool_]:
         """Tell which shared numbers stand at a bound."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, ServoFileError
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Prior, Search
+from servotwin.identification.fitting.batches import Running
 from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Trace
 from servotwin.identification.fitting.forecast import Forecast
@@ -24,6 +25,7 @@ from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.logs.log import Log
 from servotwin.models import MODELS, Model
+from servotwin.models.engine.memory import ACCURACY
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES
 from servotwin.units import is_finite
@@ -134,7 +136,7 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     known = recorded_nuisance(servo)
     always = ("initial_state", "frame_phase") if "frame_phase" in servo.fit else ("initial_state",)
     used = [name for name in NUISANCES if name in known or name in nuisance or name in always]
-    forecast = Forecast(given, plain, _space(plain, given), used, seen)
+    forecast = Forecast(given, plain, _space(plain, given), used, seen, Running(accuracy=ACCURACY))
     with explained(noticed), checks.shown(progress) as show:
         show(0.0, "simulating")
         point = with_pulses_of(forecast, Loss(HUBER), _point(forecast, known, nuisance, show), range(len(given)))

@@ -92,6 +92,8 @@ def creep(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, limit: 
     dw = _acceleration(numbers, course, w)
     there, ends_by = _next_change(numbers, mode, u, course, w, w == 0.0 or dw * course.way > 0.0)
     begin, end = math.sqrt(abs(w)), math.sqrt(abs(there))
+    if there == w or (there < w) == (dw > 0.0):
+        return Crept(0.0, q, w, ends_by, 1.0)
     for _ in range(_HALVINGS):
         found = _between(numbers, course, begin, end)
         size = 1.0 + abs(dw) * found.time + abs(found.way)
@@ -127,7 +129,7 @@ def _next_change(numbers: Numbers, mode: Mode, u: float, course: _Course, w: flo
     rises = away == (way > 0.0)
     low, high = currents.zone_limits(numbers, mode.zone, u)
     edge = (u - low if rises else u - high) / back_emf(1.0, numbers.motor.K_b)
-    if _nearer(edge, w, end):
+    if _nearer(edge, w, end) or edge == w or (edge < w) == rises:  # a zone without width is left at once
         end, ends_by = edge, ZONE_DOWN if rises else ZONE_UP
     at = _root(share(own, m_0, e_0), share(own, m_1, e_1))
     if _nearer(at, w, end):

@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, cast
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -113,9 +114,8 @@ def look(log: Log, model: Model) -> Look | None:
         return None
     time = log.time - log.time[0]
     _, first, where = np.unique(log.command, return_index=True, return_inverse=True)
-    levels = [float(drives(t)) for t in time[first]]
-    drive = np.array(levels)[where]
-    asked = np.array([float(here.start_angle(level)) for level in levels])[where]
+    levels = drives(time[first])
+    drive, asked = levels[where], np.asarray(here.start_angle(cast("Any", levels)))[where]
     name = log.angle_name
     values = log.measured[name]
     angle = (values - _offset(here)) / _gain(here) if name == "feedback_voltage" else values
