@@ -72,7 +72,7 @@ def events_of(plans: Sequence[Plan], rows: Rows) -> list[tuple[Event, ...]]:
     """Return the events of each servo."""
     found: list[list[Event]] = [[] for _ in plans]
     for unit, time, kind, zone, contact, angle in rows.events.tolist():
-        if kind == guards.SHARE:  # where a law of friction has a kink; nothing that anybody sees
+        if kind in guards.KINKS:
             continue
         name = _WORDS.get(kind) or event_name(int(kind), Mode(int(zone), int(contact), 0, 0, 0))
         found[int(unit)].append(Event(time, name, angle))

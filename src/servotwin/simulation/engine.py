@@ -237,7 +237,7 @@ def _keep(record: Record, plan: Plan, before: Memory, memory: Memory, m: Motion,
                                        memory.chip.silent, origin))
     if record.tell is not None:
         record.tell(now)
-    if event >= 0:
+    if event >= 0 and event not in guards.KINKS:
         record.events.append(Event(now, event_name(event, point.mode), point.y[0]))
 
 

@@ -35,6 +35,7 @@ SPEED, CORE_FORWARD, CORE_BACKWARD, ZONE_UP, ZONE_DOWN, UPPER, LOWER, RELEASE_FO
 MEET_FORWARD, MEET_BACKWARD, PART, PART_OUTPUT, PART_MOTOR = range(9, 14)
 MOTOR_SPEED, MOTOR_RELEASE_FORWARD, MOTOR_RELEASE_BACKWARD, SHARE, CREEPS = range(14, 19)
 KINDS = 19
+KINKS = (SHARE, CREEPS)  # of a law: no event that anybody would see
 IN_CLOSED_FORM = 1 << SHARE | 1 << CREEPS  # what a creep has looked at itself
 _CORE = 1 << CORE_FORWARD | 1 << CORE_BACKWARD
 _RELEASE = 1 << RELEASE_FORWARD | 1 << RELEASE_BACKWARD
@@ -42,7 +43,7 @@ _MEET = 1 << MEET_FORWARD | 1 << MEET_BACKWARD
 _MOTOR_RELEASE = 1 << MOTOR_RELEASE_FORWARD | 1 << MOTOR_RELEASE_BACKWARD
 EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper stop", "lower stop",
                "release forward", "release backward", "gear meets", "gear meets", "gear parts", "gear parts",
-               "gear parts", "motor speed zero", "motor release", "motor release", "share turns", "creeps")
+               "gear parts", "motor speed zero", "motor release", "motor release")
 
 
 def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
