@@ -5,6 +5,11 @@
 writes the file anew from the engine as it is (a quarter of an hour). That may be done only where a change of results is
 meant, and said in the CHANGELOG; a change of form, speed or structure leaves the file as it is.
 
+    python tests/models/frozen_servos.py --renew 1e-9
+
+takes over the results of those cases that another method has moved by more than is allowed and by no more than that;
+draws, times and allowances stay. It tells which, and which have moved further or differ in their events: these stay.
+
 Everything is drawn from seeds, nothing from the catalog. A case is its number, which fixes model and features, and
 its draw, which fixes all numbers; the file keeps the draws that rounding alone does not move (`frozen_search.py`).
 """
@@ -408,9 +413,12 @@ def described(number, draw):
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] != ["--write"]:
-        sys.exit(__doc__)
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-    from models.frozen_search import write
+    from models.frozen_search import renew, write
 
-    write()
+    if sys.argv[1:] == ["--write"]:
+        write()
+    elif sys.argv[1:2] == ["--renew"] and len(sys.argv) == 3:
+        renew(float(sys.argv[2]))
+    else:
+        sys.exit(__doc__)
