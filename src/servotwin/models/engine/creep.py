@@ -46,6 +46,7 @@ _FEWER = (  # those of the rule of 10 points among them
 IN_ANY_ORDER = ("_between",)  # functions whose sums a compiler may take side by side
 _HALVINGS = 12  # of a range of speeds; one that needs more is for the integrator
 _ROUNDS = 40
+_PART, _ROUNDING = 0.01, 2e-15  # of a tolerance: where two runs halve otherwise, they should not differ by more
 
 
 class Crept(NamedTuple):
@@ -94,6 +95,7 @@ def creep(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, limit: 
     begin, end = math.sqrt(abs(w)), math.sqrt(abs(there))
     if there == w or (there < w) == (dw > 0.0):
         return Crept(0.0, q, w, ends_by, 1.0)
+    tolerance = max(_PART * tolerance, _ROUNDING)
     for _ in range(_HALVINGS):
         found = _between(numbers, course, begin, end)
         size = 1.0 + abs(dw) * found.time + abs(found.way)
