@@ -16,7 +16,7 @@ from servotwin.models.engine.elementary import fading, fma, log
 def drive_or_rest(size: int, slack: bool, tile: Any, plan: Any) -> None:
     """Move all lanes through a time with or without drive; `slack` where potentiometers have play."""
     for j in range(size):
-        _drive_or_rest(slack, tile, plan, j)
+        _drive_or_rest(tile, plan, j)
     _end(size, slack, tile, plan)
 
 
@@ -26,20 +26,20 @@ def drive(size: int, slack: bool, tile: Any, plan: Any) -> None:
         numbers, power = tile.arc, plan.power[j]
         forward, backward = numbers.start_forward[j], numbers.start_backward[j]
         start = forward if power > 0.0 else backward
-        _move(power, numbers.rate_drive[j], numbers.per_rate_drive[j], start, slack, tile, plan, j)
+        _move(power, numbers.rate_drive[j], numbers.per_rate_drive[j], start, tile, plan, j)
     _end(size, slack, tile, plan)
 
 
 def rest(size: int, slack: bool, tile: Any, plan: Any) -> None:
     """Move all lanes through a time without drive."""
     for j in range(size):
-        _move(0.0, tile.arc.rate_off[j], tile.arc.per_rate_off[j], tile.arc.start_off[j], slack, tile, plan, j)
+        _move(0.0, tile.arc.rate_off[j], tile.arc.per_rate_off[j], tile.arc.start_off[j], tile, plan, j)
     _end(size, slack, tile, plan)
 
 
 def alone(slack: bool, tile: Any, plan: Any, j: int) -> None:
     """Move one lane through a time with or without drive."""
-    _drive_or_rest(slack, tile, plan, j)
+    _drive_or_rest(tile, plan, j)
     if plan.ends[j] > 0.0:
         _arc_by_arc(tile, plan, j)
     if slack:
@@ -47,18 +47,18 @@ def alone(slack: bool, tile: Any, plan: Any, j: int) -> None:
         tiles.drag(tile, tile.servo.q[j], j)
 
 
-def _drive_or_rest(slack: bool, tile: Any, plan: Any, j: int) -> None:
+def _drive_or_rest(tile: Any, plan: Any, j: int) -> None:
     power = plan.power[j]
     off = power == 0.0
     rate, per_rate, rate_off, per_rate_off = (
         tile.arc.rate_drive[j], tile.arc.per_rate_drive[j], tile.arc.rate_off[j], tile.arc.per_rate_off[j])
     forward, backward, start_off = tile.arc.start_forward[j], tile.arc.start_backward[j], tile.arc.start_off[j]
     start = forward if power > 0.0 else backward
-    _move(power, rate_off if off else rate, per_rate_off if off else per_rate, start_off if off else start, slack,
-          tile, plan, j)
+    _move(power, rate_off if off else rate, per_rate_off if off else per_rate, start_off if off else start, tile, plan,
+          j)
 
 
-def _move(power: float, rate: float, per_rate: float, start: float, slack: bool, tile: Any, plan: Any, j: int) -> None:
+def _move(power: float, rate: float, per_rate: float, start: float, tile: Any, plan: Any, j: int) -> None:
     """Slide to the end, or stop on the way and go on from rest: w + λ (q − q0) − f t is constant while it slides."""
     time, q, w = plan.time[j], tile.servo.q[j], tile.servo.w[j]
     forward, backward = tile.arc.friction_forward[j], tile.arc.friction_backward[j]
@@ -82,8 +82,7 @@ def _move(power: float, rate: float, per_rate: float, start: float, slack: bool,
     good = not outside and to == to
     moves = time > 0.0 and (w != 0.0 or start != 0.0)
     goes = moves and good
-    if slack:
-        plan.turned[j] = at_stop if goes else q
+    plan.turned[j] = at_stop if goes else q
     tile.servo.q[j] = to if goes else q
     tile.servo.w[j] = after if goes else w
     plan.ends[j] = 1.0 if moves and not good else 0.0

@@ -125,6 +125,7 @@ class Plan(NamedTuple):
     start: float  # −1, 0, +1: which way it starts from rest
     turned: float  # where it stopped last
     creeps: float  # time for it to creep
+    sensed: float  # angle of the potentiometer
     q1: float  # angle and speed at the start of each phase
     w1: float
     wiper1: float

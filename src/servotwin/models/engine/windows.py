@@ -130,21 +130,25 @@ def divide(size: int, full: bool, slack: bool, tile: Any, plan: Any) -> None:
             servo = tile.servo
             _divide(math.inf, servo.due[j], servo.sign[j], servo.duration[j], servo.decided[j], servo.silence[j],
                     tile, plan, j)
-    elif full:
-        for j in range(size):
-            _decide(tiles.chip_at(tile.chip, j), plan.v_m[j], plan.V_bus[j], plan.draw[j], slack, tile, plan, j)
     else:
         for j in range(size):
-            _decide(tiles.plain_chip_at(tile.chip, j), 0.0, 0.0, 0.0, slack, tile, plan, j)
+            plan.sensed[j] = tile.servo.q[j]
+        if slack:
+            for j in range(size):
+                plan.sensed[j] = tile.servo.wiper[j]
+        if full:
+            for j in range(size):
+                _decide(tiles.chip_at(tile.chip, j), plan.v_m[j], plan.V_bus[j], plan.draw[j], tile, plan, j)
+        else:
+            for j in range(size):
+                _decide(tiles.plain_chip_at(tile.chip, j), 0.0, 0.0, 0.0, tile, plan, j)
 
 
-def _decide(chip: Chip, v_m: float, V_bus: float, draw: float, slack: bool, tile: Any, plan: Any,
-            j: int) -> None:
+def _decide(chip: Chip, v_m: float, V_bus: float, draw: float, tile: Any, plan: Any, j: int) -> None:
     """Measure and decide where a pulse rises, and divide the window."""
     servo = tile.servo
     width, due = servo.width[j], servo.due[j]
-    at = servo.wiper[j] if slack else servo.q[j]
-    v_o = potentiometer.feedback_voltage(at, tile.meter.p[j], tile.meter.b_o[j])
+    v_o = potentiometer.feedback_voltage(plan.sensed[j], tile.meter.p[j], tile.meter.b_o[j])
     new = frame.decide(chip, 0.0, width, v_o, v_m, V_bus, draw)
     valid = frame.accepted(chip, width) and plan.at_edge[j] != 0.0
     replaces = valid and new.time <= due
