@@ -44,7 +44,7 @@ def same(one, other, tolerance):
                                    atol=1e-11)
 
 
-@pytest.mark.compiles
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_compiled_a_fleet_is_what_it_is_in_plain_python(servo, monkeypatch, name):
     monkeypatch.setattr(bus_run, "COMPILES_FROM", 1e99)

@@ -54,8 +54,9 @@ def same(a, b):
     assert one.records.tobytes() == other.records.tobytes()
 
 
-@pytest.mark.parametrize(("kind", "dtype"), [(st.PulseServo, "float64"), (st.PulseServo, "float32"),
-                                             (st.PulseServoInductive, "float64"), (st.BoundedServo, "float64")])
+@pytest.mark.parametrize(("kind", "dtype"), [
+    (st.PulseServo, "float64"), pytest.param(st.PulseServo, "float32", marks=pytest.mark.slow),
+    (st.PulseServoInductive, "float64"), (st.BoundedServo, "float64")])
 @pytest.mark.parametrize("name", CASES)
 def test_it_is_python_bit_for_bit(servo, name, kind, dtype):
     """Ticks of random lengths, each input given or not, in Python alone and in Python and C by turns."""

@@ -59,6 +59,7 @@ def agree(sims, fleet, tolerance=1e-9):
         np.testing.assert_allclose(sims[name], there, rtol=1e-9, atol=scale * tolerance, err_msg=name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_lanes_on_a_bus_are_the_servos_of_simulate_bus_cut_at_random_ticks(servo, name):
     rng = np.random.default_rng(3)
@@ -70,6 +71,7 @@ def test_lanes_on_a_bus_are_the_servos_of_simulate_bus_cut_at_random_ticks(servo
     assert np.ptp(sims["output_angle"]) > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["plain", "inductive"])
 def test_how_time_is_cut_changes_rounding_alone(servo, name):
     runs = [sims_of(servo, name) for _ in range(3)]
@@ -79,6 +81,7 @@ def test_how_time_is_cut_changes_rounding_alone(servo, name):
         np.testing.assert_allclose(sims["output_angle"], runs[0]["output_angle"], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_what_is_saved_goes_on_as_if_nothing_had_been(servo):
     sims, other = sims_of(servo, "inductive"), sims_of(servo, "inductive")
     advance(sims, [0.0, 0.0537])
@@ -92,6 +95,7 @@ def test_what_is_saved_goes_on_as_if_nothing_had_been(servo):
         np.testing.assert_array_equal(again["output_angle"], expected)
 
 
+@pytest.mark.slow
 def test_each_lane_has_a_clock_of_its_own(servo):
     """A lane that is reset later has its frames later, as a servo has to whom pulses come later."""
     late, model = 0.007, st.PulseServo(servo.replace({"electronics.supply_coupling": 0.02}))
@@ -112,6 +116,7 @@ def test_each_lane_has_a_clock_of_its_own(servo):
     assert abs(sims["output_angle"][1] - start[1]) > 0.1
 
 
+@pytest.mark.slow
 def test_buses_and_lanes_alone_do_not_feel_each_other(servo):
     """Lanes 1 and 4 on a battery, 2 and 3 on a regulator, 0 on its own: each as in a simulator of its own."""
     model, lanes = st.PulseServo(servo.replace({"supply.internal_resistance": 0.3})), 5
@@ -127,6 +132,7 @@ def test_buses_and_lanes_alone_do_not_feel_each_other(servo):
             np.testing.assert_allclose(sims[name][some], own[name], rtol=0.0, atol=1e-11, err_msg=name)
 
 
+@pytest.mark.slow
 def test_threads_change_nothing(servo):
     buses = [(BATTERY, [k, k + 1]) for k in range(0, 24, 2)]
     runs = [st.VectorSimulator(st.PulseServo(servo), 24, bus=buses, threads=threads) for threads in (1, 2)]
@@ -137,6 +143,7 @@ def test_threads_change_nothing(servo):
     np.testing.assert_array_equal(runs[0]["output_angle"], runs[1]["output_angle"])
 
 
+@pytest.mark.slow
 def test_inertia_speed_and_parameters_may_be_set_on_a_bus(servo):
     model = st.PulseServo(servo)
     sims = st.VectorSimulator(model, 2, bus=BATTERY, threads=1)
@@ -153,6 +160,7 @@ def test_inertia_speed_and_parameters_may_be_set_on_a_bus(servo):
     agree(sims, fleet)
 
 
+@pytest.mark.slow
 def test_the_energy_of_a_bus_closes(servo):
     """What the source gives is what windings, bridges, friction and loads have taken, and what is stored."""
     model = st.PulseServo(servo.replace({"motor.brush_drop_voltage": 0.1, "supply.bridge_drop_resistance": 0.2}))
@@ -172,6 +180,7 @@ def test_the_energy_of_a_bus_closes(servo):
     assert delivered == pytest.approx(energy.supply, rel=2e-3)  # by midpoints, across edges of the drive
 
 
+@pytest.mark.slow
 def test_a_bus_that_cannot_go_on_harms_no_other(servo):
     stiff = {"load.spring.stiffness": [1e19, 0.1, 0.1, 0.1]}  # it oscillates too fast to be followed
     sims = st.VectorSimulator(st.PulseServo(servo), 4, bus=[(BATTERY, [0, 1]), (BATTERY, [2, 3])], threads=1,
@@ -203,6 +212,7 @@ def test_bad_buses(servo, bus, message):
         st.VectorSimulator(st.PulseServo(servo), 4, bus=bus)
 
 
+@pytest.mark.slow
 def test_what_a_bus_refuses(servo):
     with pytest.raises(InputError, match="PulseServo or PulseServoInductive"):
         st.VectorSimulator(st.BoundedServo(st.load_servo("hitec-hs-755hb")), 2, bus=BATTERY)
