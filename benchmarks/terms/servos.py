@@ -42,6 +42,8 @@ PLAIN = Term("plain", {})
 TERMS = (
     Term("inductance", {}, inductive=True),
     Term("regulator", _REGULATOR),
+    Term("M3", {"friction.load_friction": 0.08}),
+    Term("M5", {"friction.load_friction_motor": 0.08, "friction.load_friction_external": 0.1}),
     Term("Stribeck", _STRIBECK),
     Term("M4", {**_STRIBECK, "friction.load_friction": 0.08, "friction.load_friction_stribeck": 0.04}),
     Term("M6", _M6),

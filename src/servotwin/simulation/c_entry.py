@@ -54,8 +54,6 @@ class CEntry:
     ----------
     address : int
         Of the function `int32_t servotwin_advance(servotwin_tick *tick)`.
-    simulator : int
-        What the struct's member of this name has to be.
     lanes : int
 
     Examples

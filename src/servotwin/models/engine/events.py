@@ -52,12 +52,12 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
     low, high = currents.zone_limits(numbers, motion.mode.zone, u)
     w, x = after[1], u - back_emf(after[1], numbers.motor.K_b)
     first, found = math.inf, -1
-    way = 1.0 if motion.mode.contact == FORWARD else -1.0
+    way, per_speed = 1.0 if motion.mode.contact == FORWARD else -1.0, back_emf(1.0, numbers.motor.K_b)
     slow = creeping_speed(numbers.friction)
     share, turn = guards.share_along(numbers, motion.mode, u, piece_value(motion.tau, motion.t0), after)
     for kind, left, there in ((guards.SPEED, way * w, 0.0),
-                              (guards.ZONE_UP, high - x, (u - high) / numbers.motor.K_b),
-                              (guards.ZONE_DOWN, x - low, (u - low) / numbers.motor.K_b),
+                              (guards.ZONE_UP, high - x, (u - high) / per_speed),
+                              (guards.ZONE_DOWN, x - low, (u - low) / per_speed),
                               (guards.SHARE, share, turn), (guards.CREEPS, way * w - slow, way * slow)):
         if not kinds >> kind & 1 or left >= _BELOW:  # monotone: what holds at the end has held
             continue
