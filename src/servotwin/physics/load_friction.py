@@ -79,21 +79,13 @@ def share_balance(motor_torque: float, external_torque_on_gear: float, motor_sha
 
     Parameters
     ----------
-    motor_torque : float or array
-        τ_m, at the output shaft [N m].
-    external_torque_on_gear : float or array
-        τ_e, what acts on the gear from outside, towards +q [N m].
-    motor_share, external_share : float or array
-        K_m and K_e of sliding, or K_ms and K_es of static friction [1].
+    motor_torque, external_torque_on_gear, motor_share, external_share : float or array
+        As in `torque_share`.
 
     Returns
     -------
     float or array
         K_m τ_m − K_e τ_e [N m].
-
-    Notes
-    -----
-    Models M3 to M6 of Duclusaud et al., 2025.
 
     Examples
     --------

@@ -152,6 +152,4 @@ def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
         elif form == ARCS:
             arc_rounds.rest(size, tile, plan)
         elif form == BANDS:
-            for j in range(size):
-                plan.power[j] = 0.0
             band_rounds.phase(size, slack, tile, plan)
