@@ -72,7 +72,7 @@ def validation(arguments: list[str]) -> None:
 
 def check(arguments: list[str]) -> None:
     """Lint, types and import rules."""
-    run("ruff", "check", ".")
+    run("ruff", "check", "--no-cache", ".")  # a cached verdict does not see that a new folder changed what is ours
     run("mypy")
     run("lint-imports")
 

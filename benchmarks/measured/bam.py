@@ -5,7 +5,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from tables import row
+from report import row
 
 import servotwin as st
 from servotwin.identification import BamConvention, LogError, friction_ladder, read_bam_log, read_bam_parameters

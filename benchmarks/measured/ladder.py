@@ -4,9 +4,9 @@ import time
 from pathlib import Path
 
 import bam
+from report import row
 
 from servotwin.identification import RUNGS, friction_ladder
-from tables import row
 
 NUISANCE = ("delay", "angle_offset", "initial_state")  # loops of 1 ms are short: when they come tells nothing
 

@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from tables import folds, row
+from report import folds, row
 
 import servotwin as st
 
