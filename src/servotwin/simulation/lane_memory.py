@@ -30,13 +30,13 @@ def put(tiles: NDArray[Any], group: str, name: str, places: Indices, values: Any
     tiles[group][name][places // TILE, places % TILE] = values
 
 
-def records_of(tiles: NDArray[Any], places: Indices, temperatures: Floats) -> NDArray[Any]:
-    """Return what the lanes at these places of tiles remember; temperatures (2, n) are constant there [K]."""
+def records_of(tiles: NDArray[Any], places: Indices) -> NDArray[Any]:
+    """Return what the lanes at these places of tiles remember."""
     records = np.zeros(len(places), RECORD)
     if len(places):
         side = Side(*(columns_of(kind, tiles[group], places) for group, kind in _GROUPS.items()))
         regular, half_slack = flat(tiles, "count", "edges")[places] < 0, flat(tiles, "hung", "half_slack")[places]
-        _put_in(records, _remembered(mapped(_doubled, side), regular, half_slack, *temperatures))
+        _put_in(records, _remembered(mapped(_doubled, side), regular, half_slack))
     return records
 
 

@@ -23,18 +23,24 @@ _straight = array_form(straight, __name__)
 Mask = NDArray[np.bool_]
 
 _SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
-_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32", never=("BANDS",))
+_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32",
+                        never=("BANDS", "STRIDES"))
             for dtype in ("float64", "float32")}
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
 ALL_RUNS = Recipe("runs", _ENTRIES)  # everything
-_GENERAL = ("friction.kappa", "play", "heat", "motor.L")  # what only lanes one by one have
+_ALONE = ("friction.kappa", "play", "motor.L")  # what only lanes one by one have
 _BANDED = ("friction.varies", "source.I_max")
-_RARE = (*_BANDED, *_GENERAL, "sensor.half_slack")
 _PENDULUM = "load.gravity"
-_NOT_IN_BANDS = (*_GENERAL, _PENDULUM, "load.stiffness", "follower", "sweep")
+_STRIDING = ("heat", _PENDULUM, "load.stiffness")
+_RARE = (*_BANDED, *_ALONE, "heat", "sensor.half_slack")
+_NOT_IN_STRIDES = (*_ALONE, "follower", "sweep")
+_NOT_IN_BANDS = (*_NOT_IN_STRIDES, *_STRIDING)
 _BY_BANDS = {creeps: Recipe("by_bands" + "_and_creep" * creeps, _SIDE, vector=True, absent=(
-    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), never=("ONE_FORMULA", "ARCS", "CORE"))
+    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), never=("ONE_FORMULA", "ARCS", "STRIDES", "CORE"))
     for creeps in (False, True)}
+_BY_STRIDES = {banded: Recipe("by_strides" + "_in_bands" * banded, _SIDE, vector=True, absent=(
+    _NOT_IN_STRIDES if banded else (*_NOT_IN_STRIDES, *_BANDED)),
+    never=("ONE_FORMULA", "ARCS", "BANDS", "CORE", "INSIDE", "ON_FORWARD", "ON_BACKWARD")) for banded in (False, True)}
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep"),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
@@ -43,7 +49,7 @@ PENDULUM_RUNS = Recipe(
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 LOOK_SIDE_BY_SIDE = Recipe(
     "look_side_by_side", ("servotwin.models.engine.sights:side_by_side",),
-    absent=(*_GENERAL, _PENDULUM, "load.stiffness"))
+    absent=_ALONE)
 LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",))
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
@@ -75,7 +81,7 @@ def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> No
     """Run some lanes side by side; finish those that are given up one by one."""
     which = kind.which
     rows = room(-(-len(which) // tiles.TILE), tiles.tile_type(kind.dtype, kind.form))
-    plans = room(1, tiles.plan_type(kind.dtype))
+    plans = tiles.plan_room(kind.dtype, kind.form)
     times = _own(work.times, np.float64)
     module = kernels(kind.recipe)
     module.start(some_of(lanes, which), kind.form, times[0] if len(times) else np.inf, rows)
@@ -86,13 +92,14 @@ def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> No
         if name in raw.fields and values is not raw.fields[name]:
             with np.errstate(over="ignore"):
                 raw.fields[name][which] = values[which]
-    raw.final[which, 0], raw.final[which, 1] = (flat(rows, "servo", name)[:len(which)] for name in ("q", "w"))
+    for k, name in enumerate(("q", "w", "T_w", "T_h") if kind.form == tiles.STRIDES else ("q", "w")):
+        raw.final[which, k] = flat(rows, "servo", name)[:len(which)]
     if lost:
         owed = flat(rows, "clock", "owed")[:len(which)]
         places = np.flatnonzero(owed > 0.0)
         gone = which[places]
         _finish(work, lanes, gone, owed[places], flat(rows, "count", "output")[places],
-                records_of(rows, places, lanes.start[3:5, gone]), raw, kind.general)
+                records_of(rows, places), raw, kind.general)
 
 
 def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = ALL_RUNS) -> None:
@@ -131,23 +138,30 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
 
 
 class SideBySide(NamedTuple):
-    """Lanes that run side by side in one form, whether some have a potentiometer with play, and whether some creep."""
+    """Lanes that run side by side in one form.
+
+    Whether some have a potentiometer with play, whether some creep, and, where they go by strides, whether they have
+    what makes bands.
+    """
 
     which: Indices
     form: int
     slack: bool
     dtype: str
     creeps: bool = False
+    banded: bool = False
 
     @property
     def recipe(self) -> Recipe:
         """Their kernels."""
+        if self.form == tiles.STRIDES:
+            return _BY_STRIDES[self.banded]
         return _BY_BANDS[self.creeps] if self.form == tiles.BANDS else _BY_ARCS[self.dtype]
 
     @property
     def general(self) -> Recipe:
         """The kernels of those that cannot go on side by side."""
-        return ALL_RUNS if self.form == tiles.BANDS or self.slack else PLAIN_RUNS
+        return ALL_RUNS if self.form in (tiles.BANDS, tiles.STRIDES) or self.slack else PLAIN_RUNS
 
 
 class OneByOne(NamedTuple):
@@ -165,16 +179,13 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     potentiometers have a table.
     """
     bridge, own = numbers.bridge, numbers.friction
-    general, swinging = swept.any() and swept, _differs(numbers, _PENDULUM)
-    for name in _GENERAL:
-        general = _either(general, _differs(numbers, name))
-    slack, banded = _differs(numbers, "sensor.half_slack"), False
-    for name in _BANDED:
-        banded = _either(banded, _differs(numbers, name))
+    slack, swinging = _differs(numbers, "sensor.half_slack"), _differs(numbers, _PENDULUM)
+    alone = _either(swept.any() and swept, _any_differs(numbers, _ALONE))
+    banded, striding = _any_differs(numbers, _BANDED), _any_differs(numbers, _STRIDING)
     side: Any = False
     if pulsed and not curved:
-        side = (np.logical_not(_either(_either(general, swinging), recorded.any() and recorded))
-                & (numbers.load.stiffness == 0.0) & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
+        side = (np.logical_not(_either(alone, recorded.any() and recorded))
+                & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
                 & (bridge.silence.coast == bridge.off.coast) & ((own.varies == 0.0) | _straight(own)))
     if dtype == "float32":  # what is not zero has to stay so
         for x in (*numbers_in(numbers), *numbers_in(chip)):
@@ -182,14 +193,18 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
             side = side if fits is True else side & fits
     braked = (bridge.off.D == 0.0) & (bridge.D_drive < numbers.source.V)
     banded = _either(banded, slack & np.logical_not(braked))
-    rare = _either(general, _either(banded, slack))
+    rare = _either(_either(alone, _differs(numbers, "heat")), _either(banded, slack))
+    flowing = np.logical_not(_either(banded, striding))
     found: list[SideBySide | OneByOne] = []
-    for form, some in ((tiles.ONE_FORMULA, braked & np.logical_not(banded)),
-                       (tiles.ARCS, np.logical_not(braked) & np.logical_not(banded)), (tiles.BANDS, banded)):
+    for form, some in ((tiles.ONE_FORMULA, braked & flowing), (tiles.ARCS, np.logical_not(braked) & flowing),
+                       (tiles.BANDS, banded & np.logical_not(striding)),
+                       (tiles.STRIDES, striding & np.logical_not(banded)), (tiles.STRIDES, striding & banded)):
         which = _where(side, some, lanes)
         lagging = bool(np.any(np.broadcast_to(slack, lanes)[which])) if np.any(slack) else False
         creeping = form == tiles.BANDS and bool(np.any(np.broadcast_to(own.varies * own.w_s > 0.0, lanes)[which]))
-        found.append(SideBySide(which, form, lagging, dtype if form != tiles.BANDS else "float64", creeping))
+        own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
+        found.append(SideBySide(which, form, lagging, own_type, creeping, bool(np.any(
+            np.broadcast_to(banded, lanes)[which]))))
     found += [OneByOne(_where(some, np.logical_not(side), lanes), recipe) for recipe, some in (
         (PLAIN_RUNS, np.logical_not(_either(rare, swinging))), (PENDULUM_RUNS, swinging & np.logical_not(rare)),
         (ALL_RUNS, rare))]
@@ -198,7 +213,15 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
 
 def goes_together(numbers: Numbers, pulsed: bool) -> bool:
     """Tell whether all lanes take about as long, for none has a term that would let it run on its own."""
-    return pulsed and not any(np.any(_differs(numbers, name)) for name in (*_GENERAL, _PENDULUM))
+    return pulsed and not np.any(_any_differs(numbers, (*_ALONE, *_STRIDING)))
+
+
+def _any_differs(numbers: Numbers, names: tuple[str, ...]) -> Any:
+    """Tell which lanes have one of some terms or numbers."""
+    found: Any = False
+    for name in names:
+        found = _either(found, _differs(numbers, name))
+    return found
 
 
 def _either(a: Any, b: Any) -> Any:
@@ -271,9 +294,9 @@ def _own(values: Any, kind: Any) -> NDArray[Any]:
 
 def outputs_of(work: Work, raw: Raw, dtype: str) -> Outputs:
     """Return the arrays into which the kernels write: those of `raw`, or others of their type."""
-    types = {name: np.dtype(np.int8 if name in SMALL_FIELDS else dtype) for name in FIELDS}
+    types = {name: np.dtype(np.int8 if name in SMALL_FIELDS else dtype) for name in Outputs._fields}
     arrays = {name: np.zeros((0, 0), kind) for name, kind in types.items()}
-    for name in FIELDS:
+    for name in Outputs._fields:
         if name in raw.fields:
             own = raw.fields[name]
             arrays[name] = own if own.dtype == types[name] else np.zeros(own.shape, types[name])

@@ -122,7 +122,7 @@ class BusSet:
         raise InputError("c_entry of lanes on a bus", got=f"{len(self.which)} lanes on buses",
                          allowed="lanes with supplies of their own")
 
-    def records(self, columns: Lanes) -> NDArray[Any]:
+    def records(self) -> NDArray[Any]:
         """Return what the lanes remember."""
         return self.rows.copy()
 

@@ -83,7 +83,7 @@ def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[
     advance = call_of(kernels, "advance", which, *some.form, 0, len(rows), Now(store.now, 0), command, store.total,
                       Now(store.now, 1, True), rows, some.plans[0], returns=True)
     alone = _Alone(len(which))
-    lost = [call_of(TICKS, "gather_lost", which, store.status, store.columns.start, rows, *alone.room, returns=True),
+    lost = [call_of(TICKS, "gather_lost", which, store.status, rows, *alone.room, returns=True),
             *alone.go_on(some.general, store),
             call_of(TICKS, "put_lost", *alone.some("places", "lanes", "records"), store.numbers.frame_period, rows)]
     return {

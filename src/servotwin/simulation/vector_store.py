@@ -161,7 +161,7 @@ class Store:
         """Return the memories of all lanes."""
         found = np.zeros(len(self.status), RECORD)
         for some in self.sets:
-            found[some.which] = some.records(self.columns)
+            found[some.which] = some.records()
         return found
 
     def shaft(self, name: str) -> Array:
@@ -221,7 +221,7 @@ class Store:
             places, durations = places[alive], durations[alive]
             if len(places):
                 self.columns.pieces[:, 1] = command
-                part = records_of(some.rows, places, self.columns.start[3:5, some.which[places]])
+                part = records_of(some.rows, places)
                 self._one_by_one(some.general, some.which[places], durations, part)
                 put_records(some.rows, places, part, self.numbers.frame_period[some.which[places]])
 
@@ -280,7 +280,7 @@ class _Tiles:
         self.which, self.form, self.general = kind.which, (kind.form, kind.slack), kind.general
         self.rows = room(-(-len(self.which) // TILE), tiles.tile_type(kind.dtype, kind.form))
         self.workers = max(1, min(threads, len(self.rows) // _WORTH))
-        self.plans = [room(1, tiles.plan_type(kind.dtype)) for _ in range(self.workers)]
+        self.plans = [tiles.plan_room(kind.dtype, kind.form) for _ in range(self.workers)]
         self.recipe = kind.recipe
         module = kernels(kind.recipe)
         self.advance, self._refit = module.advance, module.refit
@@ -302,8 +302,8 @@ class _Tiles:
         """Let the general way finish the calls of these lanes."""
         put(self.rows, "clock", "owed", places, 0.0)
 
-    def records(self, columns: tiles.Lanes) -> NDArray[Any]:
-        return records_of(self.rows, np.arange(len(self.which)), columns.start[3:5, self.which])
+    def records(self) -> NDArray[Any]:
+        return records_of(self.rows, np.arange(len(self.which)))
 
     def shaft(self, name: str) -> Array:
         return np.asarray(self.rows["servo"][SHAFT[name][0]].reshape(-1)[:len(self.which)], dtype=np.float64)
@@ -339,7 +339,7 @@ class _Records:
         """Set angles and speeds, as `engine.lane_ticks` does; motor and potentiometer go along as far as their play."""
         kernels(TICKS).impose_on_records(*imposed, self.rows)
 
-    def records(self, columns: tiles.Lanes) -> NDArray[Any]:
+    def records(self) -> NDArray[Any]:
         return self.rows.copy()
 
     def shaft(self, name: str) -> Array:

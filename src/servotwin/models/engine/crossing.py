@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine.memory import BEAT, FIRST_STEP, NOTHING, SAME, Memory, Point
+from servotwin.models.engine.memory import BEAT, NOTHING, SAME, Memory, Point
 from servotwin.models.engine.modes import RIGID, Mode
 from servotwin.models.engine.records import reader, writer
 from servotwin.models.terms.frame import Decision, Frame
@@ -29,6 +29,9 @@ class Held(NamedTuple):
     later_duration: float
     later_decided: float
     wiper: float
+    T_w: float
+    T_h: float
+    step: float
 
 
 class Hour(NamedTuple):
@@ -63,21 +66,22 @@ put_hour = writer("put_hour", Hour)
 put_counted = writer("put_counted", Counted)
 
 
-def remembered(side: Side, regular: bool, half_slack: float, T_w: float, T_h: float) -> Memory:
-    """Return the memory of a servo that ran side by side, at temperatures that stay [K].
+def remembered(side: Side, regular: bool, half_slack: float) -> Memory:
+    """Return the memory of a servo that ran side by side.
 
     `regular` is whether its frames come regularly; without slack the potentiometer goes with the shaft.
     """
     held, hour, number = side.held, side.hour, side.counted.number
     now = hour.since - hour.length if regular else hour.edge + hour.since
-    y = (1.0 * held.q, 1.0 * held.w, 0.0, T_w, T_h, 1.0 * held.q, 1.0 * held.w)  # float64, whatever tiles hold
+    q, w = 1.0 * held.q, 1.0 * held.w  # float64, whatever tiles hold
+    y = (q, w, 0.0, 1.0 * held.T_w, 1.0 * held.T_h, q, w)
     chip = Frame(
         number, side.counted.first_draw + number, 1.0 * held.drive,
         now + held.left if held.drive != 0.0 else math.inf, now + held.silence, 0, 1.0 * held.error,
         Decision(now + held.due, 1.0 * held.sign, 1.0 * held.duration, 1.0 * held.decided),
         Decision(now + held.later_due, 1.0 * held.later_sign, 1.0 * held.later_duration, 1.0 * held.later_decided))
-    wiper = 1.0 * held.wiper if half_slack > 0.0 else 1.0 * held.q
-    point = Point(now, y, Mode(0, 0, RIGID, 0, 0), math.inf, y, FIRST_STEP, wiper)
+    wiper = 1.0 * held.wiper if half_slack > 0.0 else q
+    point = Point(now, y, Mode(0, 0, RIGID, 0, 0), math.inf, y, 1.0 * held.step, wiper)
     return Memory(number if regular else 0, hour.period if regular else BEAT, point, chip, NOTHING, math.inf, NOTHING,
                   math.inf)
 
@@ -94,6 +98,7 @@ def side_of(memory: Memory, period: float) -> Side:
     held = Held(
         memory.point.y[0], memory.point.y[1], chip.drive, chip.drive_end - now if chip.drive != 0.0 else 0.0,
         chip.clock - now, chip.error, pending.time - now, pending.sign, pending.duration, pending.error,
-        later.time - now, later.sign, later.duration, later.error, memory.point.wiper)
+        later.time - now, later.sign, later.duration, later.error, memory.point.wiper, memory.point.y[3],
+        memory.point.y[4], memory.point.step)
     return Side(held, Hour(period, (number - 1) * period, period - to_next, period),
                 Counted(number, chip.draws - number))

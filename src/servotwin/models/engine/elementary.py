@@ -186,3 +186,26 @@ def log1p_and_rest(x: float) -> tuple[float, float]:
     tail = _log_tail(e, f, lost * fma(f, f - 1.0, 1.0))
     y = _ln2_parts(e, f, tail)
     return y, (tail if small else x - y)
+
+
+def sin(x: float) -> float:
+    """Return sin x for |x| < 1e5, in float64 alone.
+
+    Examples
+    --------
+    >>> sin(0.0), round(sin(100.0), 12)
+    (0.0, -0.506365641110)
+    """
+    k = nearest(x * 0.6366197723675814)  # quarter turns
+    r = fma(-k, 2.0222662487959506e-21, fma(-k, 6.077100506303966e-11, fma(-k, 1.5707963267341256, x)))
+    r2 = r * r
+    sine = fma(r * r2, fma(r2, fma(r2, fma(r2, fma(r2, fma(r2, 1.58969099521155010221e-10, -2.50507602534068634195e-08),
+                                                   2.75573137070700676789e-06), -1.98412698298579493134e-04),
+                                   8.33333333332248946124e-03), -1.66666666666666324348e-01), r)
+    cosine = fma(r2 * r2, fma(r2, fma(r2, fma(r2, fma(r2, fma(r2, -1.13596475577881948265e-11,
+                                                              2.08757232129817482790e-09),
+                                                      -2.75573143513906633035e-07), 2.48015872894767294178e-05),
+                                      -1.38888888888741095749e-03), 4.16666666666666019037e-02), 1.0 - 0.5 * r2)
+    turn = k - 4.0 * nearest(0.25 * k)  # −2 … 2
+    part = cosine if abs(turn) == 1.0 else sine
+    return -part if turn == -1.0 or abs(turn) == 2.0 else part

@@ -18,8 +18,6 @@ from servotwin.models.terms.friction import creeping_speed
 from servotwin.physics.motor import back_emf
 from servotwin.physics.pieces import piece_rate, piece_value
 
-_BELOW = -1e-13  # a guard counts as crossed below this (V, rad, rad/s, N m): rounding is not an event
-
 
 def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int, Vector]:
     """Return the time since the anchor and the kind of the first event in (s0, s1], inf and −1 where none is.
@@ -59,7 +57,7 @@ def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, 
                               (guards.ZONE_UP, high - x, (u - high) / per_speed),
                               (guards.ZONE_DOWN, x - low, (u - low) / per_speed),
                               (guards.SHARE, share, turn), (guards.CREEPS, way * w - slow, way * slow)):
-        if not kinds >> kind & 1 or left >= _BELOW:  # monotone: what holds at the end has held
+        if not kinds >> kind & 1 or left >= guards.BELOW:  # monotone: what holds at the end has held
             continue
         s = first_order.time_to(rate, f, w0, there)
         s = s1 if s > s1 else s0 if s < s0 else s
@@ -86,10 +84,10 @@ def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b
         if not kinds >> kind & 1:
             continue
         end = _guard(motion, kind, b, at_b, rates_b)
-        if end[0] >= _BELOW and not end[1] > 0.0:
+        if end[0] >= guards.BELOW and not end[1] > 0.0:
             continue  # it does not fall below zero, nor rises from there
         begin = _guard(motion, kind, a, at_a, rates_a)
-        if end[0] >= _BELOW and not begin[1] < 0.0:
+        if end[0] >= guards.BELOW and not begin[1] < 0.0:
             continue  # nor dips
         motion = prepared(motion)
         s = _crossing(motion, kind, a, begin, b, end)
@@ -119,11 +117,11 @@ def _crossing(motion: Motion, kind: int, a: float, at_a: tuple[float, float], b:
 
     The motion is `prepared`; the guard ends below zero, or falls at a and rises at b.
     """
-    if at_b[0] >= _BELOW:
+    if at_b[0] >= guards.BELOW:
         # It may dip below zero and come back: look at the lowest point.
         b = _root(motion, kind, a, b, at_a[1], at_b[1], True)
         at_b = _at(motion, kind, b, False)
-        if at_b[0] >= _BELOW:
+        if at_b[0] >= guards.BELOW:
             return math.inf
     if at_a[0] <= 0.0:
         # It starts at zero, to rounding, and so may its rate: look whether it rises before it falls.

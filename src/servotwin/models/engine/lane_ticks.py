@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats, Indices
 
 
-def gather_lost(which: Indices, status: Any, start: Floats, tile_rows: Any, count: Indices, places: Indices,
+def gather_lost(which: Indices, status: Any, tile_rows: Any, count: Indices, places: Indices,
                 lanes: Indices, durations: Floats, records: Any) -> int:
     """Put together the lanes of tiles that were given up; return how many there are. They owe nothing any more."""
     n = 0
@@ -38,8 +38,7 @@ def gather_lost(which: Indices, status: Any, start: Floats, tile_rows: Any, coun
         if tile.clock.owed[j] > 0.0:
             if status[lane] == COMPLETED:
                 side = Side(held_at(tile.servo, j), hour_at(tile.clock, j), counted_at(tile.count, j))
-                put_memory(records[n], remembered(
-                    side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j], start[3, lane], start[4, lane]))
+                put_memory(records[n], remembered(side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j]))
                 places[n], lanes[n], durations[n] = k, lane, tile.clock.owed[j]
                 n += 1
             tile.clock.owed[j] = 0.0

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine import arc_rounds, band_rounds, braked_rounds, tiles
-from servotwin.models.engine.tiles import ARCS, BANDS, ONE_FORMULA
+from servotwin.models.engine import arc_rounds, band_rounds, braked_rounds, stride_rounds, tiles
+from servotwin.models.engine.tiles import ARCS, BANDS, ONE_FORMULA, STRIDES
 
 
 def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) -> None:
@@ -20,15 +20,21 @@ def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) 
         return
     if keep:
         _keep(plan.q1, plan.w1, plan.wiper1, size, tile)
+        if form == STRIDES:
+            _keep_warmth(plan.T_w1, plan.T_h1, size, tile)
         for j in range(size):
             plan.time[j] = plan.time1[j]
             plan.power[j] = plan.drive1[j]
         _drive(size, form, slack, tile, plan)
         _keep(plan.q2, plan.w2, plan.wiper2, size, tile)
+        if form == STRIDES:
+            _keep_warmth(plan.T_w2, plan.T_h2, size, tile)
         for j in range(size):
             plan.time[j] = plan.time2[j]
         _idle(size, form, slack, tile, plan)
         _keep(plan.q3, plan.w3, plan.wiper3, size, tile)
+        if form == STRIDES:
+            _keep_warmth(plan.T_w3, plan.T_h3, size, tile)
     else:
         _before(size, form, slack, tile, plan)
     for j in range(size):
@@ -37,6 +43,8 @@ def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) 
     _drive(size, form, slack, tile, plan)
     if keep:
         _keep(plan.q4, plan.w4, plan.wiper4, size, tile)
+        if form == STRIDES:
+            _keep_warmth(plan.T_w4, plan.T_h4, size, tile)
     for j in range(size):
         plan.time[j] = plan.time4[j]
     _idle(size, form, slack, tile, plan)
@@ -51,6 +59,8 @@ def _lane(keep: bool, form: int, slack: bool, tile: Any, plan: Any, j: int) -> N
         time = time if phase < 3 else plan.time4[j]
         if keep:
             _keep_one(phase, q, w, tile.servo.wiper[j], plan, j)
+            if form == STRIDES:
+                _keep_warmth_one(phase, tile.servo.T_w[j], tile.servo.T_h[j], plan, j)
         if time > 0.0 and (w != 0.0 or start != 0.0 or power != 0.0):
             plan.time[j] = time
             plan.power[j] = power
@@ -76,6 +86,17 @@ def _keep_one(phase: int, q: float, w: float, wiper: float, plan: Any, j: int) -
         plan.wiper4[j] = wiper
 
 
+def _keep_warmth_one(phase: int, T_w: float, T_h: float, plan: Any, j: int) -> None:
+    if phase == 0:
+        plan.T_w1[j], plan.T_h1[j] = T_w, T_h
+    elif phase == 1:
+        plan.T_w2[j], plan.T_h2[j] = T_w, T_h
+    elif phase == 2:
+        plan.T_w3[j], plan.T_h3[j] = T_w, T_h
+    else:
+        plan.T_w4[j], plan.T_h4[j] = T_w, T_h
+
+
 def _alone(form: int, slack: bool, tile: Any, plan: Any, j: int) -> None:
     """Move one lane through one phase."""
     if form == ONE_FORMULA:
@@ -84,6 +105,8 @@ def _alone(form: int, slack: bool, tile: Any, plan: Any, j: int) -> None:
         arc_rounds.alone(tile, plan, j)
     elif form == BANDS:
         band_rounds.alone(slack, tile, plan, j)
+    elif form == STRIDES:
+        stride_rounds.alone(slack, tile, plan, j)
 
 
 def _keep(angle: Any, speed: Any, wiper: Any, size: int, tile: Any) -> None:
@@ -91,6 +114,12 @@ def _keep(angle: Any, speed: Any, wiper: Any, size: int, tile: Any) -> None:
         angle[j] = tile.servo.q[j]
         speed[j] = tile.servo.w[j]
         wiper[j] = tile.servo.wiper[j]
+
+
+def _keep_warmth(winding: Any, housing: Any, size: int, tile: Any) -> None:
+    for j in range(size):
+        winding[j] = tile.servo.T_w[j]
+        housing[j] = tile.servo.T_h[j]
 
 
 def _before(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
@@ -111,6 +140,8 @@ def _before(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
             arc_rounds.drive_or_rest(size, tile, plan)
         elif form == BANDS:
             band_rounds.phase(size, slack, tile, plan)
+        elif form == STRIDES:
+            stride_rounds.phase(size, slack, tile, plan)
     if both > 0:
         both = 0
         for j in range(size):
@@ -137,6 +168,8 @@ def _drive(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
             arc_rounds.drive(size, tile, plan)
         elif form == BANDS:
             band_rounds.phase(size, slack, tile, plan)
+        elif form == STRIDES:
+            stride_rounds.phase(size, slack, tile, plan)
 
 
 def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
@@ -153,3 +186,5 @@ def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
             arc_rounds.rest(size, tile, plan)
         elif form == BANDS:
             band_rounds.phase(size, slack, tile, plan)
+        elif form == STRIDES:
+            stride_rounds.phase(size, slack, tile, plan)

@@ -27,10 +27,10 @@ def _fields_of(kind: Hashable) -> tuple[tuple[str, Any], ...]:
     return tuple(get_type_hints(kind).items())
 
 
-def tile_of(fields: dict[str, Any]) -> np.dtype[Any]:
-    """Return the type of a tile: a row of `TILE` numbers for each name, or a tile in it."""
-    return np.dtype((np.record, [(name, kind) if isinstance(kind, np.dtype) and kind.names else (name, kind, (TILE,))
-                                 for name, kind in fields.items()]))
+def tile_of(fields: dict[str, Any], lanes: int = TILE) -> np.dtype[Any]:
+    """Return the type of a tile: a row of numbers, one for each of its lanes, for each name, or a tile in it."""
+    return np.dtype((np.record, [(name, kind) if isinstance(kind, np.dtype) and (kind.names or kind.shape)
+                                 else (name, kind, (lanes,)) for name, kind in fields.items()]))
 
 
 def room(count: int, kind: np.dtype[Any]) -> NDArray[Any]:
@@ -40,22 +40,22 @@ def room(count: int, kind: np.dtype[Any]) -> NDArray[Any]:
     return bytes_[start:start + count * kind.itemsize].view(kind)
 
 
-def rows_of(kind: type[Any], number: Any) -> np.dtype[Any]:
+def rows_of(kind: type[Any], number: Any, lanes: int = TILE) -> np.dtype[Any]:
     """Return the type of a tile that holds named tuples of numbers, with those in it."""
     key: Any = kind
-    return _rows_of(key, np.dtype(number))
+    return _rows_of(key, np.dtype(number), lanes)
 
 
 @cache
-def _rows_of(kind: Any, number: Hashable) -> np.dtype[Any]:
-    return tile_of({name: _rows_of(hint, number) if hasattr(hint, "_fields") else number
-                    for name, hint in fields_of(kind)})
+def _rows_of(kind: Any, number: Hashable, lanes: int) -> np.dtype[Any]:
+    return tile_of({name: _rows_of(hint, number, lanes) if hasattr(hint, "_fields") else number
+                    for name, hint in fields_of(kind)}, lanes)
 
 
 def reader(name: str, kind: type[Kind]) -> Callable[[Any, int], Kind]:
     """Return the function `name(tile, j)` that reads a named tuple with those in it; a compiler gets it as text."""
     kinds: dict[str, type[Any]] = {}
-    return _made(name, f"def {name}(tile, j):\n    return {_row(kind, 'tile', kinds)}\n", kinds)
+    return made(name, f"def {name}(tile, j):\n    return {_row(kind, 'tile', kinds)}\n", kinds)
 
 
 def _row(kind: Any, place: str, kinds: dict[str, type[Any]]) -> str:
@@ -67,7 +67,7 @@ def _row(kind: Any, place: str, kinds: dict[str, type[Any]]) -> str:
 
 def writer(name: str, kind: type[Kind]) -> Callable[[Any, int, Kind], None]:
     """Return the function `name(tile, j, values)` that puts a named tuple into a tile."""
-    return _made(name, f"def {name}(tile, j, values):\n{''.join(_filling(kind, 'tile', 'values'))}", {})
+    return made(name, f"def {name}(tile, j, values):\n{''.join(_filling(kind, 'tile', 'values'))}", {})
 
 
 def _filling(kind: Any, to: str, of: str) -> Iterator[str]:
@@ -102,6 +102,15 @@ def tiles_with(kind: type[Any], values: Any, count: int) -> NDArray[Any]:
 
     put(tiles, values)
     return tiles
+
+
+def fill(tiles: NDArray[Any], values: Any) -> None:
+    """Give all lanes of tiles the numbers of a named tuple, with those in it."""
+    for name, x in zip(values._fields, values, strict=True):
+        if hasattr(x, "_fields"):
+            fill(tiles[name], x)
+        else:
+            tiles[name] = x
 
 
 def columns_of(kind: type[Kind], tiles: NDArray[Any], which: Any) -> Kind:
@@ -158,7 +167,7 @@ def _nothing(hint: Any) -> Any:
 def record_reader(name: str, kind: type[Kind]) -> Callable[[Any], Kind]:
     """Return the function `name(record)` that reads a named tuple with those in it; a compiler gets it as text."""
     kinds: dict[str, type[Any]] = {}
-    return _made(name, f"def {name}(record):\n    return {_reading(kind, 'record', kinds)}\n", kinds)
+    return made(name, f"def {name}(record):\n    return {_reading(kind, 'record', kinds)}\n", kinds)
 
 
 def _reading(kind: Any, place: str, kinds: dict[str, type[Any]]) -> str:
@@ -176,7 +185,7 @@ def _reading(kind: Any, place: str, kinds: dict[str, type[Any]]) -> str:
 
 def record_writer(name: str, kind: type[Kind]) -> Callable[[Any, Kind], None]:
     """Return the function `name(record, values)` that puts a named tuple into a record."""
-    return _made(name, f"def {name}(record, values):\n{''.join(_writing(kind, 'record', 'values'))}", {})
+    return made(name, f"def {name}(record, values):\n{''.join(_writing(kind, 'record', 'values'))}", {})
 
 
 def _writing(kind: Any, to: str, of: str) -> Iterator[str]:
@@ -189,7 +198,8 @@ def _writing(kind: Any, to: str, of: str) -> Iterator[str]:
             yield from (f"    {to}.{field}[{k}] = {of}.{field}[{k}]\n" for k in range(len(get_args(hint))))
 
 
-def _made(name: str, text: str, kinds: Mapping[str, type[Any]]) -> Callable[..., Any]:
+def made(name: str, text: str, kinds: Mapping[str, Any]) -> Callable[..., Any]:
+    """Return a function given as text, with what it names; a compiler gets it as such."""
     space: dict[str, Any] = dict(kinds)
     exec(text, space)
     function: Any = space[name]

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import arcs, bands, phases, tiles, windows
-from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine import arcs, bands, phases, stride_rounds, tiles, windows
 from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, STUCK
 from servotwin.models.engine.noise import gaussian
 
@@ -71,7 +70,7 @@ def _advance(which: Indices, form: int, slack: bool, duration: float, widths: Fl
     lost = 0
     while windows.begin(widths, size, False, tile, plan, before) > 0:
         _through(size, full, noisy, form, slack, False, tile, plan)
-        lost += windows.give_up(size, tile, plan, before)
+        lost += _give_up(size, form, tile, plan, before)
     return lost
 
 
@@ -90,7 +89,7 @@ def _go_on(pieces: Floats, listed: Floats, form: int, slack: bool, which: Indice
         _through(size, full, noisy, form, slack, wanted > 0, tile, plan)
         if wanted > 0:
             _write(which, form, slack, times, outputs, tile, plan, before)
-        lost += windows.give_up(size, tile, plan, before)
+        lost += _give_up(size, form, tile, plan, before)
     return lost
 
 
@@ -105,7 +104,16 @@ def _through(size: int, full: bool, noisy: bool, form: int, slack: bool, keep: b
     if full:
         windows.measure(size, form, tile, plan)
     windows.divide(size, full, slack, tile, plan)
+    if form == tiles.STRIDES:
+        stride_rounds.keep(size, tile, plan)
     phases.phases(size, keep, form, slack, tile, plan)
+
+
+def _give_up(size: int, form: int, tile: Any, plan: Any, before: Any) -> int:
+    """Put lanes that cannot go on side by side back to where the window began; return how many there are."""
+    if form == tiles.STRIDES:
+        stride_rounds.put_back(size, tile, plan)
+    return windows.give_up(size, tile, plan, before)
 
 
 def _needs_all(size: int, tile: Any) -> tuple[bool, bool]:
@@ -121,6 +129,10 @@ def _needs_all(size: int, tile: Any) -> tuple[bool, bool]:
 def _hang(which: Indices, form: int, torques: Floats, tile: Any) -> None:
     """Hang constant external torques [N m] on the shafts of a tile."""
     numbers = tile.arc
+    if form == tiles.STRIDES:
+        for j in range(which.size):
+            tile.hung.torque[j] = torques[which[j]]
+        return
     if form == tiles.BANDS:
         for j in range(which.size):
             tiles.hang(tiles.numbers_at(tile.own, j), torques[which[j]], tile, j)
@@ -164,16 +176,20 @@ def _write(which: Indices, form: int, slack: bool, times: Floats, outputs: Outpu
 def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> None:
     x, end = plan.time[j], plan.window[j]  # what happens at the very end is not yet so
     drive, error, q, w, begin = plan.drive1[j], plan.error_before[j], plan.q1[j], plan.w1[j], 0.0
-    wiper = plan.wiper1[j]
+    wiper, phase = plan.wiper1[j], 0
     if plan.decides[j] > 0.0 and plan.end2[j] <= x and plan.end2[j] < end:
         drive, error, q, w, begin = plan.drive3[j], tile.servo.error[j], plan.q3[j], plan.w3[j], plan.end2[j]
-        wiper = plan.wiper3[j]
+        wiper, phase = plan.wiper3[j], 2
         if plan.end3[j] <= x and plan.end3[j] < end:
-            drive, q, w, begin, wiper = 0.0, plan.q4[j], plan.w4[j], plan.end3[j], plan.wiper4[j]
+            drive, q, w, begin, wiper, phase = 0.0, plan.q4[j], plan.w4[j], plan.end3[j], plan.wiper4[j], 3
     elif plan.end1[j] <= x and plan.end1[j] < end:
-        drive, q, w, begin, wiper = 0.0, plan.q2[j], plan.w2[j], plan.end1[j], plan.wiper2[j]
+        drive, q, w, begin, wiper, phase = 0.0, plan.q2[j], plan.w2[j], plan.end1[j], plan.wiper2[j], 1
     numbers = tiles.arc_numbers_at(tile.arc, j)
-    if form == tiles.BANDS:
+    start, T_w, T_h = arcs.start_of(numbers, drive), tile.servo.T_w[j], tile.servo.T_h[j]
+    if form == tiles.STRIDES:
+        state, start, wiper = stride_rounds.seen(slack, phase, drive, x - begin, q, w, wiper, tile, plan, j)
+        q, w, T_w, T_h, turned = state.q, state.w, state.T_w, state.T_h, state.q
+    elif form == tiles.BANDS:
         begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
         q, w, turned, _ = bands.slide(
             tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x - begin,
@@ -187,18 +203,22 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
     if outputs.speed.size > 0:
         outputs.speed[lane, o] = w
     if outputs.contact.size > 0:
-        outputs.contact[lane, o] = contact_of(tile.hung.dry[j] > 0.0, numbers, drive, w)
+        outputs.contact[lane, o] = contact_of(tile.hung.dry[j] > 0.0, start, w)
     if outputs.drive.size > 0:
         outputs.drive[lane, o] = 1 if drive > 0.0 else (-1 if drive < 0.0 else 0)
     if outputs.error.size > 0:
         outputs.error[lane, o] = error
+    if outputs.winding.size > 0:
+        outputs.winding[lane, o] = T_w
+    if outputs.housing.size > 0:
+        outputs.housing[lane, o] = T_h
 
 
-def contact_of(dry: bool, numbers: ArcNumbers, drive: float, w: float) -> int:
-    """Return the contact of a shaft that has this speed [rad/s] under this drive."""
+def contact_of(dry: bool, start: float, w: float) -> int:
+    """Return the contact of a shaft that has this speed [rad/s], and starts that way from rest: −1, 0, +1."""
     if not dry:
         return FREE
-    way = w if w != 0.0 else arcs.start_of(numbers, drive)
+    way = w if w != 0.0 else start
     if way == 0.0:
         return STUCK
     return FORWARD if way > 0.0 else BACKWARD

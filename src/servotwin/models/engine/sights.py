@@ -44,7 +44,8 @@ def side_by_side(lanes: Lanes, curve: Floats, which: Indices, tiles: Any, seen: 
         numbers, tau = numbers_of(lanes, lane), lanes.torque[lane]
         q, w, drive, error = 1.0 * servo.q[j], 1.0 * servo.w[j], 1.0 * servo.drive[j], 1.0 * servo.error[j]  # float64
         wiper = 1.0 * servo.wiper[j] if slack(numbers.sensor) else q
-        y = (q, w, 0.0, lanes.start[3, lane], lanes.start[4, lane], q, w)
+        y = (q, w, 0.0, 1.0 * servo.T_w[j], 1.0 * servo.T_h[j], q, w)
+        numbers = warm(numbers, y)
         u = drive * numbers.source.V
         mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, q, w, 0.0), u, tau, y, RIGID, False)
         put(seen, lane, observed(numbers, curve, mode, u, tau, y, wiper, drive, error))

@@ -13,10 +13,13 @@ import numpy as np
 
 from servotwin.models.engine import arcs, bands, contacts
 from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.memory import FIRST_STEP
 from servotwin.models.engine.motion import FINE
-from servotwin.models.engine.records import TILE, reader, rows_of, tile_of, writer
+from servotwin.models.engine.records import TILE, fill, reader, room, rows_of, tile_of, writer
+from servotwin.models.engine.slots import slots_type
+from servotwin.models.engine.strides import SMOOTH, STEEP
 from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.physics.backlash import play
 
 if TYPE_CHECKING:
@@ -27,7 +30,8 @@ if TYPE_CHECKING:
     Smalls = NDArray[np.int8]
 
 FEW = 2  # lanes that are not worth going together
-ONE_FORMULA, ARCS, BANDS = range(3)  # how lanes go through a phase: `braked_rounds`, `arc_rounds`, `band_rounds`
+# How lanes go through a phase: as `braked_rounds`, `arc_rounds`, `band_rounds` and `stride_rounds` have it
+ONE_FORMULA, ARCS, BANDS, STRIDES = range(4)
 
 
 class Meter(NamedTuple):
@@ -66,6 +70,9 @@ class Servo(NamedTuple):
     later_duration: float
     later_decided: float
     wiper: float  # angle of the potentiometer, where that has play
+    T_w: float  # temperatures of winding and housing [K]
+    T_h: float
+    step: float  # length that an integrator would try next [s]
 
 
 class Clock(NamedTuple):
@@ -157,6 +164,22 @@ class Plan(NamedTuple):
     decided_before: float
 
 
+class Warmth(NamedTuple):
+    """What a window needs besides, where servos are integrated: temperatures at the start of each phase, and before."""
+
+    T_w1: float
+    T_h1: float
+    T_w2: float
+    T_h2: float
+    T_w3: float
+    T_h3: float
+    T_w4: float
+    T_h4: float
+    T_w_before: float
+    T_h_before: float
+    step_before: float
+
+
 class Hung(NamedTuple):
     """What hangs on the shafts of lanes that read their own numbers."""
 
@@ -177,7 +200,7 @@ class Times(NamedTuple):
 @cache
 def tile_type(real: str, form: int) -> np.dtype[Any]:
     """Return the type of a tile whose servos have numbers of this type and go through phases in this form."""
-    own = {"own": rows_of(Numbers, real)} if form == BANDS else {}
+    own = {"own": rows_of(Numbers, real)} if form in (BANDS, STRIDES) else {}
     return tile_of({
         **own, "hung": rows_of(Hung, real), "arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real),
         "meter": rows_of(Meter, real), "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
@@ -185,9 +208,22 @@ def tile_type(real: str, form: int) -> np.dtype[Any]:
 
 
 @cache
-def plan_type(real: str) -> np.dtype[Any]:
-    """Return the type of the room that a window is worked out in."""
-    return tile_of({"of": rows_of(Plan, real), "clock": rows_of(Times, np.float64)})
+def plan_type(real: str, form: int) -> np.dtype[Any]:
+    """Return the type of the room that a window is worked out in, by lanes that go through phases in this form."""
+    names: tuple[str, ...] = Plan._fields
+    more: dict[str, Any] = {}
+    if form == STRIDES:
+        names, more = (*names, *Warmth._fields), {"slots": slots_type()}
+    return tile_of({"of": tile_of({**dict.fromkeys(names, real), **more}), "clock": rows_of(Times, np.float64)})
+
+
+def plan_room(real: str, form: int) -> NDArray[Any]:
+    """Return room to work windows out in; what is in empty slots may be computed with."""
+    rows = room(1, plan_type(real, form))
+    if form == STRIDES:
+        rows.view(np.uint8)[...] = 0
+        fill(rows["of"]["slots"]["own"], NEUTRAL)
+    return rows
 
 
 chip_at = reader("chip_at", Chip)
@@ -229,6 +265,8 @@ class Outputs(NamedTuple):
     drive: Smalls
     error: Floats
     wiper: Floats
+    winding: Floats
+    housing: Floats
 
 
 def numbers_of(lanes: Lanes, lane: int) -> Numbers:
@@ -258,12 +296,18 @@ def set_numbers(lanes: Lanes, form: int, first: int, size: int, tile: Any, place
     for j in range(size):
         numbers = numbers_of(lanes, first + j)
         tile.hung.half_slack[place + j] = numbers.sensor.half_slack
-        tile.hung.tolerance[place + j] = FINE * lanes.accuracy
+        part = FINE if form != STRIDES else STEEP if numbers.friction.varies > 0.0 else SMOOTH
+        tile.hung.tolerance[place + j] = part * lanes.accuracy
         tile.hung.dry[place + j] = 1.0 if contacts.has_friction(numbers) else 0.0
     if form == BANDS:
         for j in range(size):
             put_numbers(tile.own, place + j, numbers_of(lanes, first + j))
             hang(numbers_of(lanes, first + j), lanes.torque[first + j], tile, place + j)
+    if form == STRIDES:
+        for j in range(size):
+            put_numbers(tile.own, place + j, numbers_of(lanes, first + j))
+            tile.hung.torque[place + j] = lanes.torque[first + j]
+            tile.arc.start_off[place + j] = 1.0  # whether it starts depends on where it stands
 
 
 def hang(numbers: Numbers, torque: float, tile: Any, j: int) -> None:
@@ -291,7 +335,7 @@ def start(lanes: Lanes, form: int, first: int, size: int, first_output: float, t
     for j in range(size):
         q, w = lanes.start[0, first + j], lanes.start[1, first + j]
         put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, -math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
-                                       0.0, q))
+                                       0.0, q, lanes.start[3, first + j], lanes.start[4, first + j], FIRST_STEP))
     for j in range(size):
         own = lanes.edge_count[first + j]
         late = lanes.edges[lanes.edge_first[first + j]] if own > 0 else math.inf if own == 0 else 0.0

@@ -3,8 +3,8 @@
 Starting from the entries, every function that is called is collected from its own module under the name
 `package_module__function`; constants come along by value, classes are imported from where they are. A kernel is changed
 in these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out; in the float32
-form every float literal gets that type; in the vector form `math.exp`, `math.log` and `math.log1p` become the
-polynomials of `engine.elementary`, and the sums of functions that a module names `IN_ANY_ORDER` are taken so.
+form every float literal gets that type; in the vector form exponentials, logarithms and sines become the polynomials of
+`engine.elementary`, and the sums of functions that a module names `IN_ANY_ORDER` are taken so.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from servotwin.physics.pieces import Piece
 _ELEMENTARY = "servotwin.models.engine.elementary"
 _INTRINSICS = "servotwin.simulation.compile.intrinsics"
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instructions in the vector form
-_POLYNOMIALS = ("exp", "log", "log1p")
+_POLYNOMIALS = ("exp", "log", "log1p", "sin")
 _DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
 _PACKAGE = "servotwin."
 _MODELS = "servotwin.models."
@@ -205,10 +205,8 @@ class _Rewriting(ast.NodeTransformer):
         named = list(zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True))
         for argument, default in sorted(named, key=lambda pair: pair[1] is not None):
             arguments.args.append(argument)
-            if default is not None:
-                arguments.defaults.append(default)
-            elif arguments.defaults:
-                raise TypeError(f"{self._module}: {argument.arg} has no default, and stands behind some that have one")
+            if default is not None or arguments.defaults:  # None: it has to be given all the same
+                arguments.defaults.append(default or ast.Constant(None))
         arguments.kwonlyargs, arguments.kw_defaults = [], []
 
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:

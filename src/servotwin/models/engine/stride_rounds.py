@@ -1,0 +1,197 @@
+"""How lanes that have to be integrated go through a phase: stride by stride, so many together as there are slots.
+
+A lane that is through makes room for the next one. What a lane does depends on itself alone: it takes the same strides
+whoever its neighbours are.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from servotwin.models.engine import guards, strides, tiles
+from servotwin.models.engine.slots import (
+    NOBODY,
+    SLOTS,
+    before_in,
+    mode_in,
+    numbers_in,
+    put_before_in,
+    put_numbers_in,
+    step,
+)
+from servotwin.models.engine.strides import State
+from servotwin.models.terms import heat
+from servotwin.models.terms.friction import fades
+from servotwin.models.terms.numbers import Numbers
+
+_SHORTEST = 1e-15  # s: time that is none any more
+
+
+def phase(size: int, slack: bool, tile: Any, plan: Any) -> None:
+    """Move all lanes through a time with or without drive; `slack` where potentiometers have play."""
+    for j in range(size):
+        _look(tiles.numbers_at(tile.own, j), tile, plan, j)
+    for j in range(size):
+        _cool(tiles.numbers_at(tile.own, j), tile, plan, j)
+    waiting = 0
+    for j in range(size):
+        tile.count.which[waiting] = j
+        waiting += 1 if plan.time[j] > 0.0 else 0
+    if waiting > 0:
+        _run(waiting, slack, tile, plan)
+
+
+def alone(slack: bool, tile: Any, plan: Any, j: int) -> None:
+    """Move one lane through a time with or without drive."""
+    numbers = tiles.numbers_at(tile.own, j)
+    _look(numbers, tile, plan, j)
+    _cool(numbers, tile, plan, j)
+    if plan.time[j] > 0.0:
+        tile.count.which[0] = j
+        _run(1, slack, tile, plan)
+
+
+def keep(size: int, tile: Any, plan: Any) -> None:
+    """Keep the temperatures of before a window."""
+    for j in range(size):
+        plan.T_w_before[j] = tile.servo.T_w[j]
+        plan.T_h_before[j] = tile.servo.T_h[j]
+        plan.step_before[j] = tile.servo.step[j]
+
+
+def put_back(size: int, tile: Any, plan: Any) -> None:
+    """Put lanes that were given up back to these temperatures."""
+    for j in range(size):
+        if plan.lost[j] > 0.0:
+            tile.servo.T_w[j] = plan.T_w_before[j]
+            tile.servo.T_h[j] = plan.T_h_before[j]
+            tile.servo.step[j] = plan.step_before[j]
+
+
+def seen(slack: bool, phase: int, power: float, time: float, q: float, w: float, wiper: float, tile: Any, plan: Any,
+         j: int) -> tuple[State, float, float]:
+    """Return the state within a phase that a lane has gone through, which way it starts there, and its wiper."""
+    servo = tile.servo
+    after = servo.q[j], servo.w[j], servo.wiper[j], servo.T_w[j], servo.T_h[j], servo.step[j]
+    servo.q[j], servo.w[j], servo.wiper[j] = q, w, wiper
+    servo.T_w[j] = plan.T_w1[j] if phase == 0 else plan.T_w2[j] if phase == 1 else plan.T_w3[j] if phase == 2 else (
+        plan.T_w4[j])
+    servo.T_h[j] = plan.T_h1[j] if phase == 0 else plan.T_h2[j] if phase == 1 else plan.T_h3[j] if phase == 2 else (
+        plan.T_h4[j])
+    plan.time[j], plan.power[j] = time, power
+    if time > 0.0:
+        alone(slack, tile, plan, j)
+    state, wiper, numbers = _state(tile, j), servo.wiper[j], tiles.numbers_at(tile.own, j)
+    start = strides.way_from_rest(numbers, power * numbers.source.V, tile.hung.torque[j], state)
+    servo.q[j], servo.w[j], servo.wiper[j], servo.T_w[j], servo.T_h[j], servo.step[j] = after
+    return state, start, wiper
+
+
+def _look(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
+    """Find which way a lane starts from rest: one that stands still, and is not heated, has nothing but to cool."""
+    u, w = plan.power[j] * numbers.source.V, tile.servo.w[j]
+    start = strides.way_from_rest(numbers, u, tile.hung.torque[j], _state(tile, j))
+    plan.creeps[j] = 1.0 if w == 0.0 and start == 0.0 and (u == 0.0 or not heat.present(numbers.heat)) else 0.0
+
+
+def _cool(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
+    """Let a lane that rests go through its time."""
+    rests, time, T_w, T_h = plan.creeps[j] > 0.0, plan.time[j], tile.servo.T_w[j], tile.servo.T_h[j]
+    cool_w, cool_h = strides.cooled(numbers, T_w, T_h, max(time, 0.0))
+    tile.servo.T_w[j] = cool_w if rests else T_w
+    tile.servo.T_h[j] = cool_h if rests else T_h
+    plan.time[j] = 0.0 if rests else time
+
+
+def _run(waiting: int, slack: bool, tile: Any, plan: Any) -> None:
+    """Let the lanes of a list pass through the slots."""
+    slots = plan.slots
+    following = busy = 0
+    for k in range(SLOTS):
+        if following < waiting:
+            _enter(tile, plan, slots, k, tile.count.which[following])
+            following += 1
+            busy += 1
+        else:
+            _idle(slots, k)
+    while busy > 0:
+        step(slots)
+        for k in range(SLOTS):
+            if slots.busy.lane[k] != NOBODY and not _goes_on(slack, tile, plan, slots, k):
+                if following < waiting:
+                    _enter(tile, plan, slots, k, tile.count.which[following])
+                    following += 1
+                else:
+                    slots.busy.lane[k] = NOBODY
+                    busy -= 1
+
+
+def _enter(tile: Any, plan: Any, slots: Any, k: int, j: int) -> None:
+    """Put a lane into a slot."""
+    numbers, state, stride = tiles.numbers_at(tile.own, j), _state(tile, j), slots.stride
+    put_numbers_in(slots.own, k, numbers)
+    put_before_in(slots.before, k, state)
+    stride.u[k], stride.tau[k] = plan.power[j] * numbers.source.V, tile.hung.torque[j]
+    stride.left[k], stride.length[k], stride.tolerance[k] = plan.time[j], tile.servo.step[j], tile.hung.tolerance[j]
+    stride.reach[k], stride.origin[k], stride.rise[k] = 0.0, 0.0, 0.0
+    stride.span[k], stride.curved[k] = strides.first_span(numbers), 1.0 if fades(numbers.friction) else 0.0
+    mode = strides.entered(numbers, stride.u[k], stride.tau[k], state)
+    slots.busy.lane[k], slots.busy.tries[k], slots.busy.idle[k] = j, 0, 0
+    _put_mode(slots.busy, k, mode)
+
+
+def _idle(slots: Any, k: int) -> None:
+    """Leave a slot empty: what was in it last goes on without effect."""
+    slots.busy.lane[k], slots.busy.tries[k] = NOBODY, 1
+    slots.stride.reach[k] = slots.stride.rise[k] = 0.0
+
+
+def _put_mode(busy: Any, k: int, mode: Any) -> None:
+    busy.zone[k], busy.contact[k], busy.share[k] = mode.zone, mode.contact, mode.share
+
+
+def _goes_on(slack: bool, tile: Any, plan: Any, slots: Any, k: int) -> bool:
+    """Judge the stride of the lane in a slot; tell whether it has further to go."""
+    stride, busy, after, j = slots.stride, slots.busy, slots.after, slots.busy.lane[k]
+    numbers, mode, u, tau = numbers_in(slots.own, k), mode_in(busy, k), stride.u[k], stride.tau[k]
+    to, time = State(after.q[k], after.w[k], after.T_w[k], after.T_h[k]), after.t[k]
+    aim = strides.Aim(stride.reach[k], stride.origin[k], stride.rise[k])
+    met = strides.first_met(numbers, mode, u, tau, before_in(slots.before, k), to, busy.tries[k] > 0)
+    found = strides.judged(numbers.stops, to, aim, time, stride.left[k], stride.length[k], stride.span[k],
+                           stride.error[k], stride.factor[k], met)
+    busy.tries[k] = busy.tries[k] + 1 if found.known else 0
+    if not found.good or max(busy.tries[k], busy.idle[k]) > strides.MOST_TRIES:
+        plan.lost[j] = 1.0
+        return False
+    stride.length[k], stride.span[k] = found.length, found.span
+    stride.reach[k], stride.origin[k], stride.rise[k] = found.aim.reach, found.aim.origin, found.aim.rise
+    if not found.taken:
+        return True
+    left = max(stride.left[k] - time, 0.0)
+    left = left if left > _SHORTEST else 0.0
+    busy.idle[k] = busy.idle[k] + 1 if left == stride.left[k] else 0
+    stride.left[k] = left
+    if found.crossed >= 0:
+        if slack:
+            tiles.drag(tile, to.q, j)
+        mode, y = guards.cross(numbers, mode, found.crossed, u, tau, strides.vector_of(to))
+        to = State(y[0], y[1], y[3], y[4])
+        _put_mode(busy, k, mode)
+    put_before_in(slots.before, k, to)
+    if left > 0.0 and not strides.stays(numbers, mode, u):
+        return True
+    _leave(numbers, to, left, stride.length[k], tile, j)
+    if slack:
+        tiles.drag(tile, to.q, j)
+    return False
+
+
+def _leave(numbers: Numbers, state: State, left: float, length: float, tile: Any, j: int) -> None:
+    """Put a lane back into its tile; what is left of its time it stands still."""
+    T_w, T_h = strides.cooled(numbers, state.T_w, state.T_h, left)
+    tile.servo.q[j], tile.servo.w[j], tile.servo.T_w[j], tile.servo.T_h[j] = state.q, state.w, T_w, T_h
+    tile.servo.step[j] = length
+
+
+def _state(tile: Any, j: int) -> State:
+    return State(tile.servo.q[j], tile.servo.w[j], tile.servo.T_w[j], tile.servo.T_h[j])
