@@ -23,7 +23,7 @@ from servotwin.models.terms.stops import Stops
 from servotwin.physics.thermal import two_mass_temperatures
 
 # Error of a stride, parts of the accuracy asked for: where friction does not vary, and where it bends and fades
-SMOOTH, STEEP = 0.1, 1e-3
+SMOOTH, STEEP = 0.1, 1e-4
 MOST_TRIES = 60  # of a stride; one that needs more is for the general engine
 SPEED_TURNS = 0.25  # relative: a stride goes by the speed where the acceleration changes by less until rest
 BEFORE = 0.98  # of the time to a standstill that is only guessed
@@ -97,10 +97,10 @@ def cooled(numbers: Numbers, T_w: float, T_h: float, time: float) -> tuple[float
     if not heat.present(numbers.heat):
         return T_w, T_h
     own = numbers.heat
-    winding, housing = two_mass_temperatures(
+    T_w, T_h = two_mass_temperatures(
         time, 0.0, T_w, T_h, winding_capacity=own.C_w, housing_capacity=own.C_h, winding_to_housing=1.0 / own.G_wh,
         housing_to_ambient=1.0 / own.G_ha, ambient=own.T_amb)
-    return winding, housing
+    return float(T_w), float(T_h)
 
 
 def acceleration(numbers: Numbers, mode: Mode, u: float, tau: float, state: State, w: float) -> float:
