@@ -37,6 +37,8 @@ def records_of(tiles: NDArray[Any], places: Indices, temperatures: Floats) -> ND
         side = Side(*(columns_of(kind, tiles[group], places) for group, kind in _GROUPS.items()))
         regular, half_slack = flat(tiles, "count", "edges")[places] < 0, flat(tiles, "hung", "half_slack")[places]
         _put_in(records, _remembered(mapped(_doubled, side), regular, half_slack, *temperatures))
+        if _have_currents(tiles):
+            records["point"]["y"][:, 2] = flat(tiles, "coil", "i")[places]
     return records
 
 
@@ -46,6 +48,13 @@ def put_records(tiles: NDArray[Any], places: Indices, records: NDArray[Any], per
         side = _side_of(_read_from(Memory, records), period)
         for group, values in zip(_GROUPS, side, strict=True):
             put_columns(tiles[group], places, values)
+        if _have_currents(tiles):
+            put(tiles, "coil", "i", places, records["point"]["y"][:, 2])
+
+
+def _have_currents(tiles: NDArray[Any]) -> bool:
+    """Tell whether the currents of the lanes in tiles have inertia."""
+    return "coil" in (tiles.dtype.names or ())
 
 
 def _doubled(column: NDArray[Any]) -> NDArray[Any]:

@@ -23,32 +23,38 @@ _straight = array_form(straight, __name__)
 Mask = NDArray[np.bool_]
 
 _SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
-_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32", never=("BANDS",))
-            for dtype in ("float64", "float32")}
+_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32",
+                          never=("BANDS", "COILS")) for dtype in ("float64", "float32")}
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
 ALL_RUNS = Recipe("runs", _ENTRIES)  # everything
-_GENERAL = ("friction.kappa", "play", "heat", "motor.L")  # what only lanes one by one have
+_GENERAL = ("friction.kappa", "play", "heat")  # what only lanes one by one have
 _BANDED = ("friction.varies", "source.I_max")
-_RARE = (*_BANDED, *_GENERAL, "sensor.half_slack")
+_COIL = "motor.L"
+_RARE = (*_BANDED, *_GENERAL, _COIL, "sensor.half_slack")
 _PENDULUM = "load.gravity"
 _NOT_IN_BANDS = (*_GENERAL, _PENDULUM, "load.stiffness", "follower", "sweep")
 _BY_BANDS = {creeps: Recipe("by_bands" + "_and_creep" * creeps, _SIDE, vector=True, absent=(
-    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), never=("ONE_FORMULA", "ARCS", "CORE"))
-    for creeps in (False, True)}
+    (*_NOT_IN_BANDS, _COIL) if creeps else (*_NOT_IN_BANDS, _COIL, "friction.w_s")),
+    never=("ONE_FORMULA", "ARCS", "COILS", "CORE")) for creeps in (False, True)}
+_BY_COILS = Recipe("by_coils", _SIDE, vector=True, absent=(*_NOT_IN_BANDS, *_BANDED), never=(
+    "ONE_FORMULA", "ARCS", "BANDS", "CORE", "LINEAR", "LINEAR_BACKWARD", "LIMITED_FORWARD", "LIMITED_BACKWARD",
+    "SHORT_FORWARD", "SHORT_BACKWARD"))
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep"),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
 PENDULUM_RUNS = Recipe(
     "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep"),
     never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
-LOOK_SIDE_BY_SIDE = Recipe(
-    "look_side_by_side", ("servotwin.models.engine.sights:side_by_side",),
-    absent=(*_GENERAL, _PENDULUM, "load.stiffness"))
+_LOOK = ("servotwin.models.engine.sights:side_by_side",)
+_LOOK_WITHOUT_CURRENT = Recipe(
+    "look_side_by_side", _LOOK, absent=(*_GENERAL, _COIL, _PENDULUM, "load.stiffness"), never=("COILS",))
+_LOOK_WITH_CURRENT = Recipe("look_with_current", _LOOK, absent=(*_GENERAL, *_BANDED, _PENDULUM, "load.stiffness"))
 LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",))
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
 _SHARED = ("pieces", "edges", "accuracy")  # by all lanes
 _TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
+_OWN = (tiles.BANDS, tiles.COILS)  # forms whose lanes read all of their own numbers, in float64
 _SMALLEST = 2.0**-150  # what is not more is zero in float32
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
 
@@ -142,12 +148,19 @@ class SideBySide(NamedTuple):
     @property
     def recipe(self) -> Recipe:
         """Their kernels."""
+        if self.form == tiles.COILS:
+            return _BY_COILS
         return _BY_BANDS[self.creeps] if self.form == tiles.BANDS else _BY_ARCS[self.dtype]
 
     @property
     def general(self) -> Recipe:
         """The kernels of those that cannot go on side by side."""
-        return ALL_RUNS if self.form == tiles.BANDS or self.slack else PLAIN_RUNS
+        return ALL_RUNS if self.form in _OWN or self.slack else PLAIN_RUNS
+
+
+def look_of(form: int) -> Recipe:
+    """Return the kernel that looks at lanes which run side by side in a form."""
+    return _LOOK_WITH_CURRENT if form == tiles.COILS else _LOOK_WITHOUT_CURRENT
 
 
 class OneByOne(NamedTuple):
@@ -168,28 +181,30 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     general, swinging = swept.any() and swept, _differs(numbers, _PENDULUM)
     for name in _GENERAL:
         general = _either(general, _differs(numbers, name))
-    slack, banded = _differs(numbers, "sensor.half_slack"), False
+    coiled, slack, banded = _differs(numbers, _COIL), _differs(numbers, "sensor.half_slack"), False
     for name in _BANDED:
         banded = _either(banded, _differs(numbers, name))
     side: Any = False
     if pulsed and not curved:
         side = (np.logical_not(_either(_either(general, swinging), recorded.any() and recorded))
                 & (numbers.load.stiffness == 0.0) & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
-                & (bridge.silence.coast == bridge.off.coast) & ((own.varies == 0.0) | _straight(own)))
+                & (bridge.silence.coast == bridge.off.coast) & ((own.varies == 0.0) | _straight(own))
+                & np.logical_not(coiled & banded))
     if dtype == "float32":  # what is not zero has to stay so
         for x in (*numbers_in(numbers), *numbers_in(chip)):
             fits = (x == 0.0) | (abs(x) > _SMALLEST)
             side = side if fits is True else side & fits
     braked = (bridge.off.D == 0.0) & (bridge.D_drive < numbers.source.V)
     banded = _either(banded, slack & np.logical_not(braked))
-    rare = _either(general, _either(banded, slack))
+    rare = _either(general, _either(_either(banded, slack), coiled))
+    single = np.logical_not(_either(banded, coiled))
     found: list[SideBySide | OneByOne] = []
-    for form, some in ((tiles.ONE_FORMULA, braked & np.logical_not(banded)),
-                       (tiles.ARCS, np.logical_not(braked) & np.logical_not(banded)), (tiles.BANDS, banded)):
+    for form, some in ((tiles.ONE_FORMULA, braked & single), (tiles.ARCS, np.logical_not(braked) & single),
+                       (tiles.BANDS, np.logical_and(banded, np.logical_not(coiled))), (tiles.COILS, coiled)):
         which = _where(side, some, lanes)
         lagging = bool(np.any(np.broadcast_to(slack, lanes)[which])) if np.any(slack) else False
         creeping = form == tiles.BANDS and bool(np.any(np.broadcast_to(own.varies * own.w_s > 0.0, lanes)[which]))
-        found.append(SideBySide(which, form, lagging, dtype if form != tiles.BANDS else "float64", creeping))
+        found.append(SideBySide(which, form, lagging, "float64" if form in _OWN else dtype, creeping))
     found += [OneByOne(_where(some, np.logical_not(side), lanes), recipe) for recipe, some in (
         (PLAIN_RUNS, np.logical_not(_either(rare, swinging))), (PENDULUM_RUNS, swinging & np.logical_not(rare)),
         (ALL_RUNS, rare))]

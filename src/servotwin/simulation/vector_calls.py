@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.observe import Observed
+from servotwin.models.engine.tiles import COILS
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
@@ -26,8 +27,8 @@ Programs = dict[str, list[list[Call]]]
 TICKS = Recipe("ticks", (
     *(f"servotwin.models.engine.ticks:{name}" for name in ("accept", "change", "follow")),
     *(f"servotwin.models.engine.lane_ticks:{name}" for name in (
-        "gather_lost", "put_lost", "gather", "put", "note_failures", "forget_motions", "impose_on_tiles",
-        "impose_on_records", "show_tiles", "show_records", "read_clocks"))))
+        "gather_lost", "put_lost", "gather_currents", "put_currents", "gather", "put", "note_failures",
+        "forget_motions", "impose_on_tiles", "impose_on_records", "show_tiles", "show_records", "read_clocks"))))
 _NONE = np.zeros(0)
 
 
@@ -83,16 +84,21 @@ def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[
     advance = call_of(kernels, "advance", which, *some.form, 0, len(rows), Now(store.now, 0), command, store.total,
                       Now(store.now, 1, True), rows, some.plans[0], returns=True)
     alone = _Alone(len(which))
+    there, back = [], []
+    if some.form[0] == COILS:
+        lost_places, lost_records = alone.some("places", "records")
+        there = [call_of(TICKS, "gather_currents", lost_places, rows, lost_records)]
+        back = [call_of(TICKS, "put_currents", lost_places, lost_records, rows)]
     lost = [call_of(TICKS, "gather_lost", which, store.status, store.columns.start, rows, *alone.room, returns=True),
-            *alone.go_on(some.general, store),
+            *there, *alone.go_on(some.general, store), *back,
             call_of(TICKS, "put_lost", *alone.some("places", "lanes", "records"), store.numbers.frame_period, rows)]
     return {
         "refit": [call_of(kernels, "refit", store.columns, some.form[0], which, places, rows)],
         "impose": [call_of(TICKS, "impose_on_tiles", room.has, room.given, store.columns.numbers, which, places,
                            store.work, rows)],
         "advance": [advance, *lost], "show": [call_of(TICKS, "show_tiles", which, rows, room.shaft)],
-        "look": [call_of(lane_runs.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns, store.inputs[0], which, rows,
-                         room.seen)]}
+        "look": [call_of(lane_runs.look_of(some.form[0]), "side_by_side", store.columns, store.inputs[0], some.form[0],
+                         which, rows, room.seen)]}
 
 
 def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dict[str, list[Call]]:

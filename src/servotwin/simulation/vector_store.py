@@ -314,7 +314,8 @@ class _Tiles:
         return np.asarray(edge + since)
 
     def look(self, columns: tiles.Lanes, inputs: Any, status: Any, seen: Array) -> None:
-        kernels(lane_runs.LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
+        kernels(lane_runs.look_of(self.form[0])).side_by_side(
+            columns, inputs[0], self.form[0], self.which, self.rows, seen)
 
     def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
         """Return what compiled code calls at each stage of a tick."""

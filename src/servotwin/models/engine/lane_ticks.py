@@ -57,6 +57,18 @@ def put_lost(places: Indices, lanes: Indices, records: Any, periods: Floats, til
         put_counted(tile.count, j, side.counted)
 
 
+def gather_currents(places: Indices, tile_rows: Any, records: Any) -> None:
+    """Give the lanes of tiles that have been put together the currents that they have there."""
+    for k in range(places.size):
+        records[k].point.y[2] = tile_rows[places[k] // TILE].coil.i[places[k] % TILE]
+
+
+def put_currents(places: Indices, records: Any, tile_rows: Any) -> None:
+    """Put the currents of lanes that have gone on one by one back into their tiles."""
+    for k in range(places.size):
+        tile_rows[places[k] // TILE].coil.i[places[k] % TILE] = records[k].point.y[2]
+
+
 def gather(which: Indices, status: Any, now: Floats, rows: Any, count: Indices, places: Indices, lanes: Indices,
            durations: Floats, records: Any) -> int:
     """Put together the lanes of records that have not failed; return how many there are."""

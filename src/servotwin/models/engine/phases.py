@@ -8,27 +8,29 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine import arc_rounds, band_rounds, braked_rounds, tiles
-from servotwin.models.engine.tiles import ARCS, BANDS, ONE_FORMULA
+from servotwin.models.engine import arc_rounds, band_rounds, braked_rounds, coil_rounds, tiles
+from servotwin.models.engine.tiles import ARCS, BANDS, COILS, ONE_FORMULA
 
 
 def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) -> None:
     """Move all lanes through the four phases; keep the state at the start of each where it is wanted."""
+    if form == COILS:
+        coil_rounds.begin(size, tile)
     if size <= tiles.FEW:
         for j in range(size):
             _lane(keep, form, slack, tile, plan, j)
         return
     if keep:
-        _keep(plan.q1, plan.w1, plan.wiper1, size, tile)
+        _keep(1, plan.q1, plan.w1, plan.wiper1, size, form, tile)
         for j in range(size):
             plan.time[j] = plan.time1[j]
             plan.power[j] = plan.drive1[j]
         _drive(size, form, slack, tile, plan)
-        _keep(plan.q2, plan.w2, plan.wiper2, size, tile)
+        _keep(2, plan.q2, plan.w2, plan.wiper2, size, form, tile)
         for j in range(size):
             plan.time[j] = plan.time2[j]
         _idle(size, form, slack, tile, plan)
-        _keep(plan.q3, plan.w3, plan.wiper3, size, tile)
+        _keep(3, plan.q3, plan.w3, plan.wiper3, size, form, tile)
     else:
         _before(size, form, slack, tile, plan)
     for j in range(size):
@@ -36,7 +38,7 @@ def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) 
         plan.power[j] = plan.drive3[j]
     _drive(size, form, slack, tile, plan)
     if keep:
-        _keep(plan.q4, plan.w4, plan.wiper4, size, tile)
+        _keep(4, plan.q4, plan.w4, plan.wiper4, size, form, tile)
     for j in range(size):
         plan.time[j] = plan.time4[j]
     _idle(size, form, slack, tile, plan)
@@ -51,7 +53,9 @@ def _lane(keep: bool, form: int, slack: bool, tile: Any, plan: Any, j: int) -> N
         time = time if phase < 3 else plan.time4[j]
         if keep:
             _keep_one(phase, q, w, tile.servo.wiper[j], plan, j)
-        if time > 0.0 and (w != 0.0 or start != 0.0 or power != 0.0):
+        if keep and form == COILS:
+            coil_rounds.keep_one(phase, tile, j)
+        if time > 0.0 and (form == COILS or w != 0.0 or start != 0.0 or power != 0.0):
             plan.time[j] = time
             plan.power[j] = power
             _alone(form, slack, tile, plan, j)
@@ -76,6 +80,17 @@ def _keep_one(phase: int, q: float, w: float, wiper: float, plan: Any, j: int) -
         plan.wiper4[j] = wiper
 
 
+def kept(phase: int, plan: Any, j: int) -> tuple[float, float, float]:
+    """Return angle, speed and angle of the potentiometer at the start of a phase, where they were kept."""
+    if phase == 0:
+        return plan.q1[j], plan.w1[j], plan.wiper1[j]
+    if phase == 1:
+        return plan.q2[j], plan.w2[j], plan.wiper2[j]
+    if phase == 2:
+        return plan.q3[j], plan.w3[j], plan.wiper3[j]
+    return plan.q4[j], plan.w4[j], plan.wiper4[j]
+
+
 def _alone(form: int, slack: bool, tile: Any, plan: Any, j: int) -> None:
     """Move one lane through one phase."""
     if form == ONE_FORMULA:
@@ -84,9 +99,14 @@ def _alone(form: int, slack: bool, tile: Any, plan: Any, j: int) -> None:
         arc_rounds.alone(tile, plan, j)
     elif form == BANDS:
         band_rounds.alone(slack, tile, plan, j)
+    elif form == COILS:
+        coil_rounds.alone(tile, plan, j)
 
 
-def _keep(angle: Any, speed: Any, wiper: Any, size: int, tile: Any) -> None:
+def _keep(phase: int, angle: Any, speed: Any, wiper: Any, size: int, form: int, tile: Any) -> None:
+    if form == COILS:
+        for j in range(size):
+            coil_rounds.keep_one(phase - 1, tile, j)
     for j in range(size):
         angle[j] = tile.servo.q[j]
         speed[j] = tile.servo.w[j]
@@ -104,13 +124,15 @@ def _before(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
         plan.power[j] = power if drive > 0.0 else 0.0
         moving += 1 if drive > 0.0 or (rest > 0.0 and (w != 0.0 or start != 0.0)) else 0
         both += 1 if min(drive, rest) > 0.0 else 0
-    if moving > 0:
+    if moving > 0 or form == COILS:
         if form == ONE_FORMULA:
             braked_rounds.drive_or_rest(size, slack, tile, plan)
         elif form == ARCS:
             arc_rounds.drive_or_rest(size, tile, plan)
         elif form == BANDS:
             band_rounds.phase(size, slack, tile, plan)
+        elif form == COILS:
+            coil_rounds.phase(size, slack, tile, plan)
     if both > 0:
         both = 0
         for j in range(size):
@@ -130,13 +152,15 @@ def _drive(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
     for j in range(size):
         time, power = plan.time[j], plan.power[j]
         moving += 1 if time > 0.0 and power != 0.0 else 0
-    if moving > 0:
+    if moving > 0 or form == COILS:
         if form == ONE_FORMULA:
             braked_rounds.drive(size, slack, tile, plan)
         elif form == ARCS:
             arc_rounds.drive(size, tile, plan)
         elif form == BANDS:
             band_rounds.phase(size, slack, tile, plan)
+        elif form == COILS:
+            coil_rounds.phase(size, slack, tile, plan)
 
 
 def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
@@ -146,10 +170,12 @@ def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
         plan.power[j] = 0.0
         time, w, start = plan.time[j], tile.servo.w[j], tile.arc.start_off[j]
         moving += 1 if time > 0.0 and (w != 0.0 or start != 0.0) else 0
-    if moving > 0:
+    if moving > 0 or form == COILS:
         if form == ONE_FORMULA:
             braked_rounds.rest(size, slack, tile, plan)
         elif form == ARCS:
             arc_rounds.rest(size, tile, plan)
         elif form == BANDS:
             band_rounds.phase(size, slack, tile, plan)
+        elif form == COILS:
+            coil_rounds.phase(size, slack, tile, plan)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import arcs, bands, phases, tiles, windows
+from servotwin.models.engine import arcs, bands, coil_rounds, coils, phases, tiles, windows
 from servotwin.models.engine.arcs import ArcNumbers
 from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, STUCK
 from servotwin.models.engine.noise import gaussian
@@ -71,7 +71,7 @@ def _advance(which: Indices, form: int, slack: bool, duration: float, widths: Fl
     lost = 0
     while windows.begin(widths, size, False, tile, plan, before) > 0:
         _through(size, full, noisy, form, slack, False, tile, plan)
-        lost += windows.give_up(size, tile, plan, before)
+        lost += windows.give_up(size, form, tile, plan, before)
     return lost
 
 
@@ -90,7 +90,7 @@ def _go_on(pieces: Floats, listed: Floats, form: int, slack: bool, which: Indice
         _through(size, full, noisy, form, slack, wanted > 0, tile, plan)
         if wanted > 0:
             _write(which, form, slack, times, outputs, tile, plan, before)
-        lost += windows.give_up(size, tile, plan, before)
+        lost += windows.give_up(size, form, tile, plan, before)
     return lost
 
 
@@ -124,6 +124,10 @@ def _hang(which: Indices, form: int, torques: Floats, tile: Any) -> None:
     if form == tiles.BANDS:
         for j in range(which.size):
             tiles.hang(tiles.numbers_at(tile.own, j), torques[which[j]], tile, j)
+        return
+    if form == tiles.COILS:
+        for j in range(which.size):
+            tile.hung.torque[j] = torques[which[j]]
         return
     for j in range(which.size):
         load = arcs.loading(numbers.inertia[j], numbers.pull[j], numbers.hold_forward[j], numbers.hold_backward[j],
@@ -162,36 +166,49 @@ def _write(which: Indices, form: int, slack: bool, times: Floats, outputs: Outpu
 
 
 def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> None:
-    x, end = plan.time[j], plan.window[j]  # what happens at the very end is not yet so
-    drive, error, q, w, begin = plan.drive1[j], plan.error_before[j], plan.q1[j], plan.w1[j], 0.0
-    wiper = plan.wiper1[j]
-    if plan.decides[j] > 0.0 and plan.end2[j] <= x and plan.end2[j] < end:
-        drive, error, q, w, begin = plan.drive3[j], tile.servo.error[j], plan.q3[j], plan.w3[j], plan.end2[j]
-        wiper = plan.wiper3[j]
-        if plan.end3[j] <= x and plan.end3[j] < end:
-            drive, q, w, begin, wiper = 0.0, plan.q4[j], plan.w4[j], plan.end3[j], plan.wiper4[j]
-    elif plan.end1[j] <= x and plan.end1[j] < end:
-        drive, q, w, begin, wiper = 0.0, plan.q2[j], plan.w2[j], plan.end1[j], plan.wiper2[j]
+    x = plan.time[j]
+    phase = _phase_at(x, plan, j)
+    after = plan.end1[j] if phase == 1 else plan.end2[j] if phase == 2 else plan.end3[j]
+    x -= after if phase > 0 else 0.0
+    drive = plan.drive1[j] if phase == 0 else plan.drive3[j] if phase == 2 else 0.0
+    q, w, wiper = phases.kept(phase, plan, j)
     numbers = tiles.arc_numbers_at(tile.arc, j)
-    if form == tiles.BANDS:
-        begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
-        q, w, turned, _ = bands.slide(
-            tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x - begin,
-            tile.hung.tolerance[j])
+    if form == tiles.COILS:
+        own, torque = tiles.numbers_at(tile.own, j), tile.hung.torque[j]
+        q, w, i, wiper, _ = coils.through(
+            own, tiles.winding_at(tile.winding, j), torque, drive, q, w, coil_rounds.kept(phase, tile, j), wiper, x)
+        contact = coils.contact_of(own, torque, w, i)
+        if outputs.current.size > 0:
+            outputs.current[lane, o] = i
     else:
-        q, w, turned, _ = arcs.slide(numbers, drive, q, w, x - begin)
+        if form == tiles.BANDS:
+            begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
+            q, w, turned, _ = bands.slide(
+                tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x, tile.hung.tolerance[j])
+        else:
+            q, w, turned, _ = arcs.slide(numbers, drive, q, w, x)
+        wiper = tiles.dragged(tile.hung.half_slack[j], wiper, turned, q)
+        contact = contact_of(tile.hung.dry[j] > 0.0, numbers, drive, w)
     if outputs.wiper.size > 0:
-        outputs.wiper[lane, o] = tiles.dragged(tile.hung.half_slack[j], wiper, turned, q) if slack else q
+        outputs.wiper[lane, o] = wiper if slack else q
     if outputs.angle.size > 0:
         outputs.angle[lane, o] = q
     if outputs.speed.size > 0:
         outputs.speed[lane, o] = w
     if outputs.contact.size > 0:
-        outputs.contact[lane, o] = contact_of(tile.hung.dry[j] > 0.0, numbers, drive, w)
+        outputs.contact[lane, o] = contact
     if outputs.drive.size > 0:
         outputs.drive[lane, o] = 1 if drive > 0.0 else (-1 if drive < 0.0 else 0)
     if outputs.error.size > 0:
-        outputs.error[lane, o] = error
+        outputs.error[lane, o] = plan.error_before[j] if phase < 2 else tile.servo.error[j]
+
+
+def _phase_at(x: float, plan: Any, j: int) -> int:
+    """Return the phase that holds an instant of a window; what happens at its very end is not yet so."""
+    end = plan.window[j]
+    if plan.decides[j] > 0.0 and plan.end2[j] <= x and plan.end2[j] < end:
+        return 3 if plan.end3[j] <= x and plan.end3[j] < end else 2
+    return 1 if plan.end1[j] <= x and plan.end1[j] < end else 0
 
 
 def contact_of(dry: bool, numbers: ArcNumbers, drive: float, w: float) -> int:

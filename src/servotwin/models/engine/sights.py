@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import contacts, currents
+from servotwin.models.engine import contacts, currents, tiles
 from servotwin.models.engine.memory import memory_of, silent_now, time_of
 from servotwin.models.engine.modes import RIGID
 from servotwin.models.engine.observe import Observed, observed
@@ -37,16 +37,17 @@ def one_by_one(lanes: Lanes, curve: Floats, torque_rows: Floats, torque_first: I
                                  point.y, point.wiper, now.drive, now.error))
 
 
-def side_by_side(lanes: Lanes, curve: Floats, which: Indices, tiles: Any, seen: Floats) -> None:
-    """Look at the lanes named in `which`, which tiles hold."""
+def side_by_side(lanes: Lanes, curve: Floats, form: int, which: Indices, tile_rows: Any, seen: Floats) -> None:
+    """Look at the lanes named in `which`, which tiles of a form hold."""
     for k in range(which.size):
-        lane, servo, j = which[k], tiles[k // TILE].servo, k % TILE
+        lane, servo, j = which[k], tile_rows[k // TILE].servo, k % TILE
         numbers, tau = numbers_of(lanes, lane), lanes.torque[lane]
         q, w, drive, error = 1.0 * servo.q[j], 1.0 * servo.w[j], 1.0 * servo.drive[j], 1.0 * servo.error[j]  # float64
         wiper = 1.0 * servo.wiper[j] if slack(numbers.sensor) else q
-        y = (q, w, 0.0, lanes.start[3, lane], lanes.start[4, lane], q, w)
+        i = tile_rows[k // TILE].coil.i[j] if form == tiles.COILS else 0.0
+        y = (q, w, i, lanes.start[3, lane], lanes.start[4, lane], q, w)
         u = drive * numbers.source.V
-        mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, q, w, 0.0), u, tau, y, RIGID, False)
+        mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, q, w, i), u, tau, y, RIGID, False)
         put(seen, lane, observed(numbers, curve, mode, u, tau, y, wiper, drive, error))
 
 

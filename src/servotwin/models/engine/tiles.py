@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from servotwin.models.engine import arcs, bands, contacts
+from servotwin.models.engine import arcs, bands, coils, contacts
 from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.coils import Winding
 from servotwin.models.engine.motion import FINE
 from servotwin.models.engine.records import TILE, reader, rows_of, tile_of, writer
 from servotwin.models.terms.chip import Chip
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
     Smalls = NDArray[np.int8]
 
 FEW = 2  # lanes that are not worth going together
-ONE_FORMULA, ARCS, BANDS = range(3)  # how lanes go through a phase: `braked_rounds`, `arc_rounds`, `band_rounds`
+# How lanes go through a phase: `braked_rounds`, `arc_rounds`, `band_rounds`, `coil_rounds`
+ONE_FORMULA, ARCS, BANDS, COILS = range(4)
 
 
 class Meter(NamedTuple):
@@ -166,6 +168,17 @@ class Hung(NamedTuple):
     dry: float  # 1: there is friction of some kind, or what counts as such
 
 
+class Coil(NamedTuple):
+    """Currents with inertia [A]: now, before the window, and at the start of each phase."""
+
+    i: float
+    before: float
+    i1: float
+    i2: float
+    i3: float
+    i4: float
+
+
 class Times(NamedTuple):
     """The clock before a window [s]."""
 
@@ -177,7 +190,8 @@ class Times(NamedTuple):
 @cache
 def tile_type(real: str, form: int) -> np.dtype[Any]:
     """Return the type of a tile whose servos have numbers of this type and go through phases in this form."""
-    own = {"own": rows_of(Numbers, real)} if form == BANDS else {}
+    own = {"own": rows_of(Numbers, real)} if form in (BANDS, COILS) else {}
+    own |= {"coil": rows_of(Coil, real), "winding": rows_of(Winding, real)} if form == COILS else {}
     return tile_of({
         **own, "hung": rows_of(Hung, real), "arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real),
         "meter": rows_of(Meter, real), "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
@@ -196,6 +210,8 @@ put_numbers = writer("put_numbers", Numbers)
 put_chip = writer("put_chip", Chip)
 arc_numbers_at = reader("arc_numbers_at", ArcNumbers)
 put_arc_numbers = writer("put_arc_numbers", ArcNumbers)
+winding_at = reader("winding_at", Winding)
+put_winding = writer("put_winding", Winding)
 put_servo = writer("put_servo", Servo)
 put_clock = writer("put_clock", Clock)
 put_count = writer("put_count", Count)
@@ -229,6 +245,7 @@ class Outputs(NamedTuple):
     drive: Smalls
     error: Floats
     wiper: Floats
+    current: Floats
 
 
 def numbers_of(lanes: Lanes, lane: int) -> Numbers:
@@ -264,6 +281,11 @@ def set_numbers(lanes: Lanes, form: int, first: int, size: int, tile: Any, place
         for j in range(size):
             put_numbers(tile.own, place + j, numbers_of(lanes, first + j))
             hang(numbers_of(lanes, first + j), lanes.torque[first + j], tile, place + j)
+    if form == COILS:
+        for j in range(size):
+            put_numbers(tile.own, place + j, numbers_of(lanes, first + j))
+            put_winding(tile.winding, place + j, coils.winding(numbers_of(lanes, first + j)))
+            tile.hung.torque[place + j] = lanes.torque[first + j]
 
 
 def hang(numbers: Numbers, torque: float, tile: Any, j: int) -> None:
@@ -292,6 +314,9 @@ def start(lanes: Lanes, form: int, first: int, size: int, first_output: float, t
         q, w = lanes.start[0, first + j], lanes.start[1, first + j]
         put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, -math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
                                        0.0, q))
+    if form == COILS:
+        for j in range(size):
+            tile.coil.i[j] = lanes.start[2, first + j]
     for j in range(size):
         own = lanes.edge_count[first + j]
         late = lanes.edges[lanes.edge_first[first + j]] if own > 0 else math.inf if own == 0 else 0.0

@@ -100,6 +100,14 @@ def measure(size: int, form: int, tile: Any, plan: Any) -> None:
             plan.v_m[j] = v_m
             plan.V_bus[j] = V_bus
         return
+    if form == tiles.COILS:
+        for j in range(size):
+            numbers, w = tiles.numbers_at(tile.own, j), tile.servo.w[j]
+            y = (0.0, w, tile.coil.i[j], 0.0, 0.0, 0.0, w)
+            v_m, V_bus = voltages(numbers, tile.servo.drive[j] * numbers.source.V, y)
+            plan.v_m[j] = v_m
+            plan.V_bus[j] = V_bus
+        return
     for j in range(size):
         meter = tiles.meter_at(tile.meter, j)
         drive, w = tile.servo.drive[j], tile.servo.w[j]
@@ -202,7 +210,7 @@ def _divide(second: float, due: float, sign: float, duration: float, decided: fl
     servo.decided[j] = decided
 
 
-def give_up(size: int, tile: Any, plan: Any, before: Any) -> int:
+def give_up(size: int, form: int, tile: Any, plan: Any, before: Any) -> int:
     """Put lanes that cannot go on side by side back to where the window began; return how many there are."""
     servo, clock, count = tile.servo, tile.clock, tile.count
     lost = 0
@@ -213,6 +221,8 @@ def give_up(size: int, tile: Any, plan: Any, before: Any) -> int:
             if plan.lost[j] > 0.0:
                 servo.q[j], servo.w[j], servo.drive[j] = plan.q_before[j], plan.w_before[j], plan.drive1[j]
                 servo.wiper[j] = plan.wiper_before[j]
+                if form == tiles.COILS:
+                    tile.coil.i[j] = tile.coil.before[j]
                 servo.left[j], servo.silence[j] = plan.left_before[j], plan.silence_before[j]
                 servo.error[j], servo.due[j] = plan.error_before[j], plan.due_before[j]
                 servo.sign[j], servo.duration[j] = plan.sign_before[j], plan.duration_before[j]
