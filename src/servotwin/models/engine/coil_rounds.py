@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.models.engine import arcs, coils, tiles
-from servotwin.models.engine.coils import Circuit
+from servotwin.models.engine.coils import Circuit, Course
 from servotwin.models.engine.modes import NO_CURRENT, sign_of
 from servotwin.models.terms.numbers import Numbers
 
@@ -44,8 +44,14 @@ def phase(size: int, slack: bool, tile: Any, plan: Any) -> None:
         going += 1 if plan.time[j] > 0.0 else 0
     if going == 0:
         return
+    _choose(size, tile, plan)
     for j in range(size):
-        _glide(tiles.numbers_at(tile.own, j), _circuit_at(tile, plan, j), tile, plan, j)
+        after = coils.course(tiles.circuit_at(tile.circuit, j), plan.time[j])
+        tile.coil.g[j] = after.g
+        tile.coil.once[j] = after.once
+        tile.coil.twice[j] = after.twice
+    for j in range(size):
+        _glide(tiles.numbers_at(tile.own, j), tiles.circuit_at(tile.circuit, j), tile, plan, j)
     if slack:
         for j in range(size):
             tiles.drag(tile, tile.servo.q[j], j)
@@ -75,26 +81,35 @@ def _enter(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
     plan.time[j] = plan.time[j] if moves else 0.0
 
 
-def _circuit_at(tile: Any, plan: Any, j: int) -> Circuit:
-    """Return the circuit of a lane, chosen number by number: so all lanes can choose at once."""
-    own, drives = tiles.winding_at(tile.winding, j), plan.power[j] != 0.0
-    return Circuit(
-        own.drive.R if drives else own.off.R, own.drive.rate if drives else own.off.rate,
-        own.drive.per_rate if drives else own.off.per_rate, own.drive.damping if drives else own.off.damping,
-        own.drive.product if drives else own.off.product, own.drive.slow if drives else own.off.slow,
-        own.drive.per_slow if drives else own.off.per_slow, own.drive.fast if drives else own.off.fast,
-        own.drive.per_fast if drives else own.off.per_fast, own.drive.apart if drives else own.off.apart)
+def _choose(size: int, tile: Any, plan: Any) -> None:
+    """Choose the circuit of every lane, in two loops: a compiler loses sight of more rows at once."""
+    drive, off, own = tile.winding.drive, tile.winding.off, tile.circuit
+    for j in range(size):
+        drives = plan.power[j] != 0.0
+        own.R[j] = drive.R[j] if drives else off.R[j]
+        own.rate[j] = drive.rate[j] if drives else off.rate[j]
+        own.per_rate[j] = drive.per_rate[j] if drives else off.per_rate[j]
+        own.damping[j] = drive.damping[j] if drives else off.damping[j]
+        own.product[j] = drive.product[j] if drives else off.product[j]
+    for j in range(size):
+        drives = plan.power[j] != 0.0
+        own.slow[j] = drive.slow[j] if drives else off.slow[j]
+        own.per_slow[j] = drive.per_slow[j] if drives else off.per_slow[j]
+        own.fast[j] = drive.fast[j] if drives else off.fast[j]
+        own.per_fast[j] = drive.per_fast[j] if drives else off.per_fast[j]
+        own.apart[j] = drive.apart[j] if drives else off.apart[j]
 
 
 def _glide(numbers: Numbers, circuit: Circuit, tile: Any, plan: Any, j: int) -> None:
     """Move a lane to the end of its time if that lies in one leg; otherwise mark it."""
+    after = Course(tile.coil.g[j], tile.coil.once[j], tile.coil.twice[j])
     time, way, zone, u = plan.time[j], plan.way[j], tile.count.zone[j], plan.power[j] * numbers.source.V
     torque, q, w, i = tile.hung.torque[j], tile.servo.q[j], tile.servo.w[j], tile.coil.i[j]
     rests = way == 0.0
     arc = coils.held_arc(numbers, circuit, torque, u, zone, i)
     held = coils.held_current(circuit, arc, i, time)
     x = coils.flow(numbers, circuit, torque, u, zone, way, w, i)
-    to = coils.slid(circuit, x, coils.course(circuit, time), way, sign_of(zone), q, time)
+    to = coils.slid(circuit, x, after, way, sign_of(zone), q, time)
     inside = tile.arc.lower[j] < to.q < tile.arc.upper[j]
     slides = zone != NO_CURRENT and circuit.apart > 0.0 and inside and not to.ends
     goes = not arcs.reaches_edge(arc, held) if rests else slides

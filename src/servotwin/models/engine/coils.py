@@ -23,7 +23,7 @@ from servotwin.physics.backlash import play
 
 _BELOW = -1e-13  # A, rad/s: less below zero is rounding
 _SETTLED = 40.0  # e^-40 of a current is less than rounding
-_NEAR = 1e-9  # a step of Newton that is so short beside the time is the last
+_NEAR = 1e-7  # a step of Halley's that is so short beside the time is the last
 _FAR = 0.01  # roots are far apart where their distance is a tenth of their mean
 
 
@@ -252,18 +252,23 @@ def _rest(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int
 
 def _slide(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int, way: float, q: float, w: float,
            i: float, time: float) -> Leg:
-    x, side = flow(numbers, circuit, torque, u, zone, way, w, i), sign_of(zone)
-    to = slid(circuit, x, _response(circuit, time), way, side, q, time)
-    if to.ends or circuit.apart == 0.0:
-        stop = _zero(circuit, way * x.w, way * x.dw, way * x.rw, time)
-        fade = _zero(circuit, side * x.i, side * x.di, side * x.ri, min(stop, time)) if side != 0.0 else math.inf
-        if min(stop, fade) <= time:
-            t = min(stop, fade)
-            to = slid(circuit, x, _response(circuit, t), way, side, q, t)
-            left = time - t
-            if fade <= stop:
-                return Leg(to.q, to.w, 0.0, left, currents.zone_of(numbers, u, 0.0, q, to.w, 0.0), way)
-            return Leg(to.q, 0.0, to.i, left, zone, way_from_rest(numbers, torque, to.i))
+    x, side, after = flow(numbers, circuit, torque, u, zone, way, w, i), sign_of(zone), _response(circuit, time)
+    to = slid(circuit, x, after, way, side, q, time)
+    if not to.ends and circuit.apart > 0.0:
+        return Leg(to.q, to.w, to.i, 0.0, zone, way)
+    stop = _zero(circuit, after, way * x.w, way * x.dw, way * x.rw, time)
+    if stop < math.inf:
+        time, after, left = stop, _response(circuit, stop), time - stop
+    else:
+        left = 0.0
+    fade = _zero(circuit, after, side * x.i, side * x.di, side * x.ri, time) if side != 0.0 else math.inf
+    if fade < math.inf:
+        to = slid(circuit, x, _response(circuit, fade), way, side, q, fade)
+        zone = currents.zone_of(numbers, u, 0.0, q, to.w, 0.0)
+        return Leg(to.q, to.w, 0.0, left + (time - fade), zone, way)
+    if stop < math.inf:
+        to = slid(circuit, x, after, way, side, q, stop)
+        return Leg(to.q, 0.0, to.i, left, zone, way_from_rest(numbers, torque, to.i))
     return Leg(to.q, to.w, to.i, 0.0, zone, way)
 
 
@@ -275,11 +280,17 @@ def _response(circuit: Circuit, s: float) -> Course:
     return Course(g, once, twice)
 
 
-def _zero(circuit: Circuit, x: float, dx: float, r: float, until: float) -> float:
-    """Return when x ≥ 0 with the rate dx first falls below zero, by `until` [s] at the latest; inf where it does not.
+def _zero(circuit: Circuit, after: Course, x: float, dx: float, r: float, until: float) -> float:
+    """Return when x ≥ 0 with the rate dx first falls below zero; inf where it does not by `until` [s].
 
-    Between the zeros of its rate it is monotone.
+    `after` is the response then. Between the zeros of its rate x is monotone; rates far apart leave one at most.
     """
+    if circuit.apart > 0.0:
+        end = fma(r, after.once, fma(dx, after.g, x))
+        if not _falls(circuit, after, dx, r, end):
+            return math.inf
+        if x > 0.0 and end < _BELOW:
+            return _root(circuit, x, dx, r, 0.0, until)
     zero, spacing = second_order.first_zero(0.5 * circuit.damping, circuit.product, dx, r - circuit.damping * dx)
     left, right = 0.0, min(zero, until)
     for _ in range(MOST_ARCS):
@@ -298,16 +309,14 @@ def _value(circuit: Circuit, x: float, dx: float, r: float, s: float) -> tuple[f
 
 
 def _root(circuit: Circuit, x: float, dx: float, r: float, a: float, b: float) -> float:
-    """Return where x falls through zero between a and b [s], where it is monotone, to rounding: by Newton in brackets.
-
-    It begins where the slow exponential alone would be zero.
-    """
-    s, last = _slow_zero(circuit, x, dx, r), math.inf
+    """Return where x falls through zero between a and b [s], once, to rounding: by Halley's steps in brackets."""
+    s, last, pull = _guess(circuit, x, dx, r), math.inf, fma(circuit.product, x, r)
     s = s if a < s < b else 0.5 * (a + b)
     for _ in range(200):
         value, rate = _value(circuit, x, dx, r, s)
         a, b = (s, b) if value > 0.0 else (a, s)
-        new = s - value / rate if rate < 0.0 else a
+        bend = pull - circuit.damping * rate - circuit.product * value
+        new = s - value * rate / (rate * rate - 0.5 * value * bend) if rate < 0.0 else a
         if abs(new - s) <= _NEAR * s or b - a <= 4e-16 * b:
             return min(max(new, a), b)
         s = new if a < new < b and abs(value) < 0.5 * last else 0.5 * (a + b)
@@ -315,8 +324,13 @@ def _root(circuit: Circuit, x: float, dx: float, r: float, a: float, b: float) -
     return s
 
 
-def _slow_zero(circuit: Circuit, x: float, dx: float, r: float) -> float:
-    """Return when x would be zero if its fast exponential were none; 0 where it never would, or rates are close."""
+def _guess(circuit: Circuit, x: float, dx: float, r: float) -> float:
+    """Return about when x is zero: by its slow exponential after the fast one has faded, before that by a parabola."""
     of_slow = (dx - r * circuit.per_slow) * circuit.apart
     ratio = -of_slow / fma(r, circuit.per_slow * circuit.per_fast, x)
-    return circuit.per_slow * log(ratio) if ratio > 1.0 else 0.0
+    late = circuit.per_slow * log(ratio) if ratio > 1.0 else 0.0
+    if late > circuit.per_fast:
+        return late
+    square = dx * dx - 2.0 * x * (r - circuit.damping * dx)
+    early = 2.0 * x / (math.sqrt(square) - dx) if square > 0.0 else circuit.per_fast
+    return min(early, circuit.per_fast)

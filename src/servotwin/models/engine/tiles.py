@@ -13,7 +13,7 @@ import numpy as np
 
 from servotwin.models.engine import arcs, bands, coils, contacts
 from servotwin.models.engine.arcs import ArcNumbers
-from servotwin.models.engine.coils import Winding
+from servotwin.models.engine.coils import Circuit, Winding
 from servotwin.models.engine.motion import FINE
 from servotwin.models.engine.records import TILE, reader, rows_of, tile_of, writer
 from servotwin.models.terms.chip import Chip
@@ -169,7 +169,7 @@ class Hung(NamedTuple):
 
 
 class Coil(NamedTuple):
-    """Currents with inertia [A]: now, before the window, and at the start of each phase."""
+    """Currents with inertia [A]: now, before the window, and at the start of each phase; and what moves them."""
 
     i: float
     before: float
@@ -177,6 +177,9 @@ class Coil(NamedTuple):
     i2: float
     i3: float
     i4: float
+    g: float  # the response after a phase, as in `Course`
+    once: float
+    twice: float
 
 
 class Times(NamedTuple):
@@ -191,7 +194,7 @@ class Times(NamedTuple):
 def tile_type(real: str, form: int) -> np.dtype[Any]:
     """Return the type of a tile whose servos have numbers of this type and go through phases in this form."""
     own = {"own": rows_of(Numbers, real)} if form in (BANDS, COILS) else {}
-    own |= {"coil": rows_of(Coil, real), "winding": rows_of(Winding, real)} if form == COILS else {}
+    own |= {"coil": rows_of(Coil, real), "winding": rows_of(Winding, real), "circuit": rows_of(Circuit, real)} if form == COILS else {}
     return tile_of({
         **own, "hung": rows_of(Hung, real), "arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real),
         "meter": rows_of(Meter, real), "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
@@ -212,6 +215,7 @@ arc_numbers_at = reader("arc_numbers_at", ArcNumbers)
 put_arc_numbers = writer("put_arc_numbers", ArcNumbers)
 winding_at = reader("winding_at", Winding)
 put_winding = writer("put_winding", Winding)
+circuit_at = reader("circuit_at", Circuit)
 put_servo = writer("put_servo", Servo)
 put_clock = writer("put_clock", Clock)
 put_count = writer("put_count", Count)
