@@ -106,13 +106,13 @@ def _glide(numbers: Numbers, circuit: Circuit, tile: Any, plan: Any, j: int) -> 
     time, way, zone, u = plan.time[j], plan.way[j], tile.count.zone[j], plan.power[j] * numbers.source.V
     torque, q, w, i = tile.hung.torque[j], tile.servo.q[j], tile.servo.w[j], tile.coil.i[j]
     rests = way == 0.0
-    arc = coils.held_arc(numbers, circuit, torque, u, zone, i)
-    held = coils.held_current(circuit, arc, i, time)
-    x = coils.flow(numbers, circuit, torque, u, zone, way, w, i)
-    to = coils.slid(circuit, x, after, way, sign_of(zone), q, time)
+    x = coils.held(numbers, circuit, torque, u, zone, i)
+    held = coils.held_current(x, i, time)
+    start = coils.flow(numbers, circuit, torque, u, zone, way, w, i)
+    to = coils.slid(circuit, start, after, way, sign_of(zone), q, time)
     inside = tile.arc.lower[j] < to.q < tile.arc.upper[j]
     slides = zone != NO_CURRENT and circuit.apart > 0.0 and inside and not to.ends
-    goes = not arcs.reaches_edge(arc, held) if rests else slides
+    goes = not arcs.reaches_edge(x.arc, held) if rests else slides
     moves = time > 0.0
     plan.ends[j] = 1.0 if moves and not goes else 0.0
     tile.servo.q[j] = to.q if moves and goes and not rests else q

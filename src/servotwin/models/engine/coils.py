@@ -57,6 +57,13 @@ class Course(NamedTuple):
     twice: float
 
 
+class Held(NamedTuple):
+    """How the current of a shaft at rest changes, up to where the leg ends, and what it tends to [A]."""
+
+    arc: Arc
+    final: float
+
+
 class Flow(NamedTuple):
     """Speed and current at the start of a leg, their rates, and ẍ + damping ẋ of both, which is constant."""
 
@@ -139,23 +146,24 @@ def contact_of(numbers: Numbers, torque: float, w: float, i: float) -> int:
     return STUCK if way == 0.0 else FORWARD if way > 0.0 else BACKWARD
 
 
-def held_arc(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int, i: float) -> Arc:
+def held(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int, i: float) -> Held:
     """Return how the current of a shaft at rest changes until its torque releases the shaft, or its zone ends."""
     v, _ = currents.loop(numbers, zone, u)
-    L, K_b = numbers.motor.L, numbers.motor.K_b
-    di = 0.0 if zone == NO_CURRENT else motor.armature_current_rate(v, i, 0.0, circuit.R, L, K_b)
+    L, K_b, flows = numbers.motor.L, numbers.motor.K_b, zone != NO_CURRENT
+    di = motor.armature_current_rate(v, i, 0.0, circuit.R, L, K_b) if flows else 0.0
     backward, forward = contacts.holding_bounds(numbers, 0.0, 0.0)
     edge = ((forward if di > 0.0 else -backward) + torque) / motor.electromagnetic_torque(1.0, numbers.motor.K)
     side = sign_of(zone)
     edge = min(edge, 0.0) if di > 0.0 and side < 0.0 else max(edge, 0.0) if di < 0.0 and side > 0.0 else edge
     there = motor.armature_current_rate(v, edge, 0.0, circuit.R, L, K_b)
-    return Arc(circuit.rate, circuit.per_rate, di, edge, there)
+    final = motor.steady_armature_current(v, 0.0, circuit.R, K_b) if flows else i
+    return Held(Arc(circuit.rate, circuit.per_rate, di, edge, there), final)
 
 
-def held_current(circuit: Circuit, arc: Arc, i: float, time: float) -> float:
-    """Return the current [A] of a shaft at rest after a time; what is less than rounding of its change is gone."""
-    once, _ = fading(arc.rate, arc.per_rate, time)
-    return fma(arc.pull, circuit.per_rate if arc.rate * time > _SETTLED else once, i)
+def held_current(x: Held, i: float, time: float) -> float:
+    """Return the current [A] of a shaft at rest after a time; in the end it is what it tends to."""
+    once, _ = fading(x.arc.rate, x.arc.per_rate, time)
+    return x.final if x.arc.rate * time > _SETTLED else fma(x.arc.pull, once, i)
 
 
 def flow(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int, way: float, w: float,
@@ -239,8 +247,8 @@ def leg(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int, 
 
 def _rest(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int, q: float, i: float,
           time: float) -> Leg:
-    arc = held_arc(numbers, circuit, torque, u, zone, i)
-    after = held_current(circuit, arc, i, time)
+    x = held(numbers, circuit, torque, u, zone, i)
+    arc, after = x.arc, held_current(x, i, time)
     if not arcs.reaches_edge(arc, after):
         return Leg(q, 0.0, after, 0.0, zone, 0.0)
     t, _ = arcs.way_to_edge(i, arc.edge, arc.pull_there, arc.rate, arc.per_rate)

@@ -194,7 +194,8 @@ class Times(NamedTuple):
 def tile_type(real: str, form: int) -> np.dtype[Any]:
     """Return the type of a tile whose servos have numbers of this type and go through phases in this form."""
     own = {"own": rows_of(Numbers, real)} if form in (BANDS, COILS) else {}
-    own |= {"coil": rows_of(Coil, real), "winding": rows_of(Winding, real), "circuit": rows_of(Circuit, real)} if form == COILS else {}
+    if form == COILS:
+        own |= {"coil": rows_of(Coil, real), "winding": rows_of(Winding, real), "circuit": rows_of(Circuit, real)}
     return tile_of({
         **own, "hung": rows_of(Hung, real), "arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real),
         "meter": rows_of(Meter, real), "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
