@@ -1,4 +1,4 @@
-"""How lanes whose current has inertia go through a phase: all lanes together, leg by leg."""
+"""How lanes whose current has inertia go through a phase: in one leg all together; more legs each lane goes alone."""
 
 from __future__ import annotations
 
