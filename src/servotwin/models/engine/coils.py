@@ -24,7 +24,6 @@ from servotwin.physics.backlash import play
 _BELOW = -1e-13  # A, rad/s: less below zero is rounding
 _SETTLED = 40.0  # e^-40 of a current is less than rounding
 _NEAR = 1e-7  # a step of Halley's that is so short beside the time is the last
-_FAR = 0.01  # roots are far apart where their distance is a tenth of their mean
 
 
 class Circuit(NamedTuple):
@@ -40,6 +39,8 @@ class Circuit(NamedTuple):
     fast: float
     per_fast: float
     apart: float  # 1/(fast − slow) [s]; 0: they are close, or shaft and current swing
+    square: float  # of half the difference [1/s²], below 0 where they swing
+    root: float  # of its magnitude
 
 
 class Winding(NamedTuple):
@@ -116,11 +117,11 @@ def _circuit(numbers: Numbers, u: float) -> Circuit:
     _, R = currents.loop(numbers, CONDUCTING, u)
     rate = -motor.armature_current_rate(0.0, 1.0, 0.0, R, numbers.motor.L, numbers.motor.K_b)
     d = a * a - c
-    far = d > _FAR * a * a
-    half = math.sqrt(max(d, 0.0))
-    fast = a + half
+    root = math.sqrt(abs(d))
+    fast = a + root if d > 0.0 else a
     slow = c / fast
-    return Circuit(R, rate, 1.0 / rate, 2.0 * a, c, slow, 1.0 / slow, fast, 1.0 / fast, 0.5 / half if far else 0.0)
+    return Circuit(R, rate, 1.0 / rate, 2.0 * a, c, slow, 1.0 / slow, fast, 1.0 / fast,
+                   0.5 / root if d > second_order.FAR * a * a else 0.0, d, root)
 
 
 # --- a leg that does not end ------------------------------------------------------------------------------------------
@@ -284,7 +285,8 @@ def _response(circuit: Circuit, s: float) -> Course:
     """Return the responses after a time s [s] in any circuit."""
     if circuit.apart > 0.0:
         return course(circuit, s)
-    _, g, once, twice, _ = second_order.response(0.5 * circuit.damping, circuit.product, s)
+    _, g, once, twice, _ = second_order.response_of_near_roots(
+        0.5 * circuit.damping, circuit.product, circuit.square, circuit.root, s)
     return Course(g, once, twice)
 
 
@@ -299,7 +301,8 @@ def _zero(circuit: Circuit, after: Course, x: float, dx: float, r: float, until:
             return math.inf
         if x > 0.0 and end < _BELOW:
             return _root(circuit, x, dx, r, 0.0, until)
-    zero, spacing = second_order.first_zero(0.5 * circuit.damping, circuit.product, dx, r - circuit.damping * dx)
+    zero, spacing = second_order.first_zero_of(
+        0.5 * circuit.damping, circuit.square, circuit.root, dx, r - circuit.damping * dx)
     left, right = 0.0, min(zero, until)
     for _ in range(MOST_ARCS):
         value, _ = _value(circuit, x, dx, r, right)
