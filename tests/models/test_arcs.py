@@ -212,3 +212,13 @@ def test_numbers_beyond_all_bounds_end_with_a_status():
     assert raw.status[1] != 0
     assert np.isnan(raw.fields["angle"][1, -1])
     np.testing.assert_array_equal(raw.fields["angle"][::2], run_lanes(work).fields["angle"][::2])
+
+
+def test_a_current_at_the_start_flows_on():
+    work = case(20, duration=0.05, times=np.array([0.0, 2e-4, 0.05]), fields=FIELDS, changes=COIL)
+    start = work.start.copy()
+    start[1], start[2] = np.linspace(-2.0, 2.0, 20), np.linspace(1.5, -1.5, 20)
+    raw = run_lanes(replace(work, start=start))
+    assert_same(raw, one_by_one(replace(work, start=start)), 1e-11)
+    np.testing.assert_array_equal(raw.fields["current"][:, 0], start[2])
+    assert np.abs(raw.fields["angle"] - run_lanes(work).fields["angle"])[:, -1].min() > 1e-6

@@ -97,7 +97,7 @@ def _choose(size: int, tile: Any, plan: Any) -> None:
         own.per_slow[j] = drive.per_slow[j] if drives else off.per_slow[j]
         own.fast[j] = drive.fast[j] if drives else off.fast[j]
         own.per_fast[j] = drive.per_fast[j] if drives else off.per_fast[j]
-        own.apart[j] = drive.apart[j] if drives else off.apart[j]  # the last that is read for all lanes together
+        own.apart[j] = drive.apart[j] if drives else off.apart[j]  # what follows it is for lanes alone
 
 
 def _glide(numbers: Numbers, circuit: Circuit, tile: Any, plan: Any, j: int) -> None:
