@@ -26,6 +26,9 @@ CASES = {  # what leads to each way in which lanes run
     "worn potentiometer": ({"potentiometer.backlash": 0.02}, None),
     "everything": (EVERYTHING, st.loads.Recorded([0.0, 0.2, 10.0], [0.0, 0.1, -0.1])),
 }
+# Those that run side by side with inductance too, or hit stops
+INDUCTIVE = ("plain", "coasting, with noise", "couplings", "limp after a while", "frames as short as pulses", "stops",
+             "dry load", "worn potentiometer")
 
 
 def model_of(servo, changes, kind=st.PulseServo):

@@ -83,6 +83,7 @@ def test_a_free_shaft_has_no_cancellation(time):
 
 
 OPEN = {"bridge.off.coast": 1.0, "bridge.silence.coast": 1.0, "bridge.off.D": 6.7, "bridge.off.R": 3.2}
+COIL = {"motor.L": 5e-4}
 STRIBECK = {"friction.varies": 1.0, "friction.w_s": 0.05, "friction.alpha": 1.5, "friction.breakaway": 1.4}
 FEATURES = {
     "plain": {}, "coast": OPEN, "RC stretcher": {"chip.tau_s": 0.02},
@@ -104,6 +105,13 @@ FEATURES = {
     "all bands": OPEN | {"friction.varies": 1.0, "friction.K_m": 0.1, "friction.K_e": 0.2, "source.I_max": 0.9,
                          "sensor.half_slack": 2e-3, "stops.lower": 0.1, "stops.upper": 2.0, "friction.F_forward": 0.0,
                          "friction.F_backward": 0.0},
+    "inductance": COIL, "inductance, open": COIL | OPEN, "inductance, swinging": {"motor.L": 5e-2},
+    "inductance, brush drop, play": COIL | {"bridge.off.D": 0.15, "bridge.V_br": 0.15, "sensor.half_slack": 2e-3},
+    "inductance, no friction": COIL | {"friction.F_forward": 0.0, "friction.F_backward": 0.0, "load.coulomb": 0.0},
+    "inductance, short frames": COIL | OPEN | {"chip.frame_period": 0.004, "chip.timeout": 0.007},
+    "inductance, everything": {"motor.L": 2e-3} | OPEN | {
+        "chip.tau_s": 0.02, "chip.beta": 0.01, "chip.c_s": 0.02, "chip.noise": 1e-3, "chip.shortest": 0.9e-3,
+        "sensor.half_slack": 2e-3, "stops.lower": 0.1, "stops.upper": 2.0},
     "everything": OPEN | {"chip.tau_s": 0.02, "chip.beta": 0.01, "chip.c_s": 0.02, "chip.noise": 1e-3,
                           "chip.timeout": 0.025, "chip.shortest": 0.9e-3, "stops.lower": 0.1, "stops.upper": 2.0}}
 
@@ -123,9 +131,9 @@ def test_side_by_side_against_one_by_one(name):
 
 def assert_same(raw, other, tolerance):
     np.testing.assert_array_equal(raw.status, other.status)
-    for name in ("angle", "error", "speed", "wiper"):
+    for name in ("angle", "error", "speed", "wiper", "current"):
         np.testing.assert_allclose(raw.fields[name], other.fields[name], rtol=0,
-                                   atol=tolerance * (100.0 if name == "speed" else 1.0))
+                                   atol=tolerance * (100.0 if name in ("speed", "current") else 1.0))
     for name in ("contact", "drive"):
         assert np.mean(raw.fields[name] != other.fields[name]) < 1e-3  # at the very instant of an event either holds
 
@@ -145,7 +153,8 @@ def plain(work):
     return raw
 
 
-@pytest.mark.parametrize("name", [name for name in FEATURES if name not in ("stops", "everything", "all bands")])
+@pytest.mark.parametrize("name", [name for name in FEATURES if name != "stops" and not name.endswith(
+    ("everything", "all bands"))])
 def test_plain_source_against_compiled(name):
     work = case(18, duration=0.12, times=np.linspace(0.0, 0.12, 7), fields=FIELDS, changes=FEATURES[name])
     assert_same(plain(work), run_lanes(work), 1e-12)
@@ -168,8 +177,9 @@ def test_commands_that_are_not_constant():
     assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
-def test_lanes_know_nothing_of_each_other():
-    work = case(300, duration=0.5, times=np.linspace(0.0, 0.5, 5), fields=FIELDS)
+@pytest.mark.parametrize("name", ["plain", "inductance"])
+def test_lanes_know_nothing_of_each_other(name):
+    work = case(300, duration=0.5, times=np.linspace(0.0, 0.5, 5), fields=FIELDS, changes=FEATURES[name])
     whole = run_lanes(work)
     for start, stop in ((0, 1), (7, 30), (100, 237)):
         part = run_lanes(work.part(start, stop))
@@ -185,8 +195,10 @@ def test_float32_follows_float64():
 
 
 def test_lanes_that_need_the_general_way_are_mixed_with_others():
-    spring = np.where(np.arange(12) % 3 == 0, 0.1, 0.0)
-    work = case(12, duration=0.3, times=np.array([0.1, 0.3]), fields=FIELDS, changes={"load.stiffness": spring})
+    lane = np.arange(12)
+    work = case(12, duration=0.3, times=np.array([0.1, 0.3]), fields=FIELDS, changes={
+        "load.stiffness": np.where(lane % 3 == 0, 0.1, 0.0), "motor.L": np.where(lane % 2 == 0, 5e-4, 0.0),
+        "source.I_max": np.where(lane > 8, 0.9, math.inf)})
     assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
@@ -200,3 +212,13 @@ def test_numbers_beyond_all_bounds_end_with_a_status():
     assert raw.status[1] != 0
     assert np.isnan(raw.fields["angle"][1, -1])
     np.testing.assert_array_equal(raw.fields["angle"][::2], run_lanes(work).fields["angle"][::2])
+
+
+def test_a_current_at_the_start_flows_on():
+    work = case(20, duration=0.05, times=np.array([0.0, 2e-4, 0.05]), fields=FIELDS, changes=COIL)
+    start = work.start.copy()
+    start[1], start[2] = np.linspace(-2.0, 2.0, 20), np.linspace(1.5, -1.5, 20)
+    raw = run_lanes(replace(work, start=start))
+    assert_same(raw, one_by_one(replace(work, start=start)), 1e-11)
+    np.testing.assert_array_equal(raw.fields["current"][:, 0], start[2])
+    assert np.abs(raw.fields["angle"] - run_lanes(work).fields["angle"])[:, -1].min() > 1e-6

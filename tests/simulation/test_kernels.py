@@ -15,6 +15,7 @@ STEP = st.signals.step(10.0, 50.0, at=0.02, unit="deg")
 FORMS = {
     "pendulum_runs": ({}, st.loads.Pendulum(mass=0.1, length=0.1), "float64", 1e-9),
     "runs": ({"gear.backlash": 0.005, "gear.output_inertia": 1e-3}, None, "float64", 1e-9),
+    "by_coils": ({"motor.armature_inductance": 5e-4}, None, "float64", 1e-12),
     "by_bands": ({"supply.current_limit": 1.0}, None, "float64", 1e-9),
     "by_bands_and_creep": ({"friction.breakaway_ratio": 1.4, "friction.stribeck_speed": 5.0}, None, "float64", 1e-9),
     "side_by_side_float64": ({}, st.loads.Inertia(1e-3), "float64", 1e-9),
@@ -29,12 +30,13 @@ def test_each_compiled_form_moves_a_servo_as_it_should(servo, monkeypatch, name)
     changes, load, dtype, tolerance = FORMS[name]
     used, kernels = [], lane_runs.kernels
     monkeypatch.setattr(lane_runs, "kernels", lambda recipe: (used.append(recipe.name), kernels(recipe))[1])
-    model = st.PulseServo(servo.replace(changes))
+    kind = st.PulseServoInductive if "motor.armature_inductance" in changes else st.PulseServo
+    model = kind(servo.replace(changes))
     column = {"motor.armature_resistance": [2.8, 3.2, 3.6]}
     batch = st.simulate_many(model, STEP, duration=0.15, load=load, parameters=column, output_step=0.01, dtype=dtype)
     assert set(used) - {"ending"} == {name}  # how a lane ends is looked at by a form of its own
     for lane, R in enumerate(column["motor.armature_resistance"]):
-        alone = st.simulate(st.PulseServo(model.servo.replace({"motor.armature_resistance": R})), STEP, duration=0.15,
+        alone = st.simulate(kind(model.servo.replace({"motor.armature_resistance": R})), STEP, duration=0.15,
                             load=load, output_step=0.01)
         np.testing.assert_allclose(batch["output_angle"][lane], alone["output_angle"], rtol=0.0, atol=tolerance)
         assert np.ptp(alone["output_angle"]) > 0.2

@@ -34,17 +34,18 @@ def lanes():
             for name, values in numbers.items()}
 
 
-@pytest.mark.parametrize("stretcher", ["linear", "rc"])
-def test_every_combination_of_features(servo, stretcher):
-    model = st.PulseServo(servo.replace({"electronics.stretcher_time_constant": 0.02}) if stretcher == "rc" else servo)
+@pytest.mark.parametrize(("kind", "changes", "every"), [  # any three features meet in all eight ways
+    (st.PulseServo, {}, 9), (st.PulseServo, {"electronics.stretcher_time_constant": 0.02}, 23),
+    (st.PulseServoInductive, {"motor.armature_inductance": 6e-4}, 23)], ids=["linear", "rc", "inductance"])
+def test_every_combination_of_features(servo, kind, changes, every):
+    model = kind(servo.replace(changes))
     parameters = lanes()
     batch = st.simulate_many(model, COMMAND, duration=0.2, load=LOAD, parameters=parameters, output_times=TIMES,
                              seeds=7, outputs=("output_angle", "drive"))
     assert batch.ok
-    every = 9 if stretcher == "linear" else 23  # any three features meet in all eight ways
     for lane in range(0, len(batch), every):
         own = {name: values[lane].item() for name, values in parameters.items()}
-        plain = st.simulate(st.PulseServo(model.servo.replace(own)), COMMAND, duration=0.2, load=LOAD,
+        plain = st.simulate(kind(model.servo.replace(own)), COMMAND, duration=0.2, load=LOAD,
                             output_times=TIMES, seed=7)
         np.testing.assert_allclose(batch["output_angle"][lane], plain["output_angle"], rtol=0.0, atol=1e-12,
                                    err_msg=str(own))
@@ -65,20 +66,22 @@ def test_a_timeout_of_one_frame_is_renewed_by_every_edge(servo):
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
-@pytest.mark.parametrize("model", [st.BoundedServo, st.PulseServo])
+@pytest.mark.parametrize("model", [st.BoundedServo, st.PulseServo, st.PulseServoInductive])
 def test_results_do_not_depend_on_the_output_step(servo, model, dtype):
     """To the last bit: outputs are read from the motions, which do not know of them."""
     count = 150
     numbers = np.random.default_rng(8)
     parameters = {"load.torque": numbers.uniform(-0.6, 0.6, count), "load.inertia": numbers.uniform(0.0, 5e-3, count),
                   "motor.armature_resistance": numbers.uniform(2.5, 4.0, count)}
-    if model is st.PulseServo:
+    if model is not st.BoundedServo:
         parameters |= {"electronics.frame_period": numbers.uniform(0.012, 0.02, count),
                        "motor.brush_drop_voltage": np.where(np.arange(count) % 3 == 0, 0.3, 0.0)}
     command = st.signals.samples([0.0, 0.1, 0.3, 0.45], [10.0, 80.0, 60.0, 61.0], unit="deg")
 
+    own = servo.replace({"motor.armature_inductance": 5e-4}) if model is st.PulseServoInductive else servo
+
     def angles(**outputs):
-        return st.simulate_many(model(servo), command, duration=0.6, parameters=parameters, dtype=dtype,
+        return st.simulate_many(model(own), command, duration=0.6, parameters=parameters, dtype=dtype,
                                 **outputs)["output_angle"]
 
     fine, coarse, end = angles(output_step=0.002), angles(output_step=0.004), angles(output_times=[0.6])

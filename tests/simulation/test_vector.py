@@ -10,7 +10,7 @@ from conftest import EVERYTHING
 from servotwin.errors import CommandError, InputError, ServotwinError, UnknownNameError
 from servotwin.models.engine.memory import memory_of, time_of
 from servotwin.simulation.engine import State
-from vector_cases import CASES, WIDTHS, model_of
+from vector_cases import CASES, INDUCTIVE, WIDTHS, model_of
 
 
 def one(model, load, seed, cuts, widths, torques=None):
@@ -25,10 +25,11 @@ def one(model, load, seed, cuts, widths, torques=None):
     return sim, states
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_it_is_many_simulators(servo, name):
+@pytest.mark.parametrize(("kind", "name"), [
+    *((st.PulseServo, name) for name in CASES), *((st.PulseServoInductive, name) for name in INDUCTIVE)])
+def test_it_is_many_simulators(servo, kind, name):
     changes, load = CASES[name]
-    model = model_of(servo, changes)
+    model = model_of(servo, changes, kind)
     rng = np.random.default_rng(3)
     cuts = np.sort(rng.uniform(0.0, 0.4, 60))
     torques = np.repeat(rng.uniform(-0.05, 0.05, 12), 5)
@@ -147,9 +148,10 @@ def test_a_million_ticks(servo, kind):
     np.testing.assert_allclose(sims.time, 1000.0, rtol=1e-13)
 
 
-@pytest.mark.parametrize("changes", [{}, EVERYTHING], ids=["plain", "with everything"])
-def test_it_goes_on_from_what_was_saved(servo, changes):
-    model = model_of(servo, changes)
+@pytest.mark.parametrize(("kind", "changes"), [(st.PulseServo, {}), (st.PulseServo, EVERYTHING),
+                                               (st.PulseServoInductive, {})])
+def test_it_goes_on_from_what_was_saved(servo, kind, changes):
+    model = model_of(servo, changes, kind)
     sims = st.VectorSimulator(model, 4)
     for k in range(30):
         sims.advance(0.003, pulse_width=WIDTHS[k // 10])
@@ -187,8 +189,9 @@ def test_lanes_are_reset_on_their_own(servo):
     assert not np.array_equal(*noise)
 
 
-def test_threads_and_neighbours_change_nothing(servo):
-    model = st.PulseServo(servo)
+@pytest.mark.parametrize("kind", [st.PulseServo, st.PulseServoInductive])
+def test_threads_and_neighbours_change_nothing(servo, kind):
+    model = model_of(servo, {}, kind)
     rng = np.random.default_rng(1)
     widths = rng.uniform(1.1e-3, 1.9e-3, (5, 20_000))
     ends = []

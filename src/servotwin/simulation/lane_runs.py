@@ -23,33 +23,48 @@ _straight = array_form(straight, __name__)
 Mask = NDArray[np.bool_]
 
 _SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
-_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32",
-                        never=("BANDS", "STRIDES"))
-            for dtype in ("float64", "float32")}
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
 ALL_RUNS = Recipe("runs", _ENTRIES)  # everything
-_ALONE = ("friction.kappa", "play", "motor.L")  # what only lanes one by one have
+_FORMS = ("ONE_FORMULA", "ARCS", "BANDS", "STRIDES", "COILS", "GAPS")
+_PENDULUM, _COIL, _PLAY = "load.gravity", "motor.L", "play"
 _BANDED = ("friction.varies", "source.I_max")
-_PENDULUM = "load.gravity"
 _STRIDING = ("heat", _PENDULUM, "load.stiffness")
-_RARE = (*_BANDED, *_ALONE, "heat", "sensor.half_slack")
-_NOT_IN_STRIDES = (*_ALONE, "follower", "sweep")
+_PLAYED = ("INSIDE", "ON_FORWARD", "ON_BACKWARD", "APART")  # with play alone
+_NO_SIDE = ("friction.kappa", "follower", "sweep")  # what no lanes side by side have
+_NOT_IN_STRIDES = (*_NO_SIDE, _PLAY, _COIL)
 _NOT_IN_BANDS = (*_NOT_IN_STRIDES, *_STRIDING)
-_BY_BANDS = {creeps: Recipe("by_bands" + "_and_creep" * creeps, _SIDE, vector=True, absent=(
-    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), never=("ONE_FORMULA", "ARCS", "STRIDES", "CORE"))
-    for creeps in (False, True)}
-_BY_STRIDES = {banded: Recipe("by_strides" + "_in_bands" * banded, _SIDE, vector=True, absent=(
-    _NOT_IN_STRIDES if banded else (*_NOT_IN_STRIDES, *_BANDED)),
-    never=("ONE_FORMULA", "ARCS", "BANDS", "CORE", "INSIDE", "ON_FORWARD", "ON_BACKWARD")) for banded in (False, True)}
+_NOT_IN_GAPS = (*_NO_SIDE, _COIL, *_STRIDING, "friction.varies")
+_RARE = (*_BANDED, "friction.kappa", _PLAY, "heat", _COIL, "sensor.half_slack")
+
+
+def _side(name: str, forms: tuple[str, ...], absent: tuple[str, ...] = (), never: tuple[str, ...] = (),
+          single: bool = False) -> Recipe:
+    """Return the recipe of lanes that go side by side in some forms."""
+    return Recipe(name, _SIDE, vector=True, single=single, absent=absent,
+                  never=(*(form for form in _FORMS if form not in forms), *never))
+
+
+_BY_ARCS = {dtype: _side(f"side_by_side_{dtype}", ("ONE_FORMULA", "ARCS"), single=dtype == "float32")
+            for dtype in ("float64", "float32")}
+_BY_BANDS = {creeps: _side("by_bands" + "_and_creep" * creeps, ("BANDS",), (
+    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), ("CORE", *_PLAYED)) for creeps in (False, True)}
+_BY_STRIDES = {banded: _side("by_strides" + "_in_bands" * banded, ("STRIDES",), (
+    _NOT_IN_STRIDES if banded else (*_NOT_IN_STRIDES, *_BANDED)), ("CORE", *_PLAYED)) for banded in (False, True)}
+_BY_COILS = _side("by_coils", ("COILS",), (*_NO_SIDE, _PLAY, *_STRIDING, *_BANDED), (
+    "CORE", *_PLAYED, "LINEAR", "LINEAR_BACKWARD", "LIMITED_FORWARD", "LIMITED_BACKWARD", "SHORT_FORWARD",
+    "SHORT_BACKWARD"))
+_BY_GAPS = _side("by_gaps", ("GAPS",), _NOT_IN_GAPS, ("CORE",))
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep"),
-    never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
+    never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))
 PENDULUM_RUNS = Recipe(
     "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep"),
-    never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
+    never=("SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))
+GAP_RUNS = Recipe(
+    "gap_runs", _ENTRIES, absent=_NOT_IN_GAPS,
+    never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "CREEP", "CORE"))
 LOOK_SIDE_BY_SIDE = Recipe(
-    "look_side_by_side", ("servotwin.models.engine.sights:side_by_side",),
-    absent=_ALONE)
+    "look_side_by_side", ("servotwin.models.engine.sights:side_by_side",), absent=("friction.kappa", "follower"))
 LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",))
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
 _ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
@@ -92,7 +107,7 @@ def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> No
         if name in raw.fields and values is not raw.fields[name]:
             with np.errstate(over="ignore"):
                 raw.fields[name][which] = values[which]
-    for k, name in enumerate(("q", "w", "T_w", "T_h") if kind.form == tiles.STRIDES else ("q", "w")):
+    for k, name in enumerate(("q", "w", "T_w", "T_h") if tiles.has_more(kind.form) else ("q", "w")):
         raw.final[which, k] = flat(rows, "servo", name)[:len(which)]
     if lost:
         owed = flat(rows, "clock", "owed")[:len(which)]
@@ -154,14 +169,18 @@ class SideBySide(NamedTuple):
     @property
     def recipe(self) -> Recipe:
         """Their kernels."""
+        if self.form == tiles.BANDS:
+            return _BY_BANDS[self.creeps]
         if self.form == tiles.STRIDES:
             return _BY_STRIDES[self.banded]
-        return _BY_BANDS[self.creeps] if self.form == tiles.BANDS else _BY_ARCS[self.dtype]
+        return _BY_COILS if self.form == tiles.COILS else _BY_GAPS if self.form == tiles.GAPS else _BY_ARCS[self.dtype]
 
     @property
     def general(self) -> Recipe:
         """The kernels of those that cannot go on side by side."""
-        return ALL_RUNS if self.form in (tiles.BANDS, tiles.STRIDES) or self.slack else PLAIN_RUNS
+        if self.form == tiles.GAPS:
+            return GAP_RUNS
+        return PLAIN_RUNS if self.form in (tiles.ONE_FORMULA, tiles.ARCS) and not self.slack else ALL_RUNS
 
 
 class OneByOne(NamedTuple):
@@ -180,40 +199,56 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     """
     bridge, own = numbers.bridge, numbers.friction
     slack, swinging = _differs(numbers, "sensor.half_slack"), _differs(numbers, _PENDULUM)
-    alone = _either(swept.any() and swept, _any_differs(numbers, _ALONE))
+    waving = swept.any() and swept
+    alone = _either(_either(waving, recorded.any() and recorded), _differs(numbers, "friction.kappa"))
     banded, striding = _any_differs(numbers, _BANDED), _any_differs(numbers, _STRIDING)
+    coiled, played = _differs(numbers, _COIL), _differs(numbers, _PLAY)
+    braked = (bridge.off.D == 0.0) & (bridge.D_drive < numbers.source.V)
+    by_bands = _either(banded, slack & np.logical_not(braked))
+    loose = _without(played, alone, striding, coiled, own.varies != 0.0) if pulsed else False
     side: Any = False
     if pulsed and not curved:
-        side = (np.logical_not(_either(alone, recorded.any() and recorded))
-                & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
+        side = (_without(True, alone) & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
                 & (bridge.silence.coast == bridge.off.coast) & ((own.varies == 0.0) | _straight(own)))
     if dtype == "float32":  # what is not zero has to stay so
         for x in (*numbers_in(numbers), *numbers_in(chip)):
             fits = (x == 0.0) | (abs(x) > _SMALLEST)
             side = side if fits is True else side & fits
-    braked = (bridge.off.D == 0.0) & (bridge.D_drive < numbers.source.V)
-    banded = _either(banded, slack & np.logical_not(braked))
-    rare = _either(_either(alone, _differs(numbers, "heat")), _either(banded, slack))
-    flowing = np.logical_not(_either(banded, striding))
+    plain = _without(True, by_bands, striding, coiled, played)
+    forms: list[tuple[int, Any]] = [
+        (tiles.ONE_FORMULA, braked & plain), (tiles.ARCS, np.logical_not(braked) & plain),
+        (tiles.BANDS, _without(by_bands, striding, coiled, played)),
+        (tiles.STRIDES, _without(striding, banded, coiled, played)),
+        (tiles.STRIDES, _without(striding & banded, coiled, played)),
+        (tiles.COILS, _without(coiled, banded, striding, played)), (tiles.GAPS, loose)]
     found: list[SideBySide | OneByOne] = []
-    for form, some in ((tiles.ONE_FORMULA, braked & flowing), (tiles.ARCS, np.logical_not(braked) & flowing),
-                       (tiles.BANDS, banded & np.logical_not(striding)),
-                       (tiles.STRIDES, striding & np.logical_not(banded)), (tiles.STRIDES, striding & banded)):
+    gone: Any = False
+    for form, some in forms:
         which = _where(side, some, lanes)
+        gone = _either(gone, some)
         lagging = bool(np.any(np.broadcast_to(slack, lanes)[which])) if np.any(slack) else False
         creeping = form == tiles.BANDS and bool(np.any(np.broadcast_to(own.varies * own.w_s > 0.0, lanes)[which]))
+        in_bands = form == tiles.STRIDES and bool(np.any(np.broadcast_to(banded, lanes)[which]))
         own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
-        found.append(SideBySide(which, form, lagging, own_type, creeping, bool(np.any(
-            np.broadcast_to(banded, lanes)[which]))))
-    found += [OneByOne(_where(some, np.logical_not(side), lanes), recipe) for recipe, some in (
-        (PLAIN_RUNS, np.logical_not(_either(rare, swinging))), (PENDULUM_RUNS, swinging & np.logical_not(rare)),
-        (ALL_RUNS, rare))]
+        found.append(SideBySide(which, form, lagging, own_type, creeping, in_bands))
+    one_by_one = np.logical_not(side & gone)
+    rare = _without(_either(_any_differs(numbers, _RARE), waving), loose)
+    found += [OneByOne(_where(some, one_by_one, lanes), recipe) for recipe, some in (
+        (PLAIN_RUNS, _without(True, rare, swinging, loose)), (PENDULUM_RUNS, _without(swinging, rare)),
+        (GAP_RUNS, loose), (ALL_RUNS, rare))]
     return [kind for kind in found if len(kind.which)]
+
+
+def _without(some: Any, *others: Any) -> Any:
+    """Return `some` but for those that one of the others holds for."""
+    for other in others:
+        some = some if other is False else np.logical_and(some, np.logical_not(other))
+    return some
 
 
 def goes_together(numbers: Numbers, pulsed: bool) -> bool:
     """Tell whether all lanes take about as long, for none has a term that would let it run on its own."""
-    return pulsed and not np.any(_any_differs(numbers, (*_ALONE, *_STRIDING)))
+    return pulsed and not np.any(_any_differs(numbers, ("friction.kappa", _PLAY, *_STRIDING)))
 
 
 def _any_differs(numbers: Numbers, names: tuple[str, ...]) -> Any:

@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Record = TypeVar("Record", bound=tuple[object, ...])
 
-FIELDS = ("angle", "speed", "contact", "drive", "error", "wiper")
-MORE_FIELDS = ("current", "winding", "housing", "motor_angle", "motor_speed", "mesh", "motor",
-               "silent")  # of servos that run one by one
+FIELDS = ("angle", "speed", "contact", "drive", "error", "wiper", "current", "winding", "housing", "motor_angle",
+          "motor_speed", "mesh")
+MORE_FIELDS = ("motor", "silent")  # of servos that run one by one
 SMALL_FIELDS = ("contact", "drive", "mesh", "motor", "silent")  # fields that are kept as int8
 
 
@@ -98,7 +98,8 @@ class Work:
         Output times [s], not decreasing, within [0, duration].
     fields : tuple of str
         Of "angle" [rad], "speed" [rad/s], "contact" (`engine.modes.FREE` … `ON_UPPER`), "drive" (−1, 0, +1),
-        "error" (of the latest decision [s]) and "wiper" (of the potentiometer [rad]), or of `MORE_FIELDS`; only these
+        "error" (of the latest decision [s]), "wiper" (of the potentiometer [rad]) and "current" (of an armature with
+        inductance [A], else 0), or of `MORE_FIELDS`; only these
         are computed and kept.
     dtype : str
         "float64" or "float32".

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from servotwin.models.engine.memory import BEAT, NOTHING, SAME, Memory, Point
-from servotwin.models.engine.modes import RIGID, Mode
+from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, RIGID, Mode
 from servotwin.models.engine.records import reader, writer
 from servotwin.models.terms.frame import Decision, Frame
 
@@ -29,8 +29,12 @@ class Held(NamedTuple):
     later_duration: float
     later_decided: float
     wiper: float
+    i: float
     T_w: float
     T_h: float
+    q_m: float
+    w_m: float
+    mesh: float
     step: float
 
 
@@ -74,21 +78,24 @@ def remembered(side: Side, regular: bool, half_slack: float) -> Memory:
     held, hour, number = side.held, side.hour, side.counted.number
     now = hour.since - hour.length if regular else hour.edge + hour.since
     q, w = 1.0 * held.q, 1.0 * held.w  # float64, whatever tiles hold
-    y = (q, w, 0.0, 1.0 * held.T_w, 1.0 * held.T_h, q, w)
+    pushed = ON_FORWARD if held.mesh == ON_FORWARD else ON_BACKWARD if held.mesh == ON_BACKWARD else RIGID
+    mesh = INSIDE if held.mesh == INSIDE else pushed
+    y = (q, w, 1.0 * held.i, 1.0 * held.T_w, 1.0 * held.T_h, q if held.mesh == RIGID else 1.0 * held.q_m,
+         w if held.mesh == RIGID else 1.0 * held.w_m)
     chip = Frame(
         number, side.counted.first_draw + number, 1.0 * held.drive,
         now + held.left if held.drive != 0.0 else math.inf, now + held.silence, 0, 1.0 * held.error,
         Decision(now + held.due, 1.0 * held.sign, 1.0 * held.duration, 1.0 * held.decided),
         Decision(now + held.later_due, 1.0 * held.later_sign, 1.0 * held.later_duration, 1.0 * held.later_decided))
     wiper = 1.0 * held.wiper if half_slack > 0.0 else q
-    point = Point(now, y, Mode(0, 0, RIGID, 0, 0), math.inf, y, 1.0 * held.step, wiper)
+    point = Point(now, y, Mode(0, 0, mesh, 0, 0), math.inf, y, 1.0 * held.step, wiper)
     return Memory(number if regular else 0, hour.period if regular else BEAT, point, chip, NOTHING, math.inf, NOTHING,
                   math.inf)
 
 
 def side_of(memory: Memory, period: float) -> Side:
     """Return what a servo remembers side by side, whose frames are regular, of a period [s], from now on."""
-    now, beat, chip = memory.point.time, memory.beat, memory.chip
+    now, beat, chip, y = memory.point.time, memory.beat, memory.chip, memory.point.y
     time = memory.frames * beat + now
     same = beat == period
     number = chip.number if same else math.ceil(time / period - SAME)
@@ -96,9 +103,9 @@ def side_of(memory: Memory, period: float) -> Side:
     to_next = max(to_next, 0.0)
     pending, later = chip.pending, chip.later
     held = Held(
-        memory.point.y[0], memory.point.y[1], chip.drive, chip.drive_end - now if chip.drive != 0.0 else 0.0,
+        y[0], y[1], chip.drive, chip.drive_end - now if chip.drive != 0.0 else 0.0,
         chip.clock - now, chip.error, pending.time - now, pending.sign, pending.duration, pending.error,
-        later.time - now, later.sign, later.duration, later.error, memory.point.wiper, memory.point.y[3],
-        memory.point.y[4], memory.point.step)
+        later.time - now, later.sign, later.duration, later.error, memory.point.wiper, y[2], y[3], y[4], y[5], y[6],
+        memory.point.mode.mesh, memory.point.step)
     return Side(held, Hour(period, (number - 1) * period, period - to_next, period),
                 Counted(number, chip.draws - number))

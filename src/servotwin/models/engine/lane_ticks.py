@@ -21,6 +21,7 @@ from servotwin.models.engine.crossing import (
 )
 from servotwin.models.engine.imposing import carried, impulse_work, placed
 from servotwin.models.engine.memory import Memory, memory_of, put_memory, time_of
+from servotwin.models.engine.modes import INSIDE
 from servotwin.models.engine.records import TILE
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.ticks import ANGLE, SPEED, shaft_at, stops_at
@@ -92,17 +93,22 @@ def forget_motions(rows: Any) -> None:
 
 def impose_on_tiles(has: Indices, given: Floats, numbers: Any, which: Indices, places: Indices, work: Floats,
                     tile_rows: Any) -> None:
-    """Set angles and speeds of lanes at these places of tiles, and book the work of the impulses [J]; none has play."""
+    """Set angles and speeds of lanes at these places of tiles, and book the work of the impulses [J]."""
     for k in range(which.size):
         lane, servo, j = which[k], tile_rows[places[k] // TILE].servo, places[k] % TILE
         own, i = numbers[lane // TILE], lane % TILE
+        half = own.play.half[i]
+        if half > 0.0:
+            servo.mesh[j] = INSIDE
         if has[SPEED] != 0:
             after = given[SPEED, lane]
-            work[lane] += impulse_work(shaft_at(own.shaft, i), own.play.half[i], 1.0 * servo.w[j], after)
+            work[lane] += impulse_work(shaft_at(own.shaft, i), half, 1.0 * servo.w[j], after)
             servo.w[j] = after
+            servo.w_m[j] = servo.w_m[j] if half > 0.0 else after
         if has[ANGLE] != 0:
             angle = within_stops(own, i, given[ANGLE, lane])
             servo.q[j], servo.wiper[j] = angle, carried(1.0 * servo.wiper[j], angle, own.sensor.half_slack[i])
+            servo.q_m[j] = carried(1.0 * servo.q_m[j], angle, half) if half > 0.0 else angle
 
 
 def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices, places: Indices, work: Floats,

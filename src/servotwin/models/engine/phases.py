@@ -8,33 +8,29 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine import arc_rounds, band_rounds, braked_rounds, stride_rounds, tiles
-from servotwin.models.engine.tiles import ARCS, BANDS, ONE_FORMULA, STRIDES
+from servotwin.models.engine import arc_rounds, band_rounds, braked_rounds, coil_rounds, gap_rounds, stride_rounds, tiles
+from servotwin.models.engine.tiles import ARCS, BANDS, COILS, GAPS, ONE_FORMULA, STRIDES, More
 
 
 def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) -> None:
     """Move all lanes through the four phases; keep the state at the start of each where it is wanted."""
+    if form == COILS:
+        coil_rounds.begin(size, tile)
     if size <= tiles.FEW:
         for j in range(size):
             _lane(keep, form, slack, tile, plan, j)
         return
     if keep:
-        _keep(plan.q1, plan.w1, plan.wiper1, size, tile)
-        if form == STRIDES:
-            _keep_warmth(plan.T_w1, plan.T_h1, size, tile)
+        _keep(1, plan.q1, plan.w1, plan.wiper1, size, form, tile)
         for j in range(size):
             plan.time[j] = plan.time1[j]
             plan.power[j] = plan.drive1[j]
         _drive(size, form, slack, tile, plan)
-        _keep(plan.q2, plan.w2, plan.wiper2, size, tile)
-        if form == STRIDES:
-            _keep_warmth(plan.T_w2, plan.T_h2, size, tile)
+        _keep(2, plan.q2, plan.w2, plan.wiper2, size, form, tile)
         for j in range(size):
             plan.time[j] = plan.time2[j]
         _idle(size, form, slack, tile, plan)
-        _keep(plan.q3, plan.w3, plan.wiper3, size, tile)
-        if form == STRIDES:
-            _keep_warmth(plan.T_w3, plan.T_h3, size, tile)
+        _keep(3, plan.q3, plan.w3, plan.wiper3, size, form, tile)
     else:
         _before(size, form, slack, tile, plan)
     for j in range(size):
@@ -42,9 +38,7 @@ def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) 
         plan.power[j] = plan.drive3[j]
     _drive(size, form, slack, tile, plan)
     if keep:
-        _keep(plan.q4, plan.w4, plan.wiper4, size, tile)
-        if form == STRIDES:
-            _keep_warmth(plan.T_w4, plan.T_h4, size, tile)
+        _keep(4, plan.q4, plan.w4, plan.wiper4, size, form, tile)
     for j in range(size):
         plan.time[j] = plan.time4[j]
     _idle(size, form, slack, tile, plan)
@@ -59,8 +53,8 @@ def _lane(keep: bool, form: int, slack: bool, tile: Any, plan: Any, j: int) -> N
         time = time if phase < 3 else plan.time4[j]
         if keep:
             _keep_one(phase, q, w, tile.servo.wiper[j], plan, j)
-            if form == STRIDES:
-                _keep_warmth_one(phase, tile.servo.T_w[j], tile.servo.T_h[j], plan, j)
+        if keep and tiles.has_more(form):
+            _keep_more(phase, tile, j)
         if time > 0.0 and (w != 0.0 or start != 0.0 or power != 0.0):
             plan.time[j] = time
             plan.power[j] = power
@@ -86,15 +80,36 @@ def _keep_one(phase: int, q: float, w: float, wiper: float, plan: Any, j: int) -
         plan.wiper4[j] = wiper
 
 
-def _keep_warmth_one(phase: int, T_w: float, T_h: float, plan: Any, j: int) -> None:
+def kept(phase: int, plan: Any, j: int) -> tuple[float, float, float]:
+    """Return angle, speed and angle of the potentiometer at the start of a phase, where they were kept."""
     if phase == 0:
-        plan.T_w1[j], plan.T_h1[j] = T_w, T_h
+        return plan.q1[j], plan.w1[j], plan.wiper1[j]
+    if phase == 1:
+        return plan.q2[j], plan.w2[j], plan.wiper2[j]
+    if phase == 2:
+        return plan.q3[j], plan.w3[j], plan.wiper3[j]
+    return plan.q4[j], plan.w4[j], plan.wiper4[j]
+
+
+def more_kept(phase: int, tile: Any, j: int) -> More:
+    """Return what few forms change besides, at the start of a phase."""
+    if phase == 0:
+        return tiles.more_at(tile.more_0, j)
+    if phase == 1:
+        return tiles.more_at(tile.more_1, j)
+    return tiles.more_at(tile.more_2, j) if phase == 2 else tiles.more_at(tile.more_3, j)
+
+
+def _keep_more(phase: int, tile: Any, j: int) -> None:
+    more = tiles.more_at(tile.servo, j)
+    if phase == 0:
+        tiles.put_more(tile.more_0, j, more)
     elif phase == 1:
-        plan.T_w2[j], plan.T_h2[j] = T_w, T_h
+        tiles.put_more(tile.more_1, j, more)
     elif phase == 2:
-        plan.T_w3[j], plan.T_h3[j] = T_w, T_h
+        tiles.put_more(tile.more_2, j, more)
     else:
-        plan.T_w4[j], plan.T_h4[j] = T_w, T_h
+        tiles.put_more(tile.more_3, j, more)
 
 
 def _alone(form: int, slack: bool, tile: Any, plan: Any, j: int) -> None:
@@ -107,19 +122,20 @@ def _alone(form: int, slack: bool, tile: Any, plan: Any, j: int) -> None:
         band_rounds.alone(slack, tile, plan, j)
     elif form == STRIDES:
         stride_rounds.alone(slack, tile, plan, j)
+    elif form == COILS:
+        coil_rounds.alone(tile, plan, j)
+    elif form == GAPS:
+        gap_rounds.alone(tile, plan, j)
 
 
-def _keep(angle: Any, speed: Any, wiper: Any, size: int, tile: Any) -> None:
+def _keep(phase: int, angle: Any, speed: Any, wiper: Any, size: int, form: int, tile: Any) -> None:
+    if tiles.has_more(form):
+        for j in range(size):
+            _keep_more(phase - 1, tile, j)
     for j in range(size):
         angle[j] = tile.servo.q[j]
         speed[j] = tile.servo.w[j]
         wiper[j] = tile.servo.wiper[j]
-
-
-def _keep_warmth(winding: Any, housing: Any, size: int, tile: Any) -> None:
-    for j in range(size):
-        winding[j] = tile.servo.T_w[j]
-        housing[j] = tile.servo.T_h[j]
 
 
 def _before(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
@@ -142,6 +158,10 @@ def _before(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
             band_rounds.phase(size, slack, tile, plan)
         elif form == STRIDES:
             stride_rounds.phase(size, slack, tile, plan)
+        elif form == COILS:
+            coil_rounds.phase(size, slack, tile, plan)
+        elif form == GAPS:
+            gap_rounds.phase(size, tile, plan)
     if both > 0:
         both = 0
         for j in range(size):
@@ -170,6 +190,10 @@ def _drive(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
             band_rounds.phase(size, slack, tile, plan)
         elif form == STRIDES:
             stride_rounds.phase(size, slack, tile, plan)
+        elif form == COILS:
+            coil_rounds.phase(size, slack, tile, plan)
+        elif form == GAPS:
+            gap_rounds.phase(size, tile, plan)
 
 
 def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
@@ -188,3 +212,7 @@ def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
             band_rounds.phase(size, slack, tile, plan)
         elif form == STRIDES:
             stride_rounds.phase(size, slack, tile, plan)
+        elif form == COILS:
+            coil_rounds.phase(size, slack, tile, plan)
+        elif form == GAPS:
+            gap_rounds.phase(size, tile, plan)

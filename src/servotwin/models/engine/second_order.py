@@ -14,17 +14,26 @@ from __future__ import annotations
 
 import math
 
+FAR = 0.01  # roots are far apart where their distance is a tenth of their mean
+
 
 def response(a: float, c: float, s: float) -> tuple[float, float, float, float, float]:
     """Return ġ, g, G1, G2, G3 at s ≥ 0 for g̈ + 2 a ġ + c g = 0, g(0) = 0, ġ(0) = 1, with a ≥ 0."""
-    x = a * s
-    y = c * s * s
-    if x < 0.25 and -0.25 < y < 0.25:
-        return _series(x, y, s)
     d = a * a - c
-    if d > 0.01 * a * a:
+    if d > FAR * a * a and not _short(a * s, c * s * s):
         return _distinct(a, c, math.sqrt(d), s)
-    return _close(a, c, d, s)
+    return response_of_near_roots(a, c, d, math.sqrt(abs(d)), s)
+
+
+def response_of_near_roots(a: float, c: float, d: float, root: float,
+                           s: float) -> tuple[float, float, float, float, float]:
+    """Return the same where roots are complex or close, for d = a² − c and √|d|; for short times in any case."""
+    x, y = a * s, c * s * s
+    return _series(x, y, s) if _short(x, y) else _close(a, c, d, root, s)
+
+
+def _short(x: float, y: float) -> bool:
+    return x < 0.25 and -0.25 < y < 0.25
 
 
 def _series(x: float, y: float, s: float) -> tuple[float, float, float, float, float]:
@@ -83,7 +92,7 @@ def _phi2_phi3(x: float, phi1: float) -> tuple[float, float]:
     return phi2, (phi2 - 0.5) / x
 
 
-def _close(a: float, c: float, d: float, s: float) -> tuple[float, float, float, float, float]:
+def _close(a: float, c: float, d: float, root: float, s: float) -> tuple[float, float, float, float, float]:
     # Complex roots, or real ones close together; here c s² is not small.
     z = d * s * s
     decay = math.exp(-a * s)
@@ -91,15 +100,13 @@ def _close(a: float, c: float, d: float, s: float) -> tuple[float, float, float,
         sh = decay * s * (1.0 + z * (1 / 6 + z * (1 / 120 + z * (1 / 5040 + z * (1 / 362880 + z / 39916800)))))
         ch = decay * (1.0 + z * (1 / 2 + z * (1 / 24 + z * (1 / 720 + z * (1 / 40320 + z / 3628800)))))
     elif d > 0.0:
-        beta = math.sqrt(d)
-        slow = math.exp((beta - a) * s)
-        fast = math.exp(-(beta + a) * s)
+        slow = math.exp((root - a) * s)
+        fast = math.exp(-(root + a) * s)
         ch = 0.5 * (slow + fast)
-        sh = 0.5 * (slow - fast) / beta
+        sh = 0.5 * (slow - fast) / root
     else:
-        mu = math.sqrt(-d)
-        ch = decay * math.cos(mu * s)
-        sh = decay * math.sin(mu * s) / mu
+        ch = decay * math.cos(root * s)
+        sh = decay * math.sin(root * s) / root
     g = sh
     dg = ch - a * sh
     G1 = (1.0 - dg - 2.0 * a * g) / c
@@ -156,18 +163,21 @@ def first_zero(a: float, c: float, h0: float, h1: float) -> tuple[float, float]:
     equation under polynomial forcing, so that q̇ is monotone between its zeros.
     """
     d = a * a - c
+    return first_zero_of(a, d, math.sqrt(abs(d)), h0, h1)
+
+
+def first_zero_of(a: float, d: float, root: float, h0: float, h1: float) -> tuple[float, float]:
+    """Return the same for d = a² − c and √|d|."""
     slope = h1 + a * h0
     if d >= 0.0:
         if slope == 0.0:
             return math.inf, math.inf
         x = -h0 / slope
-        beta = math.sqrt(d)
-        if x <= 0.0 or beta * x >= 1.0:
+        if x <= 0.0 or root * x >= 1.0:
             return math.inf, math.inf
-        return (math.atanh(beta * x) / beta if beta * x > 1e-8 else x), math.inf
-    mu = math.sqrt(-d)
-    # h ~ h0 cos(mu s) + (slope/mu) sin(mu s)
-    angle = math.atan2(-h0, slope / mu)
+        return (math.atanh(root * x) / root if root * x > 1e-8 else x), math.inf
+    # h ~ h0 cos(root s) + (slope/root) sin(root s)
+    angle = math.atan2(-h0, slope / root)
     if angle <= 0.0:
         angle += math.pi
-    return angle / mu, math.pi / mu
+    return angle / root, math.pi / root

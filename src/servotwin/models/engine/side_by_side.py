@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import arcs, bands, phases, stride_rounds, tiles, windows
-from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, STUCK
+from servotwin.models.engine import arcs, bands, coils, gaps, phases, stride_rounds, strides, tiles, windows
+from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK
 from servotwin.models.engine.noise import gaussian
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _advance(which: Indices, form: int, slack: bool, duration: float, widths: Fl
     lost = 0
     while windows.begin(widths, size, False, tile, plan, before) > 0:
         _through(size, full, noisy, form, slack, False, tile, plan)
-        lost += _give_up(size, form, tile, plan, before)
+        lost += windows.give_up(size, form, tile, plan, before)
     return lost
 
 
@@ -89,7 +89,7 @@ def _go_on(pieces: Floats, listed: Floats, form: int, slack: bool, which: Indice
         _through(size, full, noisy, form, slack, wanted > 0, tile, plan)
         if wanted > 0:
             _write(which, form, slack, times, outputs, tile, plan, before)
-        lost += _give_up(size, form, tile, plan, before)
+        lost += windows.give_up(size, form, tile, plan, before)
     return lost
 
 
@@ -104,16 +104,10 @@ def _through(size: int, full: bool, noisy: bool, form: int, slack: bool, keep: b
     if full:
         windows.measure(size, form, tile, plan)
     windows.divide(size, full, slack, tile, plan)
-    if form == tiles.STRIDES:
-        stride_rounds.keep(size, tile, plan)
+    if tiles.has_more(form):
+        for j in range(size):
+            tiles.put_more(tile.more_before, j, tiles.more_at(tile.servo, j))
     phases.phases(size, keep, form, slack, tile, plan)
-
-
-def _give_up(size: int, form: int, tile: Any, plan: Any, before: Any) -> int:
-    """Put lanes that cannot go on side by side back to where the window began; return how many there are."""
-    if form == tiles.STRIDES:
-        stride_rounds.put_back(size, tile, plan)
-    return windows.give_up(size, tile, plan, before)
 
 
 def _needs_all(size: int, tile: Any) -> tuple[bool, bool]:
@@ -129,13 +123,13 @@ def _needs_all(size: int, tile: Any) -> tuple[bool, bool]:
 def _hang(which: Indices, form: int, torques: Floats, tile: Any) -> None:
     """Hang constant external torques [N m] on the shafts of a tile."""
     numbers = tile.arc
-    if form == tiles.STRIDES:
-        for j in range(which.size):
-            tile.hung.torque[j] = torques[which[j]]
-        return
     if form == tiles.BANDS:
         for j in range(which.size):
             tiles.hang(tiles.numbers_at(tile.own, j), torques[which[j]], tile, j)
+        return
+    if tiles.has_more(form):
+        for j in range(which.size):
+            tile.hung.torque[j] = torques[which[j]]
         return
     for j in range(which.size):
         load = arcs.loading(numbers.inertia[j], numbers.pull[j], numbers.hold_forward[j], numbers.hold_backward[j],
@@ -174,44 +168,80 @@ def _write(which: Indices, form: int, slack: bool, times: Floats, outputs: Outpu
 
 
 def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> None:
-    x, end = plan.time[j], plan.window[j]  # what happens at the very end is not yet so
-    drive, error, q, w, begin = plan.drive1[j], plan.error_before[j], plan.q1[j], plan.w1[j], 0.0
-    wiper, phase = plan.wiper1[j], 0
-    if plan.decides[j] > 0.0 and plan.end2[j] <= x and plan.end2[j] < end:
-        drive, error, q, w, begin = plan.drive3[j], tile.servo.error[j], plan.q3[j], plan.w3[j], plan.end2[j]
-        wiper, phase = plan.wiper3[j], 2
-        if plan.end3[j] <= x and plan.end3[j] < end:
-            drive, q, w, begin, wiper, phase = 0.0, plan.q4[j], plan.w4[j], plan.end3[j], plan.wiper4[j], 3
-    elif plan.end1[j] <= x and plan.end1[j] < end:
-        drive, q, w, begin, wiper, phase = 0.0, plan.q2[j], plan.w2[j], plan.end1[j], plan.wiper2[j], 1
-    numbers = tiles.arc_numbers_at(tile.arc, j)
-    start, T_w, T_h = arcs.start_of(numbers, drive), tile.servo.T_w[j], tile.servo.T_h[j]
-    if form == tiles.STRIDES:
-        state, start, wiper = stride_rounds.seen(slack, phase, drive, x - begin, q, w, wiper, tile, plan, j)
-        q, w, T_w, T_h, turned = state.q, state.w, state.T_w, state.T_h, state.q
-    elif form == tiles.BANDS:
-        begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
-        q, w, turned, _ = bands.slide(
-            tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x - begin,
-            tile.hung.tolerance[j])
+    x = plan.time[j]
+    phase = _phase_at(x, plan, j)
+    after = plan.end1[j] if phase == 1 else plan.end2[j] if phase == 2 else plan.end3[j]
+    x -= after if phase > 0 else 0.0
+    drive = plan.drive1[j] if phase == 0 else plan.drive3[j] if phase == 2 else 0.0
+    q, w, wiper = phases.kept(phase, plan, j)
+    if tiles.has_more(form):
+        own, torque, more = tiles.numbers_at(tile.own, j), tile.hung.torque[j], phases.more_kept(phase, tile, j)
+        i, T_w, T_h, q_m, w_m, mesh, _ = more
+        if form == tiles.COILS:
+            q, w, i, wiper, _ = coils.through(
+                own, tiles.winding_at(tile.winding, j), torque, drive, q, w, i, wiper, x)
+            contact = coils.contact_of(own, torque, w, i)
+        elif form == tiles.GAPS:
+            gone = gaps.go(own, torque, drive, (q, w, 0.0, T_w, T_h, q_m, w_m), int(mesh), wiper, x)
+            q, w, wiper, contact = gone.y[0], gone.y[1], gone.wiper, gone.mode.contact
+            q_m, w_m, mesh = gone.y[5], gone.y[6], float(gone.mode.mesh)
+        elif form == tiles.STRIDES:
+            to, wiper = stride_rounds.seen(slack, drive, x, q, w, wiper, more, tile, plan, j)
+            q, w, T_w, T_h = to.q, to.w, to.T_w, to.T_h
+            start = strides.way_from_rest(own, drive * own.source.V, torque, to)
+            contact = contact_of(tile.hung.dry[j] > 0.0, start, w)
+        else:
+            contact = FREE
+        if mesh == RIGID:
+            q_m, w_m = q, w
+        _write_more(lane, o, i, T_w, T_h, q_m, w_m, int(mesh), outputs)
     else:
-        q, w, turned, _ = arcs.slide(numbers, drive, q, w, x - begin)
+        numbers = tiles.arc_numbers_at(tile.arc, j)
+        if form == tiles.BANDS:
+            begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
+            q, w, turned, _ = bands.slide(
+                tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x, tile.hung.tolerance[j])
+        else:
+            q, w, turned, _ = arcs.slide(numbers, drive, q, w, x)
+        wiper = tiles.dragged(tile.hung.half_slack[j], wiper, turned, q)
+        contact = contact_of(tile.hung.dry[j] > 0.0, arcs.start_of(numbers, drive), w)
+        _write_more(lane, o, 0.0, tile.servo.T_w[j], tile.servo.T_h[j], q, w, RIGID, outputs)
     if outputs.wiper.size > 0:
-        outputs.wiper[lane, o] = tiles.dragged(tile.hung.half_slack[j], wiper, turned, q) if slack else q
+        outputs.wiper[lane, o] = wiper if slack else q
     if outputs.angle.size > 0:
         outputs.angle[lane, o] = q
     if outputs.speed.size > 0:
         outputs.speed[lane, o] = w
     if outputs.contact.size > 0:
-        outputs.contact[lane, o] = contact_of(tile.hung.dry[j] > 0.0, start, w)
+        outputs.contact[lane, o] = contact
     if outputs.drive.size > 0:
         outputs.drive[lane, o] = 1 if drive > 0.0 else (-1 if drive < 0.0 else 0)
     if outputs.error.size > 0:
-        outputs.error[lane, o] = error
+        outputs.error[lane, o] = plan.error_before[j] if phase < 2 else tile.servo.error[j]
+
+
+def _write_more(lane: int, o: int, i: float, T_w: float, T_h: float, q_m: float, w_m: float, mesh: int,
+                outputs: Outputs) -> None:
+    if outputs.current.size > 0:
+        outputs.current[lane, o] = i
     if outputs.winding.size > 0:
         outputs.winding[lane, o] = T_w
     if outputs.housing.size > 0:
         outputs.housing[lane, o] = T_h
+    if outputs.motor_angle.size > 0:
+        outputs.motor_angle[lane, o] = q_m
+    if outputs.motor_speed.size > 0:
+        outputs.motor_speed[lane, o] = w_m
+    if outputs.mesh.size > 0:
+        outputs.mesh[lane, o] = mesh
+
+
+def _phase_at(x: float, plan: Any, j: int) -> int:
+    """Return the phase that holds an instant of a window; what happens at its very end is not yet so."""
+    end = plan.window[j]
+    if plan.decides[j] > 0.0 and plan.end2[j] <= x and plan.end2[j] < end:
+        return 3 if plan.end3[j] <= x and plan.end3[j] < end else 2
+    return 1 if plan.end1[j] <= x and plan.end1[j] < end else 0
 
 
 def contact_of(dry: bool, start: float, w: float) -> int:

@@ -37,17 +37,18 @@ def one_by_one(lanes: Lanes, curve: Floats, torque_rows: Floats, torque_first: I
                                  point.y, point.wiper, now.drive, now.error))
 
 
-def side_by_side(lanes: Lanes, curve: Floats, which: Indices, tiles: Any, seen: Floats) -> None:
-    """Look at the lanes named in `which`, which tiles hold."""
+def side_by_side(lanes: Lanes, curve: Floats, which: Indices, tile_rows: Any, seen: Floats) -> None:
+    """Look at the lanes named in `which`, which tiles of a form hold."""
     for k in range(which.size):
-        lane, servo, j = which[k], tiles[k // TILE].servo, k % TILE
+        lane, servo, j = which[k], tile_rows[k // TILE].servo, k % TILE
         numbers, tau = numbers_of(lanes, lane), lanes.torque[lane]
         q, w, drive, error = 1.0 * servo.q[j], 1.0 * servo.w[j], 1.0 * servo.drive[j], 1.0 * servo.error[j]  # float64
-        wiper = 1.0 * servo.wiper[j] if slack(numbers.sensor) else q
-        y = (q, w, 0.0, 1.0 * servo.T_w[j], 1.0 * servo.T_h[j], q, w)
+        wiper, mesh = 1.0 * servo.wiper[j] if slack(numbers.sensor) else q, int(servo.mesh[j])
+        q_m, w_m = (q, w) if mesh == RIGID else (1.0 * servo.q_m[j], 1.0 * servo.w_m[j])
+        y = (q, w, 1.0 * servo.i[j], 1.0 * servo.T_w[j], 1.0 * servo.T_h[j], q_m, w_m)
         numbers = warm(numbers, y)
         u = drive * numbers.source.V
-        mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, q, w, 0.0), u, tau, y, RIGID, False)
+        mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, q, w_m, y[2]), u, tau, y, mesh, False)
         put(seen, lane, observed(numbers, curve, mode, u, tau, y, wiper, drive, error))
 
 

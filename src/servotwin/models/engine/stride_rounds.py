@@ -20,6 +20,7 @@ from servotwin.models.engine.slots import (
     step,
 )
 from servotwin.models.engine.strides import State
+from servotwin.models.engine.tiles import More
 from servotwin.models.terms import heat
 from servotwin.models.terms.friction import fades
 from servotwin.models.terms.numbers import Numbers
@@ -51,40 +52,20 @@ def alone(slack: bool, tile: Any, plan: Any, j: int) -> None:
         _run(1, slack, tile, plan)
 
 
-def keep(size: int, tile: Any, plan: Any) -> None:
-    """Keep the temperatures of before a window."""
-    for j in range(size):
-        plan.T_w_before[j] = tile.servo.T_w[j]
-        plan.T_h_before[j] = tile.servo.T_h[j]
-        plan.step_before[j] = tile.servo.step[j]
-
-
-def put_back(size: int, tile: Any, plan: Any) -> None:
-    """Put lanes that were given up back to these temperatures."""
-    for j in range(size):
-        if plan.lost[j] > 0.0:
-            tile.servo.T_w[j] = plan.T_w_before[j]
-            tile.servo.T_h[j] = plan.T_h_before[j]
-            tile.servo.step[j] = plan.step_before[j]
-
-
-def seen(slack: bool, phase: int, power: float, time: float, q: float, w: float, wiper: float, tile: Any, plan: Any,
-         j: int) -> tuple[State, float, float]:
-    """Return the state within a phase that a lane has gone through, which way it starts there, and its wiper."""
-    servo = tile.servo
-    after = servo.q[j], servo.w[j], servo.wiper[j], servo.T_w[j], servo.T_h[j], servo.step[j]
+def seen(slack: bool, power: float, time: float, q: float, w: float, wiper: float, more: More, tile: Any, plan: Any,
+         j: int) -> tuple[State, float]:
+    """Return the state, and the angle of the potentiometer, so much time [s] after a lane has been there and so."""
+    servo, after, q_after, w_after = tile.servo, tiles.more_at(tile.servo, j), tile.servo.q[j], tile.servo.w[j]
+    wiper_after, lost = servo.wiper[j], plan.lost[j]
     servo.q[j], servo.w[j], servo.wiper[j] = q, w, wiper
-    servo.T_w[j] = plan.T_w1[j] if phase == 0 else plan.T_w2[j] if phase == 1 else plan.T_w3[j] if phase == 2 else (
-        plan.T_w4[j])
-    servo.T_h[j] = plan.T_h1[j] if phase == 0 else plan.T_h2[j] if phase == 1 else plan.T_h3[j] if phase == 2 else (
-        plan.T_h4[j])
+    tiles.put_more(servo, j, more)
     plan.time[j], plan.power[j] = time, power
     if time > 0.0:
         alone(slack, tile, plan, j)
-    state, wiper, numbers = _state(tile, j), servo.wiper[j], tiles.numbers_at(tile.own, j)
-    start = strides.way_from_rest(numbers, power * numbers.source.V, tile.hung.torque[j], state)
-    servo.q[j], servo.w[j], servo.wiper[j], servo.T_w[j], servo.T_h[j], servo.step[j] = after
-    return state, start, wiper
+    state, wiper = _state(tile, j), servo.wiper[j]
+    servo.q[j], servo.w[j], servo.wiper[j], plan.lost[j] = q_after, w_after, wiper_after, lost
+    tiles.put_more(servo, j, after)
+    return state, wiper
 
 
 def _look(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from servotwin.models.engine import arcs, bands, contacts
+from servotwin.models.engine import arcs, bands, coils, contacts
 from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.coils import Circuit, Course, Winding
 from servotwin.models.engine.memory import FIRST_STEP
+from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.motion import FINE
 from servotwin.models.engine.records import TILE, fill, reader, room, rows_of, tile_of, writer
 from servotwin.models.engine.slots import slots_type
@@ -30,8 +32,9 @@ if TYPE_CHECKING:
     Smalls = NDArray[np.int8]
 
 FEW = 2  # lanes that are not worth going together
-# How lanes go through a phase: as `braked_rounds`, `arc_rounds`, `band_rounds` and `stride_rounds` have it
-ONE_FORMULA, ARCS, BANDS, STRIDES = range(4)
+# How lanes go through a phase: as `braked_rounds`, `arc_rounds`, `band_rounds`, `stride_rounds`, `coil_rounds` and
+# `gap_rounds` have it
+ONE_FORMULA, ARCS, BANDS, STRIDES, COILS, GAPS = range(6)
 
 
 class Meter(NamedTuple):
@@ -70,8 +73,12 @@ class Servo(NamedTuple):
     later_duration: float
     later_decided: float
     wiper: float  # angle of the potentiometer, where that has play
+    i: float  # current, where it has inertia
     T_w: float  # temperatures of winding and housing [K]
     T_h: float
+    q_m: float  # angle and speed of the motor at the output shaft, where the gear has play
+    w_m: float
+    mesh: float
     step: float  # length that an integrator would try next [s]
 
 
@@ -164,20 +171,16 @@ class Plan(NamedTuple):
     decided_before: float
 
 
-class Warmth(NamedTuple):
-    """What a window needs besides, where servos are integrated: temperatures at the start of each phase, and before."""
+class More(NamedTuple):
+    """What only few forms change of what a servo remembers, by the names that it has in `Servo`."""
 
-    T_w1: float
-    T_h1: float
-    T_w2: float
-    T_h2: float
-    T_w3: float
-    T_h3: float
-    T_w4: float
-    T_h4: float
-    T_w_before: float
-    T_h_before: float
-    step_before: float
+    i: float
+    T_w: float
+    T_h: float
+    q_m: float
+    w_m: float
+    mesh: float
+    step: float
 
 
 class Hung(NamedTuple):
@@ -197,10 +200,19 @@ class Times(NamedTuple):
     remaining: float
 
 
+def has_more(form: int) -> bool:
+    """Tell whether a form changes what is in `More`."""
+    return form == STRIDES or form == COILS or form == GAPS
+
+
 @cache
 def tile_type(real: str, form: int) -> np.dtype[Any]:
     """Return the type of a tile whose servos have numbers of this type and go through phases in this form."""
-    own = {"own": rows_of(Numbers, real)} if form in (BANDS, STRIDES) else {}
+    own = {"own": rows_of(Numbers, real)} if form >= BANDS else {}
+    if has_more(form):
+        own |= {f"more_{place}": rows_of(More, real) for place in ("before", 0, 1, 2, 3)}
+    if form == COILS:
+        own |= {"coil": rows_of(Course, real), "winding": rows_of(Winding, real), "circuit": rows_of(Circuit, real)}
     return tile_of({
         **own, "hung": rows_of(Hung, real), "arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real),
         "meter": rows_of(Meter, real), "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
@@ -210,11 +222,8 @@ def tile_type(real: str, form: int) -> np.dtype[Any]:
 @cache
 def plan_type(real: str, form: int) -> np.dtype[Any]:
     """Return the type of the room that a window is worked out in, by lanes that go through phases in this form."""
-    names: tuple[str, ...] = Plan._fields
-    more: dict[str, Any] = {}
-    if form == STRIDES:
-        names, more = (*names, *Warmth._fields), {"slots": slots_type()}
-    return tile_of({"of": tile_of({**dict.fromkeys(names, real), **more}), "clock": rows_of(Times, np.float64)})
+    slots = {"slots": slots_type()} if form == STRIDES else {}
+    return tile_of({"of": tile_of({**dict.fromkeys(Plan._fields, real), **slots}), "clock": rows_of(Times, np.float64)})
 
 
 def plan_room(real: str, form: int) -> NDArray[Any]:
@@ -232,6 +241,11 @@ put_numbers = writer("put_numbers", Numbers)
 put_chip = writer("put_chip", Chip)
 arc_numbers_at = reader("arc_numbers_at", ArcNumbers)
 put_arc_numbers = writer("put_arc_numbers", ArcNumbers)
+winding_at = reader("winding_at", Winding)
+put_winding = writer("put_winding", Winding)
+circuit_at = reader("circuit_at", Circuit)
+more_at = reader("more_at", More)
+put_more = writer("put_more", More)
 put_servo = writer("put_servo", Servo)
 put_clock = writer("put_clock", Clock)
 put_count = writer("put_count", Count)
@@ -265,8 +279,12 @@ class Outputs(NamedTuple):
     drive: Smalls
     error: Floats
     wiper: Floats
+    current: Floats
     winding: Floats
     housing: Floats
+    motor_angle: Floats
+    motor_speed: Floats
+    mesh: Smalls
 
 
 def numbers_of(lanes: Lanes, lane: int) -> Numbers:
@@ -303,11 +321,14 @@ def set_numbers(lanes: Lanes, form: int, first: int, size: int, tile: Any, place
         for j in range(size):
             put_numbers(tile.own, place + j, numbers_of(lanes, first + j))
             hang(numbers_of(lanes, first + j), lanes.torque[first + j], tile, place + j)
-    if form == STRIDES:
+    if has_more(form):
         for j in range(size):
             put_numbers(tile.own, place + j, numbers_of(lanes, first + j))
             tile.hung.torque[place + j] = lanes.torque[first + j]
             tile.arc.start_off[place + j] = 1.0  # whether it starts depends on where it stands
+    if form == COILS:
+        for j in range(size):
+            put_winding(tile.winding, place + j, coils.winding(numbers_of(lanes, first + j)))
 
 
 def hang(numbers: Numbers, torque: float, tile: Any, j: int) -> None:
@@ -333,9 +354,11 @@ def start(lanes: Lanes, form: int, first: int, size: int, first_output: float, t
     """Put lanes as they start into a tile, from the column `first` on."""
     set_numbers(lanes, form, first, size, tile, 0)
     for j in range(size):
-        q, w = lanes.start[0, first + j], lanes.start[1, first + j]
-        put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, -math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
-                                       0.0, q, lanes.start[3, first + j], lanes.start[4, first + j], FIRST_STEP))
+        y, lane = lanes.start, first + j
+        put_servo(tile.servo, j, Servo(
+            y[0, lane], y[1, lane], 0.0, 0.0, -math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0,
+            y[0, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane],
+            INSIDE if form == GAPS else RIGID, FIRST_STEP))
     for j in range(size):
         own = lanes.edge_count[first + j]
         late = lanes.edges[lanes.edge_first[first + j]] if own > 0 else math.inf if own == 0 else 0.0

@@ -92,10 +92,11 @@ def commands(r: Floats, size: int, tile: Any, plan: Any) -> None:
 
 def measure(size: int, form: int, tile: Any, plan: Any) -> None:
     """Set what the motor's voltage and the supply's sag add to the one-shot's measure."""
-    if form == tiles.BANDS or form == tiles.STRIDES:
+    if form == tiles.BANDS or tiles.has_more(form):
         for j in range(size):
             numbers, w = tiles.numbers_at(tile.own, j), tile.servo.w[j]
-            y = (0.0, w, 0.0, tile.servo.T_w[j], tile.servo.T_h[j], 0.0, w)
+            y = (0.0, w, tile.servo.i[j], tile.servo.T_w[j], tile.servo.T_h[j], 0.0,
+                 tile.servo.w_m[j] if form == tiles.GAPS else w)
             v_m, V_bus = voltages(numbers, tile.servo.drive[j] * numbers.source.V, y)
             plan.v_m[j] = v_m
             plan.V_bus[j] = V_bus
@@ -202,7 +203,7 @@ def _divide(second: float, due: float, sign: float, duration: float, decided: fl
     servo.decided[j] = decided
 
 
-def give_up(size: int, tile: Any, plan: Any, before: Any) -> int:
+def give_up(size: int, form: int, tile: Any, plan: Any, before: Any) -> int:
     """Put lanes that cannot go on side by side back to where the window began; return how many there are."""
     servo, clock, count = tile.servo, tile.clock, tile.count
     lost = 0
@@ -213,6 +214,8 @@ def give_up(size: int, tile: Any, plan: Any, before: Any) -> int:
             if plan.lost[j] > 0.0:
                 servo.q[j], servo.w[j], servo.drive[j] = plan.q_before[j], plan.w_before[j], plan.drive1[j]
                 servo.wiper[j] = plan.wiper_before[j]
+                if tiles.has_more(form):
+                    tiles.put_more(servo, j, tiles.more_at(tile.more_before, j))
                 servo.left[j], servo.silence[j] = plan.left_before[j], plan.silence_before[j]
                 servo.error[j], servo.due[j] = plan.error_before[j], plan.due_before[j]
                 servo.sign[j], servo.duration[j] = plan.sign_before[j], plan.duration_before[j]
