@@ -37,6 +37,11 @@ def records_of(tiles: NDArray[Any], places: Indices, temperatures: Floats) -> ND
         side = Side(*(columns_of(kind, tiles[group], places) for group, kind in _GROUPS.items()))
         regular, half_slack = flat(tiles, "count", "edges")[places] < 0, flat(tiles, "hung", "half_slack")[places]
         _put_in(records, _remembered(mapped(_doubled, side), regular, half_slack, *temperatures))
+        if "loose" in (tiles.dtype.names or ()):
+            point = records["point"]
+            for k, name in ((5, "q_m"), (6, "w_m")):
+                point["y"][:, k] = flat(tiles, "loose", name)[places]
+            point["mode"]["mesh"] = flat(tiles, "loose", "mesh")[places]
     return records
 
 

@@ -23,24 +23,32 @@ _straight = array_form(straight, __name__)
 Mask = NDArray[np.bool_]
 
 _SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
-_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32", never=("BANDS",))
+_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32", never=("BANDS", "GAPS"))
             for dtype in ("float64", "float32")}
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
 ALL_RUNS = Recipe("runs", _ENTRIES)  # everything
-_GENERAL = ("friction.kappa", "play", "heat", "motor.L")  # what only lanes one by one have
+_PLAY = "play"
+_BOUND = ("friction.kappa", "heat", "motor.L")  # what lets no motion inside the play be in closed form
+_GENERAL = (_PLAY, *_BOUND)  # what only lanes one by one have
 _BANDED = ("friction.varies", "source.I_max")
 _RARE = (*_BANDED, *_GENERAL, "sensor.half_slack")
 _PENDULUM = "load.gravity"
+_PLAYED = ("INSIDE", "ON_FORWARD", "ON_BACKWARD", "APART")  # with play alone
 _NOT_IN_BANDS = (*_GENERAL, _PENDULUM, "load.stiffness", "follower", "sweep")
 _BY_BANDS = {creeps: Recipe("by_bands" + "_and_creep" * creeps, _SIDE, vector=True, absent=(
-    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), never=("ONE_FORMULA", "ARCS", "CORE"))
+    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), never=("ONE_FORMULA", "ARCS", "GAPS", "CORE"))
     for creeps in (False, True)}
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep"),
-    never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
+    never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))
 PENDULUM_RUNS = Recipe(
     "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep"),
-    never=("SERIES", "HELD", "WITH_CURRENT", "INSIDE", "ON_FORWARD", "ON_BACKWARD", "CORE"))
+    never=("SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))
+_NOT_IN_GAPS = (*_BOUND, "friction.varies", _PENDULUM, "load.stiffness", "follower", "sweep")
+_BY_GAPS = Recipe("by_gaps", _SIDE, vector=True, absent=_NOT_IN_GAPS, never=("ONE_FORMULA", "ARCS", "BANDS", "CORE"))
+GAP_RUNS = Recipe(
+    "gap_runs", _ENTRIES, absent=_NOT_IN_GAPS,
+    never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "CREEP", "CORE"))
 LOOK_SIDE_BY_SIDE = Recipe(
     "look_side_by_side", ("servotwin.models.engine.sights:side_by_side",),
     absent=(*_GENERAL, _PENDULUM, "load.stiffness"))
@@ -58,7 +66,7 @@ def run(work: Work) -> Raw:
     raw = empty_raw(work)
     lanes = lanes_of(work)
     for kind in kinds_of(work.numbers, work.chip or NO_CHIP, work.lanes, work.law == "pulse", work.dtype, swept(lanes),
-                         work.torque.count > 0, bool(work.curve[0])):
+                         work.torque.count > 0, bool(work.curve[0]), set(work.fields) <= set(FIELDS)):
         if isinstance(kind, OneByOne):
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
         else:
@@ -142,11 +150,15 @@ class SideBySide(NamedTuple):
     @property
     def recipe(self) -> Recipe:
         """Their kernels."""
+        if self.form == tiles.GAPS:
+            return _BY_GAPS
         return _BY_BANDS[self.creeps] if self.form == tiles.BANDS else _BY_ARCS[self.dtype]
 
     @property
     def general(self) -> Recipe:
         """The kernels of those that cannot go on side by side."""
+        if self.form == tiles.GAPS:
+            return GAP_RUNS
         return ALL_RUNS if self.form == tiles.BANDS or self.slack else PLAIN_RUNS
 
 
@@ -158,16 +170,22 @@ class OneByOne(NamedTuple):
 
 
 def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str, swept: Mask, recorded: Mask,
-             curved: bool) -> list[SideBySide | OneByOne]:
+             curved: bool, gaps: bool) -> list[SideBySide | OneByOne]:
     """Return how lanes run, whose numbers are numbers or arrays (lanes,).
 
     `swept` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
-    potentiometers have a table.
+    potentiometers have a table, `gaps` whether lanes with play in the gear may run side by side.
     """
     bridge, own = numbers.bridge, numbers.friction
     general, swinging = swept.any() and swept, _differs(numbers, _PENDULUM)
-    for name in _GENERAL:
+    for name in _BOUND:
         general = _either(general, _differs(numbers, name))
+    bound = _either(general, _either(swinging, recorded.any() and recorded))
+    bound = _either(bound, _either(_differs(numbers, "load.stiffness"), own.varies != 0.0)) if pulsed else True
+    loose = _differs(numbers, _PLAY)
+    rigid = np.logical_not(loose)
+    general = _either(general, loose & bound)
+    loose = loose & np.logical_not(bound)
     slack, banded = _differs(numbers, "sensor.half_slack"), False
     for name in _BANDED:
         banded = _either(banded, _differs(numbers, name))
@@ -182,17 +200,19 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
             side = side if fits is True else side & fits
     braked = (bridge.off.D == 0.0) & (bridge.D_drive < numbers.source.V)
     banded = _either(banded, slack & np.logical_not(braked))
-    rare = _either(general, _either(banded, slack))
+    rare = _either(general, _either(banded, slack)) & np.logical_not(loose)
+    side = side & (rigid | loose) if gaps else side & rigid
     found: list[SideBySide | OneByOne] = []
-    for form, some in ((tiles.ONE_FORMULA, braked & np.logical_not(banded)),
-                       (tiles.ARCS, np.logical_not(braked) & np.logical_not(banded)), (tiles.BANDS, banded)):
+    for form, some in ((tiles.ONE_FORMULA, braked & np.logical_not(banded) & rigid),
+                       (tiles.ARCS, np.logical_not(braked) & np.logical_not(banded) & rigid),
+                       (tiles.BANDS, banded & rigid), (tiles.GAPS, loose)):
         which = _where(side, some, lanes)
         lagging = bool(np.any(np.broadcast_to(slack, lanes)[which])) if np.any(slack) else False
         creeping = form == tiles.BANDS and bool(np.any(np.broadcast_to(own.varies * own.w_s > 0.0, lanes)[which]))
-        found.append(SideBySide(which, form, lagging, dtype if form != tiles.BANDS else "float64", creeping))
+        found.append(SideBySide(which, form, lagging, dtype if form < tiles.BANDS else "float64", creeping))
     found += [OneByOne(_where(some, np.logical_not(side), lanes), recipe) for recipe, some in (
-        (PLAIN_RUNS, np.logical_not(_either(rare, swinging))), (PENDULUM_RUNS, swinging & np.logical_not(rare)),
-        (ALL_RUNS, rare))]
+        (PLAIN_RUNS, np.logical_not(_either(rare, swinging)) & np.logical_not(loose)),
+        (PENDULUM_RUNS, swinging & np.logical_not(rare)), (GAP_RUNS, loose), (ALL_RUNS, rare))]
     return [kind for kind in found if len(kind.which)]
 
 

@@ -76,7 +76,7 @@ class Store:
         numbers, lanes = self.numbers, slice(self.numbers.count)
         own = columns_of(Numbers, numbers.columns.numbers, lanes), columns_of(Chip, numbers.columns.chips, lanes)
         kinds = lane_runs.kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
-                                   numbers.torque.count > 0, bool(numbers.curve.size))
+                                   numbers.torque.count > 0, bool(numbers.curve.size), False)
         if numbers.supplies.lanes:
             bus_of = numbers.supplies.bus_of
             kinds = [kind._replace(which=kind.which[bus_of[kind.which] < 0]) for kind in kinds]

@@ -39,7 +39,8 @@ KINKS = (SHARE, CREEPS)  # of a law: no event that anybody would see
 IN_CLOSED_FORM = 1 << SHARE | 1 << CREEPS  # what a creep has looked at itself
 _CORE = 1 << CORE_FORWARD | 1 << CORE_BACKWARD
 _RELEASE = 1 << RELEASE_FORWARD | 1 << RELEASE_BACKWARD
-_MEET = 1 << MEET_FORWARD | 1 << MEET_BACKWARD
+STOPS = 1 << UPPER | 1 << LOWER
+MEETINGS = 1 << MEET_FORWARD | 1 << MEET_BACKWARD
 _MOTOR_RELEASE = 1 << MOTOR_RELEASE_FORWARD | 1 << MOTOR_RELEASE_BACKWARD
 EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper stop", "lower stop",
                "release forward", "release backward", "gear meets", "gear meets", "gear parts", "gear parts",
@@ -78,7 +79,7 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
     if numbers.stops.lower > -math.inf and (shaft == FREE or shaft == BACKWARD or shaft == CORE):
         kinds |= 1 << LOWER
     if mode.mesh == INSIDE:
-        kinds |= _MEET
+        kinds |= MEETINGS
         if mode.motor == STUCK:
             kinds |= _MOTOR_RELEASE
         elif mode.motor != FREE:

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine import arc_rounds, band_rounds, braked_rounds, tiles
-from servotwin.models.engine.tiles import ARCS, BANDS, ONE_FORMULA
+from servotwin.models.engine import arc_rounds, band_rounds, braked_rounds, gap_rounds, tiles
+from servotwin.models.engine.tiles import ARCS, BANDS, GAPS, ONE_FORMULA
 
 
 def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) -> None:
     """Move all lanes through the four phases; keep the state at the start of each where it is wanted."""
+    if form == GAPS:
+        gap_rounds.phases(size, keep, tile, plan)
+        return
     if size <= tiles.FEW:
         for j in range(size):
             _lane(keep, form, slack, tile, plan, j)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import arcs, bands, phases, tiles, windows
+from servotwin.models.engine import arcs, bands, gap_rounds, phases, tiles, windows
 from servotwin.models.engine.arcs import ArcNumbers
 from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, STUCK
 from servotwin.models.engine.noise import gaussian
@@ -71,6 +71,8 @@ def _advance(which: Indices, form: int, slack: bool, duration: float, widths: Fl
     lost = 0
     while windows.begin(widths, size, False, tile, plan, before) > 0:
         _through(size, full, noisy, form, slack, False, tile, plan)
+        if form == tiles.GAPS:
+            gap_rounds.give_back(size, tile, plan)
         lost += windows.give_up(size, tile, plan, before)
     return lost
 
@@ -90,6 +92,8 @@ def _go_on(pieces: Floats, listed: Floats, form: int, slack: bool, which: Indice
         _through(size, full, noisy, form, slack, wanted > 0, tile, plan)
         if wanted > 0:
             _write(which, form, slack, times, outputs, tile, plan, before)
+        if form == tiles.GAPS:
+            gap_rounds.give_back(size, tile, plan)
         lost += windows.give_up(size, tile, plan, before)
     return lost
 
@@ -124,6 +128,10 @@ def _hang(which: Indices, form: int, torques: Floats, tile: Any) -> None:
     if form == tiles.BANDS:
         for j in range(which.size):
             tiles.hang(tiles.numbers_at(tile.own, j), torques[which[j]], tile, j)
+        return
+    if form == tiles.GAPS:
+        for j in range(which.size):
+            tile.hung.torque[j] = torques[which[j]]
         return
     for j in range(which.size):
         load = arcs.loading(numbers.inertia[j], numbers.pull[j], numbers.hold_forward[j], numbers.hold_backward[j],
@@ -164,30 +172,37 @@ def _write(which: Indices, form: int, slack: bool, times: Floats, outputs: Outpu
 def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> None:
     x, end = plan.time[j], plan.window[j]  # what happens at the very end is not yet so
     drive, error, q, w, begin = plan.drive1[j], plan.error_before[j], plan.q1[j], plan.w1[j], 0.0
-    wiper = plan.wiper1[j]
+    wiper, phase = plan.wiper1[j], 0
     if plan.decides[j] > 0.0 and plan.end2[j] <= x and plan.end2[j] < end:
         drive, error, q, w, begin = plan.drive3[j], tile.servo.error[j], plan.q3[j], plan.w3[j], plan.end2[j]
-        wiper = plan.wiper3[j]
+        wiper, phase = plan.wiper3[j], 2
         if plan.end3[j] <= x and plan.end3[j] < end:
-            drive, q, w, begin, wiper = 0.0, plan.q4[j], plan.w4[j], plan.end3[j], plan.wiper4[j]
+            drive, q, w, begin, wiper, phase = 0.0, plan.q4[j], plan.w4[j], plan.end3[j], plan.wiper4[j], 3
     elif plan.end1[j] <= x and plan.end1[j] < end:
-        drive, q, w, begin, wiper = 0.0, plan.q2[j], plan.w2[j], plan.end1[j], plan.wiper2[j]
+        drive, q, w, begin, wiper, phase = 0.0, plan.q2[j], plan.w2[j], plan.end1[j], plan.wiper2[j], 1
     numbers = tiles.arc_numbers_at(tile.arc, j)
-    if form == tiles.BANDS:
+    contact, turned = FREE, q
+    if form == tiles.GAPS:
+        gone = gap_rounds.look(phase, drive, q, w, wiper, x - begin, tile, j)
+        q, w, wiper, contact = gone.y[0], gone.y[1], gone.wiper, gone.mode.contact
+    elif form == tiles.BANDS:
         begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
         q, w, turned, _ = bands.slide(
             tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x - begin,
             tile.hung.tolerance[j])
     else:
         q, w, turned, _ = arcs.slide(numbers, drive, q, w, x - begin)
+    if form != tiles.GAPS:
+        contact = contact_of(tile.hung.dry[j] > 0.0, numbers, drive, w)
+        wiper = tiles.dragged(tile.hung.half_slack[j], wiper, turned, q) if slack else q
     if outputs.wiper.size > 0:
-        outputs.wiper[lane, o] = tiles.dragged(tile.hung.half_slack[j], wiper, turned, q) if slack else q
+        outputs.wiper[lane, o] = wiper
     if outputs.angle.size > 0:
         outputs.angle[lane, o] = q
     if outputs.speed.size > 0:
         outputs.speed[lane, o] = w
     if outputs.contact.size > 0:
-        outputs.contact[lane, o] = contact_of(tile.hung.dry[j] > 0.0, numbers, drive, w)
+        outputs.contact[lane, o] = contact
     if outputs.drive.size > 0:
         outputs.drive[lane, o] = 1 if drive > 0.0 else (-1 if drive < 0.0 else 0)
     if outputs.error.size > 0:

@@ -13,6 +13,7 @@ import numpy as np
 
 from servotwin.models.engine import arcs, bands, contacts
 from servotwin.models.engine.arcs import ArcNumbers
+from servotwin.models.engine.modes import INSIDE
 from servotwin.models.engine.motion import FINE
 from servotwin.models.engine.records import TILE, reader, rows_of, tile_of, writer
 from servotwin.models.terms.chip import Chip
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
     Smalls = NDArray[np.int8]
 
 FEW = 2  # lanes that are not worth going together
-ONE_FORMULA, ARCS, BANDS = range(3)  # how lanes go through a phase: `braked_rounds`, `arc_rounds`, `band_rounds`
+# How lanes go through a phase: `braked_rounds`, `arc_rounds`, `band_rounds`, `gap_rounds`
+ONE_FORMULA, ARCS, BANDS, GAPS = range(4)
 
 
 class Meter(NamedTuple):
@@ -166,6 +168,26 @@ class Hung(NamedTuple):
     dry: float  # 1: there is friction of some kind, or what counts as such
 
 
+class Loose(NamedTuple):
+    """The motor of a lane with play in the gear, at the output shaft, and where the play is; at each phase's start."""
+
+    q_m: float
+    w_m: float
+    mesh: float
+    q_m1: float
+    w_m1: float
+    mesh1: float
+    q_m2: float
+    w_m2: float
+    mesh2: float
+    q_m3: float
+    w_m3: float
+    mesh3: float
+    q_m4: float
+    w_m4: float
+    mesh4: float
+
+
 class Times(NamedTuple):
     """The clock before a window [s]."""
 
@@ -177,7 +199,8 @@ class Times(NamedTuple):
 @cache
 def tile_type(real: str, form: int) -> np.dtype[Any]:
     """Return the type of a tile whose servos have numbers of this type and go through phases in this form."""
-    own = {"own": rows_of(Numbers, real)} if form == BANDS else {}
+    own = {"own": rows_of(Numbers, real)} if form in (BANDS, GAPS) else {}
+    own |= {"loose": rows_of(Loose, real)} if form == GAPS else {}
     return tile_of({
         **own, "hung": rows_of(Hung, real), "arc": rows_of(ArcNumbers, real), "chip": rows_of(Chip, real),
         "meter": rows_of(Meter, real), "servo": rows_of(Servo, real), "clock": rows_of(Clock, np.float64),
@@ -264,6 +287,10 @@ def set_numbers(lanes: Lanes, form: int, first: int, size: int, tile: Any, place
         for j in range(size):
             put_numbers(tile.own, place + j, numbers_of(lanes, first + j))
             hang(numbers_of(lanes, first + j), lanes.torque[first + j], tile, place + j)
+    if form == GAPS:
+        for j in range(size):
+            put_numbers(tile.own, place + j, numbers_of(lanes, first + j))
+            tile.hung.torque[place + j] = lanes.torque[first + j]
 
 
 def hang(numbers: Numbers, torque: float, tile: Any, j: int) -> None:
@@ -292,6 +319,10 @@ def start(lanes: Lanes, form: int, first: int, size: int, first_output: float, t
         q, w = lanes.start[0, first + j], lanes.start[1, first + j]
         put_servo(tile.servo, j, Servo(q, w, 0.0, 0.0, -math.inf, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0,
                                        0.0, q))
+    if form == GAPS:
+        for j in range(size):
+            tile.loose.q_m[j], tile.loose.w_m[j] = lanes.start[5, first + j], lanes.start[6, first + j]
+            tile.loose.mesh[j] = INSIDE
     for j in range(size):
         own = lanes.edge_count[first + j]
         late = lanes.edges[lanes.edge_first[first + j]] if own > 0 else math.inf if own == 0 else 0.0

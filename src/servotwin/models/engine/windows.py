@@ -92,9 +92,9 @@ def commands(r: Floats, size: int, tile: Any, plan: Any) -> None:
 
 def measure(size: int, form: int, tile: Any, plan: Any) -> None:
     """Set what the motor's voltage and the supply's sag add to the one-shot's measure."""
-    if form == tiles.BANDS:
+    if form == tiles.BANDS or form == tiles.GAPS:
         for j in range(size):
-            numbers, w = tiles.numbers_at(tile.own, j), tile.servo.w[j]
+            numbers, w = tiles.numbers_at(tile.own, j), tile.loose.w_m[j] if form == tiles.GAPS else tile.servo.w[j]
             y = (0.0, w, 0.0, 0.0, 0.0, 0.0, w)
             v_m, V_bus = voltages(numbers, tile.servo.drive[j] * numbers.source.V, y)
             plan.v_m[j] = v_m
