@@ -23,7 +23,8 @@ _straight = array_form(straight, __name__)
 Mask = NDArray[np.bool_]
 
 _SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
-_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32", never=("BANDS", "GAPS"))
+_BY_ARCS = {dtype: Recipe(f"side_by_side_{dtype}", _SIDE, vector=True, single=dtype == "float32",
+                          never=("BANDS", "GAPS"))
             for dtype in ("float64", "float32")}
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
 ALL_RUNS = Recipe("runs", _ENTRIES)  # everything
@@ -176,32 +177,28 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     `swept` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
     potentiometers have a table, `gaps` whether lanes with play in the gear may run side by side.
     """
-    bridge, own = numbers.bridge, numbers.friction
-    general, swinging = swept.any() and swept, _differs(numbers, _PENDULUM)
+    bridge, own, swinging = numbers.bridge, numbers.friction, _differs(numbers, _PENDULUM)
+    general = swept.any() and swept
     for name in _BOUND:
         general = _either(general, _differs(numbers, name))
     bound = _either(general, _either(swinging, recorded.any() and recorded))
-    bound = _either(bound, _either(_differs(numbers, "load.stiffness"), own.varies != 0.0)) if pulsed else True
-    loose = _differs(numbers, _PLAY)
-    rigid = np.logical_not(loose)
-    general = _either(general, loose & bound)
-    loose = loose & np.logical_not(bound)
+    bound = _either(bound, numbers.load.stiffness != 0.0)
+    played = _differs(numbers, _PLAY)
+    loose = played & np.logical_not(_either(bound, own.varies != 0.0)) if pulsed else False
+    rigid = np.logical_not(played)
     slack, banded = _differs(numbers, "sensor.half_slack"), False
     for name in _BANDED:
         banded = _either(banded, _differs(numbers, name))
     side: Any = False
     if pulsed and not curved:
-        side = (np.logical_not(_either(_either(general, swinging), recorded.any() and recorded))
-                & (numbers.load.stiffness == 0.0) & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
-                & (bridge.silence.coast == bridge.off.coast) & ((own.varies == 0.0) | _straight(own)))
+        side = np.logical_not(bound) & (rigid | loose if gaps else rigid) & _is_simple(numbers)
     if dtype == "float32":  # what is not zero has to stay so
         for x in (*numbers_in(numbers), *numbers_in(chip)):
             fits = (x == 0.0) | (abs(x) > _SMALLEST)
             side = side if fits is True else side & fits
     braked = (bridge.off.D == 0.0) & (bridge.D_drive < numbers.source.V)
     banded = _either(banded, slack & np.logical_not(braked))
-    rare = _either(general, _either(banded, slack)) & np.logical_not(loose)
-    side = side & (rigid | loose) if gaps else side & rigid
+    rare = _either(_either(general, played), _either(banded, slack)) & np.logical_not(loose)
     found: list[SideBySide | OneByOne] = []
     for form, some in ((tiles.ONE_FORMULA, braked & np.logical_not(banded) & rigid),
                        (tiles.ARCS, np.logical_not(braked) & np.logical_not(banded) & rigid),
@@ -214,6 +211,13 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
         (PLAIN_RUNS, np.logical_not(_either(rare, swinging)) & np.logical_not(loose)),
         (PENDULUM_RUNS, swinging & np.logical_not(rare)), (GAP_RUNS, loose), (ALL_RUNS, rare))]
     return [kind for kind in found if len(kind.which)]
+
+
+def _is_simple(numbers: Numbers) -> Any:
+    """Tell which servos with a bridge have what tiles know, apart from what only lanes one by one have."""
+    bridge, own = numbers.bridge, numbers.friction
+    return ((numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0) & (bridge.silence.coast == bridge.off.coast)
+            & ((own.varies == 0.0) | _straight(own)))
 
 
 def goes_together(numbers: Numbers, pulsed: bool) -> bool:

@@ -214,8 +214,8 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
         mesh = ON_FORWARD if kind == MEET_FORWARD else ON_BACKWARD
         if source.present(numbers.source):
             zone = currents.zone_of(numbers, u, 0.0, q, y[6], i)
-        upper = shaft == ON_UPPER and y[1] > 0.0
-        if upper or (shaft == ON_LOWER and y[1] < 0.0):  # the output rests on a stop: both hit it at once
+        upper = q >= numbers.stops.upper and y[1] > 0.0
+        if w == 0.0 and (upper or (q <= numbers.stops.lower and y[1] < 0.0)):  # it rests on a stop: both hit it at once
             return contacts.rebound(numbers, Mode(zone, shaft, mesh, motor, 0), upper, u, tau, y)
     elif kind == MOTOR_SPEED:
         y = (q, w, i, T_w, T_h, q_m, 0.0)
