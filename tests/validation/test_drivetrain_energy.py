@@ -41,7 +41,7 @@ def test_with_every_term_on(servo, command, off, inductance):
     check(st.simulate(model, command, duration=0.2, load=LOAD, seed=3).raise_if_failed())
 
 
-@pytest.mark.parametrize("terms", [*MIXTURES, {"backlash"}, {"backlash", "coast", "coulomb", "limit", "stops", "wiper"}],
+@pytest.mark.parametrize("terms", [*MIXTURES, {"backlash"}, {"backlash", "coast", "coulomb", "limit", "stops"}],
                          ids=lambda terms: "+".join(sorted(terms)))
 def test_in_mixtures(terms):
     case = replace(random_case(300, frozenset(terms)), duration=0.15)
