@@ -112,5 +112,5 @@ def test_what_no_term_asks_for_is_left_out():
     assert all(f"engine_motion__{name}" in everything for name in FLAGGED)
     assert "terms_heat__warming_rates" in everything
     assert "terms_heat__warming_rates" not in plain + swinging + loose
-    assert "engine_courses__both" in loose
-    assert "engine_courses__both" not in plain + swinging
+    assert "engine_contacts__apart(" in loose
+    assert "engine_contacts__apart(" not in plain + swinging
