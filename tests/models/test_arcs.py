@@ -84,6 +84,7 @@ def test_a_free_shaft_has_no_cancellation(time):
 
 OPEN = {"bridge.off.coast": 1.0, "bridge.silence.coast": 1.0, "bridge.off.D": 6.7, "bridge.off.R": 3.2}
 COIL = {"motor.L": 5e-4}
+LOOSE = {"play.half": 6e-3, "shaft.J_out": 1e-3, "shaft.b_out": 1e-3}
 STRIBECK = {"friction.varies": 1.0, "friction.w_s": 0.05, "friction.alpha": 1.5, "friction.breakaway": 1.4}
 FEATURES = {
     "plain": {}, "coast": OPEN, "RC stretcher": {"chip.tau_s": 0.02},
@@ -112,8 +113,17 @@ FEATURES = {
     "inductance, everything": {"motor.L": 2e-3} | OPEN | {
         "chip.tau_s": 0.02, "chip.beta": 0.01, "chip.c_s": 0.02, "chip.noise": 1e-3, "chip.shortest": 0.9e-3,
         "sensor.half_slack": 2e-3, "stops.lower": 0.1, "stops.upper": 2.0},
+    "backlash": LOOSE, "backlash, dry load": LOOSE | {"load.coulomb": 0.05},
+    "backlash, free load": LOOSE | {"load.coulomb": 0.0, "shaft.b_out": 0.0},
+    "backlash, stops": LOOSE | {"stops.lower": 0.2, "stops.upper": 1.6},
+    "backlash, no friction": LOOSE | {"friction.F_forward": 0.0, "friction.F_backward": 0.0, "load.coulomb": 0.0},
+    "backlash, two decisions wait": LOOSE | {"chip.frame_period": 1.9e-3, "chip.K": 1.0},
+    "backlash, all": LOOSE | OPEN | {"chip.tau_s": 0.02, "chip.beta": 0.01, "chip.c_s": 0.02, "chip.noise": 1e-3,
+                                     "chip.timeout": 0.025, "sensor.half_slack": 2e-3, "source.I_max": 0.9},
     "everything": OPEN | {"chip.tau_s": 0.02, "chip.beta": 0.01, "chip.c_s": 0.02, "chip.noise": 1e-3,
                           "chip.timeout": 0.025, "chip.shortest": 0.9e-3, "stops.lower": 0.1, "stops.upper": 2.0}}
+
+GIVING_UP = ("stops", "everything", "all bands", "backlash, two decisions wait")  # a lane of them at least
 
 
 def one_by_one(work):
@@ -125,8 +135,9 @@ def one_by_one(work):
 @pytest.mark.parametrize("name", FEATURES)
 def test_side_by_side_against_one_by_one(name):
     """Where the final speed lies within the creep the integrator takes over, with steps of its own."""
+    loose = name in ("Stribeck, steep", "backlash, two decisions wait")
     work = case(40, duration=0.7, times=np.linspace(0.0, 0.7, 39), fields=FIELDS, changes=FEATURES[name])
-    assert_same(run_lanes(work), one_by_one(work), 1e-10 if name == "Stribeck, steep" else 1e-11)
+    assert_same(run_lanes(work), one_by_one(work), 1e-10 if loose else 1e-11)
 
 
 def assert_same(raw, other, tolerance):
@@ -142,7 +153,7 @@ def plain(work):
     raw = empty_raw(work)
     lanes = lane_runs.lanes_of(work)
     (kind,) = lane_runs.kinds_of(work.numbers, work.chip, work.lanes, True, "float64", lane_runs.swept(lanes),
-                                   work.torque.count > 0, False)
+                                   work.torque.count > 0, False, True)
     with np.errstate(all="ignore"):
         rows = room(1, tiles.tile_type("float64", kind.form))
         side_by_side.start(lanes, kind.form, work.times[0], rows)
@@ -153,8 +164,8 @@ def plain(work):
     return raw
 
 
-@pytest.mark.parametrize("name", [name for name in FEATURES if name != "stops" and not name.endswith(
-    ("everything", "all bands"))])
+@pytest.mark.parametrize("name", [name for name in FEATURES if name not in GIVING_UP and not name.endswith(
+    "everything")])
 def test_plain_source_against_compiled(name):
     work = case(18, duration=0.12, times=np.linspace(0.0, 0.12, 7), fields=FIELDS, changes=FEATURES[name])
     assert_same(plain(work), run_lanes(work), 1e-12)

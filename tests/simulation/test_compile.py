@@ -12,7 +12,7 @@ from servotwin.models.engine.arcs import ArcNumbers
 from servotwin.models.engine.noise import gaussian
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.derive import derive
-from servotwin.simulation.lane_runs import ALL_RUNS, PENDULUM_RUNS, PLAIN_RUNS
+from servotwin.simulation.lane_runs import ALL_RUNS, GAP_RUNS, PENDULUM_RUNS, PLAIN_RUNS
 
 SLIDE = Recipe("slide", ("servotwin.models.engine.arcs:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
@@ -59,7 +59,8 @@ def test_the_vector_form_has_polynomials():
 @pytest.mark.slow
 def test_float32_stays_float32(folder):
     recipe = Recipe("single", ("servotwin.models.engine.phases:phases",
-                               "servotwin.models.engine.windows:divide"), vector=True, single=True, never=("BANDS",))
+                               "servotwin.models.engine.windows:divide"), vector=True, single=True,
+                    never=("BANDS", "GAPS"))
     module = kernels(recipe)
     from numba import from_dtype, types
 
@@ -105,9 +106,11 @@ def test_numba_comes_late(module):
 
 
 def test_what_no_term_asks_for_is_left_out():
-    plain, swinging, everything = (derive(recipe) for recipe in (PLAIN_RUNS, PENDULUM_RUNS, ALL_RUNS))
+    plain, swinging, loose, everything = (derive(one) for one in (PLAIN_RUNS, PENDULUM_RUNS, GAP_RUNS, ALL_RUNS))
     assert not any(f"engine_motion__{name}" in plain for name in FLAGGED)
     assert "engine_motion___long_step" in swinging
     assert all(f"engine_motion__{name}" in everything for name in FLAGGED)
     assert "terms_heat__warming_rates" in everything
-    assert "terms_heat__warming_rates" not in plain + swinging
+    assert "terms_heat__warming_rates" not in plain + swinging + loose
+    assert "engine_contacts__apart(" in loose
+    assert "engine_contacts__apart(" not in plain + swinging

@@ -11,15 +11,20 @@ import servotwin as st
 from servotwin.simulation import lane_runs
 
 STEP = st.signals.step(10.0, 50.0, at=0.02, unit="deg")
+LOOSE = {"gear.backlash": 0.005, "gear.output_inertia": 1e-3}
 # Each compiled form, what leads to it and how far it may be off; the order halves the work between two processes
 FORMS = {
     "pendulum_runs": ({}, st.loads.Pendulum(mass=0.1, length=0.1), "float64", 1e-9),
-    "runs": ({"gear.backlash": 0.005, "gear.output_inertia": 1e-3}, None, "float64", 1e-9),
+    "runs": (LOOSE, st.loads.Spring(0.05, 0.5), "float64", 1e-9),
     "by_coils": ({"motor.armature_inductance": 5e-4}, None, "float64", 1e-12),
+    "by_gaps": (LOOSE, None, "float64", 1e-9),
+    "by_strides": ({}, st.loads.Pendulum(mass=0.1, length=0.1), "float64", 1e-9),
+    "by_strides_in_bands": ({"friction.load_friction": 0.05}, st.loads.Spring(0.05, 0.5), "float64", 1e-9),
     "by_bands": ({"supply.current_limit": 1.0}, None, "float64", 1e-9),
     "by_bands_and_creep": ({"friction.breakaway_ratio": 1.4, "friction.stribeck_speed": 5.0}, None, "float64", 1e-9),
     "side_by_side_float64": ({}, st.loads.Inertia(1e-3), "float64", 1e-9),
     "side_by_side_float32": ({}, st.loads.Inertia(1e-3), "float32", 1e-4),
+    "gap_runs": (LOOSE | {"potentiometer.quantisation": 1e-4}, None, "float64", 1e-9),
     "plain_runs": ({}, st.loads.Recorded([0.0, 1.0], [0.0, 0.05]), "float64", 1e-9),
 }
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from servotwin.models.engine import contacts, currents
-from servotwin.models.engine.modes import CONDUCTING, FORWARD, Mode, constant_current, in_linear_zone
-from servotwin.models.terms import follower
+from servotwin.models.engine.modes import CONDUCTING, FORWARD, Mode, at_rest, constant_current, in_linear_zone
+from servotwin.models.terms import follower, shaft
 from servotwin.models.terms.friction import share_slopes
-from servotwin.models.terms.load import springy
+from servotwin.models.terms.load import external_torque, springy
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import accelerated, acceleration
-from servotwin.physics import electronics, motor, potentiometer, shaft
+from servotwin.physics import electronics, motor, potentiometer
 from servotwin.physics.load_friction import torque_on_gear
+from servotwin.physics.shaft import spring_torque
 
 
 def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau: tuple[float, ...],
@@ -22,8 +25,8 @@ def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau:
     """
     stiffness = pull = 0.0
     if springy(numbers.load):
-        stiffness = shaft.spring_torque(1.0, numbers.load.stiffness)
-        pull = shaft.spring_torque(0.0, numbers.load.stiffness, numbers.load.rest_angle)
+        stiffness = spring_torque(1.0, numbers.load.stiffness)
+        pull = spring_torque(0.0, numbers.load.stiffness, numbers.load.rest_angle)
     of_motor = of_load = 0.0  # what friction takes of the torques through the gear
     if mode.share != 0:
         of_motor, of_load = share_slopes(numbers.friction, mode.contact == FORWARD, float(mode.share))
@@ -56,6 +59,31 @@ def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau:
     if stiffness == 0.0 and rate == 0.0 and sinusoid == 0.0:
         return a, 0.0, f0, 0.0, 0.0, u[3], u[4], q, w
     return a, accelerated(own, stiffness), f0, accelerated(own, rate), accelerated(own, sinusoid), u[3], u[4], q, w
+
+
+class Apart(NamedTuple):
+    """The laws of two bodies inside the play, each ẇ = f − λ w; nothing of one at rest."""
+
+    output_rate: float  # λ of the output [1/s]
+    output_pull: float  # f of the output [rad/s²]
+    motor_rate: float
+    motor_pull: float
+
+
+def apart_coefficients(numbers: Numbers, mode: Mode, u: float, tau: float) -> Apart:
+    """Return the laws of motor and output inside the play, behind a bridge and under constant torques [N m]."""
+    own, zone = numbers.shaft, mode.zone
+    output_rate = output_pull = motor_rate = motor_pull = 0.0
+    if not at_rest(mode.contact):
+        output_rate = -shaft.output_acceleration(own, 1.0, 0.0, 0.0)
+        output_pull = contacts.output_acceleration(numbers, mode.contact, external_torque(numbers.load, tau, 0.0), 0.0)
+    if not at_rest(mode.motor):
+        torque = motor.electromagnetic_torque(currents.current(numbers, zone, u, 0.0, 0.0), numbers.motor.K)
+        drag = motor.back_emf(1.0, numbers.motor.K_b) * currents.torque_per_volt(
+            numbers, currents.resistance(numbers, zone, u))
+        motor_rate = -shaft.motor_acceleration(own, -drag, 1.0, 0.0)
+        motor_pull = contacts.motor_acceleration(numbers, mode.motor, torque, 0.0)
+    return Apart(output_rate, output_pull, motor_rate, motor_pull)
 
 
 def speed_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], against: tuple[float, ...],

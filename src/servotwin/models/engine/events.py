@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine import currents, first_order, guards
-from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Vector
-from servotwin.models.engine.motion import FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
+from servotwin.models.engine import guards
+from servotwin.models.engine.coefficients import Apart
+from servotwin.models.engine.modes import RIGID, Vector
+from servotwin.models.engine.motion import APART, FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
+from servotwin.models.engine.outright import first_end
 from servotwin.models.engine.rodas import not_constant
 from servotwin.models.terms import source
-from servotwin.models.terms.friction import creeping_speed
-from servotwin.physics.motor import back_emf
+from servotwin.models.terms.friction import varying
 from servotwin.physics.pieces import piece_rate, piece_value
 
 
@@ -26,8 +27,9 @@ def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float
     """
     if kinds == 0 or (motion.kind == REST and not not_constant(motion.u) and not not_constant(motion.tau)):
         return math.inf, -1, state(motion, s1)
-    alone = motion.mode.contact != FREE and motion.mode.mesh == RIGID
-    if motion.kind == FIRST_ORDER and source.present(motion.numbers.source) and alone:
+    straight = motion.kind == FIRST_ORDER and source.present(motion.numbers.source) and (
+        motion.mode.mesh == RIGID or not varying(motion.numbers.friction))
+    if straight or motion.kind == APART:
         return _outright(motion, kinds, s0, s1)
     left, at_left = s0, state(motion, s0)
     while left < s1:
@@ -43,35 +45,12 @@ def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float
 
 
 def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int, Vector]:
-    """Return the same behind a bridge, where zones end at a speed: outright for these, by search for a stop."""
-    numbers, c, u = motion.numbers, motion.coefficients, motion.u.value
-    rate, f, w0 = 2.0 * c[0], c[2], c[8]
-    after = state(motion, s1)
-    low, high = currents.zone_limits(numbers, motion.mode.zone, u)
-    w, x = after[1], u - back_emf(after[1], numbers.motor.K_b)
-    first, found = math.inf, -1
-    way, per_speed = 1.0 if motion.mode.contact == FORWARD else -1.0, back_emf(1.0, numbers.motor.K_b)
-    slow = creeping_speed(numbers.friction)
-    share, turn = guards.share_along(numbers, motion.mode, u, piece_value(motion.tau, motion.t0), after)
-    for kind, left, there in ((guards.SPEED, way * w, 0.0),
-                              (guards.ZONE_UP, high - x, (u - high) / per_speed),
-                              (guards.ZONE_DOWN, x - low, (u - low) / per_speed),
-                              (guards.SHARE, share, turn), (guards.CREEPS, way * w - slow, way * slow)):
-        if not kinds >> kind & 1 or left >= guards.BELOW:  # monotone: what holds at the end has held
-            continue
-        s = first_order.time_to(rate, f, w0, there)
-        s = s1 if s > s1 else s0 if s < s0 else s
-        if s < first:
-            first, found = s, kind
-    end = min(first, s1)
-    stops = kinds & (1 << guards.UPPER | 1 << guards.LOWER)
-    if stops != 0:
-        q = after[0] if end == s1 else state(motion, end)[0]
-        if q > numbers.stops.upper or q < numbers.stops.lower:
-            s, kind = _first_of(motion, stops, s0, state(motion, s0), end, state(motion, end))
-            if kind >= 0 and s < first:
-                return s, kind, after
-    return first, found, after
+    """Return the same of a motion of first order behind a bridge."""
+    c, after = motion.coefficients, state(motion, s1)
+    laws = Apart(c[0], c[1], c[2], c[3]) if motion.kind == APART else Apart(2.0 * c[0], c[2], 2.0 * c[0], c[2])
+    s, kind = first_end(motion.numbers, motion.mode, kinds, motion.u.value, piece_value(motion.tau, motion.t0), laws,
+                        motion.start, after, s0, s1)
+    return s, kind, after
 
 
 def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b: Vector) -> tuple[float, int]:

@@ -40,7 +40,8 @@ KINKS = (SHARE, CREEPS)  # of a law: no event that anybody would see
 IN_CLOSED_FORM = 1 << SHARE | 1 << CREEPS  # what a creep has looked at itself
 _CORE = 1 << CORE_FORWARD | 1 << CORE_BACKWARD
 _RELEASE = 1 << RELEASE_FORWARD | 1 << RELEASE_BACKWARD
-_MEET = 1 << MEET_FORWARD | 1 << MEET_BACKWARD
+STOPS = 1 << UPPER | 1 << LOWER
+MEETINGS = 1 << MEET_FORWARD | 1 << MEET_BACKWARD
 _MOTOR_RELEASE = 1 << MOTOR_RELEASE_FORWARD | 1 << MOTOR_RELEASE_BACKWARD
 EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper stop", "lower stop",
                "release forward", "release backward", "gear meets", "gear meets", "gear parts", "gear parts",
@@ -79,7 +80,7 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
     if numbers.stops.lower > -math.inf and (shaft == FREE or shaft == BACKWARD or shaft == CORE):
         kinds |= 1 << LOWER
     if mode.mesh == INSIDE:
-        kinds |= _MEET
+        kinds |= MEETINGS
         if mode.motor == STUCK:
             kinds |= _MOTOR_RELEASE
         elif mode.motor != FREE:
@@ -214,8 +215,8 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
         mesh = ON_FORWARD if kind == MEET_FORWARD else ON_BACKWARD
         if source.present(numbers.source):
             zone = currents.zone_of(numbers, u, 0.0, q, y[6], i)
-        upper = shaft == ON_UPPER and y[1] > 0.0
-        if upper or (shaft == ON_LOWER and y[1] < 0.0):  # the output rests on a stop: both hit it at once
+        upper = q >= numbers.stops.upper and y[1] > 0.0
+        if w == 0.0 and (upper or (q <= numbers.stops.lower and y[1] < 0.0)):  # it rests on a stop: both hit it at once
             return contacts.rebound(numbers, Mode(zone, shaft, mesh, motor, 0), upper, u, tau, y)
     elif kind == MOTOR_SPEED:
         y = (q, w, i, T_w, T_h, q_m, 0.0)

@@ -9,7 +9,8 @@ import math
 from typing import NamedTuple
 
 from servotwin.models.engine import contacts, creep, currents, dormand_prince, first_order, rodas, second_order
-from servotwin.models.engine.coefficients import linear_coefficients, speed_coefficients
+from servotwin.models.engine.coefficients import apart_coefficients, linear_coefficients, speed_coefficients
+from servotwin.models.engine.courses import Course, both
 from servotwin.models.engine.modes import (
     CONDUCTING,
     INSIDE,
@@ -41,7 +42,7 @@ from servotwin.models.terms.play import with_motor
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
-REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, CREEP, IMPOSSIBLE = range(10)
+REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, CREEP, APART, IMPOSSIBLE = range(11)
 
 _TURN = 2.0 * math.pi
 # Error of one implicit step, relative to 1 + |state|, and of an explicit one: parts of the accuracy asked for
@@ -64,7 +65,7 @@ class Motion(NamedTuple):
     t0: float
     start: Vector
     length: float
-    coefficients: tuple[float, ...]  # of second_order; FIRST_ORDER (λ, f, …), HELD (R/L, final i), SERIES of w and i
+    coefficients: tuple[float, ...]  # second_order's; FIRST_ORDER's, APART's (λ, f twice); HELD (R/L, final i); SERIES
     against: tuple[float, ...]  # WITH_CURRENT: value and slope of all torque that does not depend on speed
     end: Vector  # of a step, as all that follows
     next_step: float  # length to try next [s]
@@ -93,6 +94,10 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
     on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
     if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
         return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+    if on == TWO_BODIES and behind and not friction.varying(numbers.friction) and not not_constant(tau):
+        output_rate, output_pull, motor_rate, motor_pull = apart_coefficients(numbers, mode, u.value, tau.value)
+        laws = (output_rate, output_pull, motor_rate, motor_pull, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return _closed(APART, numbers, mode, u, tau, t0, y, laws, (0.0, 0.0), step)
     if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & (ON_Q | BY_SHARE)))):
         return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
     if on & FADING:
@@ -231,6 +236,9 @@ def state(motion: Motion, s: float) -> Vector:
     if kind == SECOND_ORDER:
         q, w = second_order.propagate(motion.coefficients, s)
         return _moved(motion, q, w, start[2])
+    if kind == APART:
+        c = motion.coefficients
+        return both(Course(c[0], c[1], start[0], start[1]), Course(c[2], c[3], start[5], start[6]), start, s)
     if kind == WITH_CURRENT:
         w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
         numbers, against = motion.numbers, motion.against
@@ -283,6 +291,9 @@ def rates(motion: Motion, s: float, y: Vector) -> Vector:
     if kind == FIRST_ORDER or kind == SECOND_ORDER:
         dw = second_order.acceleration(motion.coefficients, s, y[0], w)
         return w, dw, 0.0, 0.0, 0.0, w_m, dw
+    if kind == APART:
+        c = motion.coefficients
+        return w, c[1] - c[0] * w, 0.0, 0.0, 0.0, w_m, c[3] - c[2] * w_m
     numbers = motion.numbers
     if kind == WITH_CURRENT:
         w, dw = second_order.propagate(motion.coefficients, s)
@@ -305,6 +316,10 @@ def scales(motion: Motion) -> tuple[float, float]:
         return 1.0 / motion.coefficients[0], 40.0 / motion.coefficients[0]
     if motion.kind == SERIES or is_step(motion):  # the error control keeps it short beside what happens in it
         return motion.length, math.inf
+    if motion.kind == APART:
+        one, other = motion.coefficients[0], motion.coefficients[2]
+        slow, fast = min(one, other), max(one, other)
+        return (1.0 / fast, 40.0 / (slow if slow > 0.0 else fast)) if fast > 0.0 else (math.inf, 0.0)
     a, c = motion.coefficients[0], motion.coefficients[1]
     rate = 2.0 * a + math.sqrt(abs(c))
     if rate == 0.0:

@@ -8,14 +8,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine import arc_rounds, band_rounds, braked_rounds, coil_rounds, gap_rounds, stride_rounds, tiles
+from servotwin.models.engine import (
+    arc_rounds,
+    band_rounds,
+    braked_rounds,
+    coil_rounds,
+    gap_rounds,
+    stride_rounds,
+    tiles,
+)
 from servotwin.models.engine.tiles import ARCS, BANDS, COILS, GAPS, ONE_FORMULA, STRIDES, More
 
 
 def phases(size: int, keep: bool, form: int, slack: bool, tile: Any, plan: Any) -> None:
     """Move all lanes through the four phases; keep the state at the start of each where it is wanted."""
-    if form == COILS:
-        coil_rounds.begin(size, tile)
     if size <= tiles.FEW:
         for j in range(size):
             _lane(keep, form, slack, tile, plan, j)

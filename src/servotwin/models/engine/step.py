@@ -79,7 +79,8 @@ def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new:
     `m` is the motion so far, which is taken up again if it is still the right one and the inputs are not `new`. Return
     the point, the motion, the event (−1: none) and a status.
     """
-    if new or m.t0 != point.anchor_time or m.mode != point.mode or motion.is_step(m):
+    same = m.t0 == point.anchor_time and m.mode == point.mode and m.start == point.anchor
+    if new or not same or motion.is_step(m):
         m = motion.begin(numbers, point.mode, u, tau, point.anchor_time, point.anchor, point.step,
                          limit - point.anchor_time, accuracy)
     if m.kind == motion.IMPOSSIBLE:

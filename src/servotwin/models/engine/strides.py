@@ -10,7 +10,7 @@ instant is found to enough digits by trying again. Everything here asks the laws
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from servotwin.models.engine import arcs, contacts, currents, guards
 from servotwin.models.engine.elementary import log
@@ -97,10 +97,10 @@ def cooled(numbers: Numbers, T_w: float, T_h: float, time: float) -> tuple[float
     if not heat.present(numbers.heat):
         return T_w, T_h
     own = numbers.heat
-    T_w, T_h = two_mass_temperatures(
+    after: tuple[Any, Any] = two_mass_temperatures(
         time, 0.0, T_w, T_h, winding_capacity=own.C_w, housing_capacity=own.C_h, winding_to_housing=1.0 / own.G_wh,
         housing_to_ambient=1.0 / own.G_ha, ambient=own.T_amb)
-    return float(T_w), float(T_h)
+    return float(after[0]), float(after[1])
 
 
 def acceleration(numbers: Numbers, mode: Mode, u: float, tau: float, state: State, w: float) -> float:

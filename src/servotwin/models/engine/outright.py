@@ -1,0 +1,92 @@
+"""What ends a motion of first order behind a bridge: its time is told outright, or by a search along two courses."""
+
+from __future__ import annotations
+
+import math
+
+from servotwin.models.engine import coefficients, contacts, currents, first_order, guards
+from servotwin.models.engine.coefficients import Apart
+from servotwin.models.engine.courses import Course, both, lead_of, leaves
+from servotwin.models.engine.modes import FORWARD, INSIDE, ON_FORWARD, Mode, Vector
+from servotwin.models.terms import friction
+from servotwin.models.terms.friction import creeping_speed
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.shaft import sliding
+from servotwin.physics.motor import back_emf
+
+
+def first_end(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, laws: Apart, start: Vector,
+              after: Vector, s0: float, s1: float) -> tuple[float, int]:
+    """Return the time and the kind of the first event in (s0, s1], inf and −1 where none is.
+
+    `laws` are those of output and motor, which together have the same; `after` is the state at s1.
+    """
+    first, found = _by_speed(numbers, mode, kinds, u, tau, laws, start, after, s0, s1)
+    end = min(first, s1)
+    output = Course(laws.output_rate, laws.output_pull, start[0], start[1])
+    at_end = after if end == s1 else both(output, output, start, end)
+    stops = numbers.stops
+    if kinds & guards.STOPS and not (start[1] * at_end[1] >= 0.0 and stops.lower <= at_end[0] <= stops.upper):
+        wall = Course(0.0, 0.0, 0.0, 0.0)
+        s, side = leaves(
+            output, wall, stops.lower if kinds & 1 << guards.LOWER else -math.inf,
+            stops.upper if kinds & 1 << guards.UPPER else math.inf, s0, end,
+            lead_of(output, wall, at_end[0], at_end[1], 0.0, 0.0))
+        if s < first:
+            first, found, end = s, guards.UPPER if side > 0 else guards.LOWER, s
+    if kinds & guards.MEETINGS:
+        own, half = Course(laws.motor_rate, laws.motor_pull, start[5], start[6]), numbers.play.half
+        at_end = after if end == s1 else both(output, own, start, end)
+        s, side = leaves(own, output, -half, half, s0, end,
+                         lead_of(own, output, at_end[5], at_end[6], at_end[0], at_end[1]))
+        if s < first:
+            first, found = s, guards.MEET_FORWARD if side > 0 else guards.MEET_BACKWARD
+    return first, found
+
+
+def _by_speed(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, laws: Apart, start: Vector,
+              after: Vector, s0: float, s1: float) -> tuple[float, int]:
+    """Return the same of all events that come at a speed, of which each body's is monotone."""
+    low, high = currents.zone_limits(numbers, mode.zone, u)
+    w, w_m = after[1], after[6]
+    x, per_speed = u - back_emf(w_m, numbers.motor.K_b), back_emf(1.0, numbers.motor.K_b)
+    way, way_m = 1.0 if mode.contact == FORWARD else -1.0, 1.0 if mode.motor == FORWARD else -1.0
+    slow = creeping_speed(numbers.friction)
+    share, turn = guards.share_along(numbers, mode, u, tau, after)
+    first, found = math.inf, -1
+    for kind, left, there in ((guards.SPEED, way * w, 0.0),
+                              (guards.ZONE_UP, high - x, (u - high) / per_speed),
+                              (guards.ZONE_DOWN, x - low, (u - low) / per_speed),
+                              (guards.MOTOR_SPEED, way_m * w_m, 0.0),
+                              (guards.SHARE, share, turn), (guards.CREEPS, way * w - slow, way * slow)):
+        if not kinds >> kind & 1 or left >= guards.BELOW:  # monotone: what holds at the end has held
+            continue
+        of_motor = kind == guards.ZONE_UP or kind == guards.ZONE_DOWN or kind == guards.MOTOR_SPEED
+        rate, pull = (laws.motor_rate, laws.motor_pull) if of_motor else (laws.output_rate, laws.output_pull)
+        s = first_order.time_to(rate, pull, start[6] if of_motor else start[1], there)
+        s = s1 if s > s1 else s0 if s < s0 else s
+        if s < first:
+            first, found = s, kind
+    if kinds >> guards.PART & 1:
+        s = _parts(numbers, mode, u, tau, laws, start, after, s0, s1)
+        if s < first:
+            return s, guards.PART
+    return first, found
+
+
+def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, start: Vector, after: Vector, s0: float,
+           s1: float) -> float:
+    """Return when motor and output, in contact and sliding one way, would draw apart; inf where they do not."""
+    forward = mode.contact == FORWARD
+    alone = coefficients.apart_coefficients(numbers, Mode(
+        mode.zone, sliding(forward, contacts.holds(numbers)), INSIDE,
+        sliding(forward, friction.present(numbers.friction)), 0), u, tau)
+    toward = 1.0 if mode.mesh == ON_FORWARD else -1.0
+    still = toward * (alone.motor_pull - alone.output_pull)
+    slope = toward * (alone.output_rate - alone.motor_rate)
+    if still + slope * after[1] >= guards.BELOW:
+        return math.inf
+    if still + slope * start[1] <= 0.0:
+        return s0
+    s = first_order.time_to(laws.output_rate, laws.output_pull, start[1], -still / slope)
+    return min(max(s, s0), s1)
