@@ -29,6 +29,7 @@ CASES = {  # what leads to each way in which lanes run
 # Those that run side by side with inductance too, or hit stops
 INDUCTIVE = ("plain", "coasting, with noise", "couplings", "limp after a while", "frames as short as pulses", "stops",
              "dry load", "worn potentiometer")
+INTEGRATED = ("spring", "pendulum")  # side by side by steps of their own: right to 1e-9, not to rounding
 
 
 def model_of(servo, changes, kind=st.PulseServo):

@@ -153,13 +153,13 @@ def plain(work):
     raw = empty_raw(work)
     lanes = lane_runs.lanes_of(work)
     (kind,) = lane_runs.kinds_of(work.numbers, work.chip, work.lanes, True, "float64", lane_runs.swept(lanes),
-                                   work.torque.count > 0, False, True)
+                                   work.torque.count > 0, False)
     with np.errstate(all="ignore"):
         rows = room(1, tiles.tile_type("float64", kind.form))
         side_by_side.start(lanes, kind.form, work.times[0], rows)
         lost = side_by_side.go_on(
             lanes.pieces, lanes.edges, kind.form, kind.slack, kind.which, work.duration,
-            work.times, lane_runs.outputs_of(work, raw, "float64"), rows, room(1, tiles.plan_type("float64")))
+            work.times, lane_runs.outputs_of(work, raw, "float64"), rows, tiles.plan_room("float64", kind.form))
     assert lost == 0
     return raw
 
