@@ -104,28 +104,30 @@ def _sum(rows: Iterable[tuple[float, int]]) -> str:
     return total or "0.0"
 
 
-def _gathering(stage: int) -> Callable[[Any, int], None]:
-    """Return the function that sets the state from which a stage of the lane in a slot takes its rates."""
+def _gathering(stage: int) -> str:
+    """Return the text that sets the states from which a stage takes its rates, all written out: it goes in vectors."""
     own = range(FIRST[stage], FIRST[stage + 1])
     sums = {name: _sum((WEIGHTS[n], _WIDTH * WHICH[n] + c) for n in own) for c, name in enumerate(Reached._fields)}
-    part = FRACTIONS[stage]
-    return made(f"gather_{stage}", f"""def gather_{stage}(slots, j):
-    to, before, pace, reach = slots.after, slots.before, slots.pace, slots.stride.reach[j]
-    origin, rise = slots.stride.origin[j], slots.stride.rise[j]
-    at = fma({part!r}, rise, origin) if {stage} < {STAGES} else origin + rise
-    w = fma(reach, {sums["w"]}, before.w[j])
-    way = -1.0 if slots.busy.contact[j] == {BACKWARD} else 1.0
-    slots.stride.at_stage[j] = at
-    to.q[j] = fma(reach, {sums["q"]}, before.q[j])
-    to.w[j] = w if rise == 0.0 else way * (at * at if slots.stride.curved[j] > 0.0 else at)
-    to.T_w[j] = fma(reach, {sums["T_w"]}, before.T_w[j])
-    to.T_h[j] = fma(reach, {sums["T_h"]}, before.T_h[j])
-    to.t[j] = reach * ({sums["t"]})
-""", {"fma": fma})
+    at = f"fma({FRACTIONS[stage]!r}, rise, stride.origin[j])" if stage < STAGES else "stride.origin[j] + rise"
+    return f"""
+    if stage == {stage}:
+        for j in range({SLOTS}):
+            reach, rise = stride.reach[j], stride.rise[j]
+            at = {at}
+            by_speed = at * at if stride.curved[j] > 0.0 else at
+            by_time = fma(reach, {sums["w"]}, before.w[j])
+            stride.at_stage[j] = at
+            to.q[j] = fma(reach, {sums["q"]}, before.q[j])
+            to.w[j] = by_time if rise == 0.0 else -by_speed if slots.busy.contact[j] == {BACKWARD} else by_speed
+            to.T_w[j] = fma(reach, {sums["T_w"]}, before.T_w[j])
+            to.T_h[j] = fma(reach, {sums["T_h"]}, before.T_h[j])
+            to.t[j] = reach * ({sums["t"]})
+"""
 
 
-gather_0, gather_1, gather_2, gather_3, gather_4, gather_5, gather_6, gather_7, gather_8, gather_9, gather_10, \
-    gather_11, gather_12 = (_gathering(stage) for stage in range(STAGES + 1))
+gather = made("gather", f"""def gather(slots, stage):
+    to, before, pace, stride = slots.after, slots.before, slots.pace, slots.stride
+{"".join(_gathering(stage) for stage in range(STAGES + 1))}""", {"fma": fma})
 
 
 def step(slots: Any) -> None:
@@ -133,7 +135,7 @@ def step(slots: Any) -> None:
     for j in range(SLOTS):
         _aim(numbers_in(slots.own, j), slots, j)
     for stage in range(STAGES + 1):
-        _gather(slots, stage)
+        gather(slots, stage)
         if stage < STAGES:
             for j in range(SLOTS):
                 _pace(numbers_in(slots.own, j), slots, _WIDTH * stage, j)
@@ -141,49 +143,6 @@ def step(slots: Any) -> None:
         measure(slots, j)
     for j in range(SLOTS):
         _weigh(before_in(slots.before, j), slots, j)
-
-
-def _gather(slots: Any, stage: int) -> None:
-    """Set the states from which a stage takes its rates."""
-    if stage == 0:
-        for j in range(SLOTS):
-            gather_0(slots, j)
-    elif stage == 1:
-        for j in range(SLOTS):
-            gather_1(slots, j)
-    elif stage == 2:
-        for j in range(SLOTS):
-            gather_2(slots, j)
-    elif stage == 3:
-        for j in range(SLOTS):
-            gather_3(slots, j)
-    elif stage == 4:
-        for j in range(SLOTS):
-            gather_4(slots, j)
-    elif stage == 5:
-        for j in range(SLOTS):
-            gather_5(slots, j)
-    elif stage == 6:
-        for j in range(SLOTS):
-            gather_6(slots, j)
-    elif stage == 7:
-        for j in range(SLOTS):
-            gather_7(slots, j)
-    elif stage == 8:
-        for j in range(SLOTS):
-            gather_8(slots, j)
-    elif stage == 9:
-        for j in range(SLOTS):
-            gather_9(slots, j)
-    elif stage == 10:
-        for j in range(SLOTS):
-            gather_10(slots, j)
-    elif stage == 11:
-        for j in range(SLOTS):
-            gather_11(slots, j)
-    elif stage == 12:
-        for j in range(SLOTS):
-            gather_12(slots, j)
 
 
 def _pace(numbers: Numbers, slots: Any, k: int, j: int) -> None:

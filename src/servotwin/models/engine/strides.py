@@ -32,6 +32,9 @@ _SAME_TIME = 1e-12  # s
 _SHORTEST, _LONGEST = 0.15, 6.0  # factors from stride to stride
 _STRETCH = 1.25  # a stride is made so much longer, rather than leave a short one
 
+_WATCHED = (guards.SPEED, guards.ZONE_UP, guards.ZONE_DOWN, guards.SHARE, guards.RELEASE_FORWARD,
+            guards.RELEASE_BACKWARD)  # what may end a law
+
 
 class State(NamedTuple):
     """Angle, speed, and temperatures of winding and housing."""
@@ -181,7 +184,7 @@ def judged(stops: Stops, after: State, aim: Aim, time: float, left: float, lengt
 
 def first_met(numbers: Numbers, mode: Mode, u: float, tau: float, before: State, after: State, sought: bool) -> Met:
     """Return the guard that falls below zero first within a stride; where one is `sought`, or is as good as there."""
-    kinds = guards.guards(numbers, mode, u, False) & _LOOKED_AT
+    kinds = guards.guards(numbers, mode, u, False)
     y, y1 = vector_of(before), vector_of(after)
     found, was, now, first = -1, 0.0, 0.0, math.inf
     for kind in _WATCHED:
@@ -192,12 +195,6 @@ def first_met(numbers: Numbers, mode: Mode, u: float, tau: float, before: State,
                 if (b < guards.BELOW or b < _NEAR * a) and a / (a - b) < first:
                     found, was, now, first = kind, a, b, a / (a - b)
     return Met(found, was, now)
-
-
-_WATCHED = (guards.SPEED, guards.ZONE_UP, guards.ZONE_DOWN, guards.SHARE, guards.RELEASE_FORWARD,
-            guards.RELEASE_BACKWARD)
-_LOOKED_AT = (1 << guards.SPEED | 1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN | 1 << guards.SHARE
-              | 1 << guards.RELEASE_FORWARD | 1 << guards.RELEASE_BACKWARD)
 
 
 def rests(mode: Mode) -> bool:
