@@ -193,6 +193,31 @@ def test_a_shaft_that_is_held_is_heated():
         assert [T[k] for T in warmth] == pytest.approx(fine(HOT, 6.0, 1.8, 0.0, AT, time)[2:], rel=1e-13)
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_current_that_ends_before_a_standstill(way):
+    """The drop of brushes ends it while a load brings the shaft to rest."""
+    numbers, start = replaced(HOT, {"bridge.off.D": 0.3, "shaft.J": 0.03}), AT._replace(w=0.78 * way)
+
+    def rests(_, y):
+        return way * y[1]
+
+    rests.terminal = True
+    run = solve_ivp(law(numbers, 0.0, 1.1 * way, way), (0.0, 0.1), start, method="DOP853", rtol=1e-12, atol=1e-14,
+                    max_step=1e-4, events=rests)
+    q, w, _, _ = go(numbers, 0.0, 1.1 * way, start, [run.t[-1] + 1e-9], 1e-9)
+    assert q[0] == pytest.approx(run.y[0, -1], abs=1e-9)
+    assert abs(w[0]) < 1e-6
+
+
+def test_a_current_that_flows_for_less_than_a_stride():
+    """A spring drives the shaft a little beyond the drop of brushes, and slows it down again."""
+    numbers = replaced(HOT, {"bridge.off.D": 2.0885, "load.stiffness": 6.0})  # V; its most is 1e-3 higher
+    start = State(-0.1, 0.0, REFERENCE, REFERENCE)
+    exact = solve_ivp(law(numbers, 0.0, 0.0, 1.0), (0.0, 0.06), start, method="DOP853", rtol=1e-12, atol=1e-14,
+                      max_step=2e-4).y[0, -1]
+    assert go(numbers, 0.0, 0.0, start, [0.06], 1e-7)[0] == pytest.approx(exact, abs=1e-8)
+
+
 # --- many servos ------------------------------------------------------------------------------------------------------
 
 SERVO = st.load_servo("hitec-hs-755hb").replace({
