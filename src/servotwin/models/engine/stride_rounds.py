@@ -137,7 +137,8 @@ def _goes_on(slack: bool, tile: Any, plan: Any, slots: Any, k: int) -> bool:
     numbers, mode, u, tau = numbers_in(slots.own, k), mode_in(busy, k), stride.u[k], stride.tau[k]
     to, time = State(after.q[k], after.w[k], after.T_w[k], after.T_h[k]), after.t[k]
     aim = strides.Aim(stride.reach[k], stride.origin[k], stride.rise[k])
-    met = strides.first_met(numbers, mode, u, tau, before_in(slots.before, k), to, busy.tries[k] > 0)
+    gain = aim.reach * slots.pace[1, k] if aim.rise == 0.0 else 0.0
+    met = strides.first_met(numbers, mode, u, tau, before_in(slots.before, k), to, busy.tries[k] > 0, gain, time)
     found = strides.judged(numbers.stops, to, aim, time, stride.left[k], stride.length[k], stride.span[k],
                            stride.error[k], stride.factor[k], met)
     busy.tries[k] = busy.tries[k] + 1 if found.known else 0

@@ -30,6 +30,7 @@ BEFORE = 0.98  # of the time to a standstill that is only guessed
 _NEAR = 1e-4  # relative: a guard other than the speed that has come so near to zero is zero: nothing jumps there
 _SAME_TIME = 1e-12  # s
 _SHORTEST, _LONGEST = 0.15, 6.0  # factors from stride to stride
+_NOT_ALL = 0.99  # of a stride: where it is tried again up to its turning point, that is not its end
 _STRETCH = 1.25  # a stride is made so much longer, rather than leave a short one
 
 _WATCHED = (guards.SPEED, guards.ZONE_UP, guards.ZONE_DOWN, guards.SHARE, guards.RELEASE_FORWARD,
@@ -165,7 +166,7 @@ def judged(stops: Stops, after: State, aim: Aim, time: float, left: float, lengt
     if by_speed and time > left + _SAME_TIME:
         return Judged(False, Aim(left, 0.0, 0.0), True, length, span, -1, True)
     span = max(span, abs(aim.rise) * factor)
-    if by_speed and aim.origin + aim.rise == 0.0:
+    if by_speed and aim.origin + aim.rise == 0.0 and not met.now < guards.BELOW:  # else another law begins before
         return Judged(True, aim, False, length, span, guards.SPEED, True)
     cut = by_speed or aim.reach >= left or aim.reach < length  # a stride that was cut short tells little
     grown = max(length, time * factor) if cut else time * factor
@@ -182,8 +183,12 @@ def judged(stops: Stops, after: State, aim: Aim, time: float, left: float, lengt
     return Judged(False, Aim(reach, 0.0, 0.0), True, length, span, -1, True)
 
 
-def first_met(numbers: Numbers, mode: Mode, u: float, tau: float, before: State, after: State, sought: bool) -> Met:
-    """Return the guard that falls below zero first within a stride; where one is `sought`, or is as good as there."""
+def first_met(numbers: Numbers, mode: Mode, u: float, tau: float, before: State, after: State, sought: bool,
+              gain: float, time: float) -> Met:
+    """Return the guard that falls below zero first within a stride; where one is `sought`, or is as good as there.
+
+    By time the speed is to gain so much over the stride if its acceleration stays, in a `time` [s]; else `gain` is 0.
+    """
     kinds = guards.guards(numbers, mode, u, False)
     y, y1 = vector_of(before), vector_of(after)
     found, was, now, first = -1, 0.0, 0.0, math.inf
@@ -194,7 +199,47 @@ def first_met(numbers: Numbers, mode: Mode, u: float, tau: float, before: State,
                 a = max(guards.guard(numbers, mode, kind, u, 0.0, tau, 0.0, y, y)[0], 0.0)
                 if (b < guards.BELOW or b < _NEAR * a) and a / (a - b) < first:
                     found, was, now, first = kind, a, b, a / (a - b)
+    if found < 0 and gain != 0.0 and kinds != 0:
+        late = time * acceleration(numbers, mode, u, tau, after, after.w)
+        if gain * late < 0.0:
+            return _dipped(numbers, mode, kinds, u, tau, before, after, gain, late, time)
     return Met(found, was, now)
+
+
+def _dipped(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, before: State, after: State, gain: float,
+            late: float, time: float) -> Met:
+    """Return the guard that may have been below zero where the speed has turned back within a stride.
+
+    Met is such that the stride is tried again up to there, to see whether it has.
+    """
+    x = turning_point(after.w - before.w, gain, late)
+    w = _cubic(x, before.w, after.w, gain, late)
+    q = _cubic(x, before.q, after.q, time * before.w, time * after.w)
+    T_w, T_h = before.T_w + x * (after.T_w - before.T_w), before.T_h + x * (after.T_h - before.T_h)
+    y, y1, there = vector_of(before), vector_of(after), vector_of(State(q, w, T_w, T_h))
+    doubt = (x * (1.0 - x)) ** 2  # of the cubic, parts of how far the speed turns back
+    x = min(x, _NOT_ALL)
+    for kind in _WATCHED:
+        if kinds >> kind & 1:
+            b = guards.guard(numbers, mode, kind, u, 0.0, tau, 0.0, there, there)[0]
+            ends = max(guards.guard(numbers, mode, kind, u, 0.0, tau, 0.0, y, y)[0],
+                       guards.guard(numbers, mode, kind, u, 0.0, tau, 0.0, y1, y1)[0])
+            if b < doubt * (ends - b):
+                return Met(kind, 1.0, 1.0 - 1.0 / x)
+    return Met(-1, 0.0, 0.0)
+
+
+def turning_point(rise: float, early: float, late: float) -> float:
+    """Return where a cubic over 0 to 1 turns that rises by so much, with slopes of opposite signs at its ends."""
+    way = 1.0 if late > 0.0 else -1.0
+    half, curve = 3.0 * rise - 2.0 * early - late, 3.0 * (early + late - 2.0 * rise)
+    return early / (-half - way * math.sqrt(half * half - curve * early))
+
+
+def _cubic(x: float, begin: float, end: float, early: float, late: float) -> float:
+    """Return a cubic over 0 to 1 by its values and slopes at the ends."""
+    z = 1.0 - x
+    return z * z * (begin * (1.0 + 2.0 * x) + early * x) + x * x * (end * (1.0 + 2.0 * z) - late * z)
 
 
 def rests(mode: Mode) -> bool:
