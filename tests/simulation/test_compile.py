@@ -65,7 +65,7 @@ def test_float32_stays_float32(folder):
     from numba import from_dtype, types
 
     tile = from_dtype(tiles.tile_type("float32", tiles.ARCS))
-    plan = from_dtype(tiles.plan_type("float32")["of"])
+    plan = from_dtype(tiles.plan_type("float32", tiles.ARCS)["of"])
     module.phases.compile((types.int64, types.boolean, types.int64, types.boolean, tile, plan))
     module.divide.compile((types.int64, types.boolean, types.boolean, tile, plan))
     for entry in (module.phases, module.divide):
