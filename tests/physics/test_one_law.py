@@ -24,10 +24,11 @@ ENGINE = sorted(set(PUBLIC) - set(physics.ANALYSIS))
 SCALED = [name for name in ENGINE if name in LAWS and inspect.signature(LAWS[name]).return_annotation != "bool"]
 FEW = ("breakaway_torque", "drive_time")
 # Where lanes go side by side no potentiometer has play, so that its law is not asked; and the voltage of a bus is what
-# the currents of all balance at, while that of a servo's own supply follows from its one current. Where the current has
-# inertia the general engine tells it from the torque that a motion in closed form needs, lanes side by side from its rate
+# the currents of all balance at, while that of a servo's own supply follows from its one current. A current with inertia
+# the general engine tells from the torque that a motion in closed form needs, lanes side by side from its rate
 REPEATED = {"play": "tiles", "source_voltage": "on a bus", "supply_current": "on a bus",
-            "armature_current_rate": "inductive", "electromagnetic_torque": "inductive", "shaft_acceleration": "inductive"}
+            "armature_current_rate": "inductive", "electromagnetic_torque": "inductive",
+            "shaft_acceleration": "inductive"}
 # Laws of which the balance of energy is made: 1 % off, it cannot close
 BALANCE = {"armature_current_rate", "bridge_loss", "brush_loss", "circuit_current", "copper_loss",
            "driving_voltage", "electromagnetic_torque", "kinetic_energy", "magnetic_energy", "needed_voltage",

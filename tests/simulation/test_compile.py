@@ -60,7 +60,7 @@ def test_the_vector_form_has_polynomials():
 def test_float32_stays_float32(folder):
     recipe = Recipe("single", ("servotwin.models.engine.phases:phases",
                                "servotwin.models.engine.windows:divide"), vector=True, single=True,
-                    never=("BANDS", "GAPS"))
+                    never=("BANDS", "STRIDES", "COILS", "GAPS"))
     module = kernels(recipe)
     from numba import from_dtype, types
 
