@@ -24,8 +24,8 @@ ENGINE = sorted(set(PUBLIC) - set(physics.ANALYSIS))
 SCALED = [name for name in ENGINE if name in LAWS and inspect.signature(LAWS[name]).return_annotation != "bool"]
 FEW = ("breakaway_torque", "drive_time")
 # Where lanes go side by side no potentiometer has play, so that its law is not asked; and the voltage of a bus is what
-# the currents of all balance at, while that of a servo's own supply follows from its one current. A current with inertia
-# the general engine tells from the torque that a motion in closed form needs, lanes side by side from its rate
+# the currents of all balance at, while that of a servo's own supply follows from its one current. A current with
+# inertia the general engine tells from the torque that a motion in closed form needs, lanes side by side from its rate
 REPEATED = {"play": "tiles", "source_voltage": "on a bus", "supply_current": "on a bus",
             "armature_current_rate": "inductive", "electromagnetic_torque": "inductive",
             "shaft_acceleration": "inductive"}
