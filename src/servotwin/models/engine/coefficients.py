@@ -111,3 +111,20 @@ def speed_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], again
     return (0.5 * (fade + drag), fade * drag + per_ampere * brake, per_volt * v - fade * held - held_more,
             per_volt * gain * u[1] - fade * held_more, per_volt * gain * u[2], u[3], u[4], w,
             acceleration(numbers.shaft, motor.electromagnetic_torque(i, numbers.motor.K), w, 0.0, against[0]))
+
+
+def current_of(numbers: Numbers, dw: float, w: float, against: float) -> float:
+    """Return the armature current [A] by which a shaft speeds up so, at a speed and against a torque [N m].
+
+    The law is linear, so that the same holds of their rates of change.
+    """
+    per_ampere = accelerated(numbers.shaft, motor.electromagnetic_torque(1.0, numbers.motor.K))
+    return (dw - acceleration(numbers.shaft, 0.0, w, 0.0, against)) / per_ampere
+
+
+def fading_coefficients(numbers: Numbers, mode: Mode, u: float) -> tuple[float, float]:
+    """Return the rate [1/s] at which the current of a shaft at rest goes to its final value [A], and that value."""
+    v, R = currents.loop(numbers, mode.zone, u)
+    L, K_b = numbers.motor.L, numbers.motor.K_b
+    rate = -motor.armature_current_rate(0.0, 1.0, 0.0, R, L, K_b)
+    return rate, motor.armature_current_rate(v, 0.0, 0.0, R, L, K_b) / rate

@@ -157,7 +157,7 @@ def held(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int,
     side = sign_of(zone)
     edge = min(edge, 0.0) if di > 0.0 and side < 0.0 else max(edge, 0.0) if di < 0.0 and side > 0.0 else edge
     there = motor.armature_current_rate(v, edge, 0.0, circuit.R, L, K_b)
-    final = motor.steady_armature_current(v, 0.0, circuit.R, K_b) if flows else i
+    final = motor.armature_current_rate(v, 0.0, 0.0, circuit.R, L, K_b) * circuit.per_rate if flows else i
     return Held(Arc(circuit.rate, circuit.per_rate, di, edge, there), final)
 
 

@@ -20,6 +20,7 @@ from servotwin.models.engine.modes import (
     Vector,
     at_rest,
     sign_of,
+    slides,
 )
 from servotwin.models.terms import friction, play, shaft, source
 from servotwin.models.terms.friction import Friction, holding_friction, sliding_friction
@@ -154,9 +155,10 @@ def pressing(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> f
     if w == 0.0:
         alone = apart(numbers, mode.zone, u, tau, (y[0], 0.0, y[2], y[3], y[4], y[5], 0.0))
         motor, contact = alone.motor, alone.contact
-    else:
-        motor = sliding(w > 0.0, friction.present(numbers.friction))
-        contact = sliding(w > 0.0, holds(numbers))
+    else:  # a mode that ends where the speed is zero keeps its law there, or it would end by its parting first
+        forward = mode.contact == FORWARD if slides(mode.contact) else w > 0.0
+        motor = sliding(forward, friction.present(numbers.friction))
+        contact = sliding(forward, holds(numbers))
     gain = motor_acceleration(numbers, motor, torque, w) - output_acceleration(numbers, contact, against, w)
     return gain if mode.mesh == ON_FORWARD else -gain
 

@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 from servotwin.models.engine import contacts, currents
 from servotwin.models.engine.contacts import friction_torque
-from servotwin.models.engine.guards import SHARE, SPEED, ZONE_DOWN, ZONE_UP
-from servotwin.models.engine.modes import BACKWARD, FORWARD, Mode, Vector
+from servotwin.models.engine.guards import SHARE, SPEED, ZONE_DOWN, ZONE_UP, creeping, geared
+from servotwin.models.engine.modes import BACKWARD, FORWARD, INSIDE, Mode, Vector, slides
 from servotwin.models.terms import shaft
-from servotwin.models.terms.friction import creeping_speed, share, static_share
+from servotwin.models.terms.friction import creeping_speed, fades, share, static_share
 from servotwin.models.terms.load import external_torque
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.physics.load_friction import torque_on_gear
 from servotwin.physics.motor import back_emf
 
@@ -46,6 +46,7 @@ _FEWER = (  # those of the rule of 10 points among them
 IN_ANY_ORDER = ("_between",)  # functions whose sums a compiler may take side by side
 _HALVINGS = 12  # of a range of speeds; one that needs more is for the integrator
 _ROUNDS = 40
+_INTO = 0.9  # of the speed at which friction begins to fade: up to there next to nothing of it has
 _PART, _ROUNDING = 0.01, 2e-15  # of a tolerance: where two runs halve otherwise, they should not differ by more
 
 
@@ -84,6 +85,36 @@ def creeps(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> boo
     if abs(y[1]) != slow:
         return abs(y[1]) < slow
     return contacts.acceleration(numbers, mode, u, tau, y) * y[1] < 0.0
+
+
+def longest_step(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> float:
+    """Return the time [s] beyond which a step by time would not see static friction fade; inf where it does not."""
+    if not creeping(numbers, mode, y):
+        return math.inf
+    slow = creeping_speed(numbers.friction)
+    fast = slow if geared(mode) == FORWARD else -slow
+    most = max(_gain(numbers, mode, u, tau, y, 0.0), _gain(numbers, mode, u, tau, y, fast))
+    return 2.0 * slow / most if most > 0.0 else math.inf
+
+
+def part_before(numbers: Numbers, mode: Mode, before: Vector, after: Vector) -> float:
+    """Return the part of a step by time after which friction begins to fade; 1 where it leads no further.
+
+    What of a step lies beyond would not be seen, and spoils what lies before.
+    """
+    if not fades(numbers.friction) or not slides(geared(mode)) or creeping(numbers, mode, before):
+        return 1.0
+    by, way = 6 if mode.mesh == INSIDE else 1, 1.0 if geared(mode) == FORWARD else -1.0
+    w, w_after, slow = way * before[by], way * after[by], creeping_speed(numbers.friction)
+    return 1.0 if w_after >= _INTO * slow else (w - 0.5 * (1.0 + _INTO) * slow) / (w - w_after)
+
+
+def _gain(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: float) -> float:
+    """Return the magnitude of the acceleration [rad/s²] that a body sliding in the gear has at a speed."""
+    inside = mode.mesh == INSIDE
+    at: Vector = (y[0], y[1] if inside else w, y[2], y[3], y[4], y[5], w)
+    output, motor = contacts.accelerations(warm(numbers, at), mode, u, tau, at)
+    return abs(motor if inside else output)
 
 
 def creep(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, limit: float, tolerance: float) -> Crept:

@@ -22,6 +22,7 @@ from servotwin.models.engine.modes import (
     Mode,
     Vector,
     at_rest,
+    slides,
 )
 from servotwin.models.terms import play, source
 from servotwin.models.terms.friction import core_speed, creeping_speed, fades, holding_friction, smoothed, varying
@@ -69,7 +70,8 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
     elif shaft != FREE:
         kinds |= 1 << SPEED
         kinds |= 1 << SHARE if mode.share != 0 else 0
-        kinds |= 1 << CREEPS if fades(numbers.friction) else 0
+    if fades(numbers.friction) and slides(geared(mode)):
+        kinds |= 1 << CREEPS
     low, high = currents.zone_limits(numbers, zone, u)
     if high < math.inf:
         kinds |= 1 << ZONE_UP
@@ -90,6 +92,18 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
     return kinds
 
 
+def geared(mode: Mode) -> int:
+    """Return the contact of the body that moves against the friction of the gear: inside the play the motor."""
+    return mode.motor if mode.mesh == INSIDE else mode.contact
+
+
+def creeping(numbers: Numbers, mode: Mode, y: Vector) -> bool:
+    """Tell whether a body moves at speeds at which its friction fades."""
+    if not fades(numbers.friction) or not slides(geared(mode)):
+        return False
+    return abs(y[6] if mode.mesh == INSIDE else y[1]) <= creeping_speed(numbers.friction)
+
+
 def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
           dy: Vector) -> tuple[float, float]:
     """Return a guard and its time derivative (nan where it is not known); the mode ends when it falls below zero."""
@@ -99,8 +113,9 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
         sign = 1.0 if shaft == FORWARD else -1.0
         return sign * w - core_speed(numbers.friction), sign * dw
     if kind == CREEPS:
-        sign = 1.0 if shaft == FORWARD else -1.0
-        return sign * w - creeping_speed(numbers.friction), sign * dw
+        sign = 1.0 if geared(mode) == FORWARD else -1.0
+        by = 6 if mode.mesh == INSIDE else 1
+        return sign * y[by] - creeping_speed(numbers.friction), sign * dy[by]
     if kind == CORE_FORWARD:
         return core_speed(numbers.friction) - w, -dw
     if kind == CORE_BACKWARD:
@@ -188,7 +203,8 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
         return Mode(zone, shaft, mesh, motor, -share), y
     if kind == CREEPS:
         slow = creeping_speed(numbers.friction)
-        return mode, (y[0], slow if shaft == FORWARD else -slow, y[2], y[3], y[4], y[5], y[6])
+        w = slow if geared(mode) == FORWARD else -slow
+        return mode, (y[0], y[1] if mesh == INSIDE else w, y[2], y[3], y[4], y[5], w)
     if kind == SPEED and smoothed(numbers.friction):
         return Mode(zone, CORE, mesh, motor, 0), y
     if kind == CORE_FORWARD or kind == CORE_BACKWARD:

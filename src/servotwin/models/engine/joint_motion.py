@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from servotwin.models.engine import contacts, dormand_prince
+from servotwin.models.engine import contacts, creep, dormand_prince
 from servotwin.models.engine.dormand_prince import STAGES
 from servotwin.models.engine.modes import INSIDE, NO_CURRENT, NOWHERE, Vector, at_rest, sign_of
 from servotwin.models.engine.motion import LONG_STEP
@@ -214,9 +214,9 @@ class Step(NamedTuple):
 def joint_step(source: Source, state: int, mates: Any, count: int, time: float, step: float) -> Step:
     """Work out one accepted step of at most `step` [s]: dense outputs and ends of all mates."""
     stages = [[NOWHERE for _ in range(16)] for _ in range(count)]
-    h, factor = step, 1.0
+    h, factor, short = step, 1.0, False
     for _ in range(60):
-        size = 0.0
+        size, part = 0.0, 1.0
         for k in range(STAGES):
             _stage(source, state, mates, time, h, k, stages)
         for j in range(count):
@@ -225,15 +225,17 @@ def joint_step(source: Source, state: int, mates: Any, count: int, time: float, 
             put_vector(mates[j].end, end)
             error = dormand_prince.error_of(start, end, stages[j], h)
             size = max(size, error if error == error else math.inf)
+            part = min(part, creep.part_before(numbers_of(mates[j].numbers), mode_of(mates[j].mode), start, end))
         size = min(size / _TOLERANCE, 1e12)
         factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
-        if size <= 1.0:
+        if size <= 1.0 and part == 1.0:
             for k in range(STAGES, 16):
                 _stage(source, state, mates, time, h, k, stages)
             for j in range(count):
                 _put_dense(mates[j], stages[j], h)
-            return Step(h, h * factor)
-        h *= factor
+            return Step(h, max(step, h * factor) if short else h * factor)
+        short = size <= 1.0
+        h *= part if short else factor
     return Step(-1.0, step)
 
 

@@ -47,6 +47,11 @@ def at_rest(contact: int) -> bool:
     return contact >= STUCK
 
 
+def slides(contact: int) -> bool:
+    """Tell whether a shaft slides in this contact."""
+    return contact == FORWARD or contact == BACKWARD
+
+
 def sign_of(zone: int) -> float:
     """Return the sign of the current in a zone behind a bridge; 0 where it does not matter."""
     if zone > NO_CURRENT:

@@ -8,8 +8,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine import contacts, creep, currents, dormand_prince, first_order, rodas, second_order
-from servotwin.models.engine.coefficients import apart_coefficients, linear_coefficients, speed_coefficients
+from servotwin.models.engine import contacts, creep, dormand_prince, first_order, rodas, second_order
+from servotwin.models.engine.coefficients import (
+    apart_coefficients,
+    current_of,
+    fading_coefficients,
+    linear_coefficients,
+    speed_coefficients,
+)
 from servotwin.models.engine.courses import Course, both
 from servotwin.models.engine.modes import (
     CONDUCTING,
@@ -109,9 +115,9 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
                     return m
             return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
     if on & ON_I and still and mode.zone >= CONDUCTING:
-        v, R = currents.loop(numbers, mode.zone, u.value)
-        fading = (R / numbers.motor.L, v / R, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        return _closed(HELD, numbers, mode, u, tau, t0, y, fading, (0.0, 0.0), step)
+        rate, final = fading_coefficients(numbers, mode, u.value)
+        return _closed(HELD, numbers, mode, u, tau, t0, y, (rate, final, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0),
+                       step)
     if on & (CURVED_Q | STEEP_W | CURVED_T) or (on & ON_I and (still or (not behind and on & ON_Q))):
         return _integrated(numbers, mode, u, tau, t0, y, step, limit, accuracy)
     follows = in_linear_zone(mode.zone)
@@ -180,7 +186,8 @@ def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y
 
 def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
                limit: float, accuracy: float) -> Motion:
-    h = min(step, limit)
+    most = min(limit, creep.longest_step(numbers, mode, piece_value(u, t0), piece_value(tau, t0), y))
+    h = min(step, most)
     h = min(h, period(u, tau, t0, t0 + h) / 3.0)
     for _ in range(60):
         y1, error = dormand_prince.step(numbers, mode, u, tau, t0, y, h)
@@ -188,11 +195,13 @@ def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y:
         if not size < 1e12:
             size = 1e12
         factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
-        if size <= 1.0:
-            following = max(step, h * factor) if h == limit else h * factor  # a step that was cut short tells little
+        part = creep.part_before(numbers, mode, y, y1) if size <= 1.0 else factor
+        if part == 1.0:
+            following = max(step, h * factor) if h == most else h * factor  # a step that was cut short tells little
             return Motion(LONG_STEP, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), y1, following,
                           -1, False, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
-        h *= factor
+        h *= part
+        most = h if size <= 1.0 else most
         if t0 + h == t0:
             break
     return _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
@@ -241,9 +250,8 @@ def state(motion: Motion, s: float) -> Vector:
         return both(Course(c[0], c[1], start[0], start[1]), Course(c[2], c[3], start[5], start[6]), start, s)
     if kind == WITH_CURRENT:
         w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
-        numbers, against = motion.numbers, motion.against
-        i = (numbers.shaft.J * dw + numbers.shaft.b * w + against[0] + against[1] * s) / numbers.motor.K
-        return _moved(motion, start[0] + way, w, i)
+        against = motion.against[0] + motion.against[1] * s
+        return _moved(motion, start[0] + way, w, current_of(motion.numbers, dw, w, against))
     if kind == HELD:
         rate, final = motion.coefficients[0], motion.coefficients[1]
         return _moved(motion, start[0], start[1], start[2] + (start[2] - final) * math.expm1(-rate * s))
@@ -298,8 +306,7 @@ def rates(motion: Motion, s: float, y: Vector) -> Vector:
     if kind == WITH_CURRENT:
         w, dw = second_order.propagate(motion.coefficients, s)
         ddw = second_order.acceleration(motion.coefficients, s, w, dw)
-        di = (numbers.shaft.J * ddw + numbers.shaft.b * dw + motion.against[1]) / numbers.motor.K
-        return w, dw, di, 0.0, 0.0, w_m, dw
+        return w, dw, current_of(numbers, ddw, dw, motion.against[1]), 0.0, 0.0, w_m, dw
     if kind == HELD:
         return 0.0, 0.0, motion.coefficients[0] * (motion.coefficients[1] - y[2]), 0.0, 0.0, 0.0, 0.0
     if is_step(motion):

@@ -160,14 +160,8 @@ def _before(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
             braked_rounds.drive_or_rest(size, slack, tile, plan)
         elif form == ARCS:
             arc_rounds.drive_or_rest(size, tile, plan)
-        elif form == BANDS:
-            band_rounds.phase(size, slack, tile, plan)
-        elif form == STRIDES:
-            stride_rounds.phase(size, slack, tile, plan)
-        elif form == COILS:
-            coil_rounds.phase(size, slack, tile, plan)
-        elif form == GAPS:
-            gap_rounds.phase(size, tile, plan)
+        else:
+            _by_law(size, form, slack, tile, plan)
     if both > 0:
         both = 0
         for j in range(size):
@@ -192,14 +186,8 @@ def _drive(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
             braked_rounds.drive(size, slack, tile, plan)
         elif form == ARCS:
             arc_rounds.drive(size, tile, plan)
-        elif form == BANDS:
-            band_rounds.phase(size, slack, tile, plan)
-        elif form == STRIDES:
-            stride_rounds.phase(size, slack, tile, plan)
-        elif form == COILS:
-            coil_rounds.phase(size, slack, tile, plan)
-        elif form == GAPS:
-            gap_rounds.phase(size, tile, plan)
+        else:
+            _by_law(size, form, slack, tile, plan)
 
 
 def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
@@ -214,11 +202,17 @@ def _idle(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
             braked_rounds.rest(size, slack, tile, plan)
         elif form == ARCS:
             arc_rounds.rest(size, tile, plan)
-        elif form == BANDS:
-            band_rounds.phase(size, slack, tile, plan)
-        elif form == STRIDES:
-            stride_rounds.phase(size, slack, tile, plan)
-        elif form == COILS:
-            coil_rounds.phase(size, slack, tile, plan)
-        elif form == GAPS:
-            gap_rounds.phase(size, tile, plan)
+        else:
+            _by_law(size, form, slack, tile, plan)
+
+
+def _by_law(size: int, form: int, slack: bool, tile: Any, plan: Any) -> None:
+    """Move all lanes through a phase by a form that asks the law of each lane, whether it drives or not."""
+    if form == BANDS:
+        band_rounds.phase(size, slack, tile, plan)
+    elif form == STRIDES:
+        stride_rounds.phase(size, slack, tile, plan)
+    elif form == COILS:
+        coil_rounds.phase(size, slack, tile, plan)
+    elif form == GAPS:
+        gap_rounds.phase(size, tile, plan)

@@ -162,13 +162,16 @@ def _write(which: Indices, form: int, slack: bool, times: Floats, outputs: Outpu
             o = tile.count.output[j]
             x = tile.clock.output[j] - before.now[j]
             plan.time[j] = min(max(x, 0.0), plan.window[j])
-            _write_one(which[j], o, j, form, slack, outputs, tile, plan)
-            tile.count.output[j] = o + 1
-            tile.clock.output[j] = times[o + 1] if o + 1 < times.size else math.inf
+            if _write_one(which[j], o, j, form, slack, outputs, tile, plan) == 0.0:
+                plan.lost[j] = 1.0
+            else:
+                tile.count.output[j] = o + 1
+                tile.clock.output[j] = times[o + 1] if o + 1 < times.size else math.inf
 
 
-def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> None:
-    x = plan.time[j]
+def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> float:
+    """Write one output; return 1, or 0 where it cannot be told."""
+    x, done = plan.time[j], 1.0
     phase = _phase_at(x, plan, j)
     after = plan.end1[j] if phase == 1 else plan.end2[j] if phase == 2 else plan.end3[j]
     x -= after if phase > 0 else 0.0
@@ -178,15 +181,15 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
         own, torque, more = tiles.numbers_at(tile.own, j), tile.hung.torque[j], phases.more_kept(phase, tile, j)
         i, T_w, T_h, q_m, w_m, mesh, _ = more
         if form == tiles.COILS:
-            q, w, i, wiper, _ = coils.through(
+            q, w, i, wiper, done = coils.through(
                 own, tiles.winding_at(tile.winding, j), torque, drive, q, w, i, wiper, x)
             contact = coils.contact_of(own, torque, w, i)
         elif form == tiles.GAPS:
             gone = gaps.go(own, torque, drive, (q, w, 0.0, T_w, T_h, q_m, w_m), int(mesh), wiper, x)
             q, w, wiper, contact = gone.y[0], gone.y[1], gone.wiper, gone.mode.contact
-            q_m, w_m, mesh = gone.y[5], gone.y[6], float(gone.mode.mesh)
+            q_m, w_m, mesh, done = gone.y[5], gone.y[6], float(gone.mode.mesh), gone.done
         elif form == tiles.STRIDES:
-            to, wiper = stride_rounds.seen(slack, drive, x, q, w, wiper, more, tile, plan, j)
+            to, wiper, done = stride_rounds.seen(slack, drive, x, q, w, wiper, more, tile, plan, j)
             q, w, T_w, T_h = to.q, to.w, to.T_w, to.T_h
             start = strides.way_from_rest(own, drive * own.source.V, torque, to)
             contact = contact_of(tile.hung.dry[j] > 0.0, start, w)
@@ -199,10 +202,10 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
         numbers = tiles.arc_numbers_at(tile.arc, j)
         if form == tiles.BANDS:
             begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
-            q, w, turned, _ = bands.slide(
+            q, w, turned, done = bands.slide(
                 tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x, tile.hung.tolerance[j])
         else:
-            q, w, turned, _ = arcs.slide(numbers, drive, q, w, x)
+            q, w, turned, done = arcs.slide(numbers, drive, q, w, x)
         wiper = tiles.dragged(tile.hung.half_slack[j], wiper, turned, q)
         contact = contact_of(tile.hung.dry[j] > 0.0, arcs.start_of(numbers, drive), w)
         _write_more(lane, o, 0.0, tile.servo.T_w[j], tile.servo.T_h[j], q, w, RIGID, outputs)
@@ -218,6 +221,7 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
         outputs.drive[lane, o] = 1 if drive > 0.0 else (-1 if drive < 0.0 else 0)
     if outputs.error.size > 0:
         outputs.error[lane, o] = plan.error_before[j] if phase < 2 else tile.servo.error[j]
+    return done
 
 
 def _write_more(lane: int, o: int, i: float, T_w: float, T_h: float, q_m: float, w_m: float, mesh: int,

@@ -125,7 +125,10 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
     v = piece_value(m.u, point.time)
     kinds = guards.guards(m.numbers, m.mode, v, m.mode.contact == CORE and in_one_piece(m.numbers, m.u))
     if integrated:  # looked at as a whole, however a run is split
-        kinds &= ~(guards.IN_CLOSED_FORM if m.kind == motion.CREEP else 1 << guards.CREEPS)
+        if m.kind == motion.CREEP:
+            kinds &= ~guards.IN_CLOSED_FORM
+        elif guards.creeping(m.numbers, m.mode, m.start):
+            kinds &= ~(1 << guards.CREEPS)
         s, kind, y = events.first_event(m, kinds, 0.0, m.length)
         if kind < 0 or s > end - t0:
             kind, y = -1, motion.state(m, end - t0)

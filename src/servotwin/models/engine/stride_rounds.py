@@ -53,8 +53,11 @@ def alone(slack: bool, tile: Any, plan: Any, j: int) -> None:
 
 
 def seen(slack: bool, power: float, time: float, q: float, w: float, wiper: float, more: More, tile: Any, plan: Any,
-         j: int) -> tuple[State, float]:
-    """Return the state, and the angle of the potentiometer, so much time [s] after a lane has been there and so."""
+         j: int) -> tuple[State, float, float]:
+    """Return the state, and the angle of the potentiometer, so much time [s] after a lane has been there and so.
+
+    The third is 1, or 0 where they cannot be told.
+    """
     servo, after, q_after, w_after = tile.servo, tiles.more_at(tile.servo, j), tile.servo.q[j], tile.servo.w[j]
     wiper_after, lost = servo.wiper[j], plan.lost[j]
     servo.q[j], servo.w[j], servo.wiper[j] = q, w, wiper
@@ -63,21 +66,22 @@ def seen(slack: bool, power: float, time: float, q: float, w: float, wiper: floa
     if time > 0.0:
         alone(slack, tile, plan, j)
     state, wiper = _state(tile, j), servo.wiper[j]
+    done = 1.0 if plan.lost[j] == lost else 0.0
     servo.q[j], servo.w[j], servo.wiper[j], plan.lost[j] = q_after, w_after, wiper_after, lost
     tiles.put_more(servo, j, after)
-    return state, wiper
+    return state, wiper, done
 
 
 def _look(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
     """Find which way a lane starts from rest: one that stands still, and is not heated, has nothing but to cool."""
     u, w = plan.power[j] * numbers.source.V, tile.servo.w[j]
     start = strides.way_from_rest(numbers, u, tile.hung.torque[j], _state(tile, j))
-    plan.creeps[j] = 1.0 if w == 0.0 and start == 0.0 and (u == 0.0 or not heat.present(numbers.heat)) else 0.0
+    plan.ends[j] = 1.0 if w == 0.0 and start == 0.0 and (u == 0.0 or not heat.present(numbers.heat)) else 0.0
 
 
 def _cool(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
     """Let a lane that rests go through its time."""
-    rests, time, T_w, T_h = plan.creeps[j] > 0.0, plan.time[j], tile.servo.T_w[j], tile.servo.T_h[j]
+    rests, time, T_w, T_h = plan.ends[j] > 0.0, plan.time[j], tile.servo.T_w[j], tile.servo.T_h[j]
     cool_w, cool_h = strides.cooled(numbers, T_w, T_h, max(time, 0.0))
     tile.servo.T_w[j] = cool_w if rests else T_w
     tile.servo.T_h[j] = cool_h if rests else T_h

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine import contacts, guards, joint_motion, shared_source
+from servotwin.models.engine import contacts, creep, guards, joint_motion, shared_source
 from servotwin.models.engine.joint_motion import turns
 from servotwin.models.engine.memory import FIRST_STEP
 from servotwin.models.engine.modes import BACKWARD, FORWARD, NO_CURRENT, RIGID, STUCK, Mode, Vector, sign_of
@@ -61,15 +61,28 @@ def begin(shared: Any, mates: Any, time: float, limit: float, same: bool) -> Non
             _settle(mates[k], time, voltage)
     shared.begin, shared.phase, shared.how = time, TOGETHER, joint_motion.kind_of(mates, count)
     if shared.how == LONG_STEP:
-        shared.length = min(limit - time, shared.step)
+        most = min(limit - time, _longest_step(shared, mates))
+        shared.length = min(most, shared.step)
         following = _move(shared, mates)
-        shared.step = max(shared.step, following) if shared.length == limit - time else following
+        shared.step = max(shared.step, following) if shared.length == most else following
     else:
         longest = joint_motion.longest_series(mates, count)
         shared.length = min(limit - time, longest) if limit - time <= _MOST_SERIES * longest else -1.0
         _move(shared, mates)
     if shared.length >= 0.0:
         _find_end(source, shared, mates, limit)
+
+
+def _longest_step(shared: Any, mates: Any) -> float:
+    """Return the time [s] beyond which a common step would not see the friction of a mate fade."""
+    longest = math.inf
+    for k in range(shared.members):
+        mate = mates[k]
+        tau = piece_value(piece_of(mate.tau), shared.begin)
+        longest = min(longest, creep.longest_step(numbers_of(mate.numbers), mode_of(mate.mode),
+                                                  shared_source.behind(mate, shared.voltage), tau,
+                                                  vector_of(mate.start)))
+    return longest
 
 
 def resume(shared: Any, mates: Any) -> None:
@@ -183,8 +196,11 @@ def _keeps_its_sign(series: Any, terms: int, end: float, sign: float, length: fl
 
 def _kinds(mate: Any) -> int:
     """Return which guards can end the mode of a mate, as a sum of 1 << kind."""
-    kinds = guards.guards(numbers_of(mate.numbers), mode_of(mate.mode), mate.sign, False) & ~(1 << guards.CREEPS)
-    if mate.returns > 0 and mate.mode.zone == NO_CURRENT:  # its diodes block the other way
+    numbers, mode = numbers_of(mate.numbers), mode_of(mate.mode)
+    kinds = guards.guards(numbers, mode, mate.sign, False)
+    if guards.creeping(numbers, mode, vector_of(mate.start)):
+        kinds &= ~(1 << guards.CREEPS)
+    if mate.returns > 0 and mode.zone == NO_CURRENT:  # its diodes block the other way
         kinds &= ~(1 << (guards.ZONE_UP if mate.sign > 0.0 else guards.ZONE_DOWN))
     return kinds
 
