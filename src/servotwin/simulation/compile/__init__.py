@@ -58,7 +58,7 @@ def _name(recipe: Recipe) -> str:
 def _kernels(recipe: Recipe) -> ModuleType:
     path, known = stored(_name(recipe), lambda: derive(recipe))
     if not known:
-        sys.stderr.write("servotwin: compiling the kernels for this machine, once (15 to 35 s)\n")
+        sys.stderr.write("servotwin: compiling the kernels for this machine, once (10 to 25 s)\n")
         sys.stderr.flush()
     import_module("numba")
     return loaded(path)

@@ -28,7 +28,7 @@ from servotwin.models.terms.numbers import NEUTRAL
 from servotwin.physics.pieces import Piece
 
 _ELEMENTARY = "servotwin.models.engine.elementary"
-_INTRINSICS = "servotwin.simulation.compile.intrinsics"
+_INTRINSICS, _LINKING = (f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking"))
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instructions in the vector form
 _POLYNOMIALS = ("exp", "log", "log1p", "sin")
 _DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
@@ -72,7 +72,7 @@ def derive(recipe: Recipe) -> str:
     work = _Derivation(recipe)
     names = [work.function(*entry.split(":")) for entry in recipe.entries]
     lines = ["# Derived from servotwin's kernels; do not edit.", "import math", "", "import numpy as np",
-             "from numba import njit", ""]
+             "from numba import njit", "", f"from {_LINKING} import Part", ""]
     lines += [f"from {module} import {name} as {alias}" for alias, (module, name) in sorted(work.imports.items())]
     lines += ["", f"_f = np.{'float32' if recipe.single else 'float64'}", ""]
     lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
@@ -88,7 +88,7 @@ def _options(recipe: Recipe, entry: bool, text: str) -> str:
     options = 'nogil=True, error_model="numpy"'
     if entry:
         return options + ", cache=True"
-    options += ", no_cpython_wrapper=True, no_cfunc_wrapper=True"
+    options += ", no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=Part"
     loops = any(isinstance(node, (ast.For, ast.While)) for node in ast.walk(ast.parse(text)))
     return options + (", forceinline=True" if recipe.vector and not loops else "")
 
@@ -453,4 +453,5 @@ def _local_names(node: ast.FunctionDef) -> set[str]:
 
 def surroundings(recipe: Recipe) -> str:
     """Return what the compiled code depends on besides the derived text."""
-    return f"{sys.version_info[:2]} {recipe} {Path(__file__).with_name('intrinsics.py').read_text(encoding='utf-8')}"
+    beside = (Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("intrinsics.py", "linking.py"))
+    return f"{sys.version_info[:2]} {recipe} {' '.join(beside)}"
