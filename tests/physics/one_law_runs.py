@@ -111,11 +111,13 @@ def without_compiler():
     from servotwin.simulation import lane_runs, vector_store
     from servotwin.simulation.compile.derive import derive
 
-    numba, intrinsics = types.ModuleType("numba"), types.ModuleType("servotwin.simulation.compile.intrinsics")
+    numba, intrinsics, linking = (types.ModuleType(name) for name in (
+        "numba", *(f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking"))))
+    linking.Part = None
     numba.njit = lambda **_: lambda function: function
     for name in ("fma", "two_power", "binary_exponent", "nearest"):
         setattr(intrinsics, name, getattr(elementary, name))
-    sys.modules |= {module.__name__: module for module in (numba, intrinsics)}
+    sys.modules |= {module.__name__: module for module in (numba, intrinsics, linking)}
     known = {}
 
     def kernels(recipe):

@@ -28,7 +28,7 @@ FEW = ("breakaway_torque", "drive_time")
 REPEATED = {"play": "tiles", "source_voltage": "on a bus", "supply_current": "on a bus"}
 # Laws of which the balance of energy is made: 1 % off, it cannot close
 BALANCE = {"armature_current_rate", "bridge_loss", "brush_loss", "circuit_current", "copper_loss",
-           "driving_voltage", "electromagnetic_torque", "kinetic_energy", "magnetic_energy", "needed_voltage",
+           "driving_voltage", "kinetic_energy", "magnetic_energy", "needed_voltage",
            "shaft_acceleration", "source_voltage", "steady_armature_current", "supply_current"}
 EDGES = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -2.0)
 

@@ -130,3 +130,9 @@ def test_a_step_that_is_tried_far_too_long_is_only_tried(seed):
     """After a rest the integrator tries a hundred times L/R; current, heat and angle then leave all numbers behind."""
     terms = {"heat", "inductance", "pendulum"}
     assert left_out([replace(random_case(seed, frozenset(terms)), duration=0.1)], tolerance_of(terms)) == 0
+
+
+def test_an_output_that_goes_to_and_fro_between_motor_and_stop_comes_to_rest():
+    """Its blows, ever smaller, came one after the other without time between, so that the run ended there."""
+    terms = {"backlash", "heat", "inductance", "m6", "spring", "stops", "stribeck", "table", "wiper"}
+    assert left_out([replace(random_case(7, frozenset(terms)), duration=0.1)], tolerance_of(terms)) == 0

@@ -229,10 +229,13 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
     if play.present(numbers.play) and (kind == MEET_FORWARD or kind == MEET_BACKWARD):
         y = play.met(numbers.play, numbers.shaft, kind == MEET_FORWARD, y)
         mesh = ON_FORWARD if kind == MEET_FORWARD else ON_BACKWARD
+        upper = q >= numbers.stops.upper and y[1] > 0.0
+        hits = upper or (q <= numbers.stops.lower and y[1] < 0.0)
+        if hits and w != 0.0:  # it goes to and fro between motor and stop, without any way to go, until both stand still
+            y = (q, 0.0, i, T_w, T_h, y[5], 0.0)
         if source.present(numbers.source):
             zone = currents.zone_of(numbers, u, 0.0, q, y[6], i)
-        upper = q >= numbers.stops.upper and y[1] > 0.0
-        if w == 0.0 and (upper or (q <= numbers.stops.lower and y[1] < 0.0)):  # it rests on a stop: both hit it at once
+        if hits and w == 0.0:  # it rests on a stop: both hit it at once
             return contacts.rebound(numbers, Mode(zone, shaft, mesh, motor, 0), upper, u, tau, y)
     elif kind == MOTOR_SPEED:
         y = (q, w, i, T_w, T_h, q_m, 0.0)

@@ -60,6 +60,7 @@ class Stride(NamedTuple):
     at_stage: float  # the speed or its root
     error: float  # over the tolerance
     factor: float  # how much longer the next one may be
+    quiet: float  # 1: it has led to the end of the phase, and nothing has happened on the way
 
 
 class Busy(NamedTuple):
@@ -143,6 +144,8 @@ def step(slots: Any) -> None:
         measure(slots, j)
     for j in range(SLOTS):
         _weigh(before_in(slots.before, j), slots, j)
+    for j in range(SLOTS):
+        _listen(numbers_in(slots.own, j), slots, j)
 
 
 def _pace(numbers: Numbers, slots: Any, k: int, j: int) -> None:
@@ -193,6 +196,16 @@ def _weigh(before: State, slots: Any, j: int) -> None:
     size = abs(stride.reach[j]) * e_5 / (total * stride.tolerance[j]) if e_5 != 0.0 else 0.0
     stride.error[j] = size
     stride.factor[j] = strides.factor_of(size)
+
+
+def _listen(numbers: Numbers, slots: Any, j: int) -> None:
+    """Mark a lane whose stride is good and has led to the end of its phase without anything to look at."""
+    to, stride = slots.after, slots.stride
+    after = State(to.q[j], to.w[j], to.T_w[j], to.T_h[j])
+    gain = stride.reach[j] * slots.pace[1, j]
+    calm = strides.calm(numbers, mode_in(slots.busy, j), stride.u[j], stride.tau[j], after, gain)
+    good = stride.rise[j] == 0.0 and stride.error[j] <= 1.0 and slots.busy.tries[j] == 0
+    stride.quiet[j] = 1.0 if calm and good and stride.reach[j] >= stride.left[j] else 0.0
 
 
 def _squares(a: float, b: float, c: float, d: float, e: float) -> float:

@@ -138,8 +138,11 @@ def _put_mode(busy: Any, k: int, mode: Any) -> None:
 def _goes_on(slack: bool, tile: Any, plan: Any, slots: Any, k: int) -> bool:
     """Judge the stride of the lane in a slot; tell whether it has further to go."""
     stride, busy, after, j = slots.stride, slots.busy, slots.after, slots.busy.lane[k]
-    numbers, mode, u, tau = numbers_in(slots.own, k), mode_in(busy, k), stride.u[k], stride.tau[k]
     to, time = State(after.q[k], after.w[k], after.T_w[k], after.T_h[k]), after.t[k]
+    if stride.quiet[k] > 0.0:
+        _leave(to, max(stride.length[k], time * stride.factor[k]), slack, tile, j)
+        return False
+    numbers, mode, u, tau = numbers_in(slots.own, k), mode_in(busy, k), stride.u[k], stride.tau[k]
     aim = strides.Aim(stride.reach[k], stride.origin[k], stride.rise[k])
     gain = aim.reach * slots.pace[1, k] if aim.rise == 0.0 else 0.0
     met = strides.first_met(numbers, mode, u, tau, before_in(slots.before, k), to, busy.tries[k] > 0, gain, time)
@@ -166,17 +169,20 @@ def _goes_on(slack: bool, tile: Any, plan: Any, slots: Any, k: int) -> bool:
     put_before_in(slots.before, k, to)
     if left > 0.0 and not strides.stays(numbers, mode, u):
         return True
-    _leave(numbers, to, left, stride.length[k], tile, j)
-    if slack:
-        tiles.drag(tile, to.q, j)
+    if left > 0.0:  # it stands still
+        T_w, T_h = strides.cooled(numbers, to.T_w, to.T_h, left)
+        to = State(to.q, to.w, T_w, T_h)
+    _leave(to, stride.length[k], slack, tile, j)
     return False
 
 
-def _leave(numbers: Numbers, state: State, left: float, length: float, tile: Any, j: int) -> None:
-    """Put a lane back into its tile; what is left of its time it stands still."""
-    T_w, T_h = strides.cooled(numbers, state.T_w, state.T_h, left)
-    tile.servo.q[j], tile.servo.w[j], tile.servo.T_w[j], tile.servo.T_h[j] = state.q, state.w, T_w, T_h
-    tile.servo.step[j] = length
+def _leave(state: State, length: float, slack: bool, tile: Any, j: int) -> None:
+    """Put a lane back into its tile."""
+    servo = tile.servo
+    servo.q[j], servo.w[j], servo.T_w[j], servo.T_h[j] = state.q, state.w, state.T_w, state.T_h
+    servo.step[j] = length
+    if slack:
+        tiles.drag(tile, state.q, j)
 
 
 def _state(tile: Any, j: int) -> State:

@@ -206,6 +206,20 @@ def first_met(numbers: Numbers, mode: Mode, u: float, tau: float, before: State,
     return Met(found, was, now)
 
 
+def calm(numbers: Numbers, mode: Mode, u: float, tau: float, after: State, gain: float) -> bool:
+    """Tell that a sliding shaft has met nothing in a stride by time: what `judged` and `first_met` would find.
+
+    Its speed was to gain so much over the stride. Where this is not told, they have to look.
+    """
+    warmed = warm(numbers, vector_of(after))
+    low, high = currents.zone_limits(warmed, mode.zone, u)
+    x = currents.zone_variable(warmed, mode.zone, u, after.q, after.w, 0.0)
+    way = 1.0 if mode.contact == FORWARD else -1.0 if mode.contact == BACKWARD else 0.0
+    nearest = min(way * after.w, x - low, high - x, after.q - numbers.stops.lower, numbers.stops.upper - after.q)
+    late = acceleration(numbers, mode, u, tau, after, after.w)
+    return mode.share == 0 and 0.0 < nearest < math.inf and gain * late >= 0.0
+
+
 def _dipped(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, before: State, after: State, gain: float,
             late: float, time: float) -> Met:
     """Return the guard that may have been below zero where the speed has turned back within a stride.
