@@ -231,7 +231,7 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
         mesh = ON_FORWARD if kind == MEET_FORWARD else ON_BACKWARD
         upper = q >= numbers.stops.upper and y[1] > 0.0
         hits = upper or (q <= numbers.stops.lower and y[1] < 0.0)
-        if hits and w != 0.0:  # it goes to and fro between motor and stop, without any way to go, until both stand still
+        if hits and w != 0.0:  # it goes to and fro between motor and stop without any way to go: in the end both stand
             y = (q, 0.0, i, T_w, T_h, y[5], 0.0)
         if source.present(numbers.source):
             zone = currents.zone_of(numbers, u, 0.0, q, y[6], i)
