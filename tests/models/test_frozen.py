@@ -124,7 +124,6 @@ def test_one_by_one(frozen, k):
     fail_of(one_by_one(frozen, n) for n in group(k))
 
 
-@pytest.mark.compiles
 @pytest.mark.parametrize("k", range(GROUPS))
 def test_in_lanes(frozen, k):
     fail_of(in_a_lane(frozen, n) for n in group(k) if is_batched(n))

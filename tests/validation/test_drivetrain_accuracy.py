@@ -59,6 +59,18 @@ def main(many: int) -> None:
         found = errors(some, accuracy)
         print(f"{accuracy:.0e} rad: {len(found)} servos, median {np.median(found):.1e}, 99 % "
               f"{np.quantile(found, 0.99):.1e}, largest {np.max(found):.1e}, below {np.mean(found < accuracy):.1%}")
+        for k in np.flatnonzero(found >= accuracy):
+            tell(*some[k], accuracy)
+
+
+def tell(case: Case, trace: Trace, accuracy: float) -> None:
+    """Print when an angle is off by more than asked for the first time, and what happened just before."""
+    times = np.linspace(0.0, case.duration, 20_001)
+    result, fine = simulate(case, times, accuracy=accuracy), simulate(case, times, accuracy=1e-13)
+    t = times[np.argmax(np.abs(result["output_angle"] - fine["output_angle"]) > 0.1 * accuracy)]
+    print(f"  a tenth of it from {t:.6f} s on, after", ", ".join(
+        f"{event.kind} at {event.time:.9f} s" for event in [event for event in result.events if event.time <= t][-3:]),
+        f"(speed {np.interp(t, times, fine['output_speed']):.2g} rad/s)")
 
 
 if __name__ == "__main__":
