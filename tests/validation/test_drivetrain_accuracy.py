@@ -1,6 +1,8 @@
 """Angles are as accurate as asked: servos with every term at once, at three accuracies, against the reference.
 
-Measured over 200 servos of `python -m validation.test_drivetrain_accuracy` (with tests/ on the path): all below.
+Measured over 200 servos by `python -m validation.test_drivetrain_accuracy` in tests/: at least 99 % below. Of the others
+one has an output that goes to and fro between motor and stop, where the reference's rounding takes 12 ns until both
+stand, and one is as far from the reference as that is from itself with shorter steps.
 """
 
 import sys
@@ -60,17 +62,16 @@ def main(many: int) -> None:
         print(f"{accuracy:.0e} rad: {len(found)} servos, median {np.median(found):.1e}, 99 % "
               f"{np.quantile(found, 0.99):.1e}, largest {np.max(found):.1e}, below {np.mean(found < accuracy):.1%}")
         for k in np.flatnonzero(found >= accuracy):
-            tell(*some[k], accuracy)
+            tell(some[k][0], accuracy)
 
 
-def tell(case: Case, trace: Trace, accuracy: float) -> None:
-    """Print when an angle is off by more than asked for the first time, and what happened just before."""
-    times = np.linspace(0.0, case.duration, 20_001)
-    result, fine = simulate(case, times, accuracy=accuracy), simulate(case, times, accuracy=1e-13)
-    t = times[np.argmax(np.abs(result["output_angle"] - fine["output_angle"]) > 0.1 * accuracy)]
-    print(f"  a tenth of it from {t:.6f} s on, after", ", ".join(
-        f"{event.kind} at {event.time:.9f} s" for event in [event for event in result.events if event.time <= t][-3:]),
-        f"(speed {np.interp(t, times, fine['output_speed']):.2g} rad/s)")
+def tell(case: Case, accuracy: float) -> None:
+    """Print when the angles part for the first time, and what happened just before."""
+    times = np.linspace(0.0, case.duration, 4001)
+    result, trace = simulate(case, times, accuracy=accuracy), simulate_case(case, times)
+    t = times[np.argmax(np.abs(result["motor_angle"] - trace.motor_angle) > accuracy)]
+    before = [f"{event.kind} at {event.time:.9f} s" for event in result.events if event.time <= t]
+    print(f"  motor off by as much from {t:.6f} s on, after {', '.join(before[-6:])}")
 
 
 if __name__ == "__main__":
