@@ -158,20 +158,21 @@ def _write(which: Indices, form: int, slack: bool, times: Floats, outputs: Outpu
            before: Any) -> None:
     """Write the outputs of this window, each from the arc that holds it."""
     for j in range(which.size):
+        first, due = tile.count.output[j], tile.clock.output[j]
         while plan.lost[j] == 0.0 and _is_wanted(tile, plan, before, j):
             o = tile.count.output[j]
             x = tile.clock.output[j] - before.now[j]
             plan.time[j] = min(max(x, 0.0), plan.window[j])
-            if _write_one(which[j], o, j, form, slack, outputs, tile, plan) == 0.0:
-                plan.lost[j] = 1.0
-            else:
-                tile.count.output[j] = o + 1
-                tile.clock.output[j] = times[o + 1] if o + 1 < times.size else math.inf
+            _write_one(which[j], o, j, form, slack, outputs, tile, plan)
+            tile.count.output[j] = o + 1
+            tile.clock.output[j] = times[o + 1] if o + 1 < times.size else math.inf
+        if plan.lost[j] > 0.0:  # whoever takes it over writes them all
+            tile.count.output[j], tile.clock.output[j] = first, due
 
 
-def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> float:
-    """Write one output; return 1, or 0 where it cannot be told."""
-    x, done = plan.time[j], 1.0
+def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outputs, tile: Any, plan: Any) -> None:
+    """Write one output; a lane of which it cannot be told is given up."""
+    x = plan.time[j]
     phase = _phase_at(x, plan, j)
     after = plan.end1[j] if phase == 1 else plan.end2[j] if phase == 2 else plan.end3[j]
     x -= after if phase > 0 else 0.0
@@ -180,6 +181,7 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
     if tiles.has_more(form):
         own, torque, more = tiles.numbers_at(tile.own, j), tile.hung.torque[j], phases.more_kept(phase, tile, j)
         i, T_w, T_h, q_m, w_m, mesh, _ = more
+        done = 1.0
         if form == tiles.COILS:
             q, w, i, wiper, done = coils.through(
                 own, tiles.winding_at(tile.winding, j), torque, drive, q, w, i, wiper, x)
@@ -195,6 +197,7 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
             contact = contact_of(tile.hung.dry[j] > 0.0, start, w)
         else:
             contact = FREE
+        plan.lost[j] = plan.lost[j] if done > 0.0 else 1.0
         if mesh == RIGID:
             q_m, w_m = q, w
         _write_more(lane, o, i, T_w, T_h, q_m, w_m, int(mesh), outputs)
@@ -204,8 +207,9 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
             begins = bands.Starts(numbers.start_forward, numbers.start_backward, numbers.start_off)
             q, w, turned, done = bands.slide(
                 tiles.numbers_at(tile.own, j), tile.hung.torque[j], begins, drive, q, w, x, tile.hung.tolerance[j])
+            plan.lost[j] = plan.lost[j] if done > 0.0 else 1.0
         else:
-            q, w, turned, done = arcs.slide(numbers, drive, q, w, x)
+            q, w, turned, _ = arcs.slide(numbers, drive, q, w, x)
         wiper = tiles.dragged(tile.hung.half_slack[j], wiper, turned, q)
         contact = contact_of(tile.hung.dry[j] > 0.0, arcs.start_of(numbers, drive), w)
         _write_more(lane, o, 0.0, tile.servo.T_w[j], tile.servo.T_h[j], q, w, RIGID, outputs)
@@ -221,7 +225,6 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
         outputs.drive[lane, o] = 1 if drive > 0.0 else (-1 if drive < 0.0 else 0)
     if outputs.error.size > 0:
         outputs.error[lane, o] = plan.error_before[j] if phase < 2 else tile.servo.error[j]
-    return done
 
 
 def _write_more(lane: int, o: int, i: float, T_w: float, T_h: float, q_m: float, w_m: float, mesh: int,
