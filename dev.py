@@ -20,7 +20,7 @@ STAMP = ENVIRONMENT / "installed"
 TASKS = {
     "setup": "make .venv and install servotwin with all tools",
     "paper": "set up, then write the report of the paper to paper-report/ (main job)",
-    "test": "set up, then run the tests (8 minutes, half of it to compile on a machine that has not)",
+    "test": "set up, then run the tests (4 minutes, 8 on a machine that has compiled nothing yet)",
     "validation": "set up, then run the slow tests: validation and coverage (12 minutes more)",
     "check": "set up, then lint, types, import rules",
     "examples": "set up, then run every script of examples/",
