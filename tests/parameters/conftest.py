@@ -15,6 +15,7 @@ _NUMBERS = {
 _OTHER_LAW = ("load_friction", "load_friction_stribeck")
 
 MASSES = {"winding_capacity": 2.0, "housing_capacity": 30.0, "winding_to_housing": 8.0, "housing_to_ambient": 16.0}
+FIRMWARE_ALONE = ("compute_delay", "derivative_ticks", "whole_counts", "integral_at_rest", "signal_loss")
 COMPANIONS = {"friction.stribeck_exponent": {"stribeck_speed": 10.0}, "thermal.magnet_coefficient": MASSES,
               **{f"thermal.{name}": {key: MASSES[key] for key in MASSES if key != name} for name in MASSES}}
 
@@ -28,7 +29,7 @@ def group_values(draw, kind):
             continue
         values[f.name] = draw(st.sampled_from(rule)) if isinstance(rule, tuple) else draw(_NUMBERS[rule])
     for low, high in (("lower_angle", "upper_angle"), ("pulse_width_min", "pulse_width_max"),
-                      ("bridge_drop_voltage", "open_circuit_voltage")):
+                      ("bridge_drop_voltage", "open_circuit_voltage"), ("lower_goal", "upper_goal")):
         if low in values and high in values:
             values[low], values[high] = sorted((values[low], values[high]))
             if values[low] == values[high]:
@@ -41,6 +42,8 @@ def group_values(draw, kind):
         heat = draw(st.booleans())
         values |= {name: draw(_NUMBERS["a positive number"]) for name in MASSES if heat and name not in values}
         values = {k: v for k, v in values.items() if heat or k == "ambient"}
+    if kind is GROUPS["firmware"]:
+        values = {name: values[name] for name in values if name not in FIRMWARE_ALONE}
     if kind is GROUPS["potentiometer"] and draw(st.booleans()):
         angles = sorted(draw(st.sets(st.floats(-4.0, 4.0), min_size=1, max_size=6)))
         values["linearity_angle"] = tuple(angles)

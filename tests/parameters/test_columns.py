@@ -30,6 +30,12 @@ PAIR = np.array([2.0, 3.0])
     ("friction", {"load_friction": 0.5, "load_friction_external": PAIR},
      "friction.load_friction_external of lane 0: got 2.0, allowed: not beside friction.load_friction, "
      "which belongs to another friction law"),
+    ("firmware", {"compute_delay": np.array([1e-3, 0.1]), "control_period": 1e-3},
+     "firmware.compute_delay of lane 1: got 0.1, allowed: at most 15 times firmware.control_period = 0.015"),
+    ("firmware", {"derivative_ticks": np.array([20.0, 1.5])},
+     "firmware.derivative_ticks of lane 1: got 1.5, allowed: a whole number"),
+    ("firmware", {"whole_counts": "yes", "angle_quantum": 1e-3},
+     "firmware.whole_counts: got 'yes', allowed: only together with firmware.angle_quantum, firmware.duty_quantum"),
     ("thermal", {"winding_capacity": PAIR},
      "thermal.winding_capacity of lane 0: got 2.0, allowed: only together with thermal.housing_capacity, "
      "thermal.winding_to_housing, thermal.housing_to_ambient"),

@@ -28,6 +28,15 @@ NAMES = {
                    "stretcher_time_constant off_state silence_state one_shot_offset one_shot_slope back_emf_injection "
                    "supply_coupling pulse_timeout pulse_width_min pulse_width_max",
     "potentiometer": "feedback_gain feedback_offset backlash noise linearity_angle linearity_error quantisation",
+    "firmware": "control_period control_phase compute_delay angle_quantum filter_weight deadband_angle deadband_law "
+                "proportional_gain integral_gain derivative_gain velocity_feedforward acceleration_feedforward "
+                "derivative_of derivative_ticks derivative_threshold integral_limit anti_windup integral_at_rest "
+                "rest_travel duty_quantum whole_counts minimum_duty torque_limit duty_limit duty_slew current_limit "
+                "current_sense off_state torque_off_state pulse_resolution command_kind bus_latency lower_goal "
+                "upper_goal speed_limit acceleration_limit minimum_speed overload_duty overload_time stall_travel "
+                "overload_output overload_latches trip_current trip_time trip_temperature undervoltage "
+                "undervoltage_action restart_time signal_timeout signal_loss failsafe_angle soft_start_duty "
+                "soft_start_time",
     "supply": "open_circuit_voltage internal_resistance bridge_drop_voltage bridge_drop_resistance current_limit",
     "stops": "lower_angle upper_angle restitution",
     "thermal": "winding_capacity housing_capacity winding_to_housing housing_to_ambient ambient magnet_coefficient",

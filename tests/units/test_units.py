@@ -34,6 +34,7 @@ KNOWN = [
     (2.44, "mV", "voltage per count", 2.44e-3), (55.0, "g", "mass", 0.055), (12.0, "cm", "length", 0.12),
     (3.0, "mm", "length", 0.003), (13.0, "N cm", "torque", 0.13), (100.0, "gf cm", "torque", 9.80665e-3),
     (10.0, "in", "length", 10 * INCH), (10.0, "lb", "mass", 10 * POUND),
+    (1.0, "1/deg", "inverse angle", 180.0 / math.pi), (360.0, "deg/s2", "angular acceleration", TURN),
     (160.0, "oz", "mass", 10 * POUND), (-0.15, "%/K", "inverse temperature", -1.5e-3),
 ]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
 from servotwin.parameters import GROUPS
-from servotwin.parameters.groups import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
+from servotwin.parameters.group import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
 from servotwin.parameters.servo import check_name, unit_of
 from servotwin.units import is_finite
 

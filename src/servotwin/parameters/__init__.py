@@ -2,12 +2,13 @@
 
 from servotwin.parameters.catalog import catalog_names, load_servo
 from servotwin.parameters.datasets import Dataset, dataset_names, load_dataset
+from servotwin.parameters.firmware import Firmware
+from servotwin.parameters.group import Group
 from servotwin.parameters.groups import (
     GROUPS,
     Electronics,
     Friction,
     Gear,
-    Group,
     Motor,
     Potentiometer,
     Stops,
@@ -20,8 +21,8 @@ from servotwin.parameters.quantity import ORIGINS, Quantity
 from servotwin.parameters.servo import KINDS, Servo, dimension_of, servo_from_values, unit_of
 
 __all__ = [
-    "GROUPS", "KINDS", "ORIGINS", "Dataset", "Electronics", "Friction", "Gear", "Group", "Motor", "Potentiometer",
-    "PrintedPoint", "Quantity", "Servo", "Stops", "Supply", "Thermal", "catalog_names", "dataset_names",
-    "dimension_of", "load_dataset", "load_servo", "printed_fact", "printed_flags", "printed_points",
+    "GROUPS", "KINDS", "ORIGINS", "Dataset", "Electronics", "Firmware", "Friction", "Gear", "Group", "Motor",
+    "Potentiometer", "PrintedPoint", "Quantity", "Servo", "Stops", "Supply", "Thermal", "catalog_names",
+    "dataset_names", "dimension_of", "load_dataset", "load_servo", "printed_fact", "printed_flags", "printed_points",
     "servo_from_values", "unit_of", "write_file",
 ]

@@ -1,166 +1,32 @@
-"""The parameter groups: frozen dataclasses whose fields say unit, range, meaning and symbol, and check themselves.
+"""The parameter groups, by the tables of a servo file.
 
 Names, letters and ranges are those of Urrea & Kern (2011) where the paper has them; the theory pages list both.
-A field that is None is absent: the effect is off, or not known.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from servotwin.errors import ParameterError
-from servotwin.units import is_finite, si_unit
-
-POSITIVE = "a positive number"
-NOT_NEGATIVE = "a number of at least 0"
-ANY = "a finite number"
-AT_LEAST_ONE = "a number of at least 1"
-FRACTION = "a number from 0 to 1"
-
-_RULES: dict[str, Callable[[Any], Any]] = {  # of a number, or of each number of a column
-    POSITIVE: lambda x: x > 0.0,
-    NOT_NEGATIVE: lambda x: x >= 0.0,
-    ANY: lambda x: x == x,
-    AT_LEAST_ONE: lambda x: x >= 1.0,
-    FRACTION: lambda x: (x >= 0.0) & (x <= 1.0),
-}
-
-
-class Relation(NamedTuple):
-    """What has to hold between fields of a group; of columns, lane by lane, or for all lanes alike."""
-
-    what: str
-    holds: bool | NDArray[np.bool_]
-    got: Any
-    allowed: str
-    bound: Any = None  # a number that `allowed` ends with
-
-    def check(self) -> None:
-        """Raise ParameterError if it does not hold; of columns, for the first such lane."""
-        if self.holds is True or np.all(self.holds):
-            return
-        lane = None
-        if any(isinstance(x, np.ndarray) for x in (self.holds, self.got)):
-            lane = int(np.argmin(self.holds))  # 0 where what does not hold is the same in all lanes
-        got, bound = (_of_lane(x, lane) for x in (self.got, self.bound))
-        raise ParameterError(self.what if lane is None else f"{self.what} of lane {lane}", got=got,
-                             allowed=self.allowed if bound is None else f"{self.allowed} = {bound!r}")
-
-
-def _of_lane(value: Any, lane: int | None) -> Any:
-    return value[lane].item() if isinstance(value, np.ndarray) else value
-
-
-def parameter(symbol: str, dimension: str, rule: str, meaning: str) -> Any:
-    """Declare a number that may be absent."""
-    return field(default=None, metadata={"symbol": symbol, "dimension": dimension, "rule": rule, "meaning": meaning})
-
-
-def table(symbol: str, dimension: str, meaning: str) -> Any:
-    """Declare a table of numbers that may be absent."""
-    return field(default=None, metadata={"symbol": symbol, "dimension": dimension, "rule": "table",
-                                         "meaning": meaning})
-
-
-def choice(options: tuple[str, ...], meaning: str) -> Any:
-    """Declare a word out of a few that may be absent."""
-    return field(default=None, metadata={"symbol": "", "dimension": "word", "rule": options, "meaning": meaning})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Group:
-    """Base of all groups: checks every field once, and the relations between fields."""
-
-    title: ClassVar[str]
-
-    def __post_init__(self) -> None:
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if value is not None:
-                object.__setattr__(self, f.name, self._checked(f.name, value, f.metadata))
-        for relation in self._relations():
-            relation.check()
-
-    def _checked(self, name: str, value: Any, metadata: Any) -> Any:
-        rule = metadata["rule"]
-        what = f"{self.title}.{name}"
-        if isinstance(rule, tuple):
-            if value not in rule:
-                raise ParameterError(what, got=value, allowed=" or ".join(rule))
-            return value
-        if rule == "table":
-            if isinstance(value, np.ndarray) and value.ndim == 1:
-                value = value.tolist()
-            if not isinstance(value, list | tuple) or not all(is_finite(x) for x in value) or not value:
-                unit = si_unit(metadata["dimension"])
-                raise ParameterError(what, got=value, allowed=f"a list of finite numbers [{unit}]")
-            return tuple(float(x) for x in value)
-        if not is_finite(value) or not _RULES[rule](float(value)):  # the float is kept, so it is what counts
-            raise ParameterError(what, got=value, allowed=f"{rule} [{si_unit(metadata['dimension'])}]")
-        return float(value)
-
-    def _relations(self) -> Iterator[Relation]:
-        """Return what has to hold between several fields."""
-        return iter(())
-
-    def _only_with(self, name: str, partners: tuple[str, ...]) -> Iterator[Relation]:
-        """Yield that a field may be given only where all its partners are."""
-        value = getattr(self, name)
-        if value is not None and any(getattr(self, partner) is None for partner in partners):
-            names = ", ".join(f"{self.title}.{partner}" for partner in partners)
-            yield Relation(f"{self.title}.{name}", False, value, f"only together with {names}")
-
-    def _less(self, low: str, high: str) -> Iterator[Relation]:
-        a, b = getattr(self, low), getattr(self, high)
-        if a is not None and b is not None:
-            yield Relation(f"{self.title}.{low}", a < b, a, f"less than {self.title}.{high}", b)
-
-
-def check_column(what: str, column: NDArray[np.float64], rule: str, unit: str) -> None:
-    """Raise ParameterError that names the first lane whose number is not finite or breaks the rule.
-
-    Examples
-    --------
-    >>> check_column("gear.gear_reduction", np.array([2.0, 1.0]), AT_LEAST_ONE, "1")
-    """
-    Relation(what, np.isfinite(column) & _RULES[rule](column), column, f"{rule} [{unit}]").check()
-
-
-def check_columns(group: str, values: Mapping[str, Any]) -> None:
-    """Check the values of a group of which some are columns, one number per lane.
-
-    Parameters
-    ----------
-    group : str
-    values : mapping
-        Value by field, None where absent; a column has shape (B,).
-
-    Raises
-    ------
-    ParameterError
-        If a value breaks its range, or two break their relation; names the lane where columns take part.
-    """
-    checked: Group = object.__new__(GROUPS[group])
-    for f in fields(GROUPS[group]):
-        value = values.get(f.name)
-        if f.metadata["rule"] == "table":  # all lanes share it
-            value = value if value is None else checked._checked(f.name, value, f.metadata)
-        elif isinstance(value, np.ndarray) and value.dtype.kind == "f":
-            check_column(f"{group}.{f.name}", value, f.metadata["rule"], si_unit(f.metadata["dimension"]))
-        elif isinstance(value, np.ndarray):
-            options = f.metadata["rule"]
-            Relation(f"{group}.{f.name}", np.isin(value, options), value, " or ".join(options)).check()
-        elif value is not None:
-            value = checked._checked(f.name, value, f.metadata)
-        object.__setattr__(checked, f.name, value)
-    for relation in checked._relations():
-        relation.check()
+from servotwin.parameters.firmware import Firmware
+from servotwin.parameters.group import (
+    ANY,
+    AT_LEAST_ONE,
+    FRACTION,
+    NOT_NEGATIVE,
+    POSITIVE,
+    Group,
+    Relation,
+    check_column,
+    choice,
+    parameter,
+    table,
+)
+from servotwin.units import si_unit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -335,5 +201,39 @@ class Thermal(Group):
 
 
 GROUPS: dict[str, type[Group]] = {
-    group.title: group for group in (Motor, Gear, Friction, Electronics, Potentiometer, Supply, Stops, Thermal)
+    group.title: group for group in (
+        Motor, Gear, Friction, Electronics, Potentiometer, Firmware, Supply, Stops, Thermal)
 }
+
+
+def check_columns(group: str, values: Mapping[str, Any]) -> None:
+    """Check the values of a group of which some are columns, one number per lane.
+
+    Parameters
+    ----------
+    group : str
+    values : mapping
+        Value by field, None where absent; a column has shape (B,).
+
+    Raises
+    ------
+    ParameterError
+        If a value breaks its range, or two break their relation; names the lane where columns take part.
+    """
+    checked: Group = object.__new__(GROUPS[group])
+    for f in fields(GROUPS[group]):
+        value = values.get(f.name)
+        if f.metadata["rule"] == "table":  # all lanes share it
+            value = value if value is None else checked._checked(f.name, value, f.metadata)
+        elif isinstance(value, np.ndarray) and value.dtype.kind == "f":
+            check_column(f"{group}.{f.name}", value, f.metadata["rule"], si_unit(f.metadata["dimension"]))
+        elif isinstance(value, np.ndarray):
+            options = f.metadata["rule"]
+            Relation(f"{group}.{f.name}", np.isin(value, options), value, " or ".join(options)).check()
+        elif value is not None:
+            value = checked._checked(f.name, value, f.metadata)
+        object.__setattr__(checked, f.name, value)
+    for relation in checked._relations():
+        relation.check()
+
+

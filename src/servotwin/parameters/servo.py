@@ -9,12 +9,13 @@ from types import MappingProxyType
 from typing import Any
 
 from servotwin.errors import ParameterError, UnknownNameError
+from servotwin.parameters.firmware import Firmware
+from servotwin.parameters.group import Group
 from servotwin.parameters.groups import (
     GROUPS,
     Electronics,
     Friction,
     Gear,
-    Group,
     Motor,
     Potentiometer,
     Stops,
@@ -48,7 +49,7 @@ class Servo:
         For people.
     kind : {"analog", "digital", "bus"}
         What decides the bridge: an analog chip, or a microcontroller that listens to pulses or to packets on a bus.
-    motor, gear, friction, electronics, potentiometer, supply, stops, thermal : Group
+    motor, gear, friction, electronics, potentiometer, firmware, supply, stops, thermal : Group
         Always there; a field that is None is absent. Plain numbers in SI.
     quantities : mapping of str to Quantity
         Every given value by its dotted name, with unit, origin, source and spread; a value without one is assumed.
@@ -78,6 +79,7 @@ class Servo:
     friction: Friction = field(default_factory=Friction)
     electronics: Electronics = field(default_factory=Electronics)
     potentiometer: Potentiometer = field(default_factory=Potentiometer)
+    firmware: Firmware = field(default_factory=Firmware)
     supply: Supply = field(default_factory=Supply)
     stops: Stops = field(default_factory=Stops)
     thermal: Thermal = field(default_factory=Thermal)

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin import units
 from servotwin.errors import OutputError, ParameterError, ServoFileError, UnitError, UnknownNameError
-from servotwin.parameters.groups import GROUPS, Group
+from servotwin.parameters.group import Group
+from servotwin.parameters.groups import GROUPS
 from servotwin.parameters.output_file import write_file
 from servotwin.parameters.quantity import ORIGINS, Quantity
 from servotwin.parameters.servo import KINDS, Servo, unit_of

@@ -10,7 +10,7 @@ from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vecto
 from servotwin.models.terms.dependence import TWO_BODIES
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.shaft import Shaft
-from servotwin.parameters.groups import Relation
+from servotwin.parameters.group import Relation
 from servotwin.physics.backlash import impact_speed
 
 _LAST_IMPACT = 1e-12  # rad/s: an impact of motor and output this slow is the last one of many

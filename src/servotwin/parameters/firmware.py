@@ -1,0 +1,106 @@
+"""The firmware of a servo with a microcontroller: all that its program makes of goal, angle and time.
+
+Gains are in duty (1: the bridge always on) per unit of the output shaft. A maker's registers are set into these numbers
+by `parameters.registers`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from servotwin.parameters.group import (
+    ANY,
+    AT_LEAST_ONE,
+    FRACTION,
+    NOT_NEGATIVE,
+    POSITIVE,
+    Group,
+    Relation,
+    choice,
+    parameter,
+)
+
+MOST_WAITING = 16  # duties that may wait to be applied
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Firmware(Group):
+    """The control loop of a digital or bus servo, tick by tick; angles at the output shaft."""
+
+    title = "firmware"
+    control_period: float | None = parameter("T_c", "time", POSITIVE, "time between two ticks of the control loop")
+    control_phase: float | None = parameter("t_phi", "time", NOT_NEGATIVE, "time of the first tick")
+    compute_delay: float | None = parameter("T_d", "time", NOT_NEGATIVE, "from a tick until its duty is applied")
+    angle_quantum: float | None = parameter("Delta", "angle", POSITIVE, "output angle per count; absent: not counted")
+    filter_weight: float | None = parameter("a", "number", FRACTION, "weight of the newest angle; absent: 1, no filter")
+    deadband_angle: float | None = parameter("h", "angle", NOT_NEGATIVE, "half width of the dead zone of the error")
+    deadband_law: str | None = choice(
+        ("subtract", "gate"), "whether the dead zone is taken off the error beyond it; absent: it is")
+    proportional_gain: float | None = parameter("k_p", "inverse angle", POSITIVE, "duty per error")
+    integral_gain: float | None = parameter("k_i", "inverse angle and time", NOT_NEGATIVE, "duty per error and time")
+    derivative_gain: float | None = parameter("k_d", "inverse speed", NOT_NEGATIVE, "duty per rate")
+    velocity_feedforward: float | None = parameter("k_v", "inverse speed", NOT_NEGATIVE, "duty per profile's speed")
+    acceleration_feedforward: float | None = parameter(
+        "k_a", "inverse acceleration", NOT_NEGATIVE, "duty per profile's acceleration")
+    derivative_of: str | None = choice(("error", "measurement"), "what the derivative is of; absent: the error")
+    derivative_ticks: float | None = parameter("m", "number", AT_LEAST_ONE, "ticks for which a derivative is held")
+    derivative_threshold: float | None = parameter("", "angle", NOT_NEGATIVE, "smaller changes have no derivative")
+    integral_limit: float | None = parameter("", "number", NOT_NEGATIVE, "most duty of the integral; absent or 0: any")
+    anti_windup: float | None = parameter("kappa", "angle", NOT_NEGATIVE, "error taken off per duty beyond a limit")
+    integral_at_rest: str | None = choice(("yes", "no"), "whether it integrates at rest alone; absent: no")
+    rest_travel: float | None = parameter("", "angle", POSITIVE, "less travel in derivative_ticks counts as rest")
+    duty_quantum: float | None = parameter("delta", "number", POSITIVE, "step of the duty; absent: none")
+    whole_counts: str | None = choice(("yes", "no"), "whether it computes in whole counts and steps; absent: no")
+    minimum_duty: float | None = parameter("", "number", FRACTION, "added to any duty that is not 0")
+    torque_limit: float | None = parameter("", "number", FRACTION, "most duty that the loop asks for; absent: 1")
+    duty_limit: float | None = parameter("", "number", FRACTION, "most duty that the bridge gets; absent: 1")
+    duty_slew: float | None = parameter("", "rate", POSITIVE, "most change of the duty per time")
+    current_limit: float | None = parameter("I_m", "current", POSITIVE, "current that the duty is kept within")
+    current_sense: str | None = choice(("motor", "bus"), "which current that is; absent: the motor's")
+    off_state: str | None = choice(
+        ("brake", "diode", "coast"), "what the bridge does while it is off within a PWM period; absent: it brakes")
+    torque_off_state: str | None = choice(("open", "brake"), "the bridge with torque off; absent: open")
+    pulse_resolution: float | None = parameter("q_t", "time", POSITIVE, "step in which a pulse is measured")
+    command_kind: str | None = choice(("pulse", "goal"), "what comes in: pulses, or goals on a bus; absent: pulses")
+    bus_latency: float | None = parameter("", "time", NOT_NEGATIVE, "from the write of a goal until it counts")
+    lower_goal: float | None = parameter("", "angle", ANY, "goals below are raised to it")
+    upper_goal: float | None = parameter("", "angle", ANY, "goals above are lowered to it")
+    speed_limit: float | None = parameter("v", "output speed", POSITIVE, "most speed of the profile; absent: any")
+    acceleration_limit: float | None = parameter(
+        "a", "angular acceleration", POSITIVE, "acceleration of the profile; absent: any")
+    minimum_speed: float | None = parameter("v_0", "output speed", NOT_NEGATIVE, "least speed of a profile on its way")
+    overload_duty: float | None = parameter("", "number", FRACTION, "more duty starts the clock of the overload trip")
+    overload_time: float | None = parameter("", "time", NOT_NEGATIVE, "after which it trips")
+    stall_travel: float | None = parameter("", "angle", NOT_NEGATIVE, "more travel starts that clock anew")
+    overload_output: float | None = parameter("", "number", FRACTION, "most duty once tripped; 0: limp")
+    overload_latches: str | None = choice(("yes", "no"), "whether only a power cycle ends the trip; absent: no")
+    trip_current: float | None = parameter("", "current", POSITIVE, "current that trips")
+    trip_time: float | None = parameter("", "time", NOT_NEGATIVE, "for which it has to flow on end")
+    trip_temperature: float | None = parameter("", "temperature", POSITIVE, "housing temperature that trips")
+    undervoltage: float | None = parameter("", "voltage", POSITIVE, "bus voltage below which it stops or starts anew")
+    undervoltage_action: str | None = choice(("reset", "stop"), "what it does then; absent: it stops")
+    restart_time: float | None = parameter("", "time", NOT_NEGATIVE, "that a reset takes")
+    signal_timeout: float | None = parameter("", "time", POSITIVE, "without a command it acts as signal_loss says")
+    signal_loss: str | None = choice(("hold", "limp", "failsafe"), "what it does without a command; absent: hold")
+    failsafe_angle: float | None = parameter("", "angle", ANY, "goal without a command, where signal_loss is failsafe")
+    soft_start_duty: float | None = parameter("", "number", FRACTION, "most duty just after power-up")
+    soft_start_time: float | None = parameter("", "time", NOT_NEGATIVE, "for so long after the first goal")
+
+    def _relations(self) -> Iterator[Relation]:
+        yield from self._less("lower_goal", "upper_goal")
+        T_c, T_d = self.control_period, self.compute_delay
+        if T_c is not None and T_d is not None:
+            most = MOST_WAITING - 1
+            yield Relation("firmware.compute_delay", T_d <= most * T_c * (1.0 + _SLACK), T_d,
+                           f"at most {most} times firmware.control_period", most * T_c)
+        if self.derivative_ticks is not None:
+            m = self.derivative_ticks
+            yield Relation("firmware.derivative_ticks", m == m // 1, m, "a whole number")
+        if self.whole_counts == "yes":
+            yield from self._only_with("whole_counts", ("angle_quantum", "duty_quantum"))
+        if self.integral_at_rest == "yes":
+            yield from self._only_with("integral_at_rest", ("rest_travel",))
+        if self.signal_loss == "failsafe":
+            yield from self._only_with("signal_loss", ("failsafe_angle",))
