@@ -4,6 +4,7 @@ from servotwin.models.averaged import AveragedServo, AveragedServoInductive
 from servotwin.models.base import Model
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.default import default_class, default_model
+from servotwin.models.digital import DigitalServo
 from servotwin.models.motors import DCMotor, GearedMotor
 from servotwin.models.pulse import PulseServo, PulseServoInductive
 from servotwin.models.travel import mid_travel
@@ -16,7 +17,8 @@ MODELS: dict[str, type[Model]] = {
     "bounded": BoundedServo,
     "pulse": PulseServo,
     "pulse-inductive": PulseServoInductive,
+    "digital": DigitalServo,
 }
 
-__all__ = ["MODELS", "AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "Model",
-           "PulseServo", "PulseServoInductive", "default_class", "default_model", "mid_travel"]
+__all__ = ["MODELS", "AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "DigitalServo",
+           "GearedMotor", "Model", "PulseServo", "PulseServoInductive", "default_class", "default_model", "mid_travel"]

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from servotwin.loads import Load
     from servotwin.models.samples import Samples
     from servotwin.models.terms.chip import Chip
+    from servotwin.models.terms.firmware import Firmware
     from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
@@ -197,6 +198,10 @@ class Model(ABC):
             raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.available))
         return outputs.SIGNALS[name].compute(self, samples, drive, load)
 
+    def firmware(self, signal: Signal | None = None) -> Firmware | None:
+        """Return the numbers of the program under this command; None for models without one."""
+        return None
+
     def chip(self, signal: Signal | None = None) -> Chip | None:
         """Return the numbers of the frame logic under this command; None for models without pulses."""
         return None
@@ -239,8 +244,16 @@ def clipped(x: float, low: float, high: float) -> float:
 
 def check_travel(signal: Signal | LaneSignal, servo: Servo) -> None:
     """Raise CommandError if an angle command leaves the travel that the servo gives."""
-    lower: Any = servo.get("stops.lower_angle")
-    upper: Any = servo.get("stops.upper_angle")
+    _check_angles(signal, servo, servo.get("stops.lower_angle"), servo.get("stops.upper_angle"), "the travel")
+
+
+def check_goals(signal: Signal | LaneSignal, model: Model) -> None:
+    """Raise CommandError if an angle command leaves the goals that a digital servo takes."""
+    servo = model.servo
+    _check_angles(signal, servo, servo.get("firmware.lower_goal"), servo.get("firmware.upper_goal"), "the goals")
+
+
+def _check_angles(signal: Signal | LaneSignal, servo: Servo, lower: Any, upper: Any, which: str) -> None:
     low = -math.inf if lower is None else lower
     high = math.inf if upper is None else upper
     lowest, highest = signal.pieces.extremes
@@ -250,7 +263,7 @@ def check_travel(signal: Signal | LaneSignal, servo: Servo) -> None:
         angle = bad.of(lowest) if bad.of(lowest) < low - TRAVEL_SLACK else bad.of(highest)
         raise CommandError(
             f"angle command{bad.lane(signal)}", got=f"{math.degrees(angle):.6g} deg",
-            allowed=f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg, the travel of {servo.name}")
+            allowed=f"{math.degrees(low):.6g} to {math.degrees(high):.6g} deg, {which} of {servo.name}")
 
 
 def check_widths(signal: Signal | LaneSignal, widths: Pieces | LanePieces, period: float) -> None:

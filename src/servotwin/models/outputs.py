@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from servotwin import physics
 from servotwin.models.engine import observe
 from servotwin.models.engine.modes import FREE, RIGID, Mode
+from servotwin.models.terms import duty
 from servotwin.models.terms.bridge import heeds_silence, off_now
 from servotwin.models.terms.numbers import at_temperature
 from servotwin.physics.laws import array_form
@@ -27,9 +28,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_electrical, _armature_current, _torques, _on_bus, _off_now, _at_temperature = (
+_electrical, _armature_current, _torques, _on_bus, _off_now, _at_temperature, _at_duty, _share_of, _on_share_of = (
     array_form(law, __name__) for law in (
-        observe.electrical, observe.armature_current, observe.torques, observe.on_bus, off_now, at_temperature))
+        observe.electrical, observe.armature_current, observe.torques, observe.on_bus, off_now, at_temperature,
+        duty.at_duty, duty.share_of, duty.on_share_of))
 
 
 class Shown(Protocol):
@@ -61,16 +63,28 @@ class Output(NamedTuple):
 
 
 def warm_plant(model: Shown, samples: Samples, load: Load) -> Numbers:
-    """Return the plant at the temperatures of the samples."""
+    """Return the plant at the temperatures of the samples, and at their duty."""
     plant = model.plant(load)
-    if not np.any(plant.heat.C_w > 0.0):
-        return plant
-    return cast("Numbers", _at_temperature(plant, samples.winding, samples.housing))
+    if np.any(plant.heat.C_w > 0.0):
+        plant = cast("Numbers", _at_temperature(plant, samples.winding, samples.housing))
+    return cast("Numbers", _at_duty(plant, samples.duty)) if _digital(plant) else plant
 
 
 def electrical_of(plant: Numbers, samples: Samples, drive: Pieces) -> Electrical:
     """Return what happens electrically; each array broadcasts to shape (n,). `plant` is at their temperatures."""
-    return cast("Electrical", _electrical(*_circuit(plant, samples, drive)))
+    return _shown(plant, samples, _electrical(*_circuit(plant, samples, drive)))
+
+
+def _shown(plant: Numbers, samples: Samples, found: Electrical) -> Electrical:
+    """Return what happens electrically with voltage and current of the supply before the duty of the bridge."""
+    if not _digital(plant):
+        return found
+    share = _share_of(plant.bridge, samples.duty)
+    return found._replace(bus_voltage=found.bus_voltage / share, supply_current=found.supply_current * share)
+
+
+def _digital(plant: Numbers) -> bool:
+    return bool(np.any(plant.bridge.pwm > 0.0))
 
 
 def _circuit(plant: Numbers, samples: Samples, drive: Pieces) -> tuple[Numbers, Any, Any, Any, Any]:
@@ -78,11 +92,11 @@ def _circuit(plant: Numbers, samples: Samples, drive: Pieces) -> tuple[Numbers, 
     i = samples.current if np.any(plant.motor.L > 0.0) else 0.0
     if not np.any(plant.source.V > 0.0):
         return plant, drive(samples.time), samples.angle, samples.speed, i
-    if np.any(heeds_silence(plant.bridge)):
+    if not _digital(plant) and np.any(heeds_silence(plant.bridge)):
         plant = plant._replace(bridge=_off_now(plant.bridge, samples.silent))
     shared = getattr(samples, "bus", None)
     if shared is not None:
-        plant = _on_bus(plant, shared)
+        plant = _on_bus(plant, shared * _share_of(plant.bridge, samples.duty) if _digital(plant) else shared)
     w = samples.motor_speed if np.any(plant.play.half) else samples.speed
     return plant, samples.drive * plant.source.V, 0.0, w, i
 
@@ -110,14 +124,15 @@ def _reduction(model: Shown) -> float:
 def _electrical_signal(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
     def compute(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
         plant, u, q, w, i = _circuit(warm_plant(model, samples, load), samples, drive)
-        values = getattr(_electrical(plant, u, q, w, i), name)
+        values = getattr(_shown(plant, samples, _electrical(plant, u, q, w, i)), name)
         return np.broadcast_to(values, np.broadcast_shapes(np.shape(values), np.shape(w)))
     return compute
 
 
 def _current(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
-    current: Array = _armature_current(*_circuit(warm_plant(model, samples, load), samples, drive))
-    return current
+    plant = warm_plant(model, samples, load)
+    current: Array = _armature_current(*_circuit(plant, samples, drive))
+    return current / _on_share_of(plant.bridge, samples.duty) if _digital(plant) else current
 
 
 def _motor_torque(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
@@ -152,7 +167,8 @@ def _commanded(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
 
 # Signals that are a field of the samples as it is
 FIELDS = {"output_angle": "angle", "output_speed": "speed", "error_time": "error", "drive": "drive",
-          "winding_temperature": "winding", "housing_temperature": "housing"}
+          "goal_angle": "goal", "reference_angle": "reference", "trip": "trip", "winding_temperature": "winding",
+          "housing_temperature": "housing"}
 
 
 def _sampled(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
@@ -162,12 +178,22 @@ def _sampled(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
     return compute
 
 
+def _duty(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
+    d = cast("Array", samples.duty)
+    return np.where(np.abs(d) <= 1.0, d, 0.0)
+
+
 SIGNALS: dict[str, Output] = {
     "command_voltage": Output("V", "voltage command v_i", _commanded("command_voltage")),
     "command_angle": Output("rad", "angle that the command asks for", _commanded("command_angle")),
     "pulse_width": Output("s", "pulse width t_a of the command", _commanded("pulse_width")),
     "error_time": Output("s", "error e that the chip has decided on last", _sampled("error_time")),
     "drive": Output("1", "how the bridge drives: -1, 0 or +1", _sampled("drive")),
+    "duty": Output("1", "duty of the bridge, 0 where torque is off", _duty),
+    "goal_angle": Output("rad", "angle that the servo goes to; its own before it has a goal", _sampled("goal_angle")),
+    "reference_angle": Output("rad", "angle that its profile asks for now", _sampled("reference_angle")),
+    "trip": Output("1", "which protection acts: 0 none, 1 overload, 2 current, 3 heat, 4 undervoltage",
+                   _sampled("trip")),
     "armature_voltage": Output("V", "voltage v_a at the motor", _electrical_signal("armature_voltage")),
     "armature_current": Output("A", "current i_a through the motor", _current),
     "motor_angle": Output("rad", "motor shaft angle q_m", _of_motor("angle")),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from bisect import bisect_left
 from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
@@ -12,9 +11,9 @@ import numpy as np
 from servotwin import physics
 from servotwin.errors import InputError
 from servotwin.loads import as_load
-from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.engine.currents import stall_current
+from servotwin.models.switched import HIDDEN, MOTOR, SHAFT, SwitchedServo
 from servotwin.models.terms import bridge, chip, friction, heat, play, sensor, source, stops
 from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.chip import Chip
@@ -22,10 +21,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from servotwin.loads import Load
-    from servotwin.physics.pieces import Pieces
     from servotwin.signals import Signal
 
 
@@ -46,20 +42,11 @@ def _opens(state: Any) -> Any:
     return np.where(state == "coast", 1.0, 0.0) if isinstance(state, np.ndarray) else float(state == "coast")
 
 
-_REQUIRES = (
-    "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
-    "motor.motor_viscous_friction", "gear.gear_reduction",
-    "friction.coulomb_torque_forward", "friction.coulomb_torque_backward",
-    "electronics.stretcher_gain", "electronics.one_shot_slope",
-    "potentiometer.feedback_gain", "supply.open_circuit_voltage",
-)
-_SHAFT = ("output_angle", "output_speed")
-_HIDDEN = ("winding_temperature", "housing_temperature", "motor_angle", "motor_speed")
-_HEAT = ("winding_temperature", "housing_temperature")
+_REQUIRES = (*MOTOR, "electronics.stretcher_gain", "electronics.one_shot_slope", "potentiometer.feedback_gain")
 
 
-class _Pulsed(Model):
-    """What both pulse servos share: the chip, the bridge, the shaft, and how a command becomes pulses."""
+class _Pulsed(SwitchedServo):
+    """What both pulse servos share: the chip and the bridge."""
 
     optional = (
         "gear.output_inertia", *play.READS, *friction.READS, *chip.READS, *bridge.READS, *sensor.READS, *source.READS,
@@ -71,35 +58,6 @@ class _Pulsed(Model):
         "load_torque", "feedback_voltage", "bus_voltage", "supply_current", "winding_temperature",
         "housing_temperature",
     )
-
-    @property
-    def available(self) -> tuple[str, ...]:
-        """Names of the output signals that can be computed for this servo, `time` apart."""
-        names = super().available
-        return names if self.heats else tuple(name for name in names if name not in _HEAT)
-
-    @property
-    def heats(self) -> bool:
-        """Whether the servo gives what its temperatures depend on."""
-        return self.servo.get("thermal.winding_capacity") is not None
-
-    @property
-    def states(self) -> tuple[Place, ...]:
-        """Which signals are states of this servo, and where the engine keeps them."""
-        N = self.value("gear.gear_reduction")
-        places = [Place("output_angle", 0, 1.0), Place("output_speed", 1, 1.0)]
-        if "armature_current" in self.layout:
-            places.append(Place("armature_current", 2, 1.0))
-        if self.heats:
-            places += [Place("winding_temperature", 3, 1.0), Place("housing_temperature", 4, 1.0)]
-        if self.servo.get("gear.backlash") is not None:
-            places += [Place("motor_angle", 5, N), Place("motor_speed", 6, N)]
-        return tuple(places)
-
-    @property
-    def frame_period(self) -> float:
-        """T_f of a command that does not bring its own [s]; 20 ms unless the servo gives it."""
-        return self.value_or("electronics.frame_period", 0.02)
 
     def _bridge(self) -> Bridge:
         """Return the numbers of the bridge; without pulses it is off as between drives unless the servo says more."""
@@ -113,9 +71,6 @@ class _Pulsed(Model):
             bridge=self._bridge(), source=source.pack(self), friction=friction.pack(self, N),
             play=play.pack(self, self.load_inertia(load)), stops=stops.pack(self), sensor=sensor.pack_pulsed(self),
             heat=heat.pack(self))
-
-    def _period(self, signal: Signal | None) -> Any:
-        return self.frame_period if signal is None or signal.frame_period is None else signal.frame_period
 
     def chip(self, signal: Signal | None = None) -> Chip:
         """Return the numbers of the frame logic; the frame period is that of the command where it gives one."""
@@ -170,68 +125,6 @@ class _Pulsed(Model):
             self.value("electronics.stretcher_gain"), T_f, self.value("electronics.one_shot_slope"))
         return float(gain)
 
-    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return angles [rad] and errors [V] of the potentiometer's linearity table; empty without one."""
-        angles, errors = (self.servo.get(f"potentiometer.linearity_{name}") for name in ("angle", "error"))
-        return (angles, errors) if isinstance(angles, tuple) and isinstance(errors, tuple) else ((), ())
-
-    def edges(self, signal: Signal) -> tuple[float, ...] | None:
-        """Return when the frames of a command start [s]; None where they come regularly."""
-        return None if signal.edges is None else signal.edges[bisect_left(signal.edges, 0.0):]
-
-    def command(self, signal: Signal) -> Pieces:
-        """Return the pulse width t_a [s]: k_p1 v_i + t_0 of a voltage, T_0 + (p q* + b_o)/s_r of an angle.
-
-        Raises
-        ------
-        CommandError
-            If a width is not positive or not shorter than a frame, or an angle outside the travel.
-        """
-        if signal.kind == "voltage":
-            pieces = signal.pieces.scaled(*self._voltage_line())
-        elif signal.kind == "angle":
-            check_travel(signal, self.servo)
-            slope, T_0 = self.value("electronics.one_shot_slope"), self.value_or("electronics.one_shot_offset", 0.0)
-            p, b_o = feedback_line(self)
-            pieces = signal.pieces.scaled(physics.pulse_width_from_feedback(p, slope),
-                                          physics.pulse_width_from_feedback(b_o, slope, T_0))
-        else:
-            pieces = signal.pieces
-        check_widths(signal, pieces, self._period(signal) if signal.edges is None else math.inf)
-        return pieces
-
-    def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a pulse width [s]."""
-        if name == "pulse_width":
-            return drive
-        if name == "command_voltage":
-            return np.asarray(solved(self._voltage_line(), drive))
-        return np.asarray(self._angle_of(drive))
-
-    def _voltage_line(self) -> Line:
-        """Return how the pulse width [s] follows a voltage command [V]."""
-        k_p1, t_0 = (self.value("electronics.voltage_to_pulse_gain"),
-                     self.value_or("electronics.command_pulse_offset", 0.0))
-        return physics.pulse_width_from_voltage(1.0, k_p1), physics.pulse_width_from_voltage(0.0, k_p1, t_0)
-
-    def _angle_of(self, pulse_width: Any) -> Any:
-        """Return the angle [rad] at which the one-shot is as long as this pulse."""
-        v_o = physics.control_voltage_from_pulse(
-            pulse_width, self.value("electronics.one_shot_slope"), self.value_or("electronics.one_shot_offset", 0.0))
-        return physics.angle_from_voltage(
-            v_o, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0))
-
-    def start_angle(self, drive: float) -> float:
-        """Return the angle without error, within the stops [rad]."""
-        angles, errors = self.curve()
-        angle = self._angle_of(drive)
-        if angles:
-            p, b_o = self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)
-            angle = physics.angle_from_sensed_voltage(
-                physics.feedback_voltage(angle, p, b_o), p, b_o, angles, errors)
-        return clipped(angle, self.value_or("stops.lower_angle", -math.inf),
-                       self.value_or("stops.upper_angle", math.inf))
-
 
 @final
 class PulseServo(_Pulsed):
@@ -252,7 +145,7 @@ class PulseServo(_Pulsed):
     """
 
     requires = _REQUIRES
-    layout = (*_SHAFT, *_HIDDEN)
+    layout = (*SHAFT, *HIDDEN)
 
     def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft, with the bridge before it."""
@@ -318,7 +211,7 @@ class PulseServoInductive(_Pulsed):
     """
 
     requires = (*_REQUIRES, "motor.armature_inductance")
-    layout = (*_SHAFT, "armature_current", *_HIDDEN)
+    layout = (*SHAFT, "armature_current", *HIDDEN)
 
     def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft, with the bridge before it."""

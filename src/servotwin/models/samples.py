@@ -35,6 +35,9 @@ class Samples:
         Of a pulse servo: 1 before the first pulse, and when none has come for as long as its chip waits.
     bus : ndarray, optional
         Voltage of a bus that several servos share [V]; None for a servo that has its source for itself.
+    duty, goal, reference, trip : ndarray, optional
+        Of a digital servo: the duty of its bridge, or `terms.duty.OPEN`, `BRAKED` [1]; goal and reference [rad]; which
+        protection acts.
     """
 
     time: Array
@@ -54,12 +57,16 @@ class Samples:
     error: Array
     silent: Array
     bus: Array | None = None
+    duty: Array | None = None
+    goal: Array | None = None
+    reference: Array | None = None
+    trip: Array | None = None
 
     @classmethod
     def make(cls, time: Array, states: Array, wiper: Array, mode: Array, drive: Array, error: Array,
-             silent: Array, bus: Array | None = None) -> Samples:
-        """Build from arrays of states, shape (7, n), and of modes, shape (5, n)."""
+             silent: Array, bus: Array | None = None, told: Array | None = None) -> Samples:
+        """Build from arrays of states, shape (7, n), of modes, shape (5, n), and of what a program tells, (4, n)."""
         q, w, i, T_w, T_h, q_m, w_m = states
         zone, contact, mesh, motor, _ = mode.astype(np.int64)
         return cls(time, q, w, i, T_w, T_h, q_m, w_m, wiper, zone, contact, mesh, motor, drive, error, silent,
-                   bus)
+                   bus, *(() if told is None else told))

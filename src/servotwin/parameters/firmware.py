@@ -21,7 +21,7 @@ from servotwin.parameters.group import (
     parameter,
 )
 
-MOST_WAITING = 16  # duties that may wait to be applied
+MOST_WAITING = 16  # duties, or goals, that may be on their way
 _SLACK = 1e-9
 
 
@@ -90,11 +90,11 @@ class Firmware(Group):
 
     def _relations(self) -> Iterator[Relation]:
         yield from self._less("lower_goal", "upper_goal")
-        T_c, T_d = self.control_period, self.compute_delay
-        if T_c is not None and T_d is not None:
-            most = MOST_WAITING - 1
-            yield Relation("firmware.compute_delay", T_d <= most * T_c * (1.0 + _SLACK), T_d,
-                           f"at most {most} times firmware.control_period", most * T_c)
+        T_c, most = self.control_period, MOST_WAITING - 1
+        for name, time in (("compute_delay", self.compute_delay), ("bus_latency", self.bus_latency)):
+            if T_c is not None and time is not None:
+                yield Relation(f"firmware.{name}", time <= most * T_c * (1.0 + _SLACK), time,
+                               f"at most {most} times firmware.control_period", most * T_c)
         if self.derivative_ticks is not None:
             m = self.derivative_ticks
             yield Relation("firmware.derivative_ticks", m == m // 1, m, "a whole number")

@@ -13,12 +13,14 @@ from servotwin.physics import (
     backlash,
     bridge,
     electronics,
+    firmware,
     friction,
     gear,
     load_friction,
     motor,
     potentiometer,
     pulse,
+    pwm,
     shaft,
     supply,
     thermal,
@@ -73,6 +75,18 @@ pulse_width_from_feedback = array_form(electronics.pulse_width_from_feedback)
 pulse_width_from_voltage = array_form(electronics.pulse_width_from_voltage)
 unbounded_armature_voltage = array_form(electronics.unbounded_armature_voltage)
 
+braking_distance = array_form(firmware.braking_distance)
+counted = array_form(firmware.counted)
+cut = array_form(firmware.cut)
+duty_for_bus_current = array_form(firmware.duty_for_bus_current)
+duty_for_motor_current = array_form(firmware.duty_for_motor_current)
+duty_of = array_form(firmware.duty_of)
+error_beyond_zone = array_form(firmware.error_beyond_zone)
+filtered_angle = array_form(firmware.filtered_angle)
+integrated_error = array_form(firmware.integrated_error)
+resolved_pulse = array_form(firmware.resolved_pulse)
+started_duty = array_form(firmware.started_duty)
+
 breakaway_torque = array_form(friction.breakaway_torque)
 coulomb_torque = array_form(friction.coulomb_torque)
 smoothed_coulomb_slope = array_form(friction.smoothed_coulomb_slope)
@@ -119,6 +133,10 @@ full_drive_error = array_form(pulse.full_drive_error)
 one_shot_width = array_form(pulse.one_shot_width)
 pulse_stiffness = array_form(pulse.pulse_stiffness)
 
+averaged_drop = array_form(pwm.averaged_drop)
+averaged_resistance = array_form(pwm.averaged_resistance)
+chopped_resistance = array_form(pwm.chopped_resistance)
+
 kinetic_energy = array_form(shaft.kinetic_energy)
 load_torque = array_form(shaft.load_torque)
 pendulum_stiffness = array_form(shaft.pendulum_stiffness)
@@ -162,9 +180,12 @@ __all__ = [
     "angle_from_voltage",
     "armature_current_rate",
     "averaged_bridge_gain",
+    "averaged_drop",
+    "averaged_resistance",
     "back_drive_torque",
     "back_emf",
     "bounded_armature_voltage",
+    "braking_distance",
     "breakaway_torque",
     "bridge_current",
     "bridge_loss",
@@ -172,6 +193,7 @@ __all__ = [
     "bridge_voltage",
     "brush_loss",
     "bus_voltage",
+    "chopped_resistance",
     "circuit_current",
     "comparator_voltage",
     "conduction",
@@ -180,18 +202,25 @@ __all__ = [
     "control_voltage_from_voltage",
     "copper_loss",
     "coulomb_torque",
+    "counted",
     "creep_speed",
+    "cut",
     "decision_delay",
     "drive_time",
     "driven_spindle_torque",
     "driving_voltage",
+    "duty_for_bus_current",
+    "duty_for_motor_current",
+    "duty_of",
     "effective_voltage",
     "electromagnetic_torque",
     "error_between",
     "error_beyond_deadband",
+    "error_beyond_zone",
     "error_time",
     "feedback_error",
     "feedback_voltage",
+    "filtered_angle",
     "forward_acceleration",
     "forward_efficiency",
     "full_drive_error",
@@ -200,6 +229,7 @@ __all__ = [
     "heat_flow",
     "impact_energy",
     "impact_speed",
+    "integrated_error",
     "kinetic_energy",
     "linearity_error",
     "load_share",
@@ -229,6 +259,7 @@ __all__ = [
     "reflected_inertia",
     "reflected_viscous_friction",
     "required_motor_torque",
+    "resolved_pulse",
     "sensed_voltage",
     "shaft_acceleration",
     "share_balance",
@@ -245,6 +276,7 @@ __all__ = [
     "spring_torque",
     "stall_current_for",
     "stall_torque",
+    "started_duty",
     "static_gear_friction",
     "steady_armature_current",
     "steady_temperatures",

@@ -24,7 +24,7 @@ from servotwin.models.terms.source import Source
 from servotwin.simulation.compile import Recipe, is_compiled, kernels
 from servotwin.simulation.engine import Plan, State
 from servotwin.simulation.lane_memory import RECORD
-from servotwin.simulation.lane_runs import PLAIN_RUNS
+from servotwin.simulation.lane_runs import PLAIN_RUNS, programs_of
 
 Array = NDArray[np.float64]
 
@@ -158,7 +158,8 @@ def _lanes_of(plans: Sequence[Plan]) -> Lanes:
     return Lanes(_tiles_of(Numbers, [plan.numbers for plan in plans]), _tiles_of(Chip, [plan.chip for plan in plans]),
                  np.zeros((7, len(plans))), np.array([plan.external_torque for plan in plans]),
                  np.array([_in_64_bits(plan.seed) for plan in plans]), np.concatenate(pieces), first, count,
-                 np.concatenate(edges), edge_first, np.where(regular, -1, edge_count), plans[0].accuracy)
+                 np.concatenate(edges), edge_first, np.where(regular, -1, edge_count), plans[0].accuracy,
+                 programs_of(None, 1))
 
 
 def _in_64_bits(seed: int) -> int:

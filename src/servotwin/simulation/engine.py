@@ -5,6 +5,7 @@ It drives the kernels and keeps what they leave behind: states to go on from, se
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,7 +13,7 @@ from typing import NamedTuple
 
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
-from servotwin.models.engine import guards, motion
+from servotwin.models.engine import controller, guards, motion
 from servotwin.models.engine.memory import (
     ACCURACY,
     Inputs,
@@ -35,9 +36,11 @@ from servotwin.models.engine.modes import (
 )
 from servotwin.models.engine.motion import Motion
 from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
-from servotwin.models.terms import frame
+from servotwin.models.terms import control, duty, firmware, frame
 from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.control import Firm
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Pieces
@@ -76,6 +79,8 @@ class Plan:
         Constant, beside the load's [N m].
     accuracy : float
         Of what is integrated [rad].
+    firmware : Firmware, optional
+        The numbers of its program, for a digital servo.
     """
 
     numbers: Numbers
@@ -87,6 +92,12 @@ class Plan:
     curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     external_torque: float = 0.0
     accuracy: float = ACCURACY
+    firmware: Firmware = NO_FIRMWARE
+
+    @property
+    def digital(self) -> bool:
+        """Whether a program decides on the drive."""
+        return firmware.present(self.firmware)
 
     @property
     def pulsed(self) -> bool:
@@ -107,9 +118,9 @@ class Plan:
     @cached_property
     def inputs(self) -> Inputs:
         """What the servo is told, as a step reads it."""
-        period = self.chip.frame_period if self.edges is None else 0.0
+        period = (self.firmware.T_f if self.digital else self.chip.frame_period) if self.edges is None else 0.0
         return Inputs(self.command.table, self.torque.table, self.external_torque, period, self.edges or (),
-                      self.curve, self.seed, self.accuracy)
+                      self.curve, self.seed, self.accuracy, (self.firmware,))
 
 
 @dataclass(frozen=True)
@@ -159,7 +170,8 @@ class Segment(NamedTuple):
 
     `error` is the latest that the chip has decided on [s], `wiper` the angle of the potentiometer at the start [rad],
     `drive` how a bridge drives: −1, 0 or +1, `silent` whether pulses stay away from it, 1 or 0, `origin` the instant
-    from which the times of the motion count [s].
+    from which the times of the motion count [s]. Of a digital servo `duty` is
+    that of its bridge, or `terms.duty.OPEN`, `BRAKED`; `goal` and `reference` are angles [rad], `trip` tells which.
     """
 
     start: float
@@ -170,6 +182,10 @@ class Segment(NamedTuple):
     drive: float
     silent: int = 0
     origin: float = 0.0
+    duty: float = 0.0
+    goal: float = 0.0
+    reference: float = 0.0
+    trip: int = 0
 
     @property
     def anchor(self) -> float:
@@ -196,6 +212,9 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
     """
     numbers, chip, inputs = plan.numbers, plan.chip, plan.inputs
     memory = resumed(plan.pulsed, inputs, state.memory, numbers != state.numbers)
+    if plan.digital:
+        memory = memory._replace(firm=(control.thawed(memory.firm[0]),))
+        controller.resume(inputs, memory)
     end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
     m = motion.nothing(numbers, memory.u, memory.tau)
     idle = 0
@@ -203,7 +222,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
         if due(memory):
             memory = counted_anew(memory)
             end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
-        before = memory
+        before, trip = memory, memory.firm[0].trip
         try:
             memory, m, event, status = step(numbers, chip, inputs, before, m, end)
         except ArithmeticError:  # numbers beyond what a float holds
@@ -214,7 +233,10 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
         if idle > MOST_IDLE:
             raise failure(Status.CHATTER, time_of(before))
         if record is not None:
-            _keep(record, plan, before, memory, m, event)
+            _keep(record, plan, before, trip, memory, m, event)
+    if plan.digital:
+        controller.pause(inputs, memory)
+        memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
     return State(until, state.places, memory, numbers, state.changes)
 
 
@@ -223,7 +245,7 @@ def failure(status: Status, time: float) -> SimulationError:
     return SimulationError(status.name, time, status.message)
 
 
-def _keep(record: Record, plan: Plan, before: Memory, memory: Memory, m: Motion, event: int) -> None:
+def _keep(record: Record, plan: Plan, before: Memory, trip: int, memory: Memory, m: Motion, event: int) -> None:
     """Add a step to a record: its chip's doings, its motion, its event."""
     origin, point, was = origin_of(memory), memory.point, before.point
     start, now, angle = origin + was.time, origin + point.time, was.y[0]
@@ -232,9 +254,12 @@ def _keep(record: Record, plan: Plan, before: Memory, memory: Memory, m: Motion,
         if (plan.refuses and memory.chip.number > before.chip.number
                 and not frame.accepted(plan.chip, pulse_width(plan.inputs, before))):
             record.events.append(Event(start, "pulse refused", angle))
+    if memory.firm[0].trip != trip:
+        record.events.append(Event(start, _TRIPS[memory.firm[0].trip], angle))
     if now > start or not record.segments:
-        record.segments.append(Segment(start, now, m, memory.chip.error, was.wiper, memory.chip.drive,
-                                       memory.chip.silent, origin))
+        drive = sign_of(memory.firm[0].duty) if plan.digital else memory.chip.drive
+        record.segments.append(Segment(start, now, m, memory.chip.error, was.wiper, drive,
+                                       memory.chip.silent, origin, *told_by(plan, memory.firm[0])))
     if record.tell is not None:
         record.tell(now)
     if event >= 0 and event not in guards.KINKS:
@@ -249,6 +274,19 @@ def keep_switch(record: Record, before: Frame, after: Frame, time: float, angle:
         record.events.append(Event(time, "silence begins" if after.silent else "silence ends", angle))
 
 
+def sign_of(now: float) -> float:
+    """Return how a bridge drives at a duty: −1, 0 or +1."""
+    return math.copysign(1.0, now) if duty.drives(now) else 0.0
+
+
+def told_by(plan: Plan, firm: Firm) -> tuple[float, float, float, int]:
+    """Return what shows of a program: its duty, or `OPEN`, `BRAKED`; goal and reference [rad]; its trip."""
+    if not plan.digital:
+        return 0.0, 0.0, 0.0, 0
+    return firm.duty, firm.r if firm.goal == control.NOWHERE else firm.goal, firm.r, firm.trip
+
+
+_TRIPS = ("trip ends", "trips by overload", "trips by current", "trips by heat", "trips by undervoltage")
 _DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import CommandError, InputError, LoadError, ParameterError, UnknownNameError
 from servotwin.loads import Load, as_load
-from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive
+from servotwin.models import BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
 from servotwin.parameters import GROUPS, Servo
 from servotwin.parameters.groups import check_columns
 from servotwin.signals import Signal
@@ -23,7 +23,8 @@ from servotwin.units import is_finite
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-LAWS: dict[type[Model], str] = {PulseServo: "pulse", PulseServoInductive: "pulse", BoundedServo: "bounded"}
+LAWS: dict[type[Model], str] = {PulseServo: "pulse", PulseServoInductive: "pulse", BoundedServo: "bounded",
+                             DigitalServo: "digital"}
 
 
 @dataclass(frozen=True, eq=False)

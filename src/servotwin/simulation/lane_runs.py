@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
-from servotwin.models.engine.records import columns_of, numbers_in, room, tiles_with
+from servotwin.models.engine.records import columns_of, numbers_in, record_of, room, tiles_with
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.friction import straight
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.physics.laws import array_form
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.lane_memory import RECORD, flat, records_of
-from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
+from servotwin.simulation.lanes import ALL_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
 
 Indices = NDArray[np.int64]
 _straight = array_form(straight, __name__)
@@ -24,20 +25,23 @@ Mask = NDArray[np.bool_]
 
 _SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
-ALL_RUNS = Recipe("runs", _ENTRIES)  # everything
+_PROGRAM = ("firmware", "bridge.pwm", "bridge.one_way")  # what only digital servos have
+ALL_RUNS = Recipe("runs", _ENTRIES, absent=_PROGRAM)  # everything
 _FORMS = ("ONE_FORMULA", "ARCS", "BANDS", "STRIDES", "COILS", "GAPS")
 _PENDULUM, _COIL, _PLAY = "load.gravity", "motor.L", "play"
 _BANDED = ("friction.varies", "source.I_max")
 _STRIDING = ("heat", _PENDULUM, "load.stiffness")
 _PLAYED = ("INSIDE", "ON_FORWARD", "ON_BACKWARD", "APART")  # with play alone
-_NO_SIDE = ("friction.kappa", "follower", "sweep")  # what no lanes side by side have
+_NO_SIDE = ("friction.kappa", "follower", "sweep", *_PROGRAM)  # what no lanes side by side have
 _NOT_IN_STRIDES = (*_NO_SIDE, _PLAY, _COIL)
 _NOT_IN_BANDS = (*_NOT_IN_STRIDES, *_STRIDING)
 _NOT_IN_GAPS = (*_NO_SIDE, _COIL, *_STRIDING, "friction.varies")
 _RARE = (*_BANDED, "friction.kappa", _PLAY, "heat", _COIL, "sensor.half_slack")
+_DIGITAL = ("firmware.T_c", "bridge.pwm")  # what each of them has
+_NO_DIGITAL = ("friction.kappa", "follower", "chip", _COIL)  # what no digital servo has
 
 
-def _side(name: str, forms: tuple[str, ...], absent: tuple[str, ...] = (), never: tuple[str, ...] = (),
+def _side(name: str, forms: tuple[str, ...], absent: tuple[str, ...] = _PROGRAM, never: tuple[str, ...] = (),
           single: bool = False) -> Recipe:
     """Return the recipe of lanes that go side by side in some forms."""
     return Recipe(name, _SIDE, vector=True, single=single, absent=absent,
@@ -55,20 +59,21 @@ _BY_COILS = _side("by_coils", ("COILS",), (*_NO_SIDE, _PLAY, *_STRIDING, *_BANDE
     "SHORT_BACKWARD"))
 _BY_GAPS = _side("by_gaps", ("GAPS",), _NOT_IN_GAPS, ("CORE",))
 PLAIN_RUNS = Recipe(
-    "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep"),
+    "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep", *_PROGRAM),
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))
 PENDULUM_RUNS = Recipe(
-    "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep"),
+    "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep", *_PROGRAM),
     never=("SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))
 GAP_RUNS = Recipe(
     "gap_runs", _ENTRIES, absent=_NOT_IN_GAPS,
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "CREEP", "CORE"))
-LOOK_SIDE_BY_SIDE = Recipe(
-    "look_side_by_side", ("servotwin.models.engine.sights:side_by_side",), absent=("friction.kappa", "follower"))
-LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",))
-_ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True)
-_ALL = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
-_SHARED = ("pieces", "edges", "accuracy")  # by all lanes
+LOOK_SIDE_BY_SIDE = Recipe("look_side_by_side", ("servotwin.models.engine.sights:side_by_side",), absent=(
+    "friction.kappa", "follower", *_PROGRAM))
+LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",), absent=_PROGRAM)
+LOOK_DIGITAL = Recipe("look_digital", LOOK_ONE_BY_ONE.entries, absent=_NO_DIGITAL, present=_DIGITAL)
+DIGITAL_RUNS = Recipe("digital_runs", _ENTRIES, absent=_NO_DIGITAL, present=_DIGITAL)
+_ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, absent=_PROGRAM)
+_SHARED = ("pieces", "edges", "accuracy", "firmware")  # by all lanes, or by all that run side by side
 _TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
 _SMALLEST = 2.0**-150  # what is not more is zero in float32
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
@@ -84,6 +89,8 @@ def run(work: Work) -> Raw:
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
         else:
             run_side_by_side(work, lanes, kind, raw)
+    if work.law == "digital":
+        return raw
     kernels(_ENDING).look_at_lanes(
         work.law == "pulse", lanes, _rows(work.torque.rows), _indices(work.torque.first), _indices(work.torque.count),
         float(work.duration), raw.final, raw.refused, raw.marks)
@@ -129,11 +136,11 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
             raw: Raw, recipe: Recipe) -> None:
     """Let lanes go on one after the other, for durations of their own [s], from outputs of their own on."""
     times = _own(work.times, np.float64)
-    at_once = max(1, _ROOM // (len(_ALL) * max(len(times), 1)))
+    at_once = max(1, _ROOM // (len(ALL_FIELDS) * max(len(times), 1)))
     for start in range(0, len(which), at_once):
         some = slice(start, start + at_once)
         part, own = which[some], _indices(first[some])
-        found = np.zeros((len(part), len(_ALL), len(times)))
+        found = np.zeros((len(part), len(ALL_FIELDS), len(times)))
         status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
         kernels(recipe).go_on(
             lanes, np.array(work.curve, np.float64), _rows(work.torque.rows), _indices(work.torque.first),
@@ -145,7 +152,7 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
         raw.final[part] = y[:, [0, 1, 3, 4]]
         failed = bad[:, None] & (times >= ended[:, None])
         ahead = np.arange(len(times)) >= own[:, None]
-        for k, name in enumerate(_ALL):
+        for k, name in enumerate(ALL_FIELDS):
             if name in raw.fields:
                 with np.errstate(over="ignore"):
                     own_part = np.where(failed, 0 if name in SMALL_FIELDS else np.nan, found[:, k])
@@ -198,6 +205,8 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     potentiometers have a table.
     """
     bridge, own = numbers.bridge, numbers.friction
+    if np.any(bridge.pwm > 0.0):
+        return [OneByOne(np.arange(lanes), DIGITAL_RUNS)]
     slack, swinging = _differs(numbers, "sensor.half_slack"), _differs(numbers, _PENDULUM)
     waving = swept.any() and swept
     alone = _either(_either(waving, recorded.any() and recorded), _differs(numbers, "friction.kappa"))
@@ -237,6 +246,11 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
         (PLAIN_RUNS, _without(True, rare, swinging, loose)), (PENDULUM_RUNS, _without(swinging, rare)),
         (GAP_RUNS, loose), (ALL_RUNS, rare))]
     return [kind for kind in found if len(kind.which)]
+
+
+def looking(recipe: Recipe) -> Recipe:
+    """Return how lanes are looked at that run one by one in this way."""
+    return LOOK_DIGITAL if recipe == DIGITAL_RUNS else LOOK_ONE_BY_ONE
 
 
 def _without(some: Any, *others: Any) -> Any:
@@ -305,7 +319,16 @@ def lanes_of(work: Work) -> Lanes:
         tiles_with(Numbers, work.numbers, work.lanes), tiles_with(Chip, work.chip or NO_CHIP, work.lanes),
         _own(work.start, np.float64), _column(work.constant_torque, work.lanes), _indices(work.seeds),
         _rows(work.command.rows), _indices(work.command.first), _indices(work.command.count),
-        _own(own, np.float64), _indices(work.edges.first), _indices(work.edges.count), work.accuracy)
+        _own(own, np.float64), _indices(work.edges.first), _indices(work.edges.count), work.accuracy,
+        programs_of(work.firmware, work.lanes))
+
+
+def programs_of(firmware: Firmware | None, lanes: int) -> NDArray[Any]:
+    """Return a record of the program of each lane, whose numbers are numbers or columns; one where there is none."""
+    records = np.zeros(1 if firmware is None else lanes, record_of(Firmware))
+    for name, values in zip(Firmware._fields, firmware or NO_FIRMWARE, strict=True):
+        records[name] = values
+    return records
 
 
 def _column(values: Any, lanes: int) -> Floats:

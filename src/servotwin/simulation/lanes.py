@@ -13,6 +13,7 @@ from servotwin.models.engine.records import mapped
 
 if TYPE_CHECKING:
     from servotwin.models.terms.chip import Chip
+    from servotwin.models.terms.firmware import Firmware
     from servotwin.models.terms.numbers import Numbers
 
 Floats = NDArray[np.float64]
@@ -20,8 +21,9 @@ Record = TypeVar("Record", bound=tuple[object, ...])
 
 FIELDS = ("angle", "speed", "contact", "drive", "error", "wiper", "current", "winding", "housing", "motor_angle",
           "motor_speed", "mesh")
-MORE_FIELDS = ("motor", "silent")  # of servos that run one by one
-SMALL_FIELDS = ("contact", "drive", "mesh", "motor", "silent")  # fields that are kept as int8
+MORE_FIELDS = ("motor", "silent", "duty", "goal", "reference", "trip")  # of servos that run one by one
+ALL_FIELDS = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
+SMALL_FIELDS = ("contact", "drive", "mesh", "motor", "silent", "trip")  # fields that are kept as int8
 
 
 @dataclass(frozen=True)
@@ -75,13 +77,13 @@ class Work:
     Parameters
     ----------
     law : str
-        "pulse" or "bounded".
+        "pulse", "bounded" or "digital".
     numbers : Numbers
         Each field a number, or an array (B,).
     chip : Chip or None
         The same; its frame_period is that of the command where that gives one. None for "bounded".
     command : Tables
-        Pulse width [s] for "pulse", v_c [V] for "bounded".
+        Pulse width [s] for "pulse", v_c [V] for "bounded"; either a pulse width or a goal [rad] for "digital".
     torque : Tables
         Recorded external torque [N m] over time; count 0: none.
     constant_torque : float or ndarray, shape (B,)
@@ -107,6 +109,8 @@ class Work:
         Angles [rad] and errors [V] of the potentiometer's linearity table, the same for all lanes.
     accuracy : float
         Of what is integrated [rad].
+    firmware : Firmware, optional
+        Of digital servos, each field a number or an array (B,).
     """
 
     law: str
@@ -124,6 +128,7 @@ class Work:
     dtype: str
     curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     accuracy: float = ACCURACY
+    firmware: Firmware | None = None
 
     @property
     def lanes(self) -> int:
@@ -136,6 +141,7 @@ class Work:
         torque = self.constant_torque
         return replace(
             self, numbers=_sliced(self.numbers, lanes), chip=None if self.chip is None else _sliced(self.chip, lanes),
+            firmware=None if self.firmware is None else _sliced(self.firmware, lanes),
             command=self.command.part(start, stop), torque=self.torque.part(start, stop),
             constant_torque=torque[lanes] if isinstance(torque, np.ndarray) and torque.ndim else torque,
             edges=self.edges.part(start, stop), start=self.start[:, lanes],

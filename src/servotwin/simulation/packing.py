@@ -224,8 +224,17 @@ class Chunk:
         with np.errstate(all="ignore"):
             return self.model.chip(cast("Any", self.commands.signal(self.which)))
 
+    @cached_property
+    def firmware(self) -> Any:
+        """The numbers of the program under these commands; None for a model without one."""
+        with np.errstate(all="ignore"):
+            return self.model.firmware(cast("Any", self.commands.signal(self.which)))
+
     def frames(self, duration: float) -> Any:
         """Return how many frames the lanes run through, a number or one per lane; 0 for a model without frames."""
+        if self.firmware is not None:
+            with np.errstate(over="ignore"):
+                return duration / np.asarray(flat(self.firmware.T_c), dtype=np.float64)
         if self.chip is None:
             return 0.0
         own = self.commands.edge_count[self.commands.of[self.which]]
@@ -247,7 +256,8 @@ class Chunk:
                     constant_torque=flat(self.load.torque), edges=self.commands.frame_edges(self.which),
                     start=self.start, seeds=self.lanes.seeds[self.which], duration=asked.duration,
                     times=asked.times, fields=fields, dtype=asked.dtype, curve=self.model.curve(),
-                    accuracy=asked.accuracy)
+                    accuracy=asked.accuracy,
+                    firmware=None if self.firmware is None else mapped(flat, self.firmware))
 
     def fields(self, asked: Asked) -> tuple[str, ...]:
         """Return the raw fields that the outputs read: those that they look at when they are computed for one lane."""

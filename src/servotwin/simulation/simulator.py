@@ -11,16 +11,17 @@ import numpy as np
 
 from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
 from servotwin.loads import Constant, as_load
-from servotwin.models import Model
-from servotwin.models.engine.memory import ACCURACY, started, with_play
+from servotwin.models import DigitalServo, Model
+from servotwin.models.engine.memory import ACCURACY, Memory, started, with_play
 from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.runs import mode_of
 from servotwin.models.samples import Samples
 from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.firmware import NO_FIRMWARE
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
-from servotwin.simulation.engine import Plan, Record, State
+from servotwin.simulation.engine import Plan, Record, State, sign_of, told_by
 from servotwin.simulation.lane_inputs import check_name
 from servotwin.simulation.lane_loads import LOAD_NAMES, check_number, with_numbers
 from servotwin.simulation.oddities import warn_of
@@ -172,8 +173,10 @@ class Simulator:
             load = load + Constant(external_torque)
         y, chip = np.array(state.memory.point.y)[:, None], state.memory.chip
         mode = np.array(mode_of(plan.numbers, plan.chip, plan.inputs, state.memory))[:, None]
+        told = np.array(told_by(plan, state.memory.firm[0]))[:, None]
+        drive = sign_of(state.memory.firm[0].duty) if plan.digital else chip.drive
         samples = Samples.make(np.array([state.time]), y, np.array([state.memory.point.wiper]), mode,
-                               np.array([chip.drive]), np.array([chip.error]), np.array([chip.silent]))
+                               np.array([drive]), np.array([chip.error]), np.array([chip.silent]), None, told)
         return float(own.model.output(name, samples, plan.command, load)[0])
 
     def changed(self, state: State, *, parameters: Mapping[str, Any] | None = None,
@@ -186,6 +189,8 @@ class Simulator:
         parameters : mapping
             New values (SI) by dotted name, of the servo ("electronics.deadband") or of the load ("load.inertia"). They
             stay with the state and those that follow it.
+        torque_enable : bool, optional
+            Whether the torque of a digital servo is on.
 
         Raises
         ------
@@ -204,8 +209,9 @@ class Simulator:
         """
         self._check(state, "changed(state)")
         if torque_enable is not None:
-            raise InputError(f"torque_enable of {type(self.model).__name__}", got=torque_enable,
-                             allowed="nothing: an analog servo has no such switch")
+            state = replace(state, memory=with_torque(self.model, state.memory, torque_enable))
+            if parameters is None:
+                return state
         if not isinstance(parameters, Mapping) or not parameters:
             raise InputError("changed(parameters)", got=parameters, allowed="a mapping of names to numbers (SI)")
         changes = tuple(sorted({**dict(state.changes), **parameters}.items()))
@@ -260,9 +266,19 @@ class Simulator:
             return self._last[1]
         plan = Plan(self._numbers, self.drive(command), self._torque, self.model.chip(command) or NO_CHIP,
                     self.model.edges(command), self.seed, self.model.curve(), float(external_torque),
-                    self.accuracy)
+                    self.accuracy, self.model.firmware(command) or NO_FIRMWARE)
         self._last = (command, plan)
         return plan
+
+
+def with_torque(model: Model, memory: Memory, torque_enable: object) -> Memory:
+    """Return a memory with the torque of a digital servo on or off."""
+    if not isinstance(model, DigitalServo):
+        raise InputError(f"torque_enable of {type(model).__name__}", got=torque_enable,
+                         allowed="nothing: an analog servo has no such switch")
+    if not isinstance(torque_enable, bool | np.bool_):
+        raise InputError("torque_enable", got=torque_enable, allowed="True or False")
+    return memory._replace(firm=(memory.firm[0]._replace(torque=int(torque_enable)),))
 
 
 def simulate(model: Model, command: Signal, *, duration: float, load: Load | Part | None = None,

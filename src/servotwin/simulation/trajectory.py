@@ -17,6 +17,7 @@ from servotwin.simulation.engine import Segment
 
 Array = NDArray[np.float64]
 _NODES = 12  # Gauss-Legendre nodes per interval
+_LATE = 1e-12  # of an instant
 _AT_ONCE = 1000  # segments
 _SHORTEST = 1e-307  # s: what is over in less has no time of its own
 
@@ -38,6 +39,9 @@ class Trajectory:
         if not self.segments:
             nothing = np.full(t.size, math.nan)
             return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((5, t.size)), *np.zeros((3, t.size)))
+        if self.segments[0].motion.numbers.bridge.pwm > 0.0:  # sums of ticks may end a rounding late
+            begun = self._starts[np.minimum(np.searchsorted(self._starts, t * (1.0 + _LATE)), len(self._starts)) - 1]
+            t = np.where(abs(begun - t) <= _LATE * t, np.maximum(begun, t), t)
         index = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
         return self._states(t, index)
 
@@ -60,6 +64,7 @@ class Trajectory:
         """Return the states at times by the motions of segments; `ages` are t − anchor without what t rounds away."""
         y = np.full((7, t.size), math.nan)
         mode, wiper, drive, error, silent = np.zeros((5, t.size)), *np.zeros((4, t.size))
+        told = np.zeros((4, t.size))
         order = np.argsort(index, kind="stable")
         used, first = np.unique(index[order], return_index=True)
         groups = np.split(order, first[1:]) if t.size else []
@@ -72,8 +77,10 @@ class Trajectory:
             y[:, where] = _states(segment.motion, s)
             mode[:, where] = np.array(segment.motion.mode)[:, None]
             drive[where], error[where], silent[where] = segment.drive, segment.error, segment.silent
+            told[:, where] = np.array([segment.duty, segment.goal, segment.reference, segment.trip])[:, None]
             wiper[where] = play(segment.wiper, y[0, where], 2.0 * segment.motion.numbers.sensor.half_slack)
-        return Samples.make(t, y, wiper, mode, drive, error, silent, None if self.bus is None else self.bus(t))
+        return Samples.make(t, y, wiper, mode, drive, error, silent, None if self.bus is None else self.bus(t),
+                            told)
 
     def intervals(self, index: int) -> Array:
         """Return the ends of short intervals of one segment, in each of which all signals are smooth and gentle.

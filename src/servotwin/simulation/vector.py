@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from servotwin import physics
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.models import DigitalServo
 from servotwin.models.base import KINDS, PULSE_RANGE, Model
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.ticks import LONGEST
+from servotwin.signals import Signal, constant
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.bus_supply import supplies_of
 from servotwin.simulation.lane_inputs import lanes_of, pick
@@ -46,12 +48,13 @@ class VectorSimulator:
     """Many servos (lanes) side by side that remember where they are between calls.
 
     Every lane has a clock of its own: its frames begin when it is reset. Commands and torques stay as they were given
-    last; before the first command it is a pulse in the middle of those that the servo takes. `simulate_many` runs lanes
-    from start to end with outputs in between; here one call is one tick of a robot, an environment or a page.
+    last; before the first command it is a pulse, or a goal, in the middle of those that the servo takes.
+    `simulate_many` runs lanes from start to end with outputs in between; here one call is one tick of a robot, an
+    environment or a page.
 
     Parameters
     ----------
-    model : PulseServo, PulseServoInductive or BoundedServo
+    model : PulseServo, PulseServoInductive, DigitalServo or BoundedServo
     lanes : int
         Number of servos.
     load : Load or sequence of Load, optional
@@ -96,9 +99,7 @@ class VectorSimulator:
             raise InputError("lanes", got=count, allowed="what fits into memory: take fewer")
         supplies = supplies_of(bus, model, count)
         base = _whole("seed", seed, None)
-        from servotwin import signals
-
-        start = signals.constant(1e6 * _neutral(model), unit="us")  # until the first command
+        start = _first_command(model)
         inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count))
         if inputs.count != count:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
@@ -172,7 +173,7 @@ class VectorSimulator:
     def reset(self, *, pulse_width: ArrayLike | None = None, command_angle: ArrayLike | None = None,
               command_voltage: ArrayLike | None = None, output_angle: ArrayLike | None = None,
               lanes: ArrayLike | None = None) -> None:
-        """Put lanes at rest and their clocks to 0; noise goes on where it was.
+        """Put lanes at rest and their clocks to 0, their torque on; noise goes on where it was.
 
         Parameters
         ----------
@@ -234,6 +235,8 @@ class VectorSimulator:
             Voltage at the bridge instead of what the supply would leave, positive [V]; not of a lane on a bus.
         parameters : mapping, optional
             Number or array by dotted name, as at the beginning.
+        torque_enable : bool or array of bool, optional
+            Whether the torque of digital servos is on.
         lanes : array of bool, shape (lanes,), or of int, optional
             For which lanes; arrays have one number for each of them.
 
@@ -244,9 +247,7 @@ class VectorSimulator:
         """
         which = pick(lanes, len(self))
         self._fresh[0] = 0
-        if torque_enable is not None:
-            raise InputError(f"torque_enable of {type(self._numbers.model).__name__}", got=torque_enable,
-                             allowed="nothing: an analog servo has no such switch")
+        torque = None if torque_enable is None else self._torque_switch(torque_enable, which)
         angle, speed, inertia, bus = (
             None if value is None else numbers_of(name, value, which) for name, value in (
                 ("output_angle", output_angle), ("output_speed", output_speed), ("load_inertia", load_inertia),
@@ -271,6 +272,8 @@ class VectorSimulator:
             self._entry.refresh()
         if angle is not None or speed is not None:
             self._store.impose(which, angle, speed)
+        if torque is not None:
+            self._store.enable(which, torque)
 
     # --- memory -------------------------------------------------------------------------------------------------------
 
@@ -331,16 +334,35 @@ class VectorSimulator:
         if found is not None:
             self._command[:] = found
 
+    def _torque_switch(self, torque_enable: Any, which: NDArray[np.int64]) -> Array:
+        if not self._numbers.digital:
+            raise InputError(f"torque_enable of {type(self._numbers.model).__name__}", got=torque_enable,
+                             allowed="nothing: an analog servo has no such switch")
+        array = np.asarray(torque_enable)
+        if array.dtype != np.bool_ or array.shape not in ((), (len(which),)):
+            raise InputError("torque_enable", got=torque_enable, allowed=f"True or False, or an array ({len(which)},)")
+        return np.broadcast_to(array, which.shape).astype(np.float64)
+
     def _torque_of(self, torque: Any) -> Any:
         if type(torque) is float and math.isfinite(torque):
             return torque
         return numbers_of("external_torque", torque, np.arange(len(self)))
 
 
-def _neutral(model: object) -> float:
-    """Return a pulse width that the servo takes [s]."""
+def _first_command(model: object) -> Signal:
+    """Return what a servo is told until the first command: a pulse in the middle of those that it takes, or a goal."""
+    if isinstance(model, DigitalServo) and model.takes_goals:
+        low, high = (model.value_or(f"firmware.{end}_goal", model.value_or(f"stops.{end}_angle", math.nan))
+                     for end in ("lower", "upper"))
+        middle = 0.5 * (low + high)
+        return constant(0.0 if math.isnan(middle) else middle, unit="rad")
     if not isinstance(model, Model):
-        return 1.5e-3  # what is no model is refused in a moment
+        return constant(1500.0, unit="us")  # what is no model is refused in a moment
+    return constant(1e6 * _middle(model), unit="us")
+
+
+def _middle(model: Model) -> float:
+    """Return a pulse width that the servo takes [s]."""
     return 0.5 * sum(model.value_or(f"electronics.pulse_width_{end}", usual)
                      for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
 

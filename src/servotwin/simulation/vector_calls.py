@@ -14,6 +14,7 @@ from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.compile.layout import GIVEN, STAGES
 from servotwin.simulation.lane_memory import RECORD
+from servotwin.simulation.lanes import ALL_FIELDS
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_numbers import LaneNumbers
@@ -129,7 +130,7 @@ class _Alone:
         self.room = _Gathered(np.zeros(1, np.int64), np.zeros(most, np.int64), np.zeros(most, np.int64), np.zeros(most),
                               np.zeros(most, RECORD))
         self._how, self._at = np.zeros(most, np.int64), np.zeros(most)
-        self._first, self._outputs = np.zeros(most, np.int64), np.zeros((most, 14, 0))
+        self._first, self._outputs = np.zeros(most, np.int64), np.zeros((most, len(ALL_FIELDS), 0))
 
     def some(self, *names: str) -> list[Some]:
         """Return of the room what is gathered now."""

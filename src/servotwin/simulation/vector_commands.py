@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import CommandError, InputError
-from servotwin.models import BoundedServo
+from servotwin.models import BoundedServo, DigitalServo
 from servotwin.models.base import PULSE_RANGE, TRAVEL_SLACK
 from servotwin.models.columns import LanePieces, LaneSignal
 from servotwin.simulation.packing import Chunk, flat
@@ -148,8 +148,11 @@ def _bounds(name: str, model: Model) -> _Bounds:
         if name == "pulse_width":
             low, high = (model.value_or(f"electronics.pulse_width_{end}", usual)
                          for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
-    else:
+    elif not (isinstance(model, DigitalServo) and model.takes_goals):
         least, most = 0.0, cast("Any", model).frame_period  # the other models have pulses
+    if isinstance(model, DigitalServo) and name == "command_angle":
+        low = np.maximum(low, model.value_or("firmware.lower_goal", -math.inf) - TRAVEL_SLACK)
+        high = np.minimum(high, model.value_or("firmware.upper_goal", math.inf) + TRAVEL_SLACK)
     return _Bounds(low, high, least, most)
 
 

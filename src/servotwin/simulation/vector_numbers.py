@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
-from servotwin.models.engine.memory import put_memory, started
+from servotwin.models.engine.memory import put_started, started
 from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.records import columns_of, put_columns, tiles_with
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.tiles import Lanes as Columns
 from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.firmware import NO_FIRMWARE
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.bus_supply import Supplies
@@ -71,7 +72,7 @@ class LaneNumbers:
         commands = Commands(inputs)
         self.chunks = [Chunk(own, commands, part) for which in groups(inputs, commands)
                        for own, part in supplies.parts(inputs, which)]
-        self.pulsed = LAWS[type(inputs.model)] == "pulse"
+        self.pulsed, self.digital = (LAWS[type(inputs.model)] == law for law in ("pulse", "digital"))
         self.curve = np.array(inputs.model.curve(), np.float64).reshape(2, -1)
         self.neutral = np.empty(self.count)
         self.columns, self.torque = self._packed()
@@ -94,6 +95,7 @@ class LaneNumbers:
         numbers, chips, start = tiles_with(Numbers, NEUTRAL, B), tiles_with(Chip, NO_CHIP, B), np.empty((7, B))
         torque, first, count = np.empty(B), np.zeros(B, np.int64), np.zeros(B, np.int64)
         rows: list[Array] = []
+        programs = lane_runs.programs_of(NO_FIRMWARE if self.digital else None, B)
         for chunk in self.chunks:
             asked = Asked(1.0, np.zeros(1), (), "float64", self.accuracy)
             work = chunk.work(asked, ())
@@ -101,6 +103,8 @@ class LaneNumbers:
             put_columns(numbers, which, columns_of(Numbers, packed.numbers, slice(len(which))))
             put_columns(chips, which, columns_of(Chip, packed.chips, slice(len(which))))
             start[:, which] = packed.start
+            if self.digital:
+                programs[which] = packed.firmware
             torque[which] = packed.torque
             first[which], count[which] = work.torque.first + sum(map(len, rows)), work.torque.count
             rows.append(work.torque.rows)
@@ -108,7 +112,7 @@ class LaneNumbers:
         pieces = np.zeros((B, 7))
         index, none = np.arange(B), np.zeros(B, np.int64)
         columns = Columns(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), pieces, index, none + 1,
-                          np.zeros(0), none, none - 1, self.accuracy)
+                          np.zeros(0), none, none - 1, self.accuracy, programs)
         return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
 
     def now(self, room: str, which: Indices | None = None) -> Any:
@@ -185,7 +189,7 @@ class LaneNumbers:
             If an angle is beyond a stop; names the lane.
         """
         rest = np.zeros(1, RECORD)
-        put_memory(rest[0], started((0.0,) * 7, RIGID))
+        put_started(rest[0], started((0.0,) * 7, RIGID))
         records = np.repeat(rest, len(which))
         place = np.full(self.count, -1)
         place[which] = np.arange(len(which))

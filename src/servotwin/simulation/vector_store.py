@@ -20,6 +20,7 @@ from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
 from servotwin.simulation.lane_runs import OneByOne, SideBySide, some_of
+from servotwin.simulation.lanes import ALL_FIELDS
 from servotwin.simulation.vector_buses import BusSet, sets_of
 from servotwin.simulation.vector_calls import TICKS, asked, calls_in_records, calls_in_tiles
 from servotwin.simulation.vector_memory import Common
@@ -149,8 +150,15 @@ class Store:
 
     def start(self, which: Indices, records: NDArray[Any]) -> None:
         """Put lanes where they start; their noise goes on."""
-        records["chip"]["draws"] = self.records()["chip"]["draws"][which]
+        before = self.records()[which]
+        records["chip"]["draws"], records["firm"]["draws"] = before["chip"]["draws"], before["firm"]["draws"]
         self.status[which], self.ended[which], self.work[which] = 0, 0.0, 0.0
+        self._put(which, records)
+
+    def enable(self, which: Indices, torque: Array) -> None:
+        """Let torque of some lanes be on (1) or off (0)."""
+        records = self.records()[which]
+        records["firm"]["torque"] = torque
         self._put(which, records)
 
     def _put(self, which: Indices, records: NDArray[Any]) -> None:
@@ -234,7 +242,7 @@ class Store:
         def go(part: slice) -> None:
             some = which[part]
             go_on(self.columns, *self.inputs, some, durations[part], _NONE, np.zeros(len(some), np.int64),
-                  np.zeros((len(some), 14, 0)), records[part], status[part], ended[part])
+                  np.zeros((len(some), len(ALL_FIELDS), 0)), records[part], status[part], ended[part])
 
         workers = min(self._threads, len(which))
         if workers == 1:
@@ -350,7 +358,7 @@ class _Records:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
     def look(self, columns: tiles.Lanes, inputs: Any, status: Any, seen: Array) -> None:
-        kernels(lane_runs.LOOK_ONE_BY_ONE).one_by_one(columns, *inputs, self.which, self.rows, seen)
+        kernels(lane_runs.looking(self.recipe)).one_by_one(columns, *inputs, self.which, self.rows, seen)
 
     def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
         """Return what compiled code calls at each stage of a tick."""

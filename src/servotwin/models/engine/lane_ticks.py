@@ -64,7 +64,7 @@ def gather(which: Indices, status: Any, now: Floats, rows: Any, count: Indices, 
     for k in range(which.size):
         if status[which[k]] == COMPLETED:
             places[n], lanes[n], durations[n] = k, which[k], now[0]
-            put_memory(records[n], memory_of(rows[k]))
+            records[n] = rows[k]
             n += 1
     count[0] = n
     return n
@@ -73,7 +73,7 @@ def gather(which: Indices, status: Any, now: Floats, rows: Any, count: Indices, 
 def put(places: Indices, records: Any, rows: Any) -> None:
     """Put lanes back into their records."""
     for k in range(places.size):
-        put_memory(rows[places[k]], memory_of(records[k]))
+        rows[places[k]] = records[k]
 
 
 def note_failures(lanes: Indices, how: Indices, at: Floats, records: Any, status: Any, ended: Floats) -> None:
@@ -125,7 +125,7 @@ def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices,
         point = placed(memory.point, angle, given[SPEED, lane], has[ANGLE] != 0, has[SPEED] != 0, half,
                        own.sensor.half_slack[i])
         put_memory(rows[places[k]], Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end,
-                                           memory.tau, memory.tau_end))
+                                           memory.tau, memory.tau_end, memory.firm))
 
 
 def within_stops(numbers: Any, i: int, angle: float) -> float:

@@ -8,11 +8,13 @@ of a millisecond are a frame of twenty, however their sum is rounded.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.modes import INSIDE, RIGID, Mode, Vector
 from servotwin.models.engine.records import record_reader, record_writer
-from servotwin.models.terms import frame
+from servotwin.models.terms import control, firmware, frame
+from servotwin.models.terms.control import Firm, Programs
+from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.frame import Decision, Frame
 from servotwin.physics.pieces import Piece
 
@@ -53,6 +55,7 @@ class Memory(NamedTuple):
     u_end: float
     tau: Piece  # torque of the load that depends on time alone
     tau_end: float
+    firm: Programs  # one: what the program of a digital servo remembers; while it runs it is changed in place
 
 
 class Inputs(NamedTuple):
@@ -66,17 +69,31 @@ class Inputs(NamedTuple):
     curve: Sequence[Sequence[float]] | NDArray[np.float64]  # of the potentiometer: angles and errors
     seed: int
     accuracy: float  # of what is integrated [rad]
+    firmware: Sequence[Firmware] | NDArray[np.record]  # one
 
 
 NOTHING = Piece()
 memory_of = record_reader("memory_of", Memory)
 put_memory = record_writer("put_memory", Memory)
+put_firm = record_writer("put_firm", Firm)
 
 
 def started(y: Vector, mesh: int) -> Memory:
     """Return the memory of a servo at t = 0, in no mode yet."""
     point = Point(0.0, y, Mode(0, 0, mesh, 0, 0), math.inf, y, FIRST_STEP, y[0])
-    return Memory(0, BEAT, point, frame.AT_START, NOTHING, math.inf, NOTHING, math.inf)
+    return Memory(0, BEAT, point, frame.AT_START, NOTHING, math.inf, NOTHING, math.inf, control.NOT_STARTED)
+
+
+def with_firm(memory: Memory, firm: Any) -> Memory:
+    """Return a memory with what a program remembers, one in a sequence."""
+    return Memory(memory.frames, memory.beat, memory.point, memory.chip, memory.u, memory.u_end, memory.tau,
+                  memory.tau_end, firm)
+
+
+def put_started(record: Any, memory: Memory) -> None:
+    """Put a memory that is not yet anywhere into a record."""
+    put_memory(record, memory)
+    put_firm(record.firm, memory.firm[0])
 
 
 def origin_of(memory: Memory) -> float:
@@ -104,6 +121,10 @@ def edge_of(inputs: Inputs, memory: Memory, k: int) -> float:
 
 def instant(pulsed: bool, inputs: Inputs, memory: Memory, time: float) -> float:
     """Return a time to which a memory shall go [s]: that of the edge where it is next to one."""
+    if firmware.present(inputs.firmware[0]):
+        T_c, shift = inputs.firmware[0].T_c, inputs.firmware[0].t_phi
+        tick = round((time - shift) / T_c) * T_c + shift
+        return tick if abs(time - tick) <= SAME * T_c else time
     if not pulsed:
         return time
     if inputs.period > 0.0:
@@ -119,13 +140,17 @@ def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memo
     `changed` is whether the servo itself is another one.
     """
     beat = inputs.period if pulsed and inputs.period > 0.0 else BEAT
+    if firmware.present(inputs.firmware[0]):
+        beat = inputs.firmware[0].T_c
     if beat != memory.beat:  # its frames are others now
         origin = origin_of(memory)
         frames = int((origin + memory.point.time) / beat * (1.0 + 4e-16))
         memory = shifted(memory, frames, beat, frames * beat - origin)
     origin, time = origin_of(memory), memory.point.time
     number = memory.chip.number
-    if pulsed:
+    if firmware.present(inputs.firmware[0]):
+        u, u_end = memory.u, math.inf
+    elif pulsed:
         number = next_frame(inputs, memory, time)
         u, u_end = memory.u, math.inf
     else:
@@ -134,7 +159,7 @@ def resumed(pulsed: bool, inputs: Inputs, memory: Memory, changed: bool) -> Memo
     if changed or u != memory.u or tau != memory.tau:
         memory = forgotten(memory)
     return Memory(memory.frames, beat, memory.point, frame.numbered(memory.chip, number, silent_now(memory)), u, u_end,
-                  tau, tau_end)
+                  tau, tau_end, memory.firm)
 
 
 def silent_now(memory: Memory) -> int:
@@ -170,7 +195,8 @@ def shifted(memory: Memory, frames: int, beat: float, shift: float) -> Memory:
     point = Point(p.time - shift, p.y, p.mode, p.anchor_time - shift, p.anchor, p.step, p.wiper)
     chip = Frame(c.number, c.draws, c.drive, c.drive_end - shift, c.clock - shift, c.silent, c.error,
                  _later(c.pending, shift), _later(c.later, shift))
-    return Memory(frames, beat, point, chip, memory.u, memory.u_end - shift, memory.tau, memory.tau_end - shift)
+    return Memory(frames, beat, point, chip, memory.u, memory.u_end - shift, memory.tau, memory.tau_end - shift,
+                  memory.firm)
 
 
 def _later(decision: Decision, shift: float) -> Decision:
@@ -181,7 +207,8 @@ def forgotten(memory: Memory) -> Memory:
     """Return a memory in which no motion has begun."""
     p = memory.point
     point = Point(p.time, p.y, p.mode, math.inf, p.anchor, p.step, p.wiper)
-    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end)
+    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
+                  memory.firm)
 
 
 def next_frame(inputs: Inputs, memory: Memory, time: float) -> int:

@@ -6,13 +6,14 @@ The numbers are those of this instant: at the temperatures of winding and housin
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine import currents
 from servotwin.models.engine.contacts import joint_friction
 from servotwin.models.engine.modes import INSIDE, Mode, Vector, at_rest
-from servotwin.models.terms import bridge, shaft, source
+from servotwin.models.terms import bridge, duty, shaft, source
 from servotwin.models.terms.bridge import Bridge, Off
+from servotwin.models.terms.control import NOWHERE
 from servotwin.models.terms.friction import NO_FRICTION, Friction, holding_friction
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.numbers import Numbers
@@ -75,6 +76,10 @@ class Observed(NamedTuple):
     drive: float
     winding_temperature: float
     housing_temperature: float
+    duty: float  # of a digital servo, as all that follows
+    goal_angle: float
+    reference_angle: float
+    trip: float
 
 
 def electrical(numbers: Numbers, u: float, q: float, w: float, i: float) -> Electrical:
@@ -165,14 +170,25 @@ def observed(numbers: Numbers, curve: Sequence[Sequence[float]] | NDArray[np.flo
     shaft = torques(numbers, mode, w, w_motor, circuit.armature_current, against)
     return Observed(circuit.armature_voltage, circuit.armature_current, circuit.bus_voltage, circuit.supply_current,
                     shaft.motor, shaft.load, q_motor, w_motor, sensed_voltage(numbers.sensor, curve, wiper), error,
-                    drive, T_w, T_h)
+                    drive, T_w, T_h, 0.0, 0.0, 0.0, 0.0)
+
+
+def told_by(path: Bridge, firm: Any, shown: Observed) -> Observed:
+    """Return all signals of a digital servo: those of its plant at its duty, and what its program tells."""
+    share, now = duty.share_of(path, firm.duty), firm.duty if abs(firm.duty) <= 1.0 else 0.0
+    goal = firm.r if firm.goal == NOWHERE else firm.goal
+    return Observed(
+        shown.armature_voltage, shown.armature_current / duty.on_share_of(path, firm.duty), shown.bus_voltage / share,
+        shown.supply_current * share, shown.motor_torque, shown.load_torque, shown.motor_angle, shown.motor_speed,
+        shown.feedback_voltage, 0.0, bridge.direction(now), shown.winding_temperature, shown.housing_temperature, now,
+        goal, firm.r, float(firm.trip))
 
 
 def on_bus(numbers: Numbers, V_bus: float) -> Numbers:
     """Return a servo on a bus whose voltage is known; that of its source is then left out."""
     path, supply = numbers.bridge, numbers.source
     path = Bridge(path.D_drive, path.R_drive - supply.R_b, _off_on_bus(path.off, supply, V_bus),
-                  _off_on_bus(path.silence, supply, V_bus), path.V_br)
+                  _off_on_bus(path.silence, supply, V_bus), path.V_br, path.pwm, path.one_way)
     return Numbers(
         numbers.motor, path, Source(max(V_bus, _NO_VOLTAGE), 0.0, math.inf), numbers.follower, numbers.shaft,
         numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)

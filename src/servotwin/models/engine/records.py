@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from functools import cache
 from types import SimpleNamespace
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,6 +150,8 @@ def _field(hint: Any) -> tuple[Any, ...]:
         return (record_of(hint),)
     if hint is int:
         return (np.int64,)
+    if get_origin(hint) is Sequence:
+        return (record_of(get_args(hint)[0]),)
     return (np.float64,) if hint is float else (np.float64, (len(get_args(hint)),))
 
 
@@ -175,7 +177,9 @@ def _reading(kind: Any, place: str, kinds: dict[str, type[Any]]) -> str:
     parts = []
     for field, hint in fields_of(kind):
         at = f"{place}.{field}"
-        if hasattr(hint, "_fields"):
+        if get_origin(hint) is Sequence:
+            at = "0"  # by reference, see `with_firm`
+        elif hasattr(hint, "_fields"):
             at = _reading(hint, at, kinds)
         elif hint not in (int, float):
             at = "(" + ", ".join(f"{at}[{k}]" for k in range(len(get_args(hint)))) + ")"
@@ -190,6 +194,8 @@ def record_writer(name: str, kind: type[Kind]) -> Callable[[Any, Kind], None]:
 
 def _writing(kind: Any, to: str, of: str) -> Iterator[str]:
     for field, hint in fields_of(kind):
+        if get_origin(hint) is Sequence:
+            continue  # it stands there
         if hasattr(hint, "_fields"):
             yield from _writing(hint, f"{to}.{field}", f"{of}.{field}")
         elif hint in (int, float):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import motion
+from servotwin.models.engine import controller, motion
 from servotwin.models.engine.memory import (
+    SAME,
     Inputs,
     Memory,
     counted_anew,
@@ -16,18 +17,21 @@ from servotwin.models.engine.memory import (
     memory_of,
     origin_of,
     put_memory,
+    put_started,
     resumed,
     silent_now,
     since,
     started,
     time_of,
+    with_firm,
 )
 from servotwin.models.engine.modes import INSIDE, RIGID, Mode
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
 from servotwin.models.engine.tiles import chip_of, numbers_of
-from servotwin.models.terms import play
+from servotwin.models.terms import duty, firmware, play
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
+from servotwin.models.terms.control import NOWHERE
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.pieces import Piece
@@ -41,7 +45,7 @@ def start(lanes: Lanes, which: Indices, records: Any) -> None:
     for k in range(which.size):
         lane, y = which[k], lanes.start
         numbers = numbers_of(lanes, lane)
-        put_memory(records[k], started(
+        put_started(records[k], started(
             (y[0, lane], y[1, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane]),
             INSIDE if play.present(numbers.play) else RIGID))
 
@@ -51,18 +55,25 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
           status: Indices, ended: Floats) -> None:
     """Let the lanes named in `which`, whose memories the records hold, go on for durations of their own [s].
 
-    `outputs` has the shape (n, 14, T), as in `run`, and gets what stands at `times` from the one numbered
+    `outputs` has the shape (n, 18, T), as in `run`, and gets what stands at `times` from the one numbered
     `first_output` on.
     """
     for k in range(which.size):
         lane = which[k]
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_of(records[k]),
-                          durations[k], times, first_output[k], outputs[k])
+        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(records, k), durations[k],
+                          times, first_output[k], outputs[k])
         status[k] = how
         ended[k] = time_of(memory)
         if how == COMPLETED:
             put_memory(records[k], memory)
+
+
+def memory_at(records: Any, k: int) -> Memory:
+    """Return what a record holds, with what a program remembers by reference."""
+    if firmware.present(records[k].firm):
+        return with_firm(memory_of(records[k]), records["firm"][k:k + 1])
+    return memory_of(records[k])
 
 
 def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
@@ -70,21 +81,33 @@ def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:
     first, last = lanes.piece_first[lane], lanes.piece_first[lane] + lanes.piece_count[lane]
     own = lanes.edge_count[lane]
     edges = lanes.edges[lanes.edge_first[lane]:lanes.edge_first[lane] + max(own, 0)]
-    period = 0.0 if own >= 0 else chip_of(lanes, lane).frame_period
+    regular = lanes.firmware[lane].T_f if firmware.present(lanes.firmware[0]) else chip_of(lanes, lane).frame_period
+    period = 0.0 if own >= 0 else regular
+    program = lanes.firmware[lane:lane + 1] if firmware.present(lanes.firmware[0]) else lanes.firmware
     return Inputs(lanes.pieces[first:last], torque, lanes.torque[lane], period, edges, curve, lanes.seeds[lane],
-                  lanes.accuracy)
+                  lanes.accuracy, program)
 
 
 def mode_of(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> Mode:
     """Return the mode of a servo as it stands, under its present inputs."""
     u, tau = told(numbers, pulsed_chip(chip), inputs, memory)
-    return mode_under(at_pulses(numbers, silent_now(memory)), u, tau, memory)
+    return mode_under(as_now(numbers, inputs, memory), u, tau, memory)
+
+
+def as_now(numbers: Numbers, inputs: Inputs, memory: Memory) -> Numbers:
+    """Return the numbers of a servo with its bridge as it is now."""
+    if firmware.present(inputs.firmware[0]):
+        return duty.at_duty(numbers, memory.firm[0].duty)
+    return at_pulses(numbers, silent_now(memory))
 
 
 def told(numbers: Numbers, pulsed: bool, inputs: Inputs, memory: Memory) -> tuple[Piece, Piece]:
     """Return what a servo follows as it stands, and the torque of its load that depends on time alone."""
     origin, time = origin_of(memory), memory.point.time
     tau, _ = in_force(inputs.torque, origin, time, inputs.constant_torque)
+    if firmware.present(inputs.firmware[0]):
+        V = duty.voltage(duty.at_duty(numbers, memory.firm[0].duty).source, memory.firm[0].duty)
+        return Piece(0.0, V, 0.0, 0.0, 0.0, 0.0, 0.0), tau
     if pulsed:
         return source(numbers, memory.chip), tau
     u, _ = in_force(inputs.command, origin, time, 0.0)
@@ -103,13 +126,15 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
         done: int, outputs: Floats) -> tuple[Memory, int]:
     """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
 
-    What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (14, n): angle, speed,
+    What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (18, n): angle, speed,
     contact, drive, error, angle of the potentiometer, and what only few servos have: current, temperatures of winding
     and housing, angle and speed of the motor at the output shaft, place in the play and contact of the motor there,
-    silence of the chip.
+    silence of the chip; duty, goal, reference and trip of a program.
     """
     pulsed = pulsed_chip(chip)
     memory = resumed(pulsed, inputs, memory, False)
+    if firmware.present(inputs.firmware[0]):
+        controller.resume(inputs, memory)
     until = instant(pulsed, inputs, memory, memory.point.time + duration)
     origin = origin_of(memory)
     m = motion.nothing(numbers, memory.u, memory.tau)
@@ -127,7 +152,8 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
         idle = idle + 1 if memory.point.time == t else 0
         if idle > MOST_IDLE:
             return memory, CHATTER
-        while done < times.size and (times[done] - origin < memory.point.time or memory.point.time >= until):
+        shown = memory.point.time - (SAME * memory.beat if firmware.present(inputs.firmware[0]) else 0.0)
+        while done < times.size and (times[done] - origin < shown or memory.point.time >= until):
             m = motion.prepared(m)
             y = motion.state(m, min(times[done] - origin, until) - m.t0)
             outputs[0, done], outputs[1, done], outputs[2, done] = y[0], y[1], m.mode.contact
@@ -136,5 +162,12 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
             for k in range(5):
                 outputs[6 + k, done] = y[2 + k]
             outputs[11, done], outputs[12, done], outputs[13, done] = m.mode.mesh, m.mode.motor, memory.chip.silent
+            if firmware.present(inputs.firmware[0]):
+                firm = memory.firm[0]
+                outputs[3, done] = math.copysign(1.0, firm.duty) if duty.drives(firm.duty) else 0.0
+                outputs[14, done], outputs[16, done], outputs[17, done] = firm.duty, firm.r, firm.trip
+                outputs[15, done] = firm.r if firm.goal == NOWHERE else firm.goal
             done += 1
+    if firmware.present(inputs.firmware[0]):
+        controller.pause(inputs, memory)
     return memory, COMPLETED

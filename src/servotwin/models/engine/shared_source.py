@@ -33,9 +33,9 @@ def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
         R = path.off.R if source_term.regulated(source) else path.off.R - source.R_b
     D = max(path.D_drive, 1e-300) if returning else path.D_drive  # a diode without drop still has a direction
     return Numbers(
-        numbers.motor, Bridge(D, R, path.off, path.silence, path.V_br), Source(source.V, 0.0, math.inf),
-        numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor,
-        numbers.heat)
+        numbers.motor, Bridge(D, R, path.off, path.silence, path.V_br, path.pwm, path.one_way),
+        Source(source.V, 0.0, math.inf), numbers.follower, numbers.shaft, numbers.friction, numbers.load,
+        numbers.stops, numbers.play, numbers.sensor, numbers.heat)
 
 
 def sign_on_bus(drive: float, y: Vector) -> float:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import contacts, currents
-from servotwin.models.engine.memory import memory_of, silent_now, time_of
+from servotwin.models.engine.memory import time_of
 from servotwin.models.engine.modes import RIGID
-from servotwin.models.engine.observe import Observed, observed
+from servotwin.models.engine.observe import Observed, observed, told_by
 from servotwin.models.engine.records import TILE
-from servotwin.models.engine.runs import inputs_of, mode_under, told
-from servotwin.models.engine.step import at_pulses
+from servotwin.models.engine.runs import as_now, inputs_of, memory_at, mode_under, told
 from servotwin.models.engine.tiles import chip_of, numbers_of
+from servotwin.models.terms import duty
 from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.numbers import warm
 from servotwin.models.terms.sensor import slack
@@ -28,13 +28,14 @@ def one_by_one(lanes: Lanes, curve: Floats, torque_rows: Floats, torque_first: I
         lane = which[k]
         numbers, chip = numbers_of(lanes, lane), chip_of(lanes, lane)
         inputs = inputs_of(lanes, curve, torque_rows[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        memory = memory_of(records[k])
+        memory = memory_at(records, k)
         point, now, time = memory.point, memory.chip, time_of(memory)
         u, tau = told(numbers, pulsed_chip(chip), inputs, memory)
-        numbers = at_pulses(numbers, silent_now(memory))
+        numbers = as_now(numbers, inputs, memory)
         mode = mode_under(numbers, u, tau, memory)
-        put(seen, lane, observed(warm(numbers, point.y), curve, mode, piece_value(u, time), piece_value(tau, time),
-                                 point.y, point.wiper, now.drive, now.error))
+        shown = observed(warm(numbers, point.y), curve, mode, piece_value(u, time), piece_value(tau, time), point.y,
+                         point.wiper, now.drive, now.error)
+        put(seen, lane, told_by(numbers.bridge, memory.firm[0], shown) if duty.present(numbers.bridge) else shown)
 
 
 def side_by_side(lanes: Lanes, curve: Floats, which: Indices, tile_rows: Any, seen: Floats) -> None:

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine import currents, events, guards, motion
+from servotwin.models.engine import controller, currents, events, guards, motion
 from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, edge_of, in_force, origin_of, since
 from servotwin.models.engine.modes import CORE, Vector
 from servotwin.models.engine.motion import Motion
-from servotwin.models.terms import bridge, frame
+from servotwin.models.terms import bridge, duty, firmware, frame
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as chip_present
 from servotwin.models.terms.frame import Frame
@@ -38,13 +38,22 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
     `m` is the motion of the step before, or `motion.nothing`. Return the memory, the motion on which it went, the
     event that ended it (−1: none), and a status.
     """
-    frames, beat, point, now, u, u_end, tau, tau_end = memory
+    frames, beat, point, now, u, u_end, tau, tau_end, firm = memory
     origin, t = frames * beat, point.time
     new = point.anchor_time == math.inf
     if t >= tau_end:
         tau, tau_end = in_force(inputs.torque, origin, t, inputs.constant_torque)
         new = True
-    if chip_present(chip):
+    if firmware.present(inputs.firmware[0]):
+        program = firm[0]
+        before = program.duty
+        controller.serve(numbers, inputs, memory)
+        u_end = controller.next_due(inputs.firmware[0], program, frames)
+        numbers = duty.at_duty(numbers, program.duty)
+        V = duty.voltage(numbers.source, program.duty)
+        if new or program.duty != before or u.value != V:
+            u, new = Piece(0.0, V, 0.0, 0.0, 0.0, 0.0, 0.0), True
+    elif chip_present(chip):
         heeds, silent = bridge.heeds_silence(numbers.bridge), now.silent
         if frame.next_switch(now, heeds) <= t:
             now = frame.switched(now, t)
@@ -69,7 +78,7 @@ def step(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, m: Motion
         point = anchored(numbers, local_u, local_tau, t, point)
     point, m, event, status = onward(numbers, point, local_u, local_tau, m, new, min(u_end, tau_end), until,
                                        inputs.accuracy)
-    return Memory(frames, beat, point, now, u, u_end, tau, tau_end), m, event, status
+    return Memory(frames, beat, point, now, u, u_end, tau, tau_end, firm), m, event, status
 
 
 def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new: bool, limit: float,

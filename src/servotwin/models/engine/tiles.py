@@ -268,6 +268,7 @@ class Lanes(NamedTuple):
     edge_first: Indices
     edge_count: Indices
     accuracy: float  # of what is integrated [rad]
+    firmware: Any  # records of Firmware, for each lane, or one for all that have none
 
 
 class Outputs(NamedTuple):

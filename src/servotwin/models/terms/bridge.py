@@ -52,9 +52,11 @@ class Bridge(NamedTuple):
     off: Off  # as it is between drives
     silence: Off  # as it is while no pulses come
     V_br: float
+    pwm: float  # `duty.BRAKE` … `duty.COAST` of one that is switched many times a tick; 0: it drives or does not
+    one_way: float  # 1: the current flows in the sense of the drive alone
 
 
-NO_BRIDGE = Bridge(0.0, 0.0, Off(0.0, 0.0, 0.0), Off(0.0, 0.0, 0.0), 0.0)
+NO_BRIDGE = Bridge(0.0, 0.0, Off(0.0, 0.0, 0.0), Off(0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
 
 
 def coasts(bridge: Bridge) -> bool:
@@ -70,7 +72,7 @@ def heeds_silence(bridge: Bridge) -> bool:
 def off_now(bridge: Bridge, silent: int) -> Bridge:
     """Return the bridge as it is off now: between drives, or (1) while no pulses come."""
     off = bridge.silence if silent != 0 else bridge.off
-    return Bridge(bridge.D_drive, bridge.R_drive, off, off, bridge.V_br)
+    return Bridge(bridge.D_drive, bridge.R_drive, off, off, bridge.V_br, bridge.pwm, bridge.one_way)
 
 
 def drop(bridge: Bridge, u: float) -> float:
@@ -97,6 +99,8 @@ def zone_limits(bridge: Bridge, source: Source, by_current: bool, zone: int, u: 
         return -math.inf, math.inf
     D, I_max = drop(bridge, u), source.I_max
     if zone == NO_CURRENT:
+        if bridge.one_way > 0.0 and u != 0.0:
+            return (-math.inf, D) if u > 0.0 else (-D, math.inf)
         return -D, D
     if I_max == math.inf:
         edge = 0.0 if by_current else D
@@ -121,7 +125,7 @@ def zone_limits(bridge: Bridge, source: Source, by_current: bool, zone: int, u: 
 def zone_of(bridge: Bridge, source: Source, motor: Motor, u: float, x: float, i: float) -> int:
     """Return the zone of a current i [A], where x [V] drives it."""
     D = drop(bridge, u)
-    if D == 0.0 and source.I_max == math.inf:
+    if D == 0.0 and source.I_max == math.inf and not bridge.one_way > 0.0:
         return CONDUCTING
     if motor.L > 0.0 and i != 0.0:
         forward = i > 0.0
@@ -129,6 +133,8 @@ def zone_of(bridge: Bridge, source: Source, motor: Motor, u: float, x: float, i:
         return NO_CURRENT
     else:
         forward = x > 0.0
+        if bridge.one_way > 0.0 and u * x < 0.0:
+            return NO_CURRENT
     zone = CURRENT_FORWARD if forward else CURRENT_BACKWARD
     step = 1 if forward else -1
     if source.I_max == math.inf or u * step <= 0.0:
@@ -189,4 +195,4 @@ def pack(model: Given, coast: Any, silent_coast: Any) -> Bridge:
     battery = np.all(np.isinf(model.value_or("supply.current_limit", math.inf)))  # a regulator keeps its voltage
     off, silence = (Off(V_br + opens * (V_oc + V_ce0), R_a + (R_b * opens if battery else 0.0), opens)
                     for opens in (coast, silent_coast))
-    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, silence, V_br)
+    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, silence, V_br, 0.0, 0.0)

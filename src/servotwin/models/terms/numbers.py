@@ -48,7 +48,7 @@ def at_temperature(numbers: Numbers, T_w: float, T_h: float) -> Numbers:
     return Numbers(
         Motor(cold.K * field, cold.K_b * field, R, cold.L),
         Bridge(bridge.D_drive, bridge.R_drive + more, Off(off.D, off.R + more, off.coast),
-               Off(silence.D, silence.R + more, silence.coast), bridge.V_br),
+               Off(silence.D, silence.R + more, silence.coast), bridge.V_br, bridge.pwm, bridge.one_way),
         numbers.source, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play,
         numbers.sensor, numbers.heat)
 

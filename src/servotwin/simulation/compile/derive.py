@@ -24,11 +24,14 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, cast
 
+from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.firmware import NO_FIRMWARE
 from servotwin.models.terms.numbers import NEUTRAL
 from servotwin.physics.pieces import Piece
 
 _ELEMENTARY = "servotwin.models.engine.elementary"
 _INTRINSICS, _LINKING = (f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking"))
+_DECIDERS: dict[str, Any] = {"chip": NO_CHIP, "firmware": NO_FIRMWARE}  # rooms beside those of the plant
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instructions in the vector form
 _POLYNOMIALS = ("exp", "log", "log1p", "sin")
 _DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
@@ -57,6 +60,8 @@ class Recipe:
         neutral values, and what depends on others is left out.
     never : tuple of str
         Constants that nothing will be equal to.
+    present : tuple of str
+        Numbers of terms that are positive in all that will run ("firmware.T_c").
     """
 
     name: str
@@ -65,6 +70,7 @@ class Recipe:
     single: bool = False
     absent: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
+    present: tuple[str, ...] = ()
 
 
 def derive(recipe: Recipe) -> str:
@@ -261,6 +267,8 @@ class _Rewriting(ast.NodeTransformer):
         sides, op = (node.left, node.comparators[0]), node.ops[0]
         if any(isinstance(side, ast.Name | ast.Attribute) and _last(side) in self._work.recipe.never for side in sides):
             return {ast.Eq: False, ast.NotEq: True}.get(type(op))
+        if isinstance(op, ast.Gt) and self._number(sides[1]) == 0.0 and self._is_present(sides[0]):
+            return True
         a, b = (self._number(side) for side in sides)
         compare = _COMPARISONS.get(type(op))
         return None if a is None or b is None or compare is None else bool(compare(a, b))
@@ -317,6 +325,10 @@ class _Rewriting(ast.NodeTransformer):
         if isinstance(node, ast.Attribute):
             return math.inf if ast.unparse(node) == "math.inf" else self._absent(node)
         return None
+
+    def _is_present(self, node: ast.expr) -> bool:
+        """Tell whether a number is certainly positive."""
+        return isinstance(node, ast.Attribute) and f"{_last(node.value)}.{node.attr}" in self._work.recipe.present
 
     def _absent(self, node: ast.Attribute) -> float | None:
         """Return the neutral value of a number that is absent; a term goes by the name of its record."""
@@ -391,7 +403,7 @@ def _neutral(absent: tuple[str, ...]) -> dict[str, float]:
     found: dict[str, float] = {}
     for name in absent:
         room, _, field = name.partition(".")
-        record: Any = getattr(NEUTRAL, room, None)
+        record: Any = getattr(NEUTRAL, room, _DECIDERS.get(room))
         if record is None:
             found[name] = getattr(Piece(), name)
         else:

@@ -1,0 +1,137 @@
+"""The digital servo: a program that decides on the duty of its bridge, tick by tick."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, final
+
+import numpy as np
+
+from servotwin.errors import CommandError, MissingParameterError
+from servotwin.models.base import check_goals, check_travel, clipped
+from servotwin.models.switched import HIDDEN, MOTOR, SHAFT, SwitchedServo
+from servotwin.models.terms import duty, firmware, friction, heat, play, sensor, source, stops
+from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.numbers import Numbers
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from servotwin.loads import Load
+    from servotwin.physics.pieces import Pieces
+    from servotwin.signals import Signal
+
+_PULSES = ("electronics.one_shot_slope", "potentiometer.feedback_gain")
+_OF_PULSES = ("command_voltage", "pulse_width")
+
+
+@final
+class DigitalServo(SwitchedServo):
+    """A servo with a microcontroller: counts, filter, dead zone, P, I and D, profile, limits and protections.
+
+    At every tick the program measures the angle, follows its profile to the goal, computes a duty and protects itself;
+    the bridge averages its supply by that duty until the next. Commands are pulses, or goals on a bus
+    (`firmware.command_kind`). Armature inductance is neglected.
+
+    Raises
+    ------
+    MissingParameterError
+        If the servo lacks a required parameter.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> analog = st.load_servo("hitec-hs-755hb")
+    >>> servo = analog.replace({"firmware.control_period": 1e-3, "firmware.proportional_gain": 6.0})
+    >>> result = st.simulate(DigitalServo(servo), st.signals.step(0.0, 60.0, at=0.1, unit="deg"), duration=1.0)
+    >>> bool(55.0 < 57.29578 * result["output_angle"][-1] < 62.0)
+    True
+    """
+
+    requires = (*MOTOR, "firmware.control_period", "firmware.proportional_gain")
+    optional = (
+        "gear.output_inertia", *play.READS, *friction.READS, *duty.READS, *firmware.READS, *sensor.READS,
+        *source.READS, *stops.READS, *heat.READS, *_PULSES, "potentiometer.noise", "electronics.one_shot_offset",
+        "electronics.deadband", "electronics.frame_period", "electronics.pulse_width_min",
+        "electronics.pulse_width_max", "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset",
+    )
+    layout = (*SHAFT, *HIDDEN)
+    signals = (
+        "command_voltage", "command_angle", "pulse_width", "duty", "goal_angle", "reference_angle", "trip", "drive",
+        "armature_voltage", "armature_current", "motor_angle", "motor_speed", "motor_torque", "output_angle",
+        "output_speed", "load_torque", "feedback_voltage", "bus_voltage", "supply_current", "winding_temperature",
+        "housing_temperature",
+    )
+
+    @property
+    def takes_goals(self) -> bool:
+        """Whether commands are goals on a bus, not pulses."""
+        return bool(self.servo.get("firmware.command_kind") == "goal")
+
+    @property
+    def available(self) -> tuple[str, ...]:
+        """Names of the output signals that can be computed for this servo, `time` apart."""
+        missing = {"feedback_voltage"} if self.servo.get("potentiometer.feedback_gain") is None else set()
+        missing |= set(_OF_PULSES) if self.takes_goals else set()
+        return tuple(name for name in super().available if name not in missing)
+
+    def pack(self, load: Load) -> Numbers:
+        """Return the plant at the output shaft, with the bridge before it as at full duty."""
+        N = self.value("gear.gear_reduction")
+        return self.body(load, N)._replace(
+            bridge=duty.pack(self), source=source.pack(self), friction=friction.pack(self, N),
+            play=play.pack(self, self.load_inertia(load)), stops=stops.pack(self), sensor=self._sensor(),
+            heat=heat.pack(self))
+
+    def _sensor(self) -> sensor.Sensor:
+        return sensor.NO_SENSOR if self.servo.get("potentiometer.feedback_gain") is None else sensor.pack_pulsed(self)
+
+    def firmware(self, signal: Signal | None = None) -> Firmware:
+        """Return the numbers of the program; the frame period is that of the command where it gives one."""
+        return firmware.pack(self, self._period(signal))
+
+    def command(self, signal: Signal) -> Pieces:
+        """Return the pulse width t_a [s], or the goal [rad] of a servo on a bus.
+
+        Raises
+        ------
+        CommandError
+            If the servo does not take this kind of command, an angle lies outside the travel or the goals, a pulse
+            does not fit into its frame, or a tick lasts longer than that.
+        """
+        if signal.kind == "angle":
+            check_goals(signal, self)
+        if self.takes_goals:
+            if signal.kind != "angle":
+                raise CommandError(f"{signal.kind.replace('_', ' ')} command of {self.servo.name}", got=signal.kind,
+                                   allowed="angles: it takes goals on a bus (firmware.command_kind)")
+            check_travel(signal, self.servo)
+            return signal.pieces
+        lacks = [name for name in _PULSES if self.servo.get(name) is None]
+        if lacks:
+            raise MissingParameterError(f"{type(self).__name__} with pulses", self.servo.name, lacks)
+        T_c, T_f = self.value("firmware.control_period"), self._period(signal)
+        if signal.edges is None and np.any(T_c > T_f):
+            raise CommandError("firmware.control_period", got=f"{1e3 * float(np.max(T_c)):.6g} ms",
+                               allowed=f"at most a frame of {1e3 * float(np.min(T_f)):.6g} ms")
+        return super().command(signal)
+
+    def start_angle(self, drive: float) -> float:
+        """Return the angle without error, within stops and goals [rad]."""
+        angle = drive if self.takes_goals else super().start_angle(drive)
+        for low, high in (("firmware.lower_goal", "firmware.upper_goal"), ("stops.lower_angle", "stops.upper_angle")):
+            angle = clipped(angle, self.value_or(low, -math.inf), self.value_or(high, math.inf))
+        return angle
+
+    def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the command as an angle, or what else stands for a pulse width [s]."""
+        return drive if self.takes_goals else super().command_signal(name, drive)
+
+    def loop_stiffness(self) -> Any:
+        """Return the stiffness of the loop at rest, within its limits: k_p V K_out/R [N m/rad].
+
+        R is R_a + r_c; drops, dead zone and friction are left out.
+        """
+        K = self.value("gear.gear_reduction") * self.value("motor.torque_constant")
+        R = self.value("motor.armature_resistance") + self.value_or("supply.bridge_drop_resistance", 0.0)
+        return self.value("firmware.proportional_gain") * self.value("supply.open_circuit_voltage") * K / R

@@ -1,0 +1,187 @@
+"""The program of a digital servo among the events: when its ticks come, what it hears, when its duties are applied.
+
+Ticks come at t_phi + n T_c whatever the frames of pulses. A duty is applied T_d after its tick, and holds until the
+next; at one instant it comes first, then the command, then the tick.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from servotwin.models.engine import currents
+from servotwin.models.engine.memory import SAME, Inputs, Memory, in_force, next_frame, origin_of
+from servotwin.models.engine.modes import Vector
+from servotwin.models.engine.noise import gaussian
+from servotwin.models.terms import bridge, control, duty
+from servotwin.models.terms.control import NOTHING_SENSED, WAITING, Sensed
+from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.sensor import sensed_voltage
+from servotwin.physics.firmware import counted, resolved_pulse
+from servotwin.physics.motor import back_emf
+from servotwin.physics.pieces import piece_value
+
+
+def of(memory: Memory) -> Any:
+    """Return what the program of a servo remembers, to be changed in place."""
+    return memory.firm[0]
+
+
+def next_due(firmware: Firmware, firm: Any, frames: int) -> float:
+    """Return when a tick or a duty comes next, by the times of a memory [s]."""
+    tick: float = firmware.t_phi + (firm.tick - frames) * firmware.T_c
+    change: float = tick - firm.waiting * firmware.T_c + firmware.T_d if firm.waiting > 0 else tick
+    return min(tick, change)
+
+
+def serve(numbers: Numbers, inputs: Inputs, memory: Memory) -> None:
+    """Do all that is due now; what the program remembers changes in place."""
+    firmware, firm, frames, time = inputs.firmware[0], of(memory), memory.frames, memory.point.time
+    latest = time + SAME * firmware.T_c
+    if next_due(firmware, firm, frames) > latest:
+        return
+    _apply(firmware, firm, frames, latest)
+    if firmware.t_phi + (firm.tick - frames) * firmware.T_c > latest:
+        return
+    listen(inputs, memory)
+    firm.duties[firm.head] = control.tick(firmware, firm, _angle(numbers, inputs, memory), _sensed(
+        numbers, firmware, firm, memory.point.y), origin_of(memory) + time - firm.heard)
+    firm.head = (firm.head + 1) % WAITING
+    firm.waiting += 1
+    firm.tick += 1
+    _apply(firmware, firm, frames, latest)
+
+
+def _apply(firmware: Firmware, firm: Any, frames: int, latest: float) -> None:
+    """Put the duties whose time has come on the bridge."""
+    while firm.waiting > 0 and (firmware.t_phi + (firm.tick - firm.waiting - frames) * firmware.T_c
+                                + firmware.T_d <= latest):
+        firm.duty = firm.duties[(firm.head - firm.waiting) % WAITING]
+        firm.waiting -= 1
+
+
+def _angle(numbers: Numbers, inputs: Inputs, memory: Memory) -> float:
+    """Return what the servo measures of its output [rad], before it is counted."""
+    firmware, firm = inputs.firmware[0], of(memory)
+    if firmware.per_volt == 0.0:
+        return memory.point.y[0]
+    v = sensed_voltage(numbers.sensor, inputs.curve, memory.point.wiper) - numbers.sensor.b_o
+    if firmware.noise > 0.0:
+        v += firmware.noise * gaussian(inputs.seed, firm.draws)
+    firm.draws += 1
+    return v * firmware.per_volt
+
+
+def _sensed(numbers: Numbers, firmware: Firmware, firm: Any, y: Vector) -> Sensed:
+    """Return what the program measures besides, under the duty of now."""
+    if not control.senses(firmware):
+        return NOTHING_SENSED
+    numbers = warm(numbers, y)
+    V_bus, i = on_supply(duty.at_duty(numbers, firm.duty), firm.duty, y)
+    cold = numbers.bridge.R_drive - numbers.source.R_b
+    return Sensed(i, V_bus, back_emf(y[6], numbers.motor.K_b), cold, y[4])
+
+
+def on_supply(numbers: Numbers, now: float, y: Vector) -> tuple[float, float]:
+    """Return the voltage of the bus [V], and the current while it flows [A], of numbers at the duty of `now`."""
+    u, w = duty.voltage(numbers.source, now), y[6]
+    zone = currents.zone_of(numbers, u, 0.0, y[0], w, y[2])
+    i = currents.flowing(numbers, zone, u, y[0], w, y[2])
+    V = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)
+    return V / duty.share_of(numbers.bridge, now), i / duty.on_share_of(numbers.bridge, now)
+
+
+def listen(inputs: Inputs, memory: Memory) -> None:
+    """Take the commands that have come by now."""
+    firmware, firm = inputs.firmware[0], of(memory)
+    time = origin_of(memory) + memory.point.time
+    if firmware.goals > 0.0:
+        _read_bus(inputs, firm, time)
+        return
+    slack = SAME * firmware.T_c
+    while True:
+        if firm.falls <= time + slack:
+            _take_pulse(firmware, firm)
+        elif _edge(inputs, firm.frame) <= time + slack:
+            rise(inputs, firm)
+        else:
+            return
+
+
+def _read_bus(inputs: Inputs, firm: Any, time: float) -> None:
+    """Take the goal that stands on the bus, where it is another than the one before."""
+    firmware = inputs.firmware[0]
+    firm.heard = time
+    if firm.known > 0:
+        goal = firm.coming[firm.first]
+        firm.first = (firm.first + 1) % WAITING
+        firm.known -= 1
+    elif time - firmware.latency < inputs.command[0][0] - SAME * firmware.T_c:
+        return
+    else:
+        goal = _written(inputs, time - firmware.latency)
+    if not goal == firm.written:
+        firm.written, firm.tripped = goal, 0
+        control.aim(firmware, firm, goal)
+
+
+def _written(inputs: Inputs, time: float) -> float:
+    """Return the goal [rad] that is written at a time [s]."""
+    firmware = inputs.firmware[0]
+    piece, _ = in_force(inputs.command, 0.0, time + SAME * firmware.T_c, 0.0)
+    return counted(piece_value(piece, time), firmware.quantum)
+
+
+def rise(inputs: Inputs, firm: Any) -> None:
+    """Let the next pulse rise: it has the width that is commanded now."""
+    edge = _edge(inputs, firm.frame)
+    piece, _ = in_force(inputs.command, 0.0, edge + SAME * inputs.firmware[0].T_c, 0.0)
+    firm.width = piece_value(piece, edge)
+    firm.falls = edge + firm.width
+    firm.frame += 1
+
+
+def resume(inputs: Inputs, memory: Memory) -> None:
+    """Find the next tick and pulse of a program that goes on, under commands that may be others than before."""
+    firmware, firm = inputs.firmware[0], of(memory)
+    time = origin_of(memory) + memory.point.time
+    firm.tick = math.ceil((time - firmware.t_phi) / firmware.T_c - SAME)
+    if firmware.goals > 0.0:
+        return
+    if inputs.period > 0.0:
+        firm.frame = math.ceil((time - SAME * firmware.T_c) / inputs.period)
+    else:
+        firm.frame = next_frame(inputs, memory, memory.point.time - SAME * firmware.T_c)
+
+
+def pause(inputs: Inputs, memory: Memory) -> None:
+    """Let what is on its way stay what it is, whatever is commanded from now on: risen pulses, written goals."""
+    firm, time, firmware = of(memory), origin_of(memory) + memory.point.time, inputs.firmware[0]
+    slack = SAME * firmware.T_c
+    if firmware.goals > 0.0:
+        first = firmware.t_phi + firm.tick * firmware.T_c - firmware.latency
+        while inputs.command[0][0] - slack <= first + firm.known * firmware.T_c < time - slack:
+            firm.coming[(firm.first + firm.known) % WAITING] = _written(inputs, first + firm.known * firmware.T_c)
+            firm.known += 1
+        return
+    while _edge(inputs, firm.frame) < time - slack:
+        if firm.falls < math.inf:
+            _take_pulse(firmware, firm)
+        rise(inputs, firm)
+
+
+def _edge(inputs: Inputs, frame: int) -> float:
+    """Return when a pulse rises [s since the start]; inf after the last."""
+    if inputs.period > 0.0:
+        return frame * inputs.period
+    return inputs.edges[frame] if frame < len(inputs.edges) else math.inf
+
+
+def _take_pulse(firmware: Firmware, firm: Any) -> None:
+    """Take the pulse that has fallen as a goal, where it is neither too short nor too long."""
+    if firmware.shortest <= firm.width <= firmware.longest:
+        firm.heard, firm.tripped = firm.falls, 0
+        t = resolved_pulse(firm.width, firmware.resolution)
+        control.aim(firmware, firm, firmware.at_nothing + firmware.per_second * t)
+    firm.falls = math.inf

@@ -1,0 +1,127 @@
+"""What all servos behind a switched bridge share: their states, their potentiometer, commands that come in pulses."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from servotwin import physics
+from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from servotwin.physics.pieces import Pieces
+    from servotwin.signals import Signal
+
+MOTOR = (
+    "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
+    "motor.motor_viscous_friction", "gear.gear_reduction", "friction.coulomb_torque_forward",
+    "friction.coulomb_torque_backward", "supply.open_circuit_voltage",
+)
+"""What no such servo can do without."""
+SHAFT = ("output_angle", "output_speed")
+HIDDEN = ("winding_temperature", "housing_temperature", "motor_angle", "motor_speed")
+"""States, angle and speed first."""
+_HEAT = ("winding_temperature", "housing_temperature")
+
+
+class SwitchedServo(Model):
+    """A servo whose motor hangs behind a switched bridge and which is told by pulses."""
+
+    @property
+    def available(self) -> tuple[str, ...]:
+        """Names of the output signals that can be computed for this servo, `time` apart."""
+        names = super().available
+        return names if self.heats else tuple(name for name in names if name not in _HEAT)
+
+    @property
+    def heats(self) -> bool:
+        """Whether the servo gives what its temperatures depend on."""
+        return self.servo.get("thermal.winding_capacity") is not None
+
+    @property
+    def states(self) -> tuple[Place, ...]:
+        """Which signals are states of this servo, and where the engine keeps them."""
+        N = self.value("gear.gear_reduction")
+        places = [Place("output_angle", 0, 1.0), Place("output_speed", 1, 1.0)]
+        if "armature_current" in self.layout:
+            places.append(Place("armature_current", 2, 1.0))
+        if self.heats:
+            places += [Place("winding_temperature", 3, 1.0), Place("housing_temperature", 4, 1.0)]
+        if self.servo.get("gear.backlash") is not None:
+            places += [Place("motor_angle", 5, N), Place("motor_speed", 6, N)]
+        return tuple(places)
+
+    @property
+    def frame_period(self) -> float:
+        """T_f of a command that does not bring its own [s]; 20 ms unless the servo gives it."""
+        return self.value_or("electronics.frame_period", 0.02)
+
+    def _period(self, signal: Signal | None) -> Any:
+        return self.frame_period if signal is None or signal.frame_period is None else signal.frame_period
+
+    def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return angles [rad] and errors [V] of the potentiometer's linearity table; empty without one."""
+        angles, errors = (self.servo.get(f"potentiometer.linearity_{name}") for name in ("angle", "error"))
+        return (angles, errors) if isinstance(angles, tuple) and isinstance(errors, tuple) else ((), ())
+
+    def edges(self, signal: Signal) -> tuple[float, ...] | None:
+        """Return when the frames of a command start [s]; None where they come regularly."""
+        return None if signal.edges is None else signal.edges[bisect_left(signal.edges, 0.0):]
+
+    def command(self, signal: Signal) -> Pieces:
+        """Return the pulse width t_a [s]: k_p1 v_i + t_0 of a voltage, T_0 + (p q* + b_o)/s_r of an angle.
+
+        Raises
+        ------
+        CommandError
+            If a width is not positive or not shorter than a frame, or an angle outside the travel.
+        """
+        if signal.kind == "voltage":
+            pieces = signal.pieces.scaled(*self._voltage_line())
+        elif signal.kind == "angle":
+            check_travel(signal, self.servo)
+            slope, T_0 = self.value("electronics.one_shot_slope"), self.value_or("electronics.one_shot_offset", 0.0)
+            p, b_o = feedback_line(self)
+            pieces = signal.pieces.scaled(physics.pulse_width_from_feedback(p, slope),
+                                          physics.pulse_width_from_feedback(b_o, slope, T_0))
+        else:
+            pieces = signal.pieces
+        check_widths(signal, pieces, self._period(signal) if signal.edges is None else math.inf)
+        return pieces
+
+    def command_signal(self, name: str, drive: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return `command_voltage`, `command_angle` or `pulse_width` that stand for a pulse width [s]."""
+        if name == "pulse_width":
+            return drive
+        if name == "command_voltage":
+            return np.asarray(solved(self._voltage_line(), drive))
+        return np.asarray(self._angle_of(drive))
+
+    def _voltage_line(self) -> Line:
+        """Return how the pulse width [s] follows a voltage command [V]."""
+        k_p1, t_0 = (self.value("electronics.voltage_to_pulse_gain"),
+                     self.value_or("electronics.command_pulse_offset", 0.0))
+        return physics.pulse_width_from_voltage(1.0, k_p1), physics.pulse_width_from_voltage(0.0, k_p1, t_0)
+
+    def _angle_of(self, pulse_width: Any) -> Any:
+        """Return the angle [rad] at which the one-shot is as long as this pulse."""
+        v_o = physics.control_voltage_from_pulse(
+            pulse_width, self.value("electronics.one_shot_slope"), self.value_or("electronics.one_shot_offset", 0.0))
+        return physics.angle_from_voltage(
+            v_o, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0))
+
+    def start_angle(self, drive: float) -> float:
+        """Return the angle without error, within the stops [rad]."""
+        angles, errors = self.curve()
+        angle = self._angle_of(drive)
+        if angles:
+            p, b_o = self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0)
+            angle = physics.angle_from_sensed_voltage(
+                physics.feedback_voltage(angle, p, b_o), p, b_o, angles, errors)
+        return clipped(angle, self.value_or("stops.lower_angle", -math.inf),
+                       self.value_or("stops.upper_angle", math.inf))

@@ -1,0 +1,271 @@
+"""One tick of a digital servo: measure, follow the profile, compute the law, limit, protect.
+
+What the program remembers is changed in place, in a record of compiled code or in an object with the same names.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, NamedTuple, cast
+
+from servotwin.models.terms import profile, trips
+from servotwin.models.terms.duty import BRAKED, OPEN
+from servotwin.models.terms.firmware import FAILSAFE, HOLD, Firmware
+from servotwin.physics.firmware import (
+    NEARLY,
+    counted,
+    cut,
+    duty_for_bus_current,
+    duty_for_motor_current,
+    duty_of,
+    error_beyond_zone,
+    filtered_angle,
+    integrated_error,
+    started_duty,
+)
+
+WAITING = 16  # duties that may wait, see `parameters.firmware.MOST_WAITING`
+Duties = tuple[float, float, float, float, float, float, float, float, float, float, float, float, float, float, float,
+               float]
+
+
+NOWHERE = math.inf  # where no goal has been given
+
+
+class Firm(NamedTuple):
+    """Everything that a program remembers; angles [rad], times [s], duties [1]."""
+
+    torque: int  # 1: torque is on
+    tick: int  # number of the next tick
+    draws: int  # of noise so far, one a tick
+    waiting: int  # duties that are decided and not yet applied
+    head: int  # where the next one is put
+    duties: Duties
+    duty: float  # of the bridge now, or `OPEN`, `BRAKED`
+    decided: float  # of the latest tick
+    frame: int  # number of the next pulse
+    falls: float  # when the pulse that has risen falls; inf: none has
+    width: float  # of that
+    heard: float  # when the latest command was taken; -inf: none yet
+    coming: Duties  # goals of the next ticks that are written already
+    known: int  # how many of them
+    first: int  # where the next one is
+    written: float  # the latest goal that was written, or `NOWHERE`
+    goal: float  # g, or `NOWHERE`
+    y: float
+    age: int  # ticks since power-up
+    x: float  # of which the derivative is, when it was renewed last
+    y_then: float  # y then
+    resting: int  # 1: y has hardly moved between the two latest times
+    D: float
+    J: float
+    excess: float  # (u − w) + (J − I) of the latest tick
+    r: float
+    rate: float  # of it
+    on_course: int
+    overload_clock: float
+    overload_y: float
+    overload_sign: float
+    overloaded: int
+    current_clock: float
+    tripped: int  # 1: limp by a current, until the next goal
+    hot: int
+    starved: int
+    restart: float  # time until it has started anew
+    soft: float  # since the first goal; −1: none has come
+    trip: int
+
+
+_NONE = cast("Duties", (0.0,) * WAITING)
+AT_START = Firm(
+    torque=1, tick=0, draws=0, waiting=0, head=0, duties=_NONE, duty=0.0, decided=0.0, frame=0, falls=math.inf,
+    width=0.0, heard=-math.inf, coming=_NONE, known=0, first=0, written=NOWHERE, goal=NOWHERE, y=0.0, age=0, x=0.0,
+    y_then=0.0, resting=0, D=0.0, J=0.0, excess=0.0, r=0.0, rate=0.0, on_course=0, overload_clock=trips.OFF,
+    overload_y=0.0, overload_sign=0.0, overloaded=0, current_clock=trips.OFF, tripped=0, hot=0, starved=0, restart=0.0,
+    soft=trips.OFF, trip=trips.NONE)
+
+
+Programs = Sequence[Firm]
+NOT_STARTED: Programs = (AT_START,)
+
+
+def thawed(firm: Firm) -> Any:
+    """Return an object with what a program remembers, to be changed in place."""
+    return SimpleNamespace(**firm._asdict() | {"duties": list(firm.duties), "coming": list(firm.coming)})
+
+
+def frozen(firm: Any) -> Firm:
+    """Return what such an object holds."""
+    return Firm(**vars(firm) | {"duties": tuple(firm.duties), "coming": tuple(firm.coming)})
+
+
+class Sensed(NamedTuple):
+    """What the program measures at a tick, its own angle apart."""
+
+    i: float  # of the motor [A]
+    V_bus: float
+    back_emf: float  # [V]
+    R: float  # R_a + r_c [Ω]
+    T_h: float  # of the housing [K]
+
+
+NOTHING_SENSED = Sensed(0.0, math.inf, 0.0, 1.0, 0.0)
+
+
+def senses(firmware: Firmware) -> bool:
+    """Tell whether a tick needs more than the angle."""
+    return (firmware.I_m < math.inf or firmware.trip_current < math.inf or firmware.trip_temperature < math.inf
+            or firmware.undervoltage > 0.0)
+
+
+def tick(firmware: Firmware, firm: Any, angle: float, sensed: Sensed, silence: float) -> float:
+    """Return the duty on which a tick decides, or `OPEN`, `BRAKED`; `silence` is the time without a command [s]."""
+    if firm.restart > 0.0:
+        firm.restart -= firmware.T_c
+        if firm.restart > NEARLY * firmware.T_c:
+            return OPEN
+        firm.restart = 0.0
+    _measure(firmware, firm, angle)
+    trips.judge_supply(firmware, firm, sensed.V_bus, sensed.T_h)
+    if firm.starved != 0 and firmware.resets > 0.0:
+        _lose_all(firmware, firm)
+        return OPEN
+    firm.trip = trips.HEAT if firm.hot != 0 else trips.UNDERVOLTAGE if firm.starved != 0 else trips.NONE
+    if firm.trip != trips.NONE:
+        firm.goal = firm.y
+        _let_go(firmware, firm)
+        return 0.0
+    trips.judge_current(firmware, firm, sensed.i)
+    lost = silence >= firmware.timeout - NEARLY * firmware.T_c and firm.goal != NOWHERE
+    if lost and firmware.loss == FAILSAFE:
+        aim(firmware, firm, firmware.failsafe)
+    stopped = firm.overloaded != 0 and firmware.overload_output == 0.0
+    limp = firm.goal == NOWHERE or firm.tripped != 0 or stopped or (lost and firmware.loss != HOLD
+                                                                      and firmware.loss != FAILSAFE)
+    if firm.torque == 0 or limp:
+        return _limp(firmware, firm)
+    w = _asked_for(firmware, firm)
+    trips.judge_overload(firmware, firm, w)
+    if firm.overloaded != 0 and firmware.overload_output == 0.0:
+        return _limp(firmware, firm)
+    firm.trip = trips.OVERLOAD if firm.overloaded != 0 else trips.NONE
+    firm.decided = _given(firmware, firm, w, sensed)
+    return float(firm.decided)
+
+
+def aim(firmware: Firmware, firm: Any, goal: float) -> None:
+    """Take a goal [rad]; a new one is off course at first."""
+    goal = min(max(goal, firmware.lower), firmware.upper)
+    if not goal == firm.goal:
+        firm.goal, firm.on_course = goal, 0
+
+
+def _measure(firmware: Firmware, firm: Any, angle: float) -> None:
+    now = counted(angle, firmware.quantum)
+    if firm.age == 0:
+        firm.y = firm.y_then = firm.r = now
+        firm.x = -now if firmware.of_measurement > 0.0 else 0.0
+    elif firmware.weight < 1.0:
+        firm.y = cut(filtered_angle(firm.y, now, firmware.weight), _whole(firmware))
+    else:
+        firm.y = now
+    firm.age += 1
+    if firm.age % int(firmware.m) == 0:
+        firm.resting = 1 if abs(firm.y - firm.y_then) < firmware.rest_travel * (1.0 - NEARLY) else 0
+        firm.y_then = firm.y
+
+
+def _whole(firmware: Firmware) -> float:
+    """Return what angles are cut to: a count, where the program knows no fractions of one."""
+    return firmware.quantum if firmware.whole > 0.0 else 0.0
+
+
+def _asked_for(firmware: Firmware, firm: Any) -> float:
+    """Return the duty w that the law asks for, within its own limit."""
+    rate, delta = firm.rate, firmware.delta
+    profile.follow(firmware, firm)
+    error = cut(firm.r, _whole(firmware)) - firm.y
+    z = error_beyond_zone(error, firmware.h, firmware.gate > 0.0)
+    _renew(firmware, firm, z)
+    u = duty_of(firmware.k_p, z, delta)
+    J = 0.0
+    if firmware.k_i > 0.0:
+        if firmware.at_rest == 0.0 or (firm.resting != 0 and firm.overloaded == 0):
+            firm.J = integrated_error(firm.J, z, firm.excess, firmware.k_i, firmware.kappa, firmware.T_c)
+        J = cut(firm.J, delta)
+    integral = min(max(J, -firmware.I_limit), firmware.I_limit)
+    u += integral + firm.D
+    if firmware.k_v > 0.0:
+        u += duty_of(firmware.k_v, firm.rate, delta)
+    if firmware.k_a > 0.0:
+        u += duty_of(firmware.k_a, (firm.rate - rate) / firmware.T_c, delta)
+    u = started_duty(u, firmware.minimum)
+    w = min(max(u, -firmware.torque_limit), firmware.torque_limit)
+    firm.excess = (u - w) + (J - integral)
+    return w
+
+
+def _renew(firmware: Firmware, firm: Any, z: float) -> None:
+    """Renew the derivative, each so many ticks; between them it is held."""
+    if firmware.k_d == 0.0 or firm.age % int(firmware.m) != 0:
+        return
+    x = -firm.y if firmware.of_measurement > 0.0 else z
+    change = x - firm.x
+    firm.x = x
+    held = abs(change) < firmware.threshold * (1.0 - NEARLY)
+    firm.D = 0.0 if held else duty_of(firmware.k_d / (firmware.m * firmware.T_c), change, firmware.delta)
+
+
+def _given(firmware: Firmware, firm: Any, w: float, sensed: Sensed) -> float:
+    """Return the duty that limits and trips leave of w."""
+    most = firmware.duty_limit
+    if firm.overloaded != 0:
+        most = min(most, firmware.overload_output)
+    if firm.soft < firmware.soft_time - NEARLY * firmware.T_c:
+        most = min(most, firmware.soft_duty)
+        firm.soft = firmware.T_c if firm.soft < 0.0 else firm.soft + firmware.T_c
+    d = min(max(w, -most), most)
+    if firmware.slew < math.inf:
+        change = firmware.slew * firmware.T_c
+        d = min(max(d, firm.decided - change), firm.decided + change)
+    if firmware.I_m < math.inf:
+        low, high = _within_current(firmware, sensed)
+        d = min(max(d, low), high)
+        d = min(max(d, -firmware.duty_limit), firmware.duty_limit)
+    return d
+
+
+def _within_current(firmware: Firmware, sensed: Sensed) -> tuple[float, float]:
+    """Return the duties between which the current stays within its limit."""
+    v_b, R, V, I_m = sensed.back_emf, sensed.R, sensed.V_bus, firmware.I_m
+    if firmware.senses_bus > 0.0:
+        return duty_for_bus_current(I_m, v_b, R, V, -1.0), duty_for_bus_current(I_m, v_b, R, V, 1.0)
+    return duty_for_motor_current(-I_m, v_b, R, V), duty_for_motor_current(I_m, v_b, R, V)
+
+
+def _limp(firmware: Firmware, firm: Any) -> float:
+    """Let go of the shaft; return what the bridge does."""
+    _let_go(firmware, firm)
+    if firm.torque == 0 and firmware.latches == 0.0:
+        firm.overloaded = 0
+    firm.trip = trips.CURRENT if firm.tripped != 0 else trips.OVERLOAD if firm.overloaded != 0 else trips.NONE
+    return BRAKED if firm.torque == 0 and firmware.brakes > 0.0 else OPEN
+
+
+def _let_go(firmware: Firmware, firm: Any) -> None:
+    """Follow the shaft, so that nothing jumps when torque comes back."""
+    firm.r, firm.rate, firm.on_course = firm.y, 0.0, 0
+    firm.J = firm.D = firm.excess = firm.decided = 0.0
+    firm.x = -firm.y if firmware.of_measurement > 0.0 else 0.0
+    trips.ease(firmware, firm)
+
+
+def _lose_all(firmware: Firmware, firm: Any) -> None:
+    """Begin to start anew, as at power-up."""
+    firm.goal = firm.written = NOWHERE
+    firm.age = firm.overloaded = firm.tripped = firm.hot = 0
+    firm.overload_clock = firm.current_clock = firm.soft = trips.OFF
+    _let_go(firmware, firm)
+    firm.age, firm.restart, firm.trip = 0, firmware.restart_time, trips.UNDERVOLTAGE

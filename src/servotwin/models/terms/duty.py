@@ -1,0 +1,91 @@
+"""A bridge under PWM: a servo at a duty is one that is driven by a smaller source, through other drops and resistances.
+
+A mean bridge is an ideal transformer. So at a duty d the plant is that of a servo whose source has d V_oc, d² R_b and
+I_max/d, and everything that holds for a driven bridge holds for it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from servotwin.models.terms.bridge import Bridge, Off
+from servotwin.models.terms.given import Given
+from servotwin.models.terms.motor import Motor
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.source import Source
+from servotwin.physics.pwm import averaged_drop, averaged_resistance, chopped_resistance
+
+READS = (
+    "motor.brush_drop_voltage", "supply.bridge_drop_voltage", "supply.bridge_drop_resistance", "firmware.off_state",
+)
+"""What may be given of a digital servo."""
+
+BRAKE, DIODE, COAST = 1.0, 2.0, 3.0  # what the bridge does in the pauses of its PWM
+OPEN, BRAKED = 2.0, 3.0  # stand in the place of a duty: torque is off
+_STATES = {None: BRAKE, "brake": BRAKE, "diode": DIODE, "coast": COAST}
+
+
+def present(bridge: Bridge) -> bool:
+    """Tell whether the bridge is switched many times a tick, by a duty."""
+    return bridge.pwm > 0.0
+
+
+def drives(duty: float) -> bool:
+    """Tell whether the motor is driven at all: the duty is one, and not 0."""
+    return duty != 0.0 and abs(duty) <= 1.0
+
+
+def voltage(source: Source, duty: float) -> float:
+    """Return the voltage [V] behind the bridge of numbers at a duty."""
+    return math.copysign(source.V, duty) if drives(duty) else 0.0
+
+
+def at_duty(numbers: Numbers, duty: float) -> Numbers:
+    """Return the numbers of a servo whose bridge has this duty, or is `OPEN` or `BRAKED`."""
+    path, motor, source = numbers.bridge, numbers.motor, numbers.source
+    if not drives(duty):
+        brakes = Off(path.V_br, motor.R, 0.0)
+        off = path.off if duty == 0.0 else brakes if duty == BRAKED else path.silence
+        resting = Bridge(path.D_drive, path.R_drive, off, path.silence, path.V_br, path.pwm, 0.0)
+        return Numbers(motor, resting, source, numbers.follower, numbers.shaft, numbers.friction, numbers.load,
+                       numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+    d, R_b = abs(duty), source.R_b
+    V_ce0, r_c = path.D_drive - path.V_br, path.R_drive - motor.R - R_b
+    one_way = 0.0 if path.pwm == BRAKE else 1.0
+    if path.pwm == COAST:
+        chopped = chopped_resistance(d, motor.R, r_c)
+        bridge = Bridge(path.D_drive, chopped + R_b, path.off, path.silence, path.V_br, path.pwm, one_way)
+        own, supply = Motor(motor.K, motor.K_b, motor.R / d, motor.L), source
+    else:
+        bridge = Bridge(averaged_drop(d, V_ce0, path.V_br), averaged_resistance(d, motor.R, r_c, R_b), path.off,
+                        path.silence, path.V_br, path.pwm, one_way)
+        own, supply = motor, Source(d * source.V, d * d * R_b, source.I_max / d)
+    return Numbers(own, bridge, supply, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops,
+                   numbers.play, numbers.sensor, numbers.heat)
+
+
+def share_of(bridge: Bridge, duty: float) -> float:
+    """Return how much of the source's voltage, and of the motor's current at the source, there is at a duty."""
+    return abs(duty) if drives(duty) and bridge.pwm != COAST else 1.0
+
+
+def on_share_of(bridge: Bridge, duty: float) -> float:
+    """Return for which part of the time the motor's current flows at all."""
+    return abs(duty) if drives(duty) and bridge.pwm == COAST else 1.0
+
+
+def pack(model: Given) -> Bridge:
+    """Return the numbers of a digital servo's bridge, as at full duty."""
+    state = model.servo.get("firmware.off_state")
+    kind = np.vectorize(_STATES.get, otypes=[float])(state) if isinstance(state, np.ndarray) else _STATES[state]
+    R_a, R_b = model.value("motor.armature_resistance"), model.value_or("supply.internal_resistance", 0.0)
+    r_c, V_ce0 = (model.value_or(f"supply.bridge_drop_{name}", 0.0) for name in ("resistance", "voltage"))
+    V_oc, V_br = model.value("supply.open_circuit_voltage"), model.value_or("motor.brush_drop_voltage", 0.0)
+    battery: Any = np.all(np.isinf(model.value_or("supply.current_limit", math.inf)))
+    brakes = kind == BRAKE
+    opened = Off(V_br + V_oc + V_ce0, R_a + (R_b if battery else 0.0), 1.0)
+    off = Off(V_br + (1.0 - brakes) * (V_oc + V_ce0), R_a + (1.0 - brakes) * (R_b if battery else 0.0), 1.0 - brakes)
+    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, opened, V_br, kind, 0.0)
