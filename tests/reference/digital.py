@@ -55,8 +55,8 @@ class _Run:
     def __init__(self, values: Values, command: Mapping[str, Any], load: Mapping[str, Any], seed: int,
                  initial_angle: float) -> None:
         self.f, self.pot = values["firmware"], values.get("potentiometer", {})
-        self.T_c, self.phase = self.f["control_period"], self.f.get("control_phase", 0.0)
-        self.delay, self.slack = self.f.get("compute_delay", 0.0), SAME * self.f["control_period"]
+        self.T_c, self.phase = float(self.f["control_period"]), float(self.f.get("control_phase", 0.0))
+        self.delay, self.slack = float(self.f.get("compute_delay", 0.0)), SAME * self.T_c
         self.firmware = Firmware(values, Commands(values, command, self.slack), seed)
         self.shaft = Shaft(make_plant(values, load), initial_angle, Bridge(self.f.get("off_state", "brake")),
                            play=self.pot.get("backlash", 0.0))
@@ -103,7 +103,7 @@ class _Run:
         x, error = self.shaft.wiper, 0.0
         if self.pot.get("linearity_angle"):
             error = float(np.interp(x, self.pot["linearity_angle"], self.pot["linearity_error"]))
-        return x + error / self.pot["feedback_gain"]
+        return x + error / float(self.pot["feedback_gain"])
 
     def sample(self) -> tuple[float, ...]:
         shaft = self.shaft
@@ -111,7 +111,7 @@ class _Run:
 
 
 def run(values: Values, command: Mapping[str, Any], load: Mapping[str, Any], duration: float,
-        times: Sequence[float] | Array, seed: int = 0, initial_angle: float | None = None) -> Trace:
+        times: Sequence[float] | NDArray[np.floating[Any]], seed: int = 0, initial_angle: float | None = None) -> Trace:
     """Motion of a digital servo that rests at an angle at t = 0.
 
     Parameters

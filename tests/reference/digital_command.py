@@ -28,7 +28,7 @@ class Commands:
 
     def __init__(self, values: Mapping[str, Mapping[str, Any]], command: Mapping[str, Any], slack: float) -> None:
         firmware = values["firmware"]
-        self.low, self.high = firmware.get("lower_goal", -math.inf), firmware.get("upper_goal", math.inf)
+        self.low, self.high = float(firmware.get("lower_goal", -math.inf)), float(firmware.get("upper_goal", math.inf))
         self.quantum, self.slack = firmware.get("angle_quantum"), slack
         self.latency = firmware.get("bus_latency", 0.0)
         self.waiting: list[Arrival] = []

@@ -74,7 +74,7 @@ class Firmware:
         chip, pot = values.get("electronics", {}), values.get("potentiometer", {})
         self.T_c, self.commands = f["control_period"], commands
         self.whole, self.quantum = f.get("whole_counts") == "yes", f.get("angle_quantum")
-        self.unit = self.quantum if self.whole else 1.0
+        self.unit = float(self.quantum) if self.whole and self.quantum else 1.0
         self.tie = WHOLE if self.whole else WHOLE * (self.quantum or 1e-3)
         h = f.get("deadband_angle")
         if h is None:
@@ -255,7 +255,7 @@ class Firmware:
 
     def _within(self, d: float, sensed: Sensed) -> float:
         """The duty whose current is within the limit at this very instant."""
-        E, V, R, I_m = sensed.back_emf * sensed.speed, sensed.bus, sensed.resistance, self.f["current_limit"]
+        E, V, R, I_m = sensed.back_emf * sensed.speed, sensed.bus, sensed.resistance, float(self.f["current_limit"])
         if self.f.get("current_sense") == "bus":
             root = math.sqrt(E * E + 4.0 * V * R * I_m)
             return min(max(d, 0.5 * (E - root) / V), 0.5 * (E + root) / V)

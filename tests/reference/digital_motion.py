@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -250,7 +251,7 @@ class Shaft:
         t = self.t
         solver = _solver(rates, t, y, until)
         while solver.status == "running":
-            solver.step()
+            _step(solver)
             dense, checks = solver.dense_output(), [float(x) for x in np.linspace(t, solver.t, 9)]
             for bracket in pairwise(checks):
                 below = [k for k, x in enumerate(self._guards(side, bracket[1], dense(bracket[1]))) if x < -1e-15]
@@ -284,12 +285,19 @@ class Shaft:
         return root, _run(rates, t, y, root) if root > t else y
 
 
-def _solver(rates: Callable[[float, Array], Array], t: float, y: Array, until: float) -> DOP853:
-    return DOP853(rates, t, y, until, rtol=1e-13, atol=1e-14, first_step=min(until - t, 2e-4))
+def _solver(rates: Callable[[float, Array], Array], t: float, y: Array, until: float) -> Any:
+    scipy_solver: Any = DOP853
+    return scipy_solver(rates, t, y, until, rtol=1e-13, atol=1e-14, first_step=min(until - t, 2e-4))
 
 
 def _run(rates: Callable[[float, Array], Array], t: float, y: Array, until: float) -> Array:
     solver = _solver(rates, t, y, until)
     while solver.status == "running":
-        solver.step()
+        _step(solver)
     return np.asarray(solver.y)
+
+
+def _step(solver: Any) -> None:
+    message = solver.step()
+    if solver.status == "failed":
+        raise RuntimeError(f"at {solver.t} s: {message}")

@@ -11,9 +11,10 @@ class Profile:
     """r and its speed, in units of angle and units per second."""
 
     def __init__(self, f: Mapping[str, Any], unit: float, tie: float) -> None:
-        self.T_c, self.tie = f["control_period"], tie
-        self.v, self.a = (f.get(name, math.inf) / unit for name in ("speed_limit", "acceleration_limit"))
-        self.v_0 = f.get("minimum_speed", 0.0) / unit
+        self.T_c, self.tie = float(f["control_period"]), tie
+        self.v = float(f.get("speed_limit", math.inf)) / unit
+        self.a = float(f.get("acceleration_limit", math.inf)) / unit
+        self.v_0 = float(f.get("minimum_speed", 0.0)) / unit
         self.present = math.isfinite(self.v) or math.isfinite(self.a)
         self.r = self.speed = 0.0
         self.on_course = True

@@ -22,7 +22,7 @@ PLAIN = {"control_period": T_C, "command_kind": "goal", "proportional_gain": 1.0
 LOCKED = 1e3  # N m at the motor: no shaft of these turns
 
 
-def servo(firmware: dict[str, Any], friction: float = LOCKED, **groups: dict[str, Any]) -> dict[str, dict[str, Any]]:
+def servo(firmware: dict[str, Any], friction: float = LOCKED, **groups: Any) -> dict[str, dict[str, Any]]:
     values: dict[str, dict[str, Any]] = {
         "motor": {"armature_resistance": 3.0, "torque_constant": 4e-3, "back_emf_constant": 4e-3,
                   "rotor_inertia": 8e-8},
@@ -36,7 +36,7 @@ def goals(*pieces: tuple[float, ...]) -> dict[str, Any]:
     return {"kind": "goal", "pieces": [(*piece, 0.0)[:3] for piece in pieces]}
 
 
-def locked(firmware: dict[str, Any], duration: float, *pieces: tuple[float, ...], **groups: dict[str, Any]) -> Trace:
+def locked(firmware: dict[str, Any], duration: float, *pieces: tuple[float, ...], **groups: Any) -> Trace:
     return run(servo(firmware, **groups), goals(*pieces), {"inertia": 1e-3}, duration, [duration])
 
 
@@ -179,6 +179,44 @@ def test_pulses_are_measured_in_steps_and_used_from_their_falling_edge() -> None
     command = {"kind": "pulse", "edges": [0.0, 0.01, 0.02], "widths": [1.638e-3, 2.5e-3, 1.412e-3]}
     trace = run(values, command, {"inertia": 1e-3}, 0.03, [0.03])
     assert trace.duty[[1, 2, 21, 22]] == pytest.approx([math.nan, 0.26, 0.26, -0.18], nan_ok=True)
+
+
+LOSSES = {"bridge_drop_voltage": 0.3, "bridge_drop_resistance": 0.2, "internal_resistance": 0.5}
+
+
+@pytest.mark.parametrize(("off_state", "supply", "current", "bus"), [
+    ("brake", LOSSES, (0.4 * 12.0 - 0.4 * 0.3 - 0.25) / (3.0 + 0.4 * 0.2 + 0.16 * 0.5), "0.4"),
+    ("diode", LOSSES, (0.4 * 12.0 - 0.4 * 0.3 - 0.25) / (3.0 + 0.4 * 0.2 + 0.16 * 0.5), "0.4"),
+    ("coast", LOSSES, (12.0 - 0.3 - 0.25) / (3.0 + 0.2 + 0.4 * 0.5), "0.4"),
+    ("brake", LOSSES | {"current_limit": 0.3}, 0.3 / 0.4, "limit"),
+    ("coast", LOSSES | {"current_limit": 0.3}, 0.3 / 0.4, "limit"),
+])
+@pytest.mark.parametrize("side", [1, -1])
+def test_current_and_bus_of_a_locked_shaft(off_state: str, supply: dict[str, float], current: float, bus: str,
+                                           side: int) -> None:
+    trace = run(servo(PLAIN | {"off_state": off_state}, supply=supply, motor={"brush_drop_voltage": 0.25}),
+                goals((0.0, 0.4 * side)), {"inertia": 1e-3}, 5e-3, [5e-3])
+    slow = off_state == "coast"
+    at_winding = (3.0 + (1.0 if slow else 0.4) * 0.2) * current + 0.25
+    voltage = (at_winding if slow else at_winding / 0.4) + 0.3 if bus == "limit" else 12.0 - 0.5 * 0.4 * current
+    assert trace.current[0] == pytest.approx(side * current, rel=1e-12)
+    assert trace.bus_voltage[0] == pytest.approx(voltage, rel=1e-12)
+
+
+@pytest.mark.parametrize(("friction", "most"), [
+    ({}, 0.1), ({"breakaway_ratio": 1.5}, 0.15), ({"load_friction": 0.2}, 0.1 / 0.8),
+    ({"load_friction_motor": 0.5, "load_friction_external": 0.2}, 0.1 / 0.8),
+    ({"breakaway_ratio": 1.5, "stribeck_speed": 5.0, "load_friction": 0.2, "load_friction_stribeck": 0.1}, 0.15 / 0.7),
+])
+@pytest.mark.parametrize("side", [1, -1])
+def test_an_unpowered_shaft_starts_where_friction_ends(friction: dict[str, float], most: float, side: int) -> None:
+    values = servo(PLAIN | {"off_state": "diode"}, friction=0.1 / 250.0)
+    values["friction"] |= friction
+    for share, moves in ((0.9999, False), (1.0001, True)):
+        load = {"inertia": 1e-3, "torque": side * share * most}
+        trace = run(values, goals((1.0, 0.0)), load, 0.05, [0.05])
+        assert (trace.output_angle[0] * side < 0.0) == moves
+        assert (trace.output_angle[0] == 0.0) != moves
 
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
