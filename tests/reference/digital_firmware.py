@@ -110,13 +110,15 @@ class Firmware:
             self._forget_commands(t)
         M.number += 1
         new = self._commands(t)
+        if M.goal is not None and M.first_goal is None:
+            M.first_goal = M.number
         travel = self._measure(sensed.angle)
         if self.trips.stopped:
             M.goal = M.y
             self.profile.rest(M.y)
         limp = self._silent(t, new) or M.goal is None or not torque or self.trips.limp
         w = 0.0 if limp else self._loop(travel, new)
-        self.trips.judge(M.number, w, M.y, sensed, torque, self.T_c)
+        self.trips.judge(M.number, w, M.y, sensed, torque, limp, self.T_c)
         if self.trips.reset:
             self.dead_until = t + f.get("restart_time", 0.0)
             self._power_up()
@@ -149,11 +151,11 @@ class Firmware:
         """Take what has arrived."""
         M, arrived = self.mem, self.commands.until(t)
         if arrived:
+            before = M.goal
             M.last, M.goal, M.lost = arrived[-1].time, arrived[-1].goal / self.unit, False
             self.trips.command()
-        if M.goal is not None and M.first_goal is None:
-            M.first_goal = M.number
-        return bool(arrived)
+            return M.goal != before
+        return False
 
     def _silent(self, t: float, new: bool) -> bool:
         """Whether it is limp for want of a command; failsafe sets its goal."""
@@ -189,8 +191,7 @@ class Firmware:
     def _go_limp(self) -> None:
         M = self.mem
         M.J = M.held = M.beyond = 0.0
-        del M.history[M.number:]
-        M.history.append(-M.y if self.f.get("derivative_of") == "measurement" else 0.0)
+        M.history = [-M.y if self.f.get("derivative_of") == "measurement" else 0.0] * (M.number + 1)
         self.profile.rest(M.y)
 
     # Steps 2 to 5 --------------------------------------------------------------------------------------------------

@@ -66,10 +66,10 @@ class Trips:
         if self.current:
             self.current, self.flowing = False, None
 
-    def judge(self, n: int, w: float, y: float, seen: Seen, torque: bool, T_c: float) -> None:
+    def judge(self, n: int, w: float, y: float, seen: Seen, torque: bool, limp: bool, T_c: float) -> None:
         """Look at all four at tick number n, after w."""
         if "overload_time" in self.f and "overload_duty" in self.f:
-            self._overload(n, w, y, torque, T_c)
+            self._overload(n, w, y, torque, limp, T_c)
         self._current(n, abs(seen.current), T_c)
         hottest = self.f.get("trip_temperature")
         if hottest is not None:
@@ -80,13 +80,13 @@ class Trips:
             self.reset = below and self.f.get("undervoltage_action") == "reset"
             self.low = below and not self.reset
 
-    def _overload(self, n: int, w: float, y: float, torque: bool, T_c: float) -> None:
+    def _overload(self, n: int, w: float, y: float, torque: bool, limp: bool, T_c: float) -> None:
         if self.overload:
             eased = w * self.side < self.output - EVEN or not torque
             if not eased or self.f.get("overload_latches") == "yes":
                 return
             self.overload, self.clock = False, None
-        if self.clock is not None and w * self.clock.side < self.output - EVEN:
+        if self.clock is not None and (limp or w * self.clock.side < self.output - EVEN):
             self.clock = None
         moved = self.clock is not None and abs(y - self.clock.y) > self.travel + self.tie
         if moved or (self.clock is None and abs(w) > self.f["overload_duty"] + EVEN):

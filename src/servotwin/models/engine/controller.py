@@ -112,25 +112,32 @@ def listen(inputs: Inputs, memory: Memory) -> None:
 def _read_bus(inputs: Inputs, firm: Any, time: float) -> None:
     """Take the goal that stands on the bus, where it is another than the one before."""
     firmware = inputs.firmware[0]
-    firm.heard = time
+    written = time - firmware.latency
     if firm.known > 0:
         goal = firm.coming[firm.first]
         firm.first = (firm.first + 1) % WAITING
         firm.known -= 1
-    elif time - firmware.latency < inputs.command[0][0] - SAME * firmware.T_c:
+    elif written < inputs.command[0][0] - SAME * firmware.T_c:
         return
     else:
-        goal = _written(inputs, time - firmware.latency)
+        goal = _goal(inputs, written)
     if not goal == firm.written:
-        firm.written, firm.tripped = goal, 0
+        firm.written, firm.heard, firm.tripped = goal, _since(inputs, written) + firmware.latency, 0
         control.aim(firmware, firm, goal)
 
 
-def _written(inputs: Inputs, time: float) -> float:
+def _goal(inputs: Inputs, time: float) -> float:
     """Return the goal [rad] that is written at a time [s]."""
     firmware = inputs.firmware[0]
     piece, _ = in_force(inputs.command, 0.0, time + SAME * firmware.T_c, 0.0)
     return counted(piece_value(piece, time), firmware.quantum)
+
+
+def _since(inputs: Inputs, time: float) -> float:
+    """Return when what stands on the bus at a time [s] was written: once, or over and over where it changes."""
+    piece, _ = in_force(inputs.command, 0.0, time + SAME * inputs.firmware[0].T_c, 0.0)
+    still = piece.slope == 0.0 and piece.amplitude == 0.0
+    return max(piece.start, 0.0) if still else time
 
 
 def rise(inputs: Inputs, firm: Any) -> None:
@@ -146,7 +153,7 @@ def resume(inputs: Inputs, memory: Memory) -> None:
     """Find the next tick and pulse of a program that goes on, under commands that may be others than before."""
     firmware, firm = inputs.firmware[0], of(memory)
     time = origin_of(memory) + memory.point.time
-    firm.tick = math.ceil((time - firmware.t_phi) / firmware.T_c - SAME)
+    firm.tick = max(0, math.ceil((time - firmware.t_phi) / firmware.T_c - SAME))
     if firmware.goals > 0.0:
         return
     if inputs.period > 0.0:
@@ -162,7 +169,7 @@ def pause(inputs: Inputs, memory: Memory) -> None:
     if firmware.goals > 0.0:
         first = firmware.t_phi + firm.tick * firmware.T_c - firmware.latency
         while inputs.command[0][0] - slack <= first + firm.known * firmware.T_c < time - slack:
-            firm.coming[(firm.first + firm.known) % WAITING] = _written(inputs, first + firm.known * firmware.T_c)
+            firm.coming[(firm.first + firm.known) % WAITING] = _goal(inputs, first + firm.known * firmware.T_c)
             firm.known += 1
         return
     while _edge(inputs, firm.frame) < time - slack:

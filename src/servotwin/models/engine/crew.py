@@ -32,7 +32,7 @@ from servotwin.models.engine.seats import (
 )
 from servotwin.models.terms import frame
 from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.control import NOT_STARTED
+from servotwin.models.terms.control import ABSENT
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
@@ -67,7 +67,7 @@ def memory_now(seat: Any) -> Memory:
     decided = decided_of(seat.decided)
     u = Piece(0.0, decided.drive * seat.numbers.source.V, 0.0, 0.0, 0.0, 0.0, 0.0)
     return Memory(seat.frames, seat.beat, point_of(seat.point), decided, u, math.inf, piece_of(seat.tau), seat.tau_end,
-                  NOT_STARTED)
+                  ABSENT)
 
 
 def is_known(arrival: float) -> bool:

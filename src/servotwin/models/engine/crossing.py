@@ -8,7 +8,7 @@ from typing import NamedTuple
 from servotwin.models.engine.memory import BEAT, NOTHING, SAME, Memory, Point
 from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, RIGID, Mode
 from servotwin.models.engine.records import reader, writer
-from servotwin.models.terms.control import NOT_STARTED
+from servotwin.models.terms.control import ABSENT
 from servotwin.models.terms.frame import Decision, Frame
 
 
@@ -91,7 +91,7 @@ def remembered(side: Side, regular: bool, half_slack: float) -> Memory:
     wiper = 1.0 * held.wiper if half_slack > 0.0 else q
     point = Point(now, y, Mode(0, 0, mesh, 0, 0), math.inf, y, 1.0 * held.step, wiper)
     return Memory(number if regular else 0, hour.period if regular else BEAT, point, chip, NOTHING, math.inf, NOTHING,
-                  math.inf, NOT_STARTED)
+                  math.inf, ABSENT)
 
 
 def side_of(memory: Memory, period: float) -> Side:

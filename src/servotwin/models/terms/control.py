@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, cast
 
 from servotwin.models.terms import profile, trips
 from servotwin.models.terms.duty import BRAKED, OPEN
-from servotwin.models.terms.firmware import FAILSAFE, HOLD, Firmware
+from servotwin.models.terms.firmware import FAILSAFE, LIMP, Firmware
 from servotwin.physics.firmware import (
     NEARLY,
     counted,
@@ -70,6 +70,7 @@ class Firm(NamedTuple):
     overload_sign: float
     overloaded: int
     current_clock: float
+    lost: int  # 1: without a command for too long
     tripped: int  # 1: limp by a current, until the next goal
     hot: int
     starved: int
@@ -83,12 +84,13 @@ AT_START = Firm(
     torque=1, tick=0, draws=0, waiting=0, head=0, duties=_NONE, duty=0.0, decided=0.0, frame=0, falls=math.inf,
     width=0.0, heard=-math.inf, coming=_NONE, known=0, first=0, written=NOWHERE, goal=NOWHERE, y=0.0, age=0, x=0.0,
     y_then=0.0, resting=0, D=0.0, J=0.0, excess=0.0, r=0.0, rate=0.0, on_course=0, overload_clock=trips.OFF,
-    overload_y=0.0, overload_sign=0.0, overloaded=0, current_clock=trips.OFF, tripped=0, hot=0, starved=0, restart=0.0,
-    soft=trips.OFF, trip=trips.NONE)
+    overload_y=0.0, overload_sign=0.0, overloaded=0, current_clock=trips.OFF, lost=0, tripped=0, hot=0, starved=0,
+    restart=0.0, soft=trips.OFF, trip=trips.NONE)
 
 
 Programs = Sequence[Firm]
 NOT_STARTED: Programs = (AT_START,)
+ABSENT: Any = 0  # in its place where there is no program
 
 
 def thawed(firm: Firm) -> Any:
@@ -122,37 +124,63 @@ def senses(firmware: Firmware) -> bool:
 
 def tick(firmware: Firmware, firm: Any, angle: float, sensed: Sensed, silence: float) -> float:
     """Return the duty on which a tick decides, or `OPEN`, `BRAKED`; `silence` is the time without a command [s]."""
-    if firm.restart > 0.0:
-        firm.restart -= firmware.T_c
-        if firm.restart > NEARLY * firmware.T_c:
-            return OPEN
-        firm.restart = 0.0
+    if firm.restart > 0.0 and not _has_started(firmware, firm, silence):
+        return OPEN
     _measure(firmware, firm, angle)
-    trips.judge_supply(firmware, firm, sensed.V_bus, sensed.T_h)
+    limp = firm.torque == 0 or _loses(firmware, firm, silence)
+    if firm.goal == NOWHERE or _is_limp(firmware, firm):
+        limp = True
+    else:
+        firm.soft = firm.soft + firmware.T_c if firm.soft >= 0.0 else 0.0
+    if trips.stop(firm):
+        _stay(firm)
+    w = 0.0 if limp else _asked_for(firmware, firm)
+    trips.judge(firmware, firm, w, limp, sensed.i, sensed.V_bus, sensed.T_h)
+    firm.trip = trips.acting(firm)
     if firm.starved != 0 and firmware.resets > 0.0:
         _lose_all(firmware, firm)
         return OPEN
-    firm.trip = trips.HEAT if firm.hot != 0 else trips.UNDERVOLTAGE if firm.starved != 0 else trips.NONE
-    if firm.trip != trips.NONE:
-        firm.goal = firm.y
+    if trips.stop(firm):
+        _stay(firm)
+    if limp or _is_limp(firmware, firm):
         _let_go(firmware, firm)
-        return 0.0
-    trips.judge_current(firmware, firm, sensed.i)
-    lost = silence >= firmware.timeout - NEARLY * firmware.T_c and firm.goal != NOWHERE
-    if lost and firmware.loss == FAILSAFE:
-        aim(firmware, firm, firmware.failsafe)
-    stopped = firm.overloaded != 0 and firmware.overload_output == 0.0
-    limp = firm.goal == NOWHERE or firm.tripped != 0 or stopped or (lost and firmware.loss != HOLD
-                                                                      and firmware.loss != FAILSAFE)
-    if firm.torque == 0 or limp:
-        return _limp(firmware, firm)
-    w = _asked_for(firmware, firm)
-    trips.judge_overload(firmware, firm, w)
-    if firm.overloaded != 0 and firmware.overload_output == 0.0:
-        return _limp(firmware, firm)
-    firm.trip = trips.OVERLOAD if firm.overloaded != 0 else trips.NONE
+        return BRAKED if firm.torque == 0 and firmware.brakes > 0.0 else OPEN
     firm.decided = _given(firmware, firm, w, sensed)
     return float(firm.decided)
+
+
+def _has_started(firmware: Firmware, firm: Any, silence: float) -> bool:
+    """Tell whether a program that starts anew is ready by now; what it was told before is lost."""
+    slack = NEARLY * firmware.T_c
+    if firm.restart > firmware.T_c + slack or silence > firmware.T_c - firm.restart + slack:
+        firm.goal = NOWHERE
+    firm.restart -= firmware.T_c
+    if firm.restart > slack:
+        return False
+    firm.restart, firm.trip = 0.0, trips.NONE
+    return True
+
+
+def _loses(firmware: Firmware, firm: Any, silence: float) -> bool:
+    """Tell whether it is limp for want of a command; or go to the angle that it has for that case."""
+    if firm.goal == NOWHERE or silence < firmware.timeout - NEARLY * firmware.T_c:
+        firm.lost = 0
+        return False
+    if firmware.loss == FAILSAFE and firm.lost == 0:
+        aim(firmware, firm, firmware.failsafe)
+    firm.lost = 1
+    return firmware.loss == LIMP
+
+
+def _is_limp(firmware: Firmware, firm: Any) -> bool:
+    """Tell whether a protection leaves no torque at all."""
+    return bool(firm.tripped != 0 or (firm.overloaded != 0 and firmware.overload_output == 0.0))
+
+
+def _stay(firm: Any) -> None:
+    """Be told to stay where the shaft is."""
+    firm.goal = firm.r = firm.y
+    firm.rate, firm.on_course = 0.0, 0
 
 
 def aim(firmware: Firmware, firm: Any, goal: float) -> None:
@@ -185,14 +213,15 @@ def _whole(firmware: Firmware) -> float:
 def _asked_for(firmware: Firmware, firm: Any) -> float:
     """Return the duty w that the law asks for, within its own limit."""
     rate, delta = firm.rate, firmware.delta
-    profile.follow(firmware, firm)
+    if not trips.stop(firm):
+        profile.follow(firmware, firm)
     error = cut(firm.r, _whole(firmware)) - firm.y
-    z = error_beyond_zone(error, firmware.h, firmware.gate > 0.0)
+    z = error_beyond_zone(error, cut(firmware.h, _whole(firmware)), firmware.gate > 0.0)
     _renew(firmware, firm, z)
     u = duty_of(firmware.k_p, z, delta)
     J = 0.0
     if firmware.k_i > 0.0:
-        if firmware.at_rest == 0.0 or (firm.resting != 0 and firm.overloaded == 0):
+        if firmware.at_rest == 0.0 or (firm.resting != 0 and trips.acting(firm) == trips.NONE):
             firm.J = integrated_error(firm.J, z, firm.excess, firmware.k_i, firmware.kappa, firmware.T_c)
         J = cut(firm.J, delta)
     integral = min(max(J, -firmware.I_limit), firmware.I_limit)
@@ -220,17 +249,14 @@ def _renew(firmware: Firmware, firm: Any, z: float) -> None:
 
 def _given(firmware: Firmware, firm: Any, w: float, sensed: Sensed) -> float:
     """Return the duty that limits and trips leave of w."""
-    most = firmware.duty_limit
-    if firm.overloaded != 0:
-        most = min(most, firmware.overload_output)
+    most = min(firmware.duty_limit, trips.allowed(firmware, firm))
     if firm.soft < firmware.soft_time - NEARLY * firmware.T_c:
         most = min(most, firmware.soft_duty)
-        firm.soft = firmware.T_c if firm.soft < 0.0 else firm.soft + firmware.T_c
     d = min(max(w, -most), most)
     if firmware.slew < math.inf:
         change = firmware.slew * firmware.T_c
         d = min(max(d, firm.decided - change), firm.decided + change)
-    if firmware.I_m < math.inf:
+    if firmware.I_m < math.inf and sensed.V_bus > 0.0:
         low, high = _within_current(firmware, sensed)
         d = min(max(d, low), high)
         d = min(max(d, -firmware.duty_limit), firmware.duty_limit)
@@ -245,27 +271,17 @@ def _within_current(firmware: Firmware, sensed: Sensed) -> tuple[float, float]:
     return duty_for_motor_current(-I_m, v_b, R, V), duty_for_motor_current(I_m, v_b, R, V)
 
 
-def _limp(firmware: Firmware, firm: Any) -> float:
-    """Let go of the shaft; return what the bridge does."""
-    _let_go(firmware, firm)
-    if firm.torque == 0 and firmware.latches == 0.0:
-        firm.overloaded = 0
-    firm.trip = trips.CURRENT if firm.tripped != 0 else trips.OVERLOAD if firm.overloaded != 0 else trips.NONE
-    return BRAKED if firm.torque == 0 and firmware.brakes > 0.0 else OPEN
-
-
 def _let_go(firmware: Firmware, firm: Any) -> None:
     """Follow the shaft, so that nothing jumps when torque comes back."""
     firm.r, firm.rate, firm.on_course = firm.y, 0.0, 0
     firm.J = firm.D = firm.excess = firm.decided = 0.0
     firm.x = -firm.y if firmware.of_measurement > 0.0 else 0.0
-    trips.ease(firmware, firm)
 
 
 def _lose_all(firmware: Firmware, firm: Any) -> None:
     """Begin to start anew, as at power-up."""
     firm.goal = firm.written = NOWHERE
-    firm.age = firm.overloaded = firm.tripped = firm.hot = 0
+    firm.overloaded = firm.tripped = firm.hot = firm.starved = 0
     firm.overload_clock = firm.current_clock = firm.soft = trips.OFF
     _let_go(firmware, firm)
     firm.age, firm.restart, firm.trip = 0, firmware.restart_time, trips.UNDERVOLTAGE

@@ -26,7 +26,7 @@ def follow(firmware: Firmware, firm: Any) -> None:
     if firm.on_course == 0 and way * firm.rate >= 0.0 and S <= abs(rest) * (1.0 + NEARLY):
         firm.on_course = 1
     if firm.on_course == 0:  # it brakes, goes too far, and comes back
-        speed = speed - change if speed > firmware.v_0 and speed > change else 0.0
+        speed = speed - change if speed - change > firmware.v_0 + NEARLY * change else 0.0
         firm.rate = math.copysign(speed, firm.rate)
         firm.r += firm.rate * T_c
         return
