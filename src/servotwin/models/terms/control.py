@@ -127,11 +127,9 @@ def tick(firmware: Firmware, firm: Any, angle: float, sensed: Sensed, silence: f
     if firm.restart > 0.0 and not _has_started(firmware, firm, silence):
         return OPEN
     _measure(firmware, firm, angle)
-    limp = firm.torque == 0 or _loses(firmware, firm, silence)
-    if firm.goal == NOWHERE or _is_limp(firmware, firm):
-        limp = True
-    else:
+    if firm.goal != NOWHERE:
         firm.soft = firm.soft + firmware.T_c if firm.soft >= 0.0 else 0.0
+    limp = _loses(firmware, firm, silence) or firm.torque == 0 or firm.goal == NOWHERE or _is_limp(firmware, firm)
     if trips.stop(firm):
         _stay(firm)
     w = 0.0 if limp else _asked_for(firmware, firm)
