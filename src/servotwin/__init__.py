@@ -16,8 +16,8 @@ _LAZY = {
     **dict.fromkeys(("Servo", "catalog_names", "load_dataset", "load_servo", "servo_from_values",
                      "Supply"), "parameters"),
     **dict.fromkeys(
-        ("AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "GearedMotor", "PulseServo",
-         "PulseServoInductive"), "models"),
+        ("AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "DigitalServo", "GearedMotor",
+         "PulseServo", "PulseServoInductive"), "models"),
     **dict.fromkeys(("Batch", "Fleet", "Result", "Simulator", "State", "Status", "grid", "simulate", "simulate_bus",
                      "simulate_many", "VectorSimulator"), "simulation"),
     **dict.fromkeys(("DataSheet", "curves", "servos_that_lift"), "datasheet"),

@@ -29,6 +29,7 @@ from servotwin.models import AveragedServo as AveragedServo
 from servotwin.models import AveragedServoInductive as AveragedServoInductive
 from servotwin.models import BoundedServo as BoundedServo
 from servotwin.models import DCMotor as DCMotor
+from servotwin.models import DigitalServo as DigitalServo
 from servotwin.models import GearedMotor as GearedMotor
 from servotwin.models import PulseServo as PulseServo
 from servotwin.models import PulseServoInductive as PulseServoInductive

@@ -14,7 +14,7 @@ from servotwin.models.engine.memory import SAME, Inputs, Memory, in_force, next_
 from servotwin.models.engine.modes import Vector
 from servotwin.models.engine.noise import gaussian
 from servotwin.models.terms import bridge, control, duty
-from servotwin.models.terms.control import NOTHING_SENSED, WAITING, Sensed
+from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE, WAITING, Sensed
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import sensed_voltage
@@ -117,18 +117,18 @@ def _read_bus(inputs: Inputs, firm: Any, time: float) -> None:
         goal = firm.coming[firm.first]
         firm.first = (firm.first + 1) % WAITING
         firm.known -= 1
-    elif written < inputs.command[0][0] - SAME * firmware.T_c:
-        return
     else:
         goal = _goal(inputs, written)
-    if not goal == firm.written:
+    if goal != NOWHERE and goal != firm.written:
         firm.written, firm.heard, firm.tripped = goal, _since(inputs, written) + firmware.latency, 0
         control.aim(firmware, firm, goal)
 
 
 def _goal(inputs: Inputs, time: float) -> float:
-    """Return the goal [rad] that is written at a time [s]."""
+    """Return the goal [rad] that is written at a time [s]; `NOWHERE` before the first."""
     firmware = inputs.firmware[0]
+    if time < inputs.command[0][0] - SAME * firmware.T_c:
+        return NOWHERE
     piece, _ = in_force(inputs.command, 0.0, time + SAME * firmware.T_c, 0.0)
     return counted(piece_value(piece, time), firmware.quantum)
 
@@ -168,7 +168,7 @@ def pause(inputs: Inputs, memory: Memory) -> None:
     slack = SAME * firmware.T_c
     if firmware.goals > 0.0:
         first = firmware.t_phi + firm.tick * firmware.T_c - firmware.latency
-        while inputs.command[0][0] - slack <= first + firm.known * firmware.T_c < time - slack:
+        while first + firm.known * firmware.T_c < time - slack:
             firm.coming[(firm.first + firm.known) % WAITING] = _goal(inputs, first + firm.known * firmware.T_c)
             firm.known += 1
         return
