@@ -6,17 +6,20 @@ import warnings
 
 from servotwin.models.base import Model
 from servotwin.models.bounded import BoundedServo
+from servotwin.models.digital import DigitalServo
 from servotwin.models.pulse import PulseServo
 from servotwin.parameters import Servo
 
+_FIRMWARE = ("firmware.control_period", "firmware.proportional_gain")
 _CHIP = ("electronics.stretcher_gain", "electronics.one_shot_slope")
 
 
 def default_class(servo: Servo) -> type[Model]:
     """Return the class of the model that stands for a servo where none is named.
 
-    It follows the servo's `kind`: `PulseServo` for an analog servo, and for digital and bus servos too as long as they
-    have no model of their own. Where the servo's file says nothing of a chip it is `BoundedServo`.
+    It follows the servo's `kind`: `PulseServo` for an analog servo, `DigitalServo` for a digital or bus servo. Where the
+    servo's file says nothing of a chip, or of firmware, it is `BoundedServo`; a digital servo without firmware but with
+    a chip is computed as an analog one.
 
     Parameters
     ----------
@@ -34,9 +37,12 @@ def default_class(servo: Servo) -> type[Model]:
     'PulseServo'
     """
     if servo.kind != "analog":
+        absent = [name for name in _FIRMWARE if servo.get(name) is None]
+        if not absent:
+            return DigitalServo
         a = "a digital servo" if servo.kind == "digital" else "a bus servo"
-        warnings.warn(f"{servo.name} is {a}, which is computed here as an analog one: its firmware is not modelled",
-                      stacklevel=3)
+        warnings.warn(f"{servo.name} is {a} whose file has no firmware ({', '.join(absent)} not given): computed as an "
+                      "analog one", stacklevel=3)
     lacks = [name for name in _CHIP if servo.get(name) is None]
     if lacks and all(servo.get(name) is not None for name in BoundedServo.requires):
         warnings.warn(f"{servo.name} has no chip ({', '.join(lacks)} not given): computed as a bounded servo, with the "
