@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 ENERGIES = ("supply", "winding", "bridge", "brush", "converter", "friction", "load")
 CROWD = 200  # events between two instants that no run needs
 LATER = 1e-12  # s past the instant at which a sloping torque equals friction, where the force is not yet above rounding
+GUARDS = 2  # that end a motion; what follows them are kinks
+CLEAR = 1e-11  # from here on the sign of a kink is known
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
@@ -245,29 +247,65 @@ class Shaft:
             self._steps(1 if ended else -1, until)
         self._carry()
 
+    def _kinks(self, side: int, t: float, y: Array) -> tuple[float, ...]:
+        """What changes its sign where a law has a kink: borders of the current's zones, torques in the gear."""
+        P = self.P
+        q, w, T_w, T_h = (float(x) for x in y[:4])
+        R_a, K, K_b = P.electric(T_w, T_h)
+        zones = self.bridge.zones(P, R_a, K_b) if P.hot else self._zones
+        borders = tuple(w - zone.high for zone in zones[:-1])
+        if not side or not any(P.shares):
+            return borders
+        K_m, K_e, K_ms, K_es = P.shares[:4]
+        tau_m = K * self.zone(w, T_w, T_h).current(w)
+        tau_e = -P.external(self.piece, t, q) - P.B_load * w
+        return (*borders, K_m * tau_m - K_e * tau_e, K_ms * tau_m - K_es * tau_e, tau_m, tau_e, abs(tau_m) - abs(tau_e))
+
     def _integrate(self, side: int, rates: Callable[[float, Array], Array], y: Array,
                    until: float) -> tuple[float, Array, int | None]:
-        """Time and state at an instant, or at the end of this motion and the number of the guard that ends it."""
-        t = self.t
+        """Time and state at an instant, or at the end of this motion and the number of the guard that ends it.
+
+        A step that would pass a kink ends at it, and another begins there.
+        """
+        t, signs = self.t, [0] * 20
         solver = _solver(rates, t, y, until)
         while solver.status == "running":
             _step(solver)
-            dense, checks = solver.dense_output(), [float(x) for x in np.linspace(t, solver.t, 9)]
-            for bracket in pairwise(checks):
-                below = [k for k, x in enumerate(self._guards(side, bracket[1], dense(bracket[1]))) if x < -1e-15]
-                if below:
-                    found = [(*self._root(side, k, rates, (t, y), dense, bracket), k) for k in below]
-                    return min(found, key=lambda end: end[0])
-            t, y = solver.t, solver.y
+            found = self._first(side, rates, (t, y), solver, signs)
+            t, y, k = found or (solver.t, solver.y, None)
+            if k is not None and k < GUARDS:
+                return t, y, k
+            if k is not None and t < until:
+                signs, solver = [0] * 20, _solver(rates, t, y, until)
         return until, y, None
 
-    def _root(self, side: int, k: int, rates: Callable[[float, Array], Array], start: tuple[float, Array],
+    def _first(self, side: int, rates: Callable[[float, Array], Array], start: tuple[float, Array], solver: Any,
+               signs: list[int]) -> tuple[float, Array, int] | None:
+        """First guard or kink within a step, with its time and the state there; learns the signs of kinks."""
+        dense = solver.dense_output()
+        for bracket in pairwise(float(x) for x in np.linspace(start[0], solver.t, 9)):
+            at, y = bracket[1], dense(bracket[1])
+            passed = [(k, 1) for k, x in enumerate(self._guards(side, at, y)) if x < -1e-15]
+            for k, x in enumerate(self._kinks(side, at, y)):
+                if abs(x) > CLEAR:
+                    passed += [(k + GUARDS, signs[k])] if signs[k] * x < 0.0 else []
+                    signs[k] = signs[k] or sgn(x)
+            if passed:
+                found = [(*self._root(side, k, sign, rates, start, dense, bracket), k) for k, sign in passed]
+                return min(found, key=lambda end: end[0])
+        return None
+
+    def _root(self, side: int, k: int, sign: int, rates: Callable[[float, Array], Array], start: tuple[float, Array],
               dense: Callable[[float], Array], bracket: tuple[float, float]) -> tuple[float, Array]:
-        """First time at which a guard is 0: on the dense output, then by steps that end there."""
+        """First time at which a guard or kink is 0: on the dense output, then by steps that end there."""
         (t, y), (low, high) = start, bracket
 
+        def value(at: float, state: Array) -> float:
+            guards = self._guards(side, at, state)
+            return sign * (guards[k] if k < GUARDS else self._kinks(side, at, state)[k - GUARDS])
+
         def guard(at: float) -> float:
-            return self._guards(side, at, dense(at))[k]
+            return value(at, dense(at))
 
         if guard(low) <= 0.0:  # a start from rest that is at rest again within the bracket
             inside = (low + (high - low) * 0.5**power for power in range(1, 40))
@@ -278,7 +316,7 @@ class Shaft:
             if root <= t:
                 return t, y
             end = _run(rates, t, y, root)
-            move = self._guards(side, root, end)[k] / slope
+            move = value(root, end) / slope
             if abs(move) < 1e-15 or not math.isfinite(move):
                 break
             root -= move
