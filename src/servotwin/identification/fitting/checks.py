@@ -120,7 +120,7 @@ def check_speeds(logs: Sequence[Log], model: Model) -> None:
         if log.angle_name != "output_angle":
             continue
         voltage = log.parameters.get("supply.open_circuit_voltage", model.value("supply.open_circuit_voltage"))
-        used = log.used("output_angle") if log.torque_on is None else log.used("output_angle") & log.torque_on
+        used = log.used("output_angle") & log.sent
         time, angle = log.time[used], log.measured["output_angle"][used]
         if len(time) < 5:
             continue
