@@ -136,19 +136,19 @@ class Log:
     @cached_property
     def held(self) -> NDArray[np.float64]:
         """The command where none is missing, shape (n,): else the one before it, or at the start the first one (SI)."""
-        return filled(self.command)
+        return check.frozen(filled(self.command))
 
     @cached_property
     def sent(self) -> NDArray[np.bool_]:
         """Whether pulses are sent from each sample to the next, shape (n,): there is a command, and torque is on."""
         there = ~np.isnan(self.command)
-        return there if self.torque_on is None else there & self.torque_on
+        return check.frozen(there if self.torque_on is None else there & self.torque_on)
 
     @cached_property
     def changes(self) -> NDArray[np.int64]:
         """Samples at which the command is another one, or pulses begin or end, than at the sample before."""
         turns = (np.diff(self.held) != 0.0) | (self.sent[1:] != self.sent[:-1])
-        return np.flatnonzero(turns) + 1
+        return check.frozen(np.flatnonzero(turns) + 1)
 
     @property
     def angle_name(self) -> str:

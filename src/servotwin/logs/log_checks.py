@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from servotwin.parameters.servo import check_name, unit_of
 from servotwin.units import is_finite
 
 FEWEST = 3  # samples
+_Kind = TypeVar("_Kind", bound=np.generic)
 _LARGEST_EDGES = 10_000_000
 # signal or kind of command -> (SI unit, largest magnitude that a servo's log can hold, what was probably meant)
 _LIMITS = {
@@ -65,7 +66,7 @@ def times(where: str, time: object) -> NDArray[np.float64]:
         stands = "stands still" if t[k] == t[k - 1] else "runs backwards"
         raise InputError(f"{where}: time {stands} at sample {k}", got=f"{t[k]:.9g} s after {t[k - 1]:.9g} s",
                          allowed="increasing times")
-    return _frozen(t)
+    return frozen(t)
 
 
 def command(where: str, values: object, kind: str, hold: str, n: int) -> NDArray[np.float64]:
@@ -85,7 +86,7 @@ def command(where: str, values: object, kind: str, hold: str, n: int) -> NDArray
         raise InputError(f"{where}: pulse width of sample {k}", got=f"{y[k]:g} s",
                          allowed="a positive width, or nan where no pulse is sent")
     _plausible(f"{where}: command ({kind})", y, kind)
-    return _frozen(y)
+    return frozen(y)
 
 
 def measured(where: str, columns: object, n: int, angles: tuple[str, ...]) -> dict[str, NDArray[np.float64]]:
@@ -104,7 +105,7 @@ def measured(where: str, columns: object, n: int, angles: tuple[str, ...]) -> di
             raise InputError(f"{where}: {name} of sample {bad[0]}", got=float(y[bad[0]]),
                              allowed="a finite number, or nan where nothing was measured")
         _plausible(f"{where}: {name}", y, name)
-        made[name] = _frozen(y)
+        made[name] = frozen(y)
     if not any(name in made for name in angles):
         raise InputError(f"{where}: measured signals", got=", ".join(made) or "none",
                          allowed=f"among them {' or '.join(angles)}")
@@ -122,9 +123,7 @@ def switch(where: str, values: object, n: int) -> NDArray[np.bool_]:
     bad = np.flatnonzero((y != 0.0) & (y != 1.0))
     if bad.size:
         raise InputError(f"{where}: torque_on of sample {bad[0]}", got=float(y[bad[0]]), allowed="true or false")
-    made = np.asarray(y == 1.0)
-    made.setflags(write=False)
-    return made
+    return frozen(np.asarray(y == 1.0))
 
 
 def parameters(where: str, values: object) -> dict[str, float]:
@@ -212,6 +211,7 @@ def _plausible(what: str, values: NDArray[np.float64], name: str) -> None:
         raise InputError(what, got=f"{largest:g} {unit}", allowed=f"at most {limit:g} {unit} in magnitude: {meant}")
 
 
-def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def frozen(values: NDArray[_Kind]) -> NDArray[_Kind]:
+    """Return an array to which nobody writes any more."""
     values.setflags(write=False)
     return values

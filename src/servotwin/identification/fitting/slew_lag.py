@@ -81,8 +81,8 @@ class SlewLag:
     def predict(self, log: Log, start_angle: float | None = None) -> Array:
         """Return the angle at the times of a log, shape (n,) [rad].
 
-        The command is held from sample to sample, also where no pulses are sent. Until that of the first sample arrives,
-        the shaft stands.
+        The command is held from sample to sample, also where no pulses are sent. Until that of the first sample
+        arrives, the shaft stands.
 
         Parameters
         ----------
