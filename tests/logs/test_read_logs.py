@@ -169,6 +169,31 @@ def test_the_measured_runs_are_read(data_folder):
             assert np.abs(log.measured["output_angle"] - asked).max() < math.radians(15.0)
 
 
+def test_the_measured_servo_coasts_without_pulses(data_folder):
+    """Of two states that the file does not tell apart by any other run, the falling arm does: it coasts."""
+    assumed = {
+        "motor": {"armature_resistance": 1.8, "torque_constant": 1.1 / 300.0, "back_emf_constant": 1.1 / 300.0,
+                  "rotor_inertia": 0.008 / 300.0**2, "motor_viscous_friction": 0.0},
+        "gear": {"gear_reduction": 300.0},
+        "friction": {"coulomb_torque_forward": 1e-3, "coulomb_torque_backward": 1e-3},
+        "electronics": {"stretcher_gain": 65.0, "one_shot_slope": 1.0 / 850.0, "one_shot_offset": 0.0,
+                        "frame_period": 0.01, "pulse_timeout": 0.03, "off_state": "brake"},
+        "potentiometer": {"feedback_gain": 0.85 * 4.0 / 3.0 / math.pi, "feedback_offset": 0.85 * 1.5},
+        "supply": {"open_circuit_voltage": 6.0, "bridge_drop_voltage": 0.2},
+    }
+    off = {}
+    for silence in ("brake", "coast"):
+        servo = st.servo_from_values("miuzei", assumed).replace({"electronics.silence_state": silence})
+        for log in read_logs(data_folder / "miuzei_25kg"):
+            if log.motion == "drop":
+                run = st.simulate(st.PulseServo(servo), log.signal(), duration=log.duration, load=log.load,
+                                  output_times=log.time)
+                error = np.degrees(run["output_angle"] - log.measured["output_angle"])[~log.sent]
+                off[silence, log.name] = float(np.sqrt(np.mean(error**2)))
+    assert min(value for (silence, _), value in off.items() if silence == "brake") > 40.0
+    assert max(value for (silence, _), value in off.items() if silence == "coast") < 20.0
+
+
 def test_the_maccepa_steps_are_read_without_code(data_folder, tmp_path):
     columns = {"time": {"column": "%time", "unit": "ns", "from_first": True}}
     columns["command_angle"] = {"column": "field.u1"}
