@@ -260,8 +260,7 @@ class Simulator:
         if not isinstance(command, Signal) or not command.silences:
             return command  # `drive` says what is wrong with what is no signal
         if self._framed is None or self._framed[0] is not command or self._framed[1] < until:
-            horizon = 2.0 * until  # seldom anew
-            self._framed = (command, horizon, self.model.framed(command, horizon))
+            self._framed = (command, 2.0 * until, self.model.framed(command, 2.0 * until))  # seldom anew
         return self._framed[2]
 
     def plan(self, command: Signal, external_torque: float = 0.0) -> Plan:
