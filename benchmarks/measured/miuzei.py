@@ -7,6 +7,8 @@ import numpy as np
 from report import folds, row
 
 import servotwin as st
+from servotwin.identification import Log, validate
+from servotwin.parameters import Servo
 
 REDUCTION = 300.0  # assumed: only products with it act
 START = {
@@ -34,8 +36,29 @@ FOLDS = 4
 NOISE = {"output_angle": 0.02}  # rad, what of a residual counts in full: what the models leave open, not the encoder
 
 
+def drops(servo: Servo, logs: list[Log]) -> None:
+    """Print how far servos that brake or coast without pulses are off a run whose pulses stop: not fitted, or its like.
+
+    The two runs begin alike, with an arm held at 0 for ten samples; then no pulses come for a second, and it falls.
+    """
+    plain, (one, other) = [log for log in logs if log.motion != "drop"], [log for log in logs if log.motion == "drop"]
+    print(f"the drops {one.name} and {other.name}, Coulomb friction: rms error while no pulses come, at the end [deg]")
+    common = {"free": M1, "priors": None, "starts": 1, "intervals": False, "noise": NOISE, "diagnose": False,
+                    "compare_with": ()}
+    without = st.identify(plain, servo, holdout=None, **common).servo
+    for state in ("brake", "coast"):
+        word = {"electronics.silence_state": state}
+        like = st.identify([*plain, one, other], servo.replace(word), holdout=[other.name], **common)
+        for label, found in (("no drop fitted", without.replace(word)), (f"with {one.name}", like.servo)):
+            trace = validate([other], found).traces[0]
+            silent = np.isin(trace.time, other.time[~other.sent])
+            error = np.degrees(trace.simulated - trace.measured)
+            print(f"  {state:6} {label:16} {np.sqrt(np.mean(error[silent]**2)):6.1f} {error[-1]:+7.1f}", flush=True)
+
+
 def main(folder: Path) -> None:
-    logs = [log for log in st.read_logs(folder / "miuzei_25kg" / "runs.json") if log.motion != "drop"]
+    every = st.read_logs(folder / "miuzei_25kg" / "runs.json")
+    logs = [log for log in every if log.motion != "drop"]
     servo = st.servo_from_values("miuzei-25kg", START)
     print(f"Miuzei 25 kg: {len(logs)} runs, {FOLDS} folds by run; rms error of runs that were not fitted [deg], over "
           "all samples (mean of the runs)")
@@ -56,3 +79,4 @@ def main(folder: Path) -> None:
         row(label, errors)
         row("  on the runs it was fitted to", fitted)
         print(f"  {'':36} {(time.perf_counter() - began) / FOLDS:.0f} s a fit", flush=True)
+    drops(servo, every)

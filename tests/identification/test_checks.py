@@ -121,6 +121,15 @@ def test_no_torque_at_all(logs):
     assert set(fit.undetermined) == set(FREE)
 
 
+def test_the_angle_behind_the_shaft_waits_for_a_model_that_has_it(logs):
+    more = [replace(log, measured={**log.measured, "load_angle": log.measured["output_angle"]}) for log in logs[:2]]
+    refused("'load_angle, which PulseServo does not have', allowed: output_angle$", more,
+            sensors=("output_angle", "load_angle"))
+    fits = [identify(some, TRUTH, free=FREE, priors=None, starts=1, compare_with=(), holdout=0, intervals=False)
+            for some in (more, logs[:2])]
+    assert dict(fits[0].estimates) == dict(fits[1].estimates)
+
+
 # --------------------------------------------------------------------------------------- arguments
 
 @pytest.mark.parametrize(("more", "words"), [

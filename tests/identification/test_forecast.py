@@ -169,6 +169,10 @@ def test_torque_off_is_missing_pulses_for_a_pulse_servo_and_the_end_for_a_bounde
     assert np.abs(always.at(at, derivatives=False)[0].residual).max() > 0.05
     bounded = forecast([log], BOUNDED, st.BoundedServo, servo, nuisance=())
     assert bounded.cases[0].count == 25
+    missing = replace(log, torque_on=None, command=np.where(on, log.command, np.nan))
+    np.testing.assert_array_equal(forecast([missing], servo=servo, nuisance=()).at(at, derivatives=False)[0].residual,
+                                  f.at(at, derivatives=False)[0].residual)
+    assert forecast([missing], BOUNDED, st.BoundedServo, servo, nuisance=()).cases[0].count == 25
 
 
 def test_a_log_means_the_same_after_another_model_has_followed_it():

@@ -59,6 +59,42 @@ def test_the_command_that_two_assignments_dispute_is_named():
     assert (at[0] - log.time[0]) % PERIOD == pytest.approx(other.low, abs=1e-9)
 
 
+@pytest.mark.parametrize("first", [0.0, 0.013])
+def test_pulses_without_a_command_are_not_sent(first):
+    """Each edge by itself: what it carries is the command in force at its place in the frames, if there is one."""
+    log = uneven()
+    silent = (np.arange(60) < 5) | ((np.arange(60) > 20) & (np.arange(60) < 31)) | (np.arange(60) % 17 == 0)
+    log = replace(log, command=np.where(silent, np.nan, log.command))
+    frames = Frames(0.4 * PERIOD, PERIOD)
+    made = signal(log, frames, first, PERIOD)
+    k = np.arange(-1 if first else 0, 70)
+    latest = np.maximum(np.searchsorted(log.time - log.time[0], frames.phase + k * PERIOD, side="right") - 1, 0)
+    edges = np.maximum(first + k * PERIOD, 0.0)
+    due = ~silent[latest] & (edges <= log.duration)
+    own = np.array(made.edges)
+    np.testing.assert_allclose(own[own <= log.duration], edges[due], rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(made(own)[:due.sum()], log.command[latest][due])
+    assert made.initial == log.command[5]
+    assert set(np.flatnonzero(np.diff(silent)) + 1) <= set(log.changes.tolist())
+
+
+@pytest.mark.parametrize("kind", ["a fitted phase", "a fitted period"])
+def test_clocks_are_found_in_logs_without_some_pulses(kind):
+    servo = TRUTH.replace({"electronics.pulse_timeout": 0.03, "electronics.silence_state": "coast"})
+    on = (np.arange(75) < 45) | (np.arange(75) >= 55)
+    logs = [replace(log, torque_on=None, command=np.where(on, log.command, np.nan))
+            for log in some(servo, torque_on=on)]
+    clock, nuisance = (0.0, DEFAULT) if kind == "a fitted phase" else (2e-3, (*DEFAULT, "frame_period"))
+    logs = [replace(log, time=log.time * (1.0 + clock) + 1e-3 * k) for k, log in enumerate(logs)]
+    off = servo.replace({name: WRONG.get(name) for name in ("motor.armature_resistance", "electronics.stretcher_gain")})
+    fit = fitted(logs, servo=off, nuisance=nuisance)
+    assert fit.noise["output_angle"] < 1.2e-3
+    low, high, _ = fit.intervals()["delay"]
+    assert low < 0.05 < high
+    if clock:
+        assert fit.estimates["frame_period"] == pytest.approx(0.01 * (1.0 + clock), rel=2e-4)
+
+
 def test_commands_wait_half_a_frame_in_the_mean():
     log = uneven(n=4000)
     assert latency(log, Frames(0.3 * PERIOD, PERIOD)) == pytest.approx(0.5 * PERIOD, rel=0.05)

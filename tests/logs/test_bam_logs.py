@@ -108,7 +108,9 @@ def test_the_pendulum_is_a_point_on_a_rod(file, arm):
 def test_what_is_written_is_read_back(file, tmp_path, arm):
     content = raw(arm_mass=arm, entries=[*entries(3), *({**e, "timestamp": 1.0 + e["timestamp"] / 3.0,
                                                          "torque_enable": False} for e in entries(4))])
+    content["entries"][4]["goal_position"] = None  # no pulse
     log = read_bam_log(file(content))
+    assert np.flatnonzero(np.isnan(log.command)).tolist() == [4]
     path = tmp_path / "again" / "run.json"
     path.parent.mkdir()
     write_bam_log(log, path)

@@ -75,6 +75,26 @@ def test_the_sidecar_says_which_command(run):
     assert read_csv_log(run(content, {"command": "command_angle"})).command_kind == "angle"
 
 
+@pytest.mark.parametrize("column", ["pulse_width_ms", "command_angle_deg"])
+@pytest.mark.parametrize("empty", ["", "nan", "NA", "-"])
+def test_an_empty_cell_of_the_command_means_no_pulses(run, column, empty):
+    log = read_csv_log(run(f"time,{column},output_angle\n0,{empty},0\n1,1,0\n2,{empty},1\n3,2,1\n"))
+    assert np.isnan(log.command).tolist() == [True, False, True, False]
+    assert log.sent.tolist() == [False, True, False, True]
+    assert log.held[[0, 2]].tolist() == log.command[[1, 1]].tolist()
+    assert log.reading.remarks == ("2 of 4 samples have no command: no pulses were sent there",)
+
+
+@pytest.mark.parametrize(("column", "unit"), [("load_angle_deg", math.pi / 180.0), ("load_angle_rad", 1.0),
+                                              ("load_angle", 1.0)])
+def test_the_angle_behind_the_shaft_is_kept(run, tmp_path, column, unit):
+    log = read_csv_log(run(f"time,pulse_width_us,output_angle,{column}\n0,1500,0,0\n1,1500,0,\n2,1500,1,90\n"))
+    np.testing.assert_allclose(log.measured["load_angle"], [0.0, np.nan, 90.0 * unit], rtol=1e-15)
+    write_log(log, tmp_path / "again.csv")
+    again = read_csv_log(tmp_path / "again.csv")
+    np.testing.assert_array_equal(again.measured["load_angle"], log.measured["load_angle"])
+
+
 def test_torque_off_in_words_and_numbers(run):
     log = read_csv_log(run("time,pulse_width_us,output_angle,torque_on\n0,1500,0,1\n1,1500,0,False\n2,1500,1,ON\n"))
     assert log.torque_on.tolist() == [True, False, True]
@@ -160,17 +180,20 @@ def test_what_is_written_is_read_back_bit_for_bit(tmp_path, data, kind, n):
         return data.draw(some.lists(element, min_size=n, max_size=n))
 
     steps = column(some.floats(1e-6, 1e6))
+    hold = data.draw(some.sampled_from(["previous", "linear"]))
+    silent = some.nothing() if kind == "voltage" or hold == "linear" else some.just(math.nan)
+    value = data.draw(some.floats(1e-9, 0.1))
     angle = [0.1, *column(finite | some.just(math.nan))[1:]]
     log = Log(
         name=data.draw(some.text(min_size=1, max_size=5)), time=np.cumsum(steps), command_kind=kind,
-        command=column(some.floats(1e-9, 0.1) if kind == "pulse_width" else finite),
+        command=[value, *column((some.floats(1e-9, 0.1) if kind == "pulse_width" else finite) | silent)[1:]],
         measured={"output_angle": angle, "supply_current": column(finite)},
         torque_on=data.draw(some.none() | some.just(column(some.booleans()))),
         load=(st.loads.Recorded([0.0, 1.0], column(finite)[:2]) + st.loads.Constant(0.1 / 3.0)
               + st.loads.Pendulum(mass=0.1 / 3.0, length=0.12, inertia=1e-3)),
         parameters={"supply.open_circuit_voltage": 6.1 / 3.0}, motion=data.draw(some.text(max_size=5)),
         conditions=data.draw(some.dictionaries(some.text(max_size=3), some.text(max_size=3) | finite, max_size=2)),
-        command_hold=data.draw(some.sampled_from(["previous", "linear"])), left_out=[(-3.1, -1.0 / 3.0)],
+        command_hold=hold, left_out=[(-3.1, -1.0 / 3.0)],
         source="a bench")
     write_log(log, tmp_path / "run.csv", overwrite=True)
     again = read_csv_log(tmp_path / "run.csv")
@@ -218,12 +241,13 @@ def test_nothing_is_overwritten_unasked(tmp_path, run):
     ("time_s,time_ms,pulse_width_us,output_angle\n0,0,1500,0\n", ("time_s and time_ms", "one of them")),
     ("time_s,pulse_width_us,output_angle,output_angle\n0,1500,0,0\n", ("output_angle",)),
     (HEADER + "0,1500,0\n0.02,abc,1\n0.04,1500,2\n", ("line 3, pulse_width_us", "'abc'", "a number")),
-    (HEADER + "0,1500,0\n0.02,,1\n0.04,1500,2\n", ("line 3, pulse_width_us", "'nothing'")),
+    ("time,command_voltage,output_angle\n0,1,0\n1,,1\n2,1,2\n", ("line 3, command_voltage", "'nothing'")),
+    (HEADER + "0,,0\n0.02,,1\n0.04,,2\n", ("command", "no value in any sample")),
     (HEADER + "0,1500,0\n0.02,1500,x\n0.04,1500,2\n", ("line 3, output_angle_deg", "'x'")),
     (HEADER + "0,1500,0\n,1500,1\n0.04,1500,2\n", ("line 3, time_s",)),
     (HEADER + "0,1500,0\n0.04,1500,1\n\n0.02,1500,2\n", ("line 5, time_s", "runs backwards", "in line 3")),
     (HEADER + "0,1500,0\nnan,1500,1\n0.04,1500,2\n", ("time of sample 1", "nan")),
-    (HEADER + "0,nan,0\n0.02,1500,1\n0.04,1500,2\n", ("command of sample 0", "nan")),
+    ("time,command_voltage,output_angle\n0,nan,0\n1,1,1\n2,1,2\n", ("command of sample 0", "nan", "only pulses")),
     (HEADER + "0,1500,\n0.02,1500,\n0.04,1500,\n", ("output_angle", "no value")),
     (HEADER + "0,1500,inf\n0.02,1500,1\n0.04,1500,2\n", ("output_angle of sample 0", "inf")),
     (HEADER + "0,-1500,0\n0.02,1500,1\n0.04,1500,2\n", ("pulse width of sample 0", "positive")),

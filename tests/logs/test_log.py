@@ -97,7 +97,10 @@ def test_a_constant_log_knows_it():
     ({"time": np.zeros((N, 1))}, ("time", "shape (51, 1)")),
     ({"command": np.zeros(N - 1)}, ("command", "50 values", "51, as many as times")),
     ({"command": np.r_[np.inf, np.full(N - 1, 1.5e-3)]}, ("command of sample 0", "inf")),
-    ({"command": np.full(N, -1.5e-3)}, ("pulse width of sample 0", "torque_on")),
+    ({"command": np.full(N, -1.5e-3)}, ("pulse width of sample 0", "positive", "nan where no pulse")),
+    ({"command": np.full(N, np.nan)}, ("command", "no value in any sample")),
+    ({"command": np.r_[1.0, np.nan, np.ones(N - 2)], "command_kind": "voltage"}, ("sample 1", "nan", "only pulses")),
+    ({"command": np.r_[1e-3, np.nan, np.full(N - 2, 1e-3)], "command_hold": "linear"}, ("sample 1", '"previous"')),
     ({"command": np.zeros(N)}, ("pulse width of sample 0", "positive")),
     ({"command": np.full(N, 1500.0)}, ("command (pulse_width)", "1500 s", "microseconds?")),
     ({"command": np.full(N, 180.0), "command_kind": "angle"}, ("180 rad", "degrees or counts?")),
@@ -172,6 +175,31 @@ def test_pulses_are_missing_while_torque_is_off():
     for wrong in (0.0, -0.02, math.nan, 1e-12):
         with pytest.raises(InputError, match="frame_period"):
             make(torque_on=on).signal(frame_period=wrong)
+
+
+@pytest.mark.parametrize("kind", ["angle", "pulse_width"])
+@pytest.mark.parametrize("on", [None, np.arange(N) % 7 > 0])
+def test_a_command_that_is_missing_means_no_pulses(kind, on):
+    silent = (np.arange(N) < 4) | ((np.arange(N) >= 20) & (np.arange(N) < 30)) | (np.arange(N) == N - 1)
+    plain = 1e-3 * (1.0 + np.arange(N) // 15)
+    off = make(command=np.r_[np.full(4, plain[4]), plain[4:20], np.full(10, plain[19]), plain[30:-1], plain[-2]],
+               command_kind=kind, torque_on=~silent if on is None else ~silent & on)
+    log = make(command=np.where(silent, np.nan, plain), command_kind=kind, torque_on=on)
+    np.testing.assert_array_equal(np.isnan(log.command), silent)
+    np.testing.assert_array_equal(log.held, off.command)
+    np.testing.assert_array_equal(log.sent, off.torque_on)
+    np.testing.assert_array_equal(log.changes, off.changes)
+    assert {4, 20, 30} <= set(log.changes.tolist())
+    for array in (log.held, log.sent, log.changes):
+        assert not array.flags.writeable
+    for period in (None, 0.013):
+        assert log.signal(period) == off.signal(period)
+    assert [(p.name, p.start, len(p)) for p in log.without_torque_off()] == [
+        (p.name, p.start, len(p)) for p in off.without_torque_off()]
+    for part in (log.part(0.46, 0.7), log.part(0.46, 0.56)):  # what came last was before it
+        assert (part.held[0], part.sent[0], part.signal().initial) == (plain[19], False, plain[19])
+    assert not make(command=np.where(silent, np.nan, 1e-3), measured={
+        "output_angle": np.random.default_rng(0).normal(size=N)}).is_constant
 
 
 @pytest.mark.parametrize(("kind", "value"), [("angle", 1.0), ("pulse_width", 1.5e-3)])

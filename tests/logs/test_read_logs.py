@@ -120,8 +120,8 @@ def test_a_run_of_the_miuzei_data(tmp_path):
     log = read_miuzei_logs(write(tmp_path, "runs.json", MIUZEI))[0]
     assert (log.motion, log.command_kind, dict(log.conditions)) == ("drop", "pulse_width", {"amplitude_deg": 162.0})
     np.testing.assert_allclose(log.time, [0.0, 0.02, 0.04, 0.06, 0.08], rtol=1e-15)
-    np.testing.assert_allclose(log.command, [1.5e-3, 0.5e-3, 1.9e-3, 1.9e-3, 2.5e-3], rtol=1e-15)
-    assert log.torque_on.tolist() == [False, True, True, False, True]
+    np.testing.assert_allclose(log.command, [np.nan, 0.5e-3, 1.9e-3, np.nan, 2.5e-3], rtol=1e-15)
+    assert log.sent.tolist() == [False, True, True, False, True]
     np.testing.assert_allclose(log.measured["output_angle"], np.array([0.0, 0.1, np.nan, 0.2, 0.5]) * math.pi)
     np.testing.assert_allclose(log.signal().edges, [0.02, 0.03, 0.04, 0.05, 0.08], rtol=1e-12)
 
@@ -147,6 +147,7 @@ def test_the_arm_of_the_rig(tmp_path):
     ({"data": [{**RUN, "sensor_data": [0.0]}]}, ("output_angle", "1 values", "5, as many")),
     ({"data": [{**RUN, "sensor_data": [90.0] * 5}]}, ("282.743 rad", "degrees or counts?")),
     ({"data": [{**RUN, "actions": [0.0], "sensor_data": [0.0]}]}, ("1 sample", "at least 3")),
+    ({"data": [{**RUN, "actions": [None] * 5}]}, ("command", "no value in any sample")),
     ({"data": [RUN, RUN]}, ("007 drop in runs.json", "a name for each")),
 ])
 def test_what_is_wrong_in_the_miuzei_data_is_said_in_one_line(tmp_path, content, words):
@@ -157,11 +158,40 @@ def test_the_measured_runs_are_read(data_folder):
     logs = read_logs(data_folder / "miuzei_25kg")
     assert len(logs) == 58
     assert {log.motion for log in logs} == {"step", "prbs", "square", "ramp", "triangle", "drop"}
-    assert {log.motion for log in logs if log.torque_on is not None} == {"drop"}
+    silent = {log.name: (~log.sent).sum() for log in logs if not log.sent.all()}
+    assert silent == {"097 drop": 50, "098 drop": 50}
     for log in logs:
         asked = (log.command - 1.5e-3) / 1e-3 * 0.75 * math.pi  # 135 deg for a millisecond
+        if log.motion == "drop":  # a pulse each 10 ms for as long as there are commands, and it falls
+            np.testing.assert_allclose(log.signal().edges, 0.01 * np.arange(20), rtol=1e-12)
+            assert log.measured["output_angle"][-1] < math.radians(-95.0)
         if log.motion == "ramp":  # it follows, some degrees behind
             assert np.abs(log.measured["output_angle"] - asked).max() < math.radians(15.0)
+
+
+def test_the_measured_servo_coasts_without_pulses(data_folder):
+    """Of two states that the file does not tell apart by any other run, the falling arm does: it coasts."""
+    assumed = {
+        "motor": {"armature_resistance": 1.8, "torque_constant": 1.1 / 300.0, "back_emf_constant": 1.1 / 300.0,
+                  "rotor_inertia": 0.008 / 300.0**2, "motor_viscous_friction": 0.0},
+        "gear": {"gear_reduction": 300.0},
+        "friction": {"coulomb_torque_forward": 1e-3, "coulomb_torque_backward": 1e-3},
+        "electronics": {"stretcher_gain": 65.0, "one_shot_slope": 1.0 / 850.0, "one_shot_offset": 0.0,
+                        "frame_period": 0.01, "pulse_timeout": 0.03, "off_state": "brake"},
+        "potentiometer": {"feedback_gain": 0.85 * 4.0 / 3.0 / math.pi, "feedback_offset": 0.85 * 1.5},
+        "supply": {"open_circuit_voltage": 6.0, "bridge_drop_voltage": 0.2},
+    }
+    off = {}
+    for silence in ("brake", "coast"):
+        servo = st.servo_from_values("miuzei", assumed).replace({"electronics.silence_state": silence})
+        for log in read_logs(data_folder / "miuzei_25kg"):
+            if log.motion == "drop":
+                run = st.simulate(st.PulseServo(servo), log.signal(), duration=log.duration, load=log.load,
+                                  output_times=log.time)
+                error = np.degrees(run["output_angle"] - log.measured["output_angle"])[~log.sent]
+                off[silence, log.name] = float(np.sqrt(np.mean(error**2)))
+    assert min(value for (silence, _), value in off.items() if silence == "brake") > 40.0
+    assert max(value for (silence, _), value in off.items() if silence == "coast") < 20.0
 
 
 def test_the_maccepa_steps_are_read_without_code(data_folder, tmp_path):

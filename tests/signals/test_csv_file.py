@@ -85,6 +85,14 @@ def test_one_column_out_of_several(file):
     refused(path, "column", "output_angle_deg", "pulse_width_us, command_angle_deg", column="output_angle_deg")
 
 
+@pytest.mark.parametrize("empty", ["", "nan", "NA", "-"])
+def test_an_empty_cell_means_no_pulses(file, empty):
+    content = f"time_s,pulse_width_us\n0,{empty}\n0.1,1500\n0.2,{empty}\n0.3,1600\n0.4,{empty}\n"
+    nan = math.nan
+    assert signals.from_csv(file(content)) == signals.samples(
+        [0.0, 0.1, 0.2, 0.3, 0.4], [nan, 1500.0, nan, 1600.0, nan], unit="us")
+
+
 def test_other_columns_may_hold_anything(file):
     signal = signals.from_csv(file("time_s,remark,command_voltage\n0,nan,1\n1,x y z,2\n"))
     assert signal([0.0, 1.0]).tolist() == [1.0, 2.0]
@@ -114,7 +122,7 @@ def test_what_python_writes_is_read_back_exactly(file, gaps, data):
     ("time_s,time_s,pulse_width_us\n0,1,1500\n", ("time_s 2 times", "once")),
     ("time_s,pulse_width_us,pulse_width_us\n0,1500,1600\n", ("pulse_width_us 2 times", "once")),
     ("time_s,pulse_width_us\n0,abc\n", ("line 2, pulse_width_us", "'abc'", "a number")),
-    ("time_s,pulse_width_us\n\n\n0,1500\n1,\n", ("line 5, pulse_width_us", "nothing")),
+    ("time_s,command_voltage\n\n\n0,1500\n1,\n", ("line 5, command_voltage", "nothing")),
     ("time_s,pulse_width_us\n0,1500\n1\n", ("line 3, pulse_width_us", "nothing")),
     ("time_s,pulse_width_us\n0,1500 us\n", ("line 2", "'1500 us'")),
     ("time_s,pulse_width_us\nnull,1500\n", ("line 2, time_s", "'null'")),
@@ -122,7 +130,8 @@ def test_what_python_writes_is_read_back_exactly(file, gaps, data):
     ("time_s,pulse_width_us\n0,1500\n0,1600\n", ("time of sample 1", "the one before")),
     ("time_s,pulse_width_us\n1,1500\n0,1600\n", ("time of sample 1", "got 0.0")),
     ("time_s,pulse_width_us\n0,1e400\n", ("value of sample 0", "inf")),
-    ("time_s,pulse_width_us\n0,nan\n", ("value of sample 0", "nan")),
+    ("time_s,pulse_width_us\n0,nan\n1,\n", ("no value that is a number",)),
+    ("time_s,command_voltage\n0,nan\n", ("value of sample 0", "nan", "only pulses and angles")),
     ("time_s,pulse_width_us\n-inf,1500\n", ("time of sample 0",)),
     ("time_s,pulse_width_us\n0,0\n", ("pulse width", "positive")),
     ("time_s,pulse_width_us\n0,-1500\n", ("pulse width", "positive")),

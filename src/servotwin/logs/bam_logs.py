@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -65,7 +66,7 @@ def _log(path: Path, content: object, convention: BamConvention | None = None) -
             raise InputError(f"{path}: {key}", got=value, allowed="a text")
     entries = content["entries"]
     first = _entry(path, entries, 0) if entries else {}
-    time, command = _column(path, entries, "timestamp"), _column(path, entries, "goal_position")
+    time, command = _column(path, entries, "timestamp"), _column(path, entries, "goal_position", null=True)
     measured = {name: _column(path, entries, key) for key, (name, required) in _MEASURED.items()
                 if required or key in first}
     on = _column(path, entries, "torque_enable", default=True) == 1.0
@@ -112,7 +113,8 @@ def write_bam_log(log: Log, path: str | Path, *, overwrite: bool = False) -> Non
             raise InputError(f"{what}: {name}", got="samples without a value", allowed="a value at every sample")
         columns[key] = log.measured[name]
     on = np.ones(log.time.size, dtype=bool) if log.torque_on is None else log.torque_on
-    rows = zip(*(values.tolist() for values in columns.values()), on.tolist(), strict=True)
+    rows = zip(*([None if math.isnan(x) else x for x in values.tolist()] for values in columns.values()), on.tolist(),
+               strict=True)
     content = {**_pendulum_words(what, log), "kp": log.conditions["gain"], "vin": log.conditions["voltage"],
                "motor": str(log.conditions.get("motor", "")), "trajectory": log.motion,
                "entries": [dict(zip((*columns, "torque_enable"), row, strict=True)) for row in rows]}
@@ -156,13 +158,17 @@ def _entry(path: Path, entries: list[Any], k: int) -> Mapping[str, Any]:
     return entry
 
 
-def _column(path: Path, entries: list[Any], key: str, default: object = None) -> NDArray[np.float64]:
+def _column(path: Path, entries: list[Any], key: str, default: object = None, *,
+            null: bool = False) -> NDArray[np.float64]:
+    """Return the values of all entries; null is nan where it may be."""
     values = []
     for k in range(len(entries)):
-        value = _entry(path, entries, k).get(key, default)
+        entry = _entry(path, entries, k)
+        value = entry.get(key, default)
         if isinstance(value, bool) and key == "torque_enable":
             value = int(value)
-        if not is_finite(value):
+        absent = null and value is None and key in entry
+        if not absent and not is_finite(value):
             raise InputError(f"{path}: entry {k}, {key}", got="nothing" if value is None else value, allowed="a number")
-        values.append(float(value))
+        values.append(math.nan if absent else float(value))
     return np.array(values, dtype=np.float64)

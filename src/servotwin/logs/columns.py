@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 TIME, SWITCH = "time", "torque_on"
 # column -> (kind of command, SI unit); where a file has several, the first of these counts
 COMMANDS = {"pulse_width": "pulse_width", "command_angle": "angle", "command_voltage": "voltage"}
-NAMES = (TIME, *COMMANDS, SWITCH, *(name for name in SIGNALS if name not in COMMANDS))
+UNITS = {**{name: output.unit for name, output in SIGNALS.items()}, "load_angle": "rad"}
+"""SI unit of each signal that a log may hold; one behind the shaft may be measured before a model has it."""
+NAMES = (TIME, *COMMANDS, SWITCH, *(name for name in UNITS if name not in COMMANDS))
 _OF_SI = {"s": "time", "V": "voltage", "A": "current", "rad": "angle", "rad/s": "speed", "N m": "torque",
           "K": "temperature", "1": "number"}
 # dimension -> {suffix of a column: unit}
@@ -75,7 +77,7 @@ def dimension_of_signal(name: str) -> str:
     >>> dimension_of_signal("time"), dimension_of_signal("output_angle")
     ('time', 'angle')
     """
-    return "time" if name == TIME else "number" if name == SWITCH else _OF_SI[SIGNALS[name].unit]
+    return "time" if name == TIME else "number" if name == SWITCH else _OF_SI[UNITS[name]]
 
 
 def si_unit_of(name: str) -> str:

@@ -69,15 +69,22 @@ def read_csv_log(path: str | Path, *, sidecar: str | Path | None = None,
     time, table = _times(table, of[TIME], said.drop_repeated)
     measured = {name: column.to_si(table.numbers(column.column, missing=math.nan), name)
                 for name, column in of.items() if name not in (TIME, SWITCH, *COMMANDS)}
-    values = of[command].to_si(table.numbers(of[command].column), command)
+    missing = None if COMMANDS[command] == "voltage" else math.nan  # no pulses
+    values = of[command].to_si(table.numbers(of[command].column, missing=missing), command)
     switch = _switch(table, of[SWITCH]) if SWITCH in of else None
     used = {column.column for column in layout.shown}
-    reading = Reading(file=str(path), columns=layout.shown, remarks=table.remarks,
+    reading = Reading(file=str(path), columns=layout.shown, remarks=(*table.remarks, *_silences(values)),
                       layout=of, unread=tuple(name for name in table.header if name and name not in used))
     given = {"name": path.stem, "source": str(path), **said.log}
     with in_file(path, str(given["name"])):
         return Log(time=time, command=values, command_kind=COMMANDS[command], measured=measured, torque_on=switch,
                    reading=reading, **given)
+
+
+def _silences(command: NDArray[np.float64]) -> tuple[str, ...]:
+    """Return what is said of a command that is missing at times: a logger may have meant that it did not change."""
+    count = int(np.isnan(command).sum())
+    return (f"{count} of {command.size} samples have no command: no pulses were sent there",) if count else ()
 
 
 def logs_of(path: Path, *, sidecar: str | Path | None, columns: str | Mapping[str, str] | None) -> list[Log]:

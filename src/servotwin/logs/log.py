@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from servotwin.errors import InputError
 from servotwin.loads import Load, Recorded, as_load
 from servotwin.logs import log_checks as check
 from servotwin.signals.shapes import sampled
+from servotwin.signals.silence import filled
 
 if TYPE_CHECKING:
     from servotwin.logs.reading import Reading
@@ -35,14 +37,15 @@ class Log:
     time : ndarray, shape (n,)
         Strictly increasing, n ≥ 3; need not start at 0, may be uneven and have gaps [s].
     command : ndarray, shape (n,)
-        In SI: rad, s or V.
+        In SI: rad, s or V. Of pulses and angles that are held, nan means that no pulse was sent from this sample to the
+        next one with a value.
     command_kind : {"angle", "pulse_width", "voltage"}
     measured : mapping of str to ndarray, shape (n,)
         Signal name to values in SI, nan where nothing was measured; has `output_angle` or `feedback_voltage`.
     command_hold : {"previous", "linear"}
         What the command is between samples.
     torque_on : ndarray of bool, shape (n,), optional
-        False: from this sample to the next the servo gets no pulses. None: it always gets them.
+        False: from this sample to the next the servo gets no pulses, whatever `command` says. None: it is always on.
     load : Load or Part
         What hangs on the shaft; recorded torques count their time from the first sample.
     parameters : mapping of str to float
@@ -61,8 +64,8 @@ class Log:
     Raises
     ------
     InputError
-        If time stands still or runs backwards, there are fewer than three samples, lengths differ, the command is not
-        finite, no angle was measured, or a value is so large that its unit must be another one.
+        If time stands still or runs backwards, there are fewer than three samples, lengths differ, a command is missing
+        where it cannot be, or always, no angle was measured, or a value is so large that its unit must be another one.
     UnknownNameError
         If there is no such signal or parameter.
 
@@ -97,7 +100,7 @@ class Log:
         n = time.size
         made: dict[str, object] = {
             "time": time,
-            "command": check.command(where, self.command, self.command_kind, n),
+            "command": check.command(where, self.command, self.command_kind, self.command_hold, n),
             "measured": MappingProxyType(check.measured(where, self.measured, n, ANGLES)),
             "torque_on": None if self.torque_on is None else check.switch(where, self.torque_on, n),
             "load": as_load(self.load),
@@ -130,6 +133,23 @@ class Log:
         """From the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
+    @cached_property
+    def held(self) -> NDArray[np.float64]:
+        """The command where none is missing, shape (n,): else the one before it, or at the start the first one (SI)."""
+        return check.frozen(filled(self.command))
+
+    @cached_property
+    def sent(self) -> NDArray[np.bool_]:
+        """Whether pulses are sent from each sample to the next, shape (n,): there is a command, and torque is on."""
+        there = ~np.isnan(self.command)
+        return check.frozen(there if self.torque_on is None else there & self.torque_on)
+
+    @cached_property
+    def changes(self) -> NDArray[np.int64]:
+        """Samples at which the command is another one, or pulses begin or end, than at the sample before."""
+        turns = (np.diff(self.held) != 0.0) | (self.sent[1:] != self.sent[:-1])
+        return check.frozen(np.flatnonzero(turns) + 1)
+
     @property
     def angle_name(self) -> str:
         """The signal that tells best where the shaft is: `output_angle`, else `feedback_voltage`."""
@@ -141,7 +161,7 @@ class Log:
         values = self.measured[self.angle_name][self.used(self.angle_name)]
         if np.ptp(values) == 0.0:
             return True
-        if np.ptp(self.command) != 0.0 or (self.torque_on is not None and np.ptp(self.torque_on.astype(int))):
+        if self.changes.size:
             return False
         # Of white noise the mean square of differences is twice the variance; of a motion it is far less
         return bool(np.mean(np.diff(values)**2) > np.var(values))
@@ -164,13 +184,13 @@ class Log:
     def signal(self, frame_period: float | None = None) -> Signal:
         """Return the command; its t = 0 is the first sample.
 
-        Where torque is off pulses are missing: frames start at regular edges, and there are no edges while it is off.
+        Where a command is missing or torque is off there are no pulses: frames start at regular edges, without those.
         A servo without pulses then ends its drive by its `pulse_timeout`; the averaged models know no pulses.
 
         Parameters
         ----------
         frame_period : float, optional
-            Of the edges of a log with torque off [s]; unless given that of `parameters`, or 20 ms.
+            Of the edges of a log without some pulses [s]; unless given that of `parameters`, or 20 ms.
 
         Raises
         ------
@@ -178,11 +198,11 @@ class Log:
             If the frame period is not positive.
         """
         unit = KINDS[self.command_kind]
-        made = sampled(self.time - self.time[0], self.command, unit=unit, hold=self.command_hold)
-        if self.torque_on is None or self.torque_on.all():
+        made = sampled(self.time - self.time[0], self.held, unit=unit, hold=self.command_hold)
+        if self.sent.all():
             return made
         period = self.parameters.get(_FRAME_PERIOD, 0.02) if frame_period is None else frame_period
-        edges = check.frame_edges(self.time, self.torque_on, period)
+        edges = check.frame_edges(self.time, self.sent, period)
         return replace(made, edges=tuple(edges.tolist()))
 
     def part(self, start: float, stop: float, name: str | None = None) -> Log:
@@ -197,13 +217,13 @@ class Log:
         return self._cut(keep, self.name if name is None else name)
 
     def without_torque_off(self) -> tuple[Log, ...]:
-        """Return the stretches with torque on, each a log of its own; those too short or without an angle are left out.
+        """Return the stretches with pulses, each a log of its own; those too short or without an angle are left out.
 
         Names get " (1)", " (2)", … where there are several.
         """
-        if self.torque_on is None or self.torque_on.all():
+        if self.sent.all():
             return (self,)
-        ends = np.flatnonzero(np.diff(np.concatenate(([0], self.torque_on.astype(int), [0]))))
+        ends = np.flatnonzero(np.diff(np.concatenate(([False], self.sent, [False]))))
         seen = np.any([self.used(name) for name in ANGLES if name in self.measured], axis=0)
         spans = [(a, b) for a, b in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True)
                  if b - a >= check.FEWEST and seen[a:b].any()]
@@ -217,9 +237,12 @@ class Log:
         shift = float(self.time[keep][0] - self.time[0])
         load = replace(self.load, recorded=tuple(Recorded([t - shift for t in r.time], r.torque)
                                                  for r in self.load.recorded))
-        return replace(self, name=name, time=self.time[keep], command=self.command[keep], load=load,
+        command, on = self.command, self.torque_on
+        if np.isnan(command[keep][0]):  # what the servo was told last is only told before the part
+            command, on = self.held, self.sent
+        return replace(self, name=name, time=self.time[keep], command=command[keep], load=load,
                        measured={key: values[keep] for key, values in self.measured.items()},
-                       torque_on=None if self.torque_on is None else self.torque_on[keep])
+                       torque_on=None if on is None else on[keep])
 
 
 def _rebuild(state: dict[str, Any]) -> Log:

@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.models.outputs import SIGNALS
+from servotwin.logs.columns import UNITS
 from servotwin.parameters import GROUPS
 from servotwin.parameters.group import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
 from servotwin.parameters.servo import check_name, unit_of
 from servotwin.units import is_finite
 
 FEWEST = 3  # samples
+_Kind = TypeVar("_Kind", bound=np.generic)
 _LARGEST_EDGES = 10_000_000
 # signal or kind of command -> (SI unit, largest magnitude that a servo's log can hold, what was probably meant)
 _LIMITS = {
-    **dict.fromkeys(("output_angle", "angle"), ("rad", 100.0, "degrees or counts?")),
+    **dict.fromkeys(("output_angle", "load_angle", "angle"), ("rad", 100.0, "degrees or counts?")),
     "pulse_width": ("s", 0.1, "microseconds?"),
     **dict.fromkeys(("voltage", "feedback_voltage", "bus_voltage", "armature_voltage"),
                     ("V", 1e3, "millivolts or counts?")),
@@ -65,21 +66,27 @@ def times(where: str, time: object) -> NDArray[np.float64]:
         stands = "stands still" if t[k] == t[k - 1] else "runs backwards"
         raise InputError(f"{where}: time {stands} at sample {k}", got=f"{t[k]:.9g} s after {t[k - 1]:.9g} s",
                          allowed="increasing times")
-    return _frozen(t)
+    return frozen(t)
 
 
-def command(where: str, values: object, kind: str, n: int) -> NDArray[np.float64]:
-    """Return the command; it is finite, and a pulse width is positive."""
+def command(where: str, values: object, kind: str, hold: str, n: int) -> NDArray[np.float64]:
+    """Return the command; it is finite or, of pulses and angles that are held, nan; a pulse width is positive."""
     y = _column(f"{where}: command", values, n)
-    bad = np.flatnonzero(~np.isfinite(y))
+    silent = np.isnan(y)
+    if n and silent.all():
+        raise InputError(f"{where}: command", got="no value in any sample", allowed="at least one value")
+    bad = np.flatnonzero(~np.isfinite(y) & ~(silent & (kind != "voltage") & (hold == "previous")))
     if bad.size:
-        raise InputError(f"{where}: command of sample {bad[0]}", got=float(y[bad[0]]), allowed="a finite number")
+        why = "a finite number" + ("" if not silent[bad[0]] else "; only pulses and angles may have nan, for no pulses"
+                                   if kind == "voltage" else '; nan means no pulses only with command_hold "previous"')
+        raise InputError(f"{where}: command of sample {bad[0]}", got=float(y[bad[0]]), allowed=why)
+    y[silent] = np.nan  # one and the same for hashes, whatever nan was given
     if kind == "pulse_width" and (y <= 0.0).any():
         k = int(np.argmax(y <= 0.0))
         raise InputError(f"{where}: pulse width of sample {k}", got=f"{y[k]:g} s",
-                         allowed="a positive width; where no pulse is sent, torque_on is false")
+                         allowed="a positive width, or nan where no pulse is sent")
     _plausible(f"{where}: command ({kind})", y, kind)
-    return _frozen(y)
+    return frozen(y)
 
 
 def measured(where: str, columns: object, n: int, angles: tuple[str, ...]) -> dict[str, NDArray[np.float64]]:
@@ -88,8 +95,8 @@ def measured(where: str, columns: object, n: int, angles: tuple[str, ...]) -> di
         raise InputError(f"{where}: measured", got=type(columns).__name__, allowed="a mapping of names to arrays")
     made = {}
     for name, values in columns.items():
-        if name not in SIGNALS:
-            raise UnknownNameError(f"signal of {where}", str(name), SIGNALS)
+        if name not in UNITS:
+            raise UnknownNameError(f"signal of {where}", str(name), UNITS)
         if name in _COMMANDS:
             raise InputError(f"{where}: measured signals", got=name, allowed="no command, which belongs in `command`")
         y = _column(f"{where}: {name}", values, n)
@@ -98,7 +105,7 @@ def measured(where: str, columns: object, n: int, angles: tuple[str, ...]) -> di
             raise InputError(f"{where}: {name} of sample {bad[0]}", got=float(y[bad[0]]),
                              allowed="a finite number, or nan where nothing was measured")
         _plausible(f"{where}: {name}", y, name)
-        made[name] = _frozen(y)
+        made[name] = frozen(y)
     if not any(name in made for name in angles):
         raise InputError(f"{where}: measured signals", got=", ".join(made) or "none",
                          allowed=f"among them {' or '.join(angles)}")
@@ -116,9 +123,7 @@ def switch(where: str, values: object, n: int) -> NDArray[np.bool_]:
     bad = np.flatnonzero((y != 0.0) & (y != 1.0))
     if bad.size:
         raise InputError(f"{where}: torque_on of sample {bad[0]}", got=float(y[bad[0]]), allowed="true or false")
-    made = np.asarray(y == 1.0)
-    made.setflags(write=False)
-    return made
+    return frozen(np.asarray(y == 1.0))
 
 
 def parameters(where: str, values: object) -> dict[str, float]:
@@ -159,8 +164,8 @@ def windows(where: str, values: object) -> tuple[tuple[float, float], ...]:
     return tuple(made)
 
 
-def frame_edges(time: NDArray[np.float64], torque_on: NDArray[np.bool_], period: object) -> NDArray[np.float64]:
-    """Return regular frame edges [s], counted from the first sample, without those while torque is off."""
+def frame_edges(time: NDArray[np.float64], sent: NDArray[np.bool_], period: object) -> NDArray[np.float64]:
+    """Return regular frame edges [s], counted from the first sample, without those while no pulses are sent."""
     if not is_finite(period) or not period > 0.0:
         raise InputError("frame_period", got=period, allowed="a positive number [s]")
     since = time - time[0]
@@ -170,7 +175,7 @@ def frame_edges(time: NDArray[np.float64], torque_on: NDArray[np.bool_], period:
     edges = np.arange(int(count)) * float(period)
     # a sample that is a rounding later than the edge still decides it
     latest = np.searchsorted(since, edges + 1e-9 * period, side="right") - 1
-    return np.asarray(edges[torque_on[latest]])
+    return np.asarray(edges[sent[latest]])
 
 
 def _mapping(what: str, values: object) -> Mapping[str, Any]:
@@ -206,6 +211,7 @@ def _plausible(what: str, values: NDArray[np.float64], name: str) -> None:
         raise InputError(what, got=f"{largest:g} {unit}", allowed=f"at most {limit:g} {unit} in magnitude: {meant}")
 
 
-def _frozen(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def frozen(values: NDArray[_Kind]) -> NDArray[_Kind]:
+    """Return an array to which nobody writes any more."""
     values.setflags(write=False)
     return values

@@ -73,23 +73,20 @@ def _log(path: Path, k: int, run: object) -> Log:
     if not isinstance(index, int) or isinstance(index, bool):
         raise InputError(f"{where}, index", got=index, allowed="a whole number")
     action, angle = (_fractions(f"{where}, {key}", run.get(key)) for key in ("actions", "sensor_data"))
-    silent = np.isnan(action)
     name = f"{index:03d} {motion}"
     with in_file(path, name):
         return Log(
             name=name, source=str(path), motion=motion,
             time=np.asarray(PERIOD * np.arange(action.size), dtype=np.float64), command=_pulse_width(action),
-            command_kind="pulse_width", torque_on=~silent if silent.any() else None,
+            command_kind="pulse_width",
             measured={"output_angle": math.pi * angle}, load=arm(),
             parameters={"electronics.frame_period": FRAME_PERIOD},
-            conditions={"amplitude_deg": round(180.0 * float(np.max(np.abs(action[~silent]), initial=0.0)), 6)})
+            conditions={"amplitude_deg": round(180.0 * float(np.nanmax(np.abs(action), initial=0.0)), 6)})
 
 
 def _pulse_width(action: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return pulse widths [s] of actions (fractions of 180°); where there is none, the one before counts on."""
-    width = np.clip(500.0 + (1.0 + action * 4.0 / 3.0) * 1000.0, 500.0, 2500.0) / 1e6
-    latest = np.maximum.accumulate(np.where(np.isnan(action), -1, np.arange(action.size)))
-    return np.where(latest < 0, 1.5e-3, width[latest])
+    """Return pulse widths [s] of actions (fractions of 180°); nan where no pulses were sent."""
+    return np.clip(500.0 + (1.0 + action * 4.0 / 3.0) * 1000.0, 500.0, 2500.0) / 1e6
 
 
 def _fractions(what: str, values: object) -> NDArray[np.float64]:

@@ -80,7 +80,7 @@ def read_logs(path: str | Path, format: str = "auto", *, sidecar: str | Path | N
             raise InputError(f"{path}: name of a log", allowed="a name for each log",
                              got=f"{log.name} in {seen[log.name]} and in {Path(log.source).name}")
         seen[log.name] = Path(log.source).name
-        warn_of_time_base(log.time, log.command, log.command_kind, f"log {log.name!r}")
+        warn_of_time_base(log.time, log.held, log.command_kind, f"log {log.name!r}")
     return logs
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, final
 import numpy as np
 
 from servotwin import physics
-from servotwin.models.base import KINDS, Line, Model, check_accepted, check_travel, feedback_line, solved
+from servotwin.models.base import KINDS, Line, Model, check_accepted, check_sent, check_travel, feedback_line, solved
 from servotwin.models.terms import friction, sensor
 from servotwin.models.terms.follower import NO_FOLLOWER
 from servotwin.models.terms.numbers import Numbers
@@ -65,8 +65,9 @@ class _Averaged(Model):
         Raises
         ------
         CommandError
-            If a pulse is one that the chip refuses, or an angle is outside the travel.
+            If a pulse is one that the chip refuses, an angle is outside the travel, or pulses stay away.
         """
+        check_sent(signal, self)
         if signal.kind == "pulse_width":
             check_accepted(signal, self)
         elif signal.kind == "angle":

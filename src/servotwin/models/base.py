@@ -206,6 +206,17 @@ class Model(ABC):
         """Return the numbers of the frame logic under this command; None for models without pulses."""
         return None
 
+    def framed(self, signal: Signal, until: float) -> Signal:
+        """Return a command with its pulses one by one as far as `until` [s] where it has silences, else as it is.
+
+        Raises
+        ------
+        CommandError
+            If it has silences, and the model follows no single pulses.
+        """
+        check_sent(signal, self)
+        return signal
+
     def edges(self, signal: Signal) -> tuple[float, ...] | None:
         """Return when the frames of a command start [s]; None where they come regularly, or there are none."""
         return None
@@ -240,6 +251,14 @@ def clipped(x: float, low: float, high: float) -> float:
     if any(isinstance(number, np.ndarray) for number in (x, low, high)):
         return np.minimum(np.maximum(x, low), high)  # type: ignore[no-any-return]
     return min(max(x, low), high)
+
+
+def check_sent(signal: Signal | LaneSignal, model: Model) -> None:
+    """Raise CommandError if a command has silences, which a model of the mean of pulses does not know."""
+    if signal.silences:
+        raise CommandError(
+            f"command for {type(model).__name__}", got=f"no pulses from {max(signal.silences[0][0], 0.0):g} s on",
+            allowed="pulses throughout: take PulseServo, or end before the silence")
 
 
 def check_travel(signal: Signal | LaneSignal, servo: Servo) -> None:

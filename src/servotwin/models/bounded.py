@@ -15,6 +15,7 @@ from servotwin.models.base import (
     Line,
     Model,
     check_accepted,
+    check_sent,
     check_travel,
     clipped,
     feedback_line,
@@ -141,8 +142,9 @@ class BoundedServo(Model):
         Raises
         ------
         CommandError
-            If a pulse is one that the chip refuses, or an angle is outside the travel.
+            If a pulse is one that the chip refuses, an angle is outside the travel, or pulses stay away.
         """
+        check_sent(signal, self)
         if signal.kind == "pulse_width":
             check_accepted(signal, self)
         elif signal.kind == "angle":

@@ -160,3 +160,4 @@ class LaneSignal:
     frame_period: float | Array | None
     edges: tuple[()] | None
     lanes: Indices
+    silences: tuple[()] = ()  # they are edges by then

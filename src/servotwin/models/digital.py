@@ -116,6 +116,10 @@ class DigitalServo(SwitchedServo):
                                allowed=f"at most a frame of {1e3 * float(np.min(T_f)):.6g} ms")
         return super().command(signal)
 
+    def framed(self, signal: Signal, until: float) -> Signal:
+        """Return a command as its pulses come; on a bus a silence is a time without a write, over which a goal stays."""
+        return signal if self.takes_goals else super().framed(signal, until)
+
     def start_angle(self, drive: float) -> float:
         """Return the angle without error, within stops and goals [rad]."""
         angle = drive if self.takes_goals else super().start_angle(drive)

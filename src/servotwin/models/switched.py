@@ -73,6 +73,19 @@ class SwitchedServo(Model):
         """Return when the frames of a command start [s]; None where they come regularly."""
         return None if signal.edges is None else signal.edges[bisect_left(signal.edges, 0.0):]
 
+    def framed(self, signal: Signal, until: float) -> Signal:
+        """Return a command with its pulses one by one as far as `until` [s] where it has silences, else as it is.
+
+        Raises
+        ------
+        CommandError
+            If the model cannot follow it.
+        """
+        if not signal.silences:
+            return signal
+        self.command(signal)  # the widths have to fit into the frames that are lost here
+        return signal.framed(self._period(signal), until)
+
     def command(self, signal: Signal) -> Pieces:
         """Return the pulse width t_a [s]: k_p1 v_i + t_0 of a voltage, T_0 + (p q* + b_o)/s_r of an angle.
 

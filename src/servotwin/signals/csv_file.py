@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from servotwin.errors import CommandError, InputError
 from servotwin.signals.shapes import samples
-from servotwin.signals.signal import Signal
+from servotwin.signals.signal import Signal, kind_of
 from servotwin.tables import TextTable, read_table
 
 # column of the file -> unit of the signal; a name without suffix is in SI
@@ -27,7 +28,8 @@ def from_csv(path: str | Path, *, column: str | None = None, hold: str = "previo
     ----------
     path : str or Path
         File with a column `time_s` (or `time_ms`, `time`) and one of `pulse_width_us`, `command_angle_deg`,
-        `command_voltage_V`, … Names without a unit are SI.
+        `command_voltage_V`, … Names without a unit are SI. Where a cell of pulses or angles is empty or says nan,
+        no pulses are sent until the next one with a value.
     column : str, optional
         Which column to take, where the file has several commands.
     hold : {"previous", "linear"}
@@ -60,7 +62,10 @@ def from_csv(path: str | Path, *, column: str | None = None, hold: str = "previo
                            allowed=("one of them, chosen by column=" if found else "one of " + ", ".join(_COLUMNS)))
     name = column or found[0]
     try:
-        time, value = (table.numbers(one).tolist() for one in (time_name, name))
+        _check_whole(table, name)
+        time = table.numbers(time_name).tolist()
+        silent = kind_of(_COLUMNS[name]) != "voltage"
+        value = table.numbers(name, missing=math.nan if silent else None).tolist()
     except InputError as error:
         raise CommandError(error.what, got=error.got, allowed=error.allowed) from None
     try:
@@ -68,6 +73,14 @@ def from_csv(path: str | Path, *, column: str | None = None, hold: str = "previo
                        frame_period=frame_period)
     except CommandError as error:
         raise CommandError(f"{path}: {error.what}", got=error.got, allowed=error.allowed) from None
+
+
+def _check_whole(table: TextTable, name: str) -> None:
+    """Raise where a row ends before the command: cut off, it says nothing of pulses."""
+    at = table.header.index(name)
+    cut = next((row for row in table.rows if len(row.cells) <= at), None)
+    if cut is not None:
+        raise InputError(f"{table.path}: line {cut.line}, {name}", got="nothing", allowed="a number")
 
 
 def _table(path: Path) -> TextTable:

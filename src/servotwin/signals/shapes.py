@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ from servotwin import units
 from servotwin.errors import CommandError
 from servotwin.physics.pieces import Piece, Pieces, constant_pieces
 from servotwin.signals.signal import KINDS, Signal, in_si, kind_of
+from servotwin.signals.silence import filled, spans
 from servotwin.signals.time_base import warn_of_time_base
 
 if TYPE_CHECKING:
@@ -149,13 +151,15 @@ def samples(time: ArrayLike, value: ArrayLike, *, unit: str, hold: str = "previo
     time : array_like, shape (n,)
         Increasing [s].
     value : array_like, shape (n,)
-        In `unit`.
+        In `unit`. Of pulses and angles that are held, nan means that no pulses are sent from this sample to the next
+        one with a value: frames count on without them.
     hold : {"previous", "linear"}
 
     Raises
     ------
     CommandError
-        If the arrays are empty, of unequal length, unsorted or not finite, or a linear slope is beyond all numbers.
+        If the arrays are empty, of unequal length, unsorted or not finite, a linear slope is beyond all numbers, or
+        nan stands for a voltage, between linear samples, or everywhere.
 
     Warns
     -----
@@ -166,10 +170,15 @@ def samples(time: ArrayLike, value: ArrayLike, *, unit: str, hold: str = "previo
     --------
     >>> float(samples([0.0, 1.0], [0.0, 1.0], unit="rad", hold="linear")(0.25))
     0.25
+    >>> samples([0.0, 0.5, 1.0], [1500.0, float("nan"), 1600.0], unit="us").silences
+    ((0.5, 1.0),)
     """
-    t, y = _arrays(time, value, unit, "samples")
+    t, y = _arrays(time, value, unit, "samples", silent=kind_of(unit) != "voltage" and hold == "previous")
+    silences = spans(t, np.isnan(y))
+    y = filled(y)
     warn_of_time_base(t, y, kind_of(unit), "the command")
-    return sampled(t, y, unit=unit, hold=hold, frame_period=frame_period)
+    made = sampled(t, y, unit=unit, hold=hold, frame_period=frame_period)
+    return replace(made, silences=silences) if silences else made
 
 
 def sampled(t: NDArray[np.float64], y: NDArray[np.float64], *, unit: str, hold: str,
@@ -223,8 +232,9 @@ def _smooth(rows: tuple[Piece, ...], unit: str, frame_period: float | None) -> S
     return Signal(pieces=pieces, unit=unit, initial=float(pieces(0.0)), frame_period=frame_period)
 
 
-def _arrays(time: ArrayLike, value: ArrayLike, unit: str,
-            what: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _arrays(time: ArrayLike, value: ArrayLike, unit: str, what: str, *,
+            silent: bool = False) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return times and values (SI); nan among the values counts where samples may be `silent`."""
     kind_of(unit)
     try:
         t, y = np.asarray(time, dtype=np.float64), np.asarray(value, dtype=np.float64)
@@ -237,14 +247,26 @@ def _arrays(time: ArrayLike, value: ArrayLike, unit: str,
     for name, a, given in (("time", t, time), ("value", y, value)):
         if np.ma.is_masked(given):  # what a mask hides would count
             raise CommandError(f"{what}: {name}", got="a masked array", allowed="numbers, none of them masked")
-        bad = np.flatnonzero(~np.isfinite(a))
+        nan = np.isnan(a) if silent and a is y else np.zeros(a.shape, np.bool_)
+        if nan.all():
+            raise CommandError(what, got="no value that is a number", allowed="at least one: nan means no pulses")
+        bad = np.flatnonzero(~np.isfinite(a) & ~nan)
         if bad.size:
-            raise CommandError(f"{what}: {name} of sample {bad[0]}", got=float(a[bad[0]]), allowed="a finite number")
+            more = _without_nan(unit) if what == "samples" and a is y and np.isnan(a[bad[0]]) else ""
+            raise CommandError(f"{what}: {name} of sample {bad[0]}", got=float(a[bad[0]]),
+                               allowed=f"a finite number{more}")
     bad = np.flatnonzero(np.diff(t) <= 0.0)
     if bad.size:
         raise CommandError(f"{what}: time of sample {bad[0] + 1}", got=float(t[bad[0] + 1]),
                            allowed=f"more than {t[bad[0]]:g} s, the one before")
     return t, np.asarray(units.to_si(y, unit, KINDS[unit][1]))
+
+
+def _without_nan(unit: str) -> str:
+    """Return what an error says of a sample without a value that needs one."""
+    if kind_of(unit) == "voltage":
+        return "; only pulses and angles (us, ms, s, deg, rad) may have nan, for no pulses"
+    return '; only with hold="previous" does nan mean no pulses'
 
 
 def _time(value: float, what: str) -> float:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from struct import Struct
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,8 @@ _HEADER = np.dtype([("kind", np.int64), ("initial", np.float64), ("lowest", np.f
                     ("edges", np.int64)])
 _CODES = {unit: KIND_NAMES.index(kind) for unit, (kind, _) in KINDS.items()}
 _pack = Struct("=qdddddqq").pack
+_MOST_FRAMES = 1e7
+_SAME = 1e-9  # of a frame: instants that are nearer are one, as for the engine
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +53,9 @@ class Signal:
         Period of the transmitter's pulses [s]; overrides the servo's.
     edges : tuple of float, optional
         Rising edges of the pulses, where they are given one by one [s].
+    silences : tuple of (float, float)
+        Spans start ≤ t < end in which no pulses are sent, one after the other; the first may begin at −∞, the last end
+        at ∞ [s]. Frames count on meanwhile. Their values are held through it, and no servo sees them.
 
     Examples
     --------
@@ -64,6 +70,7 @@ class Signal:
     initial: float
     frame_period: float | None = None
     edges: tuple[float, ...] | None = None
+    silences: tuple[tuple[float, float], ...] = ()
     header: bytes = field(init=False, repr=False, compare=False)
     """What `headers` reads of it."""
 
@@ -77,6 +84,8 @@ class Signal:
                                    allowed="none: only a pulse signal (unit us, ms or s) has frames")
             if not (units.is_finite(self.frame_period) and self.frame_period > 0.0):
                 raise CommandError("frame_period", got=self.frame_period, allowed="a positive number [s]")
+        if self.silences:
+            self._check_silences()
         low, high = self.pieces.extremes
         if kind == "pulse_width" and low <= 0.0:
             raise CommandError("pulse width", got=low, allowed="a positive width [s]")
@@ -85,6 +94,50 @@ class Signal:
             _CODES[self.unit], self.initial, min(low, self.initial), max(high, self.initial),
             self.frame_period or math.nan, math.nan if change is None else change, len(self.pieces.table),
             -1 if self.edges is None else len(self.edges)))
+
+    def _check_silences(self) -> None:
+        if self.kind == "voltage":
+            raise CommandError("silences", got="a voltage", allowed="pulses or angles: a voltage is always there")
+        if self.edges is not None:
+            raise CommandError("silences", got="edges too", allowed="one of both: edges tell of silences by themselves")
+        times = [time for span in self.silences for time in span]
+        if not all(a < b for a, b in pairwise(times)):  # nan too
+            raise CommandError("silences", got=self.silences, allowed="spans (start, end), one after the other [s]")
+
+    def framed(self, period: float, until: float) -> Signal:
+        """Return it with its pulses one by one, those of regular frames in no silence; itself where it has no silence.
+
+        Parameters
+        ----------
+        period : float
+            Of frames, of which the first begins at t = 0 [s].
+        until : float
+            How long pulses are wanted for; a few more follow [s].
+
+        Raises
+        ------
+        CommandError
+            If there are more than ten million frames.
+
+        Examples
+        --------
+        >>> from servotwin.signals import samples
+        >>> signal = samples([0.0, 0.02, 0.06], [1500.0, float("nan"), 1600.0], unit="us")
+        >>> signal.framed(0.02, 0.06).edges
+        (0.0, 0.06, 0.08, 0.1)
+        """
+        if not self.silences:
+            return self
+        frames = until / period
+        if not frames <= _MOST_FRAMES:
+            raise CommandError("duration / frame period", got=f"{frames:.3g} frames",
+                               allowed=f"at most {_MOST_FRAMES:.0e} where some pulses are not sent")
+        edges = np.arange(math.ceil(frames) + 3) * period
+        starts, ends = np.array(self.silences).T
+        at = edges + _SAME * period  # a pulse that is due as the silence begins is not sent
+        which = np.searchsorted(starts, at, side="right") - 1
+        silent = (which >= 0) & (at < ends[which])
+        return replace(self, edges=tuple(edges[~silent].tolist()), silences=())
 
     @property
     def first_change(self) -> float | None:
@@ -106,7 +159,9 @@ class Signal:
         first = table[0]
         if first.slope or first.amplitude:
             return first.start
-        return table[1].start if len(table) > 1 else None
+        changes = [piece.start for piece in table[1:2]]
+        changes += [start if start > 0.0 else end for start, end in self.silences if end > 0.0]
+        return min((change for change in changes if change < math.inf), default=None)
 
     @property
     def kind(self) -> str:

@@ -238,7 +238,7 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
     times = times_asked(duration, output_step, output_times)
-    given = _checked(servos, supply, initial)
+    given = _checked(servos, supply, duration, initial)
     sims, plans, states = {}, [], []
     for k, (name, (model, command, load)) in enumerate(given.items()):
         sim = Simulator(on_supply(model, supply), load, int(seed) + k)
@@ -263,7 +263,7 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     return Fleet(times, results, status, ended, status.message, bus)
 
 
-def _checked(servos: Mapping[str, Sequence[Any]], supply: Supply,
+def _checked(servos: Mapping[str, Sequence[Any]], supply: Supply, duration: float,
              initial: Mapping[str, Mapping[str, float]] | None) -> dict[str, tuple[Model, Signal, Any]]:
     allowed = "a mapping of names to (model, command) or (model, command, load)"
     if not isinstance(servos, Mapping) or not servos:
@@ -278,7 +278,8 @@ def _checked(servos: Mapping[str, Sequence[Any]], supply: Supply,
             raise InputError(f"servo {name!r}", got=parts, allowed="(model, command) or (model, command, load)")
         if not isinstance(parts[0], MODELS):
             raise InputError(f"model of servo {name!r}", got=parts[0], allowed="PulseServo or PulseServoInductive")
-        found[str(name)] = (parts[0], parts[1], parts[2] if len(parts) == 3 else None)
+        command = parts[0].framed(parts[1], duration) if isinstance(parts[1], Signal) else parts[1]
+        found[str(name)] = (parts[0], command, parts[2] if len(parts) == 3 else None)
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -117,6 +117,18 @@ def lanes_of(model: Model, command: object, load: object, parameters: object, in
         commands=commands, command_of=_spread(command_of, count), loads=loads, load_of=_spread(load_of, count),
         initial={name: np.atleast_1d(value) for name, value in start.items()},
         seeds=np.arange(count) if seed is None else _spread(np.atleast_1d(seed), count))
+
+
+def framed(lanes: Lanes, until: float) -> Lanes:
+    """Return lanes whose commands have their pulses one by one where they have silences, as far as `until` [s]."""
+    if not any(signal.silences for signal in lanes.commands):
+        return lanes
+    if "electronics.frame_period" not in lanes.numbers:
+        return replace(lanes, commands=tuple(lanes.model.framed(signal, until) for signal in lanes.commands))
+    # Each lane has frames of its own
+    commands = tuple(lanes.lane_model(lane).framed(lanes.commands[k], until)
+                     for lane, k in enumerate(lanes.command_of.tolist()))
+    return replace(lanes, commands=commands, command_of=np.arange(lanes.count))
 
 
 def pick(lanes: Any, count: int) -> Indices:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.simulation.batch import Batch, Failure
-from servotwin.simulation.lane_inputs import Lanes, lanes_of
+from servotwin.simulation.lane_inputs import Lanes, framed, lanes_of
 from servotwin.simulation.lane_runs import goes_together
 from servotwin.simulation.lane_runs import run as run_lanes
 from servotwin.simulation.lanes import Raw, Work
@@ -141,6 +141,7 @@ def simulate_lanes(
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     times = np.array(times_asked(duration, output_step, output_times))  # a copy: it becomes read-only
     asked = Asked(float(duration), times, _outputs(lanes.model, outputs), real_type(dtype), accuracy_of(accuracy))
+    lanes = framed(lanes, asked.duration)
     commands = Commands(lanes)
     packs = _packs(lanes, commands, asked, chunk, workers_of(executor))
     signals = _space(lanes, asked)

@@ -76,6 +76,7 @@ class Simulator:
         self._numbers = model.pack(self.load)
         self._torque = self.load.torque_pieces
         self._last: tuple[Signal, Plan] | None = None
+        self._framed: tuple[Signal, float, Signal] | None = None
         self._others: dict[tuple[tuple[str, Any], ...], Simulator] = {}
 
     def drive(self, command: Signal) -> Pieces:
@@ -168,7 +169,7 @@ class Simulator:
         """
         self._check(state, "observe(state)")
         own = self._with(state.changes)
-        plan, load = own.plan(command, external_torque), own.load
+        plan, load = own.plan(own.framed(command, state.time), external_torque), own.load
         if external_torque:
             load = load + Constant(external_torque)
         y, chip = np.array(state.memory.point.y)[:, None], state.memory.chip
@@ -258,7 +259,15 @@ class Simulator:
             raise InputError("external_torque", got=external_torque, allowed="a finite number [N m]")
         own = self._with(state.changes)
         own.load.check_span(state.time, until)
-        return engine.run(own.plan(command, external_torque), state, float(until), record)
+        return engine.run(own.plan(own.framed(command, until), external_torque), state, float(until), record)
+
+    def framed(self, command: Signal, until: float) -> Signal:
+        """Return a command with its pulses one by one where it has silences, for longer than `until` [s]."""
+        if not isinstance(command, Signal) or not command.silences:
+            return command  # `drive` says what is wrong with what is no signal
+        if self._framed is None or self._framed[0] is not command or self._framed[1] < until:
+            self._framed = (command, 2.0 * until, self.model.framed(command, 2.0 * until))  # seldom anew
+        return self._framed[2]
 
     def plan(self, command: Signal, external_torque: float = 0.0) -> Plan:
         """Return what the engine needs for a run under a command, and a constant torque beside the load [N m]."""
@@ -334,7 +343,7 @@ def simulate(model: Model, command: Signal, *, duration: float, load: Load | Par
     simulator = Simulator(model, load, seed, accuracy)
     simulator.drive(command)  # raises if the model cannot follow it
     warn_of(model.servo, [command], duration)
-    return simulated(simulator, command, duration, times, initial, progress)
+    return simulated(simulator, model.framed(command, duration), duration, times, initial, progress)
 
 
 def simulated(simulator: Simulator, command: Signal, duration: float, times: NDArray[np.float64],

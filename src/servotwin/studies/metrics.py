@@ -56,7 +56,8 @@ def step_time(command: Signal) -> float:
     """Return when a command steps, if it is a single step; nan otherwise [s]."""
     table = command.pieces.table
     changes = [piece.start for piece in table[1:] if piece.start >= 0.0]
-    plain = not any(piece.slope or piece.amplitude for piece in table) and command.edges is None
+    steady = not any(piece.slope or piece.amplitude for piece in table)
+    plain = steady and command.edges is None and not command.silences
     return changes[0] if len(changes) == 1 and plain else math.nan
 
 
@@ -95,6 +96,7 @@ def decision_times(model: Model, command: Signal, duration: float) -> Array:
     chip = model.chip(command)
     if chip is None:
         return np.zeros(0)
+    command = model.framed(command, duration)
     given = model.edges(command)
     edges = np.arange(math.ceil(duration / chip.frame_period)) * chip.frame_period if given is None else np.array(given)
     return np.asarray(edges + model.command(command)(edges))

@@ -238,7 +238,8 @@ def _of_job(job: Job) -> dict[str, Any]:
         "model": type(job.model).__name__, "servo": servo.name,
         "parameters": {name: _plain(servo.get(name)) for name in servo.names()},
         "command": {"unit": command.unit, "initial": command.initial, "frame_period": command.frame_period,
-                    "edges": _plain(command.edges), "pieces": [list(piece) for piece in command.pieces.table]},
+                    "edges": _plain(command.edges), "silences": str(command.silences),
+                    "pieces": [list(piece) for piece in command.pieces.table]},
         "load": json.loads(json.dumps(load, default=_plain)), "duration": job.duration,
         "metrics": list(job.metrics),
     }

@@ -275,7 +275,7 @@ def _motions(known: _Known) -> dict[str, Array]:
 def _range(known: _Known) -> tuple[float, float]:
     """Return the lowest and highest usual command [rad or s]."""
     if known.logs:
-        return min(float(log.command.min()) for log in known.logs), max(float(log.command.max()) for log in known.logs)
+        return min(float(log.held.min()) for log in known.logs), max(float(log.held.max()) for log in known.logs)
     servo = known.model.servo
     low, high = servo.get("stops.lower_angle"), servo.get("stops.upper_angle")
     if isinstance(low, float) and isinstance(high, float):

@@ -47,7 +47,7 @@ def fit_slew_lag(logs: Sequence[Log], *, loss: Loss = "linear", loss_scale: floa
     Parameters
     ----------
     logs : sequence of Log
-        With one kind of command. Samples that do not count, and all from the first one without torque on, are left
+        With one kind of command. Samples that do not count, and all from the first one without pulses on, are left
         out.
     loss : {"linear", "soft_l1", "huber"}
         Of the squared error: the last two let outliers count less.
@@ -119,7 +119,7 @@ class _Fitted:
         seen = [(log, used) for log, used in seen if used.any()]
         self.measured = np.concatenate([log.measured[signal][used] for log, used in seen])
         self.range = float(np.ptp(self.measured))
-        commands = np.concatenate([log.command[used] for log, used in seen])
+        commands = np.concatenate([log.held[used] for log, used in seen])
         self.free = NUMBERS if gain else NUMBERS[:-1]
         if len(self.measured) < len(self.free):
             raise InputError("logs", got=f"{len(self.measured)} values that count",

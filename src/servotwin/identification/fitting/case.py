@@ -97,16 +97,16 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     values = {name: log.measured[name][mask] for name, mask in used.items()}
     times = time[any_used]
     overridden = tuple(sorted(name for name in log.parameters))
-    key = (log.command_kind, overridden, tuple(sorted(places)), log.torque_on is None or bool(log.torque_on.all()))
+    key = (log.command_kind, overridden, tuple(sorted(places)), bool(log.sent.all()))
     return Case(log=log, signal=_signal(log, model), times=times, places=places, values=values, start=(angle, speed),
                 scatter=scatter, moving=moving, key=key, period=_period(log, model))
 
 
 def _usable(log: Log, model: Model, name: str) -> NDArray[np.bool_]:
-    """Return where a sensor counts; a model without pulses says nothing once the torque was off."""
+    """Return where a sensor counts; a model without pulses says nothing once no pulses were sent."""
     used = log.used(name)
-    if isinstance(model, BoundedServo) and log.torque_on is not None and not log.torque_on.all():
-        used = used & (np.arange(len(log.time)) < int(np.argmin(log.torque_on)))
+    if isinstance(model, BoundedServo) and not log.sent.all():
+        used = used & (np.arange(len(log.time)) < int(np.argmin(log.sent)))
     return used
 
 

@@ -77,7 +77,8 @@ def checked_sensors(logs: Sequence[Log], sensors: Sequence[str] | None, model: M
             raise InputError("sensors", got=sensors, allowed="a list of " + ", ".join(there))
         for name in sensors:
             if name not in there or name not in model.available:
-                raise InputError("sensors", got=name, allowed=", ".join(n for n in there if n in model.available))
+                got = f"{name}, which {type(model).__name__} does not have" if name in there else name
+                raise InputError("sensors", got=got, allowed=", ".join(n for n in there if n in model.available))
         if not any(name in ("output_angle", "feedback_voltage") for name in sensors):
             raise InputError("sensors", got=", ".join(sensors), allowed="output_angle or feedback_voltage among them")
         return tuple(dict.fromkeys(sensors))
@@ -120,7 +121,7 @@ def check_speeds(logs: Sequence[Log], model: Model) -> None:
         if log.angle_name != "output_angle":
             continue
         voltage = log.parameters.get("supply.open_circuit_voltage", model.value("supply.open_circuit_voltage"))
-        used = log.used("output_angle") if log.torque_on is None else log.used("output_angle") & log.torque_on
+        used = log.used("output_angle") & log.sent
         time, angle = log.time[used], log.measured["output_angle"][used]
         if len(time) < 5:
             continue

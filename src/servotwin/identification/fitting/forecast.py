@@ -173,7 +173,7 @@ class Forecast:
     def hunts(self, case: Case) -> bool:
         """Tell whether the servo could not rest at the start of a log without drives, but begins there at rest."""
         log, servo = case.log, self.model.servo
-        if not self.phased or case.moving or log.load.recorded or log.torque_on is not None:
+        if not self.phased or case.moving or log.load.recorded or not log.sent.all():
             return False
         q = case.start[0]
         pull = log.load.torque + sum(s.stiffness * (q - s.rest_angle) for s in log.load.springs) + sum(

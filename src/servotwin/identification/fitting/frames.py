@@ -45,7 +45,7 @@ class Gap(NamedTuple):
 
 
 def changes(log: Log) -> Array:
-    """Return when the command changes by a jump, from the first sample [s].
+    """Return when the command changes by a jump, or pulses begin or end, from the first sample [s].
 
     Examples
     --------
@@ -56,10 +56,7 @@ def changes(log: Log) -> Array:
     """
     if log.command_hold != "previous":
         return np.zeros(0)
-    jumps = np.diff(log.command) != 0.0
-    if log.torque_on is not None:
-        jumps |= np.diff(log.torque_on.astype(np.int8)) != 0
-    return np.asarray(log.time[1:][jumps] - log.time[0])
+    return np.asarray(log.time[log.changes] - log.time[0])
 
 
 def gaps(log: Log, period: float) -> tuple[Gap, ...]:
@@ -132,8 +129,7 @@ def signal(log: Log, frames: Frames, first: float, period: float, lead: float = 
     unit = KINDS[log.command_kind]
     if log.command_hold == "previous":
         # Half a frame early, so that an edge that moves a little carries the same
-        made = sampled(edges - 0.5 * period, log.command[latest], unit=unit, hold="previous")
+        made = sampled(edges - 0.5 * period, log.held[latest], unit=unit, hold="previous")
     else:
-        made = sampled(time + lead, log.command, unit=unit, hold=log.command_hold)
-    alive = np.ones(len(k), np.bool_) if log.torque_on is None else log.torque_on[latest]
-    return replace(made, initial=float(log.command[0]), edges=tuple(edges[alive].tolist()))
+        made = sampled(time + lead, log.held, unit=unit, hold=log.command_hold)
+    return replace(made, initial=float(log.held[0]), edges=tuple(edges[log.sent[latest]].tolist()))

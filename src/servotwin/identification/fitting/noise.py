@@ -176,10 +176,10 @@ def bends(one: SensorSeries) -> Array:
 def _windows(one: SensorSeries) -> list[Array]:
     """Return the scatter while the shaft stood, in stretches of some samples: the command has been the same long."""
     at = np.searchsorted(one.log.time, one.time)
-    command = one.log.command[np.minimum(at, len(one.log.command) - 1)]
-    changed = np.append(True, np.diff(command) != 0.0)
+    place = np.minimum(at, len(one.log) - 1)
+    changed = np.append(True, np.diff(np.searchsorted(one.log.changes, place, side="right")) != 0)
     changed |= ~one.joined
-    first = np.maximum.accumulate(np.where(changed, np.arange(len(command)), 0))
+    first = np.maximum.accumulate(np.where(changed, np.arange(len(place)), 0))
     since = one.time - one.time[first]
     begins_still = first == 0  # a log may begin at rest
     still = (since >= _SETTLED) | (begins_still & (np.abs(one.simulated - one.simulated[0]) == 0.0))

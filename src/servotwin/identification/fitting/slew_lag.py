@@ -81,7 +81,8 @@ class SlewLag:
     def predict(self, log: Log, start_angle: float | None = None) -> Array:
         """Return the angle at the times of a log, shape (n,) [rad].
 
-        The command is held from sample to sample. Until that of the first sample arrives, the shaft stands.
+        The command is held from sample to sample, also where no pulses are sent. Until that of the first sample
+        arrives, the shaft stands.
 
         Parameters
         ----------
@@ -102,7 +103,7 @@ class SlewLag:
         return angle
 
     def rms(self, log: Log) -> float:
-        """Return the error of `predict` over the samples that count, up to the first one without torque [rad].
+        """Return the error of `predict` over the samples that count, up to the first one without pulses [rad].
 
         Raises
         ------
@@ -112,19 +113,19 @@ class SlewLag:
         used = usable(log, self.signal)
         if not used.any():
             raise InputError(f"log {log.name!r}: {self.signal}", got="no value that counts",
-                             allowed="values before the torque is off")
+                             allowed="values before the pulses stay away")
         error = self.predict(log)[used] - log.measured[self.signal][used]
         return float(np.sqrt(np.mean(error**2)))
 
 
 def usable(log: Log, signal: str) -> NDArray[np.bool_]:
-    """Return which samples of a log count for a model that knows no servo without torque, shape (n,)."""
+    """Return which samples of a log count for a model that knows no servo without pulses, shape (n,)."""
     if signal not in log.measured:
         return np.zeros(len(log), np.bool_)
     used = log.used(signal)
-    if log.torque_on is None or log.torque_on.all():
+    if log.sent.all():
         return used
-    return used & (np.arange(len(log)) < int(np.argmin(log.torque_on)))
+    return used & (np.arange(len(log)) < int(np.argmin(log.sent)))
 
 
 def first_angle(log: Log, signal: str) -> float:
@@ -159,8 +160,8 @@ class Course(NamedTuple):
     def of(cls, log: Log, wanted: NDArray[np.bool_], start: float) -> Course:
         """Return the course of a log whose angle is wanted at some of its samples."""
         time = log.time - log.time[0]
-        changed = np.append(True, log.command[1:] != log.command[:-1])
-        return cls(time[changed], log.command[changed], start, time[wanted])
+        changed = np.append(True, log.held[1:] != log.held[:-1])
+        return cls(time[changed], log.held[changed], start, time[wanted])
 
 
 class Courses:

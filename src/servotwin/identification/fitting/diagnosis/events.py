@@ -46,7 +46,7 @@ def lost_pulses(bench: TrialBench) -> Told | None:
     def put(log: Log, starts: Sequence[int]) -> Log:
         if not starts:
             return log
-        on = np.ones(len(log), np.bool_) if log.torque_on is None else log.torque_on.copy()
+        on = log.sent.copy()
         for start in starts:
             on[start:start + width(log)] = False
         return replace(log, torque_on=on)
@@ -55,7 +55,7 @@ def lost_pulses(bench: TrialBench) -> Told | None:
     frames = sum(log.duration for log in bench.setting.logs) / period
     return None if gained is None else Told(
         "lost pulses", f"{count} of {round(frames)} pulses that never reached the servo", "look for a loose contact, "
-        "or a generator that skips; mark them with torque_on", gained)
+        "or a generator that skips; leave their commands empty", gained)
 
 
 def dropped_samples(bench: TrialBench) -> Told | None:
@@ -64,7 +64,7 @@ def dropped_samples(bench: TrialBench) -> Told | None:
     Where the command changes, the row that is missing had the old one, or the new one (its place is then negative).
     """
     def places(log: Log) -> Sequence[int]:
-        changed = np.flatnonzero(np.diff(log.command)) + 1
+        changed = log.changes
         return [*range(1, len(log) - 1), *(-changed[changed < len(log) - 1]).tolist()]
 
     def put(log: Log, starts: Sequence[int]) -> Log:

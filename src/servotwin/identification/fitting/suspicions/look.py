@@ -113,13 +113,13 @@ def look(log: Log, model: Model) -> Look | None:
     except ServotwinError:
         return None
     time = log.time - log.time[0]
-    _, first, where = np.unique(log.command, return_index=True, return_inverse=True)
+    _, first, where = np.unique(log.held, return_index=True, return_inverse=True)
     levels = drives(time[first])
     drive, asked = levels[where], np.asarray(here.start_angle(cast("Any", levels)))[where]
     name = log.angle_name
     values = log.measured[name]
     angle = (values - _offset(here)) / _gain(here) if name == "feedback_voltage" else values
-    counts = log.used(name) if log.torque_on is None else log.used(name) & log.torque_on
+    counts = log.used(name) & log.sent
     noise = rough_noise(angle[counts])
     smooth = counts.copy()
     smooth[counts] = _near_others(time[counts], angle[counts], speed, noise)

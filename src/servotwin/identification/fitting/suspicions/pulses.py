@@ -19,8 +19,7 @@ def refused(looks: Sequence[Look]) -> list[Finding]:
 def _refused(one: Look) -> list[Finding]:
     low = one.model.value_or("electronics.pulse_width_min", 0.0)
     high = one.model.value_or("electronics.pulse_width_max", math.inf)
-    powered = np.ones(len(one.time), np.bool_) if one.log.torque_on is None else one.log.torque_on
-    outside = ((one.drive < low) | (one.drive > high)) & powered
+    outside = ((one.drive < low) | (one.drive > high)) & one.log.sent
     if not outside.any():
         return []
     worst = one.drive[outside][np.argmax(np.maximum(low - one.drive[outside], one.drive[outside] - high))]
