@@ -135,7 +135,7 @@ def dynamixel_x(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
     0.57548
     """
     base = servo if isinstance(servo, Servo) else load_servo(servo)
-    number = registers.get("Model_Number") if isinstance(registers, Mapping) else None
+    number = registers.get("Model_Number", 0) if isinstance(registers, Mapping) else 0
     variant = _BY_NUMBER.get(number) or next(
         (found for name, found in _BY_NAME.items() if name in base.name.lower()), _X)
     if "PWM_Slope" in registers and base.supply.open_circuit_voltage is None:

@@ -154,14 +154,16 @@ def set_registers(family: Family, registers: Mapping[str, int], servo: str | Ser
     raw |= {name: raw[source] for name, source in family.copied.items() if source in given and name not in given}
     family.check(raw)
     _warn_of_pairs(family, given, raw)
-    quantities: dict[str, Quantity | None] = {}
+    numbers: dict[str, Any] = {}
+    quantities = dict(base.quantities)
     for setting in family.settings:
         stays = own or base.get(f"firmware.{setting.name}") is not None
         if not stays or any(name in given or family.copied.get(name) in given for name in setting.registers):
-            quantities[setting.name] = _quantity(family, setting, raw, base)
-    firmware = replace(base.firmware, **{name: q and q.value for name, q in quantities.items()})
-    made = {f"firmware.{name}": q for name, q in quantities.items() if q is not None}
-    return replace(base, kind="bus", firmware=firmware, quantities={**base.quantities, **made})
+            quantity = _quantity(family, setting, raw, base)
+            numbers[setting.name] = None if quantity is None else quantity.value
+            if quantity is not None:
+                quantities[f"firmware.{setting.name}"] = quantity
+    return replace(base, kind="bus", firmware=replace(base.firmware, **numbers), quantities=quantities)
 
 
 def read_registers(family: Family, registers: Any) -> dict[str, int]:
