@@ -213,7 +213,7 @@ def _profile(variant: _Variant) -> tuple[Setting, ...]:
         Setting("speed_limit", _speed, ("Goal_Velocity", "Phase", "Maximum_Velocity_Limit"),
                 "counts/s, or 50 counts/s where bit 2 of Phase is not set; 0: Maximum_Velocity_Limit in 50 counts/s"
                 + ("" if variant.sure else ", whose factory value is a guess"),
-                "literature" if variant.sure else _GUESS),
+                *(() if variant.sure else (_GUESS, (0.4, 1.0)))),
         Setting("acceleration_limit", _acceleration,
                 ("Acceleration", "Maximum_Acceleration", "Acceleration_Multiplier"),
                 "100 counts/s2, the smaller of the first two; 0: the product of the others"),
@@ -237,7 +237,7 @@ def _trips(variant: _Variant) -> tuple[Setting, ...]:
                 ("Protective_Torque", _MASK), "%"),
         Setting("trip_current", lambda raw, _: raw["Protection_Current"] * variant.current_unit
                 if _by_current(raw) else None, ("Protection_Current", _MASK), unit,
-                *(("literature",) if variant.sure else (_GUESS, (6.5e-3 / variant.current_unit, 1.0)))),
+                *(() if variant.sure else (_GUESS, (6.5e-3 / variant.current_unit, 1.0)))),
         Setting("trip_time", lambda raw, _: raw["Over_Current_Protection_Time"] * 0.01 if _by_current(raw) else None,
                 ("Over_Current_Protection_Time", _MASK), "10 ms"),
         Setting("trip_temperature", lambda raw, _: raw["Max_Temperature_Limit"] + _ZERO_CELSIUS
