@@ -1,6 +1,7 @@
 """Registers of bus servos: raw values, as they are written into a servo, become the numbers of its firmware."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Protocol
 
 from servotwin.parameters.registers.dynamixel_one import dynamixel_ax, dynamixel_mx
@@ -12,7 +13,7 @@ __all__ = ["REGISTER_FAMILIES", "dynamixel_ax", "dynamixel_mx", "dynamixel_x", "
 
 
 class _Setter(Protocol):
-    def __call__(self, registers: Mapping[str, int], *, servo: str | Servo) -> Servo: ...
+    def __call__(self, registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo: ...
 
 
 REGISTER_FAMILIES: dict[str, _Setter] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 
 from servotwin.errors import ParameterError
 from servotwin.parameters.registers.table import Family, Raw, Register, Setting, on, set_registers
@@ -73,14 +74,14 @@ _MARGINS = ("CW_Compliance_Margin", "CCW_Compliance_Margin")
 _COMPLIANCE = ("CW_Compliance_Slope", "CCW_Compliance_Slope")
 
 
-def dynamixel_mx(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
+def dynamixel_mx(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Dynamixel's MX series, protocol 1, set into its firmware.
 
     Parameters
     ----------
     registers : mapping of str to int
         Raw values by the e-manual's names with underscores, such as ``{"P_Gain": 32}``. Angle 0 is at count 2048.
-    servo : str or Servo
+    servo : str, Path or Servo
         Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
 
     Raises
@@ -99,7 +100,7 @@ def dynamixel_mx(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
     return set_registers(_MX, registers, servo)
 
 
-def dynamixel_ax(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
+def dynamixel_ax(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Dynamixel's AX series set into its firmware.
 
     Parameters
@@ -107,7 +108,7 @@ def dynamixel_ax(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
     registers : mapping of str to int
         Raw values by the e-manual's names with underscores, such as ``{"CW_Compliance_Slope": 64}``. Angle 0 is at
         count 512, of 300°/1023.
-    servo : str or Servo
+    servo : str, Path or Servo
         Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
 
     Raises

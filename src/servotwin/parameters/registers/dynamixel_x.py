@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
@@ -107,7 +108,7 @@ _BY_NAME = {"xl330": _X330, "xc330": _X330, "xl430": _XL430, "xc430": _XL430}
 _BY_NUMBER = {1190: _X330, 1200: _X330, 1060: _XL430, 1070: _XL430}
 
 
-def dynamixel_x(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
+def dynamixel_x(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Dynamixel's X series set into its firmware.
 
     Which model it is, and with it the factory's values and the unit of the current, follows from Model_Number or the
@@ -118,7 +119,7 @@ def dynamixel_x(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
     registers : mapping of str to int
         Raw values by the e-manual's names with underscores, such as ``{"Position_P_Gain": 400}``; all of a dump may be
         given. Angle 0 is at count 2048.
-    servo : str or Servo
+    servo : str, Path or Servo
         Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
 
     Raises

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from servotwin.errors import ParameterError
+from servotwin.parameters.catalog import load_servo
 from servotwin.parameters.registers.table import Family, Raw, Register, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
@@ -93,7 +95,7 @@ class _Variant:
 _STS3250 = _Variant(most_speed=254, current_unit=3.8 / 310.0, sure=False)
 
 
-def feetech_sts(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
+def feetech_sts(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Feetech's STS series set into its firmware.
 
     Parameters
@@ -101,7 +103,7 @@ def feetech_sts(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
     registers : mapping of str to int
         Raw values by LeRobot's names, such as ``{"P_Coefficient": 16, "D_Coefficient": 32}``; all of a dump may be
         given. Angle 0 is at count 2048.
-    servo : str or Servo
+    servo : str, Path or Servo
         Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
 
     Raises
@@ -124,8 +126,6 @@ def feetech_sts(registers: Mapping[str, int], *, servo: str | Servo) -> Servo:
     >>> arm.source("firmware.proportional_gain").source[:52]
     'Feetech STS firmware: register P_Coefficient (21) = '
     """
-    from servotwin.parameters.catalog import load_servo
-
     base = servo if isinstance(servo, Servo) else load_servo(servo)
     return set_registers(_family(_STS3250 if "3250" in base.name else _Variant()), registers, base)
 

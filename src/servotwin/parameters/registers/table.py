@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 from servotwin.errors import ParameterError, UnknownNameError
@@ -118,7 +119,7 @@ class Family:
     check: Callable[[Raw], None] = lambda raw: None
 
 
-def set_registers(family: Family, registers: Mapping[str, int], servo: str | Servo) -> Servo:
+def set_registers(family: Family, registers: Mapping[str, int], servo: str | Path | Servo) -> Servo:
     """Return a servo whose firmware group follows from registers.
 
     What is given makes the numbers that depend on it. The other numbers stay as the servo has them; where it has none
@@ -129,7 +130,7 @@ def set_registers(family: Family, registers: Mapping[str, int], servo: str | Ser
     family : Family
     registers : mapping of str to int
         Raw values by name.
-    servo : str or Servo
+    servo : str, Path or Servo
         Catalog id, path of a servo file, or the servo itself.
 
     Raises
