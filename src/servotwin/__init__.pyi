@@ -36,6 +36,10 @@ from servotwin.models import PulseServoInductive as PulseServoInductive
 from servotwin.parameters import Servo as Servo
 from servotwin.parameters import Supply as Supply
 from servotwin.parameters import catalog_names as catalog_names
+from servotwin.parameters import dynamixel_ax as dynamixel_ax
+from servotwin.parameters import dynamixel_mx as dynamixel_mx
+from servotwin.parameters import dynamixel_x as dynamixel_x
+from servotwin.parameters import feetech_sts as feetech_sts
 from servotwin.parameters import load_dataset as load_dataset
 from servotwin.parameters import load_servo as load_servo
 from servotwin.parameters import servo_from_values as servo_from_values

@@ -50,6 +50,20 @@ def test_a_file_is_written_that_the_function_makes_too(make, cli, tmp_path):
     assert found["warnings"] == []
 
 
+@pytest.mark.parametrize(("words", "kind", "gain"), [
+    (["--modulation", "digital"], "digital", 8.0),
+    (["--modulation", "bus", "--registers", "dynamixel-mx"], "bus", 16.0 / math.pi)])
+def test_a_servo_with_a_program_gets_its_firmware(make, tmp_path, words, kind, gain):
+    assert make(*GOOD, *words, "--out", "mine.toml").code == 0
+    mine = st.load_servo(tmp_path / "mine.toml")
+    assert mine.kind == kind
+    assert mine.firmware.proportional_gain == gain
+    assert (mine.potentiometer.feedback_gain is None) is (kind == "bus")
+    made = make("mine.toml", "--out", "again.toml")
+    assert made.code == 0
+    assert (tmp_path / "again.toml").read_text() == (tmp_path / "mine.toml").read_text()
+
+
 @pytest.mark.parametrize("torque", ["1.2945 N m", "1.2945Nm", "1294.5 mN.m", "129.45 N-cm", "13.2 kg.cm", "13.2kgf·cm",
                                     "13.2 kg-cm", "183.3 oz-in", "183.31 ozf.in"])
 @pytest.mark.parametrize("speed", ["0.23 s/60deg", "0.23sec/60°", "0.23 s / 60 deg", "43.478 rpm", "260.87 deg/s"])
@@ -150,7 +164,10 @@ def test_a_list_makes_a_folder_of_servos(make, tmp_path):
     ([*GOOD, "--deadband", "8"], "--deadband: got '8'"), ([*GOOD, "--deadband", "8 ms"], "deadband: got 0.008"),
     ([*GOOD, "--pulse-range", "500 us"], "--pulse-range"), ([*GOOD, "--pulse-range", "2500-500 us"], "pulse range"),
     ([*GOOD, "--rate", "0.1 deg"], "--rate"), ([*GOOD, "--gear-ratio", "many"], "--gear-ratio"),
-    ([*GOOD, "--modulation", "fm"], "modulation: got 'fm'"), ([*GOOD, "--name", "my servo"], "name of a servo"),
+    ([*GOOD, "--modulation", "fm"], "modulation: got 'fm'"),
+    ([*GOOD, "--modulation", "bus", "--registers", "dynamixel-y"], "did you mean 'dynamixel-x'"),
+    ([*GOOD, "--registers", "dynamixel-x"], "registers: got 'dynamixel-x'"),
+    ([*GOOD, "--name", "my servo"], "name of a servo"),
     ([*GOOD, "--mass", "110"], "--mass: got '110'"), ([*GOOD, "--at", "six"], "--at: got 'six'"),
     ([*GOOD, "--csv", "list.csv"], "--csv holds the sheet already"),
     (["hitec-hs-311", "--torque", "1 N m@6V"], "SERVO holds the sheet already"),

@@ -219,6 +219,20 @@ def test_the_friction_is_that_of_the_model(file, model):
     assert servo.source("electronics.frame_period").origin == "assumed"
 
 
+@pytest.mark.parametrize(("more", "gain", "speed"), [
+    ({}, 200 * 0.166, None), ({"error_gain_ratio": 1.2, "max_velocity": 5.1}, 200 * 0.166 * 1.2, 5.1)])
+def test_the_loop_of_bam_is_a_firmware(file, more, gain, speed):
+    convention = BamConvention(error_gain=0.166, frame_period=2e-3, largest_duty=0.97)
+    servo = read_bam_parameters(file({**parameters("m3"), **more}), gain=200, voltage=7.4, convention=convention)
+    firmware = servo.firmware
+    assert firmware.proportional_gain == pytest.approx(gain, rel=1e-14)
+    assert (firmware.speed_limit, firmware.control_period, firmware.duty_limit) == (speed, 2e-3, 0.97)
+    off = {name for name in vars(firmware) if getattr(firmware, name) is not None}
+    assert off == {"proportional_gain", "control_period", "duty_limit", "command_kind"} | (
+        {"speed_limit"} if speed else set())
+    assert read_bam_parameters(file(parameters("m3"))).firmware.proportional_gain is None
+
+
 @pytest.mark.parametrize("model", [*FRICTION])
 def test_parameters_that_are_written_are_read_back(file, tmp_path, model):
     servo = read_bam_parameters(file(parameters(model)), gain=200, voltage=7.4)
@@ -333,7 +347,8 @@ def test_a_pendulum_is_lifted_as_bam_says(file, model):
     assert np.sqrt(np.mean((result["output_angle"] - reference) ** 2)) < 5e-3
 
 
-@pytest.mark.parametrize("values", [{"error_gain": 0.0}, {"frame_period": -1.0}, {"centre": 1.0}, {"centre": "x"}])
+@pytest.mark.parametrize("values", [{"error_gain": 0.0}, {"frame_period": -1.0}, {"centre": 1.0}, {"centre": "x"},
+                                    {"largest_duty": 1.1}])
 def test_a_convention_that_cannot_be(values):
     with pytest.raises(InputError, match="BamConvention"):
         BamConvention(**values)

@@ -33,7 +33,7 @@ ROUNDED = 1e-5  # the files hold six digits
 NO_LOAD_CURRENTS = {"futaba-s3003": (0.1, 0.15, 0.2), "towerpro-mg996r": (0.5, 0.6)}
 WIDENED = ("towerpro-sg90", "towerpro-mg90s")  # to a measured unit
 # Of these only a product acts, or they are counted
-WITHOUT_RANGE = {"electronics.comparator_gain", "electronics.off_state"}
+WITHOUT_RANGE = {"electronics.comparator_gain", "electronics.off_state", "firmware.signal_loss"}
 
 
 @pytest.fixture(params=IDS)

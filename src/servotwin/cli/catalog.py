@@ -16,7 +16,7 @@ from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, 
 if TYPE_CHECKING:
     from servotwin.parameters import Servo
 
-_TELLING = ("impossible", "sources disagree", "digital", "currents unknown", "stall current unknown",
+_TELLING = ("impossible", "sources disagree", "digital", "bus", "currents unknown", "stall current unknown",
             "running current unknown")  # what a list has room for
 _Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 

@@ -51,7 +51,8 @@ def from_sheet(
     gear_ratio: Annotated[str | None, _of("280:1", "Motor turns per output turn.")] = None,
     backlash: Annotated[str | None, _of('"0.5 deg"', "Play of the gear.")] = None,
     motor_type: Annotated[str, _of("TEXT", "Such as 3-pole or coreless.")] = "",
-    modulation: Annotated[str, _of("WORD", "analog or digital.")] = "",
+    modulation: Annotated[str, _of("WORD", "analog, digital or bus.")] = "",
+    registers: Annotated[str, _of("WORD", "Of a bus servo: feetech-sts, dynamixel-x, -mx or -ax.")] = "",
     source: Annotated[str, _of("TEXT", "Where the figures come from.")] = "",
     note: Annotated[str, _of("TEXT", "Remark for human readers.")] = "",
     list_file: Annotated[Path | None, typer.Option(
@@ -73,7 +74,8 @@ def from_sheet(
               "stall_current": stall_current, "idle_current": idle_current}
     whole = {"name": name, "title": title, "deadband": deadband, "pulse_range": pulse_range, "travel": travel,
              "rate": rate, "neutral": neutral, "stops": stops, "mass": mass, "gear_ratio": gear_ratio,
-             "backlash": backlash, "motor_type": motor_type, "modulation": modulation, "source": source, "note": note}
+             "backlash": backlash, "motor_type": motor_type, "modulation": modulation, "registers": registers,
+             "source": source, "note": note}
     typed = [f"--{option.replace('_', '-')}" for option, given in (
         *whole.items(), ("torque", torque), ("speed", speed), ("running-current", running_current),
         ("stall-current", stall_current), ("idle-current", idle_current), ("at", at)) if given]
@@ -128,7 +130,8 @@ def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -
         stop_travel=one("stops", "angle"), mass=one("mass", "mass"), backlash=one("backlash", "angle"),
         angle_per_pulse=fig.rate("--rate", whole["rate"]) if whole["rate"] else None,
         gear_reduction=fig.ratio("--gear-ratio", whole["gear_ratio"]) if whole["gear_ratio"] else None,
-        motor_type=whole["motor_type"], modulation=whole["modulation"], source=whole["source"], note=whole["note"])
+        motor_type=whole["motor_type"], modulation=whole["modulation"], registers=whole["registers"],
+        source=whole["source"], note=whole["note"])
 
 
 def _points(given: dict[str, _Figures], usual: float | None) -> tuple[Any, ...]:

@@ -1,8 +1,9 @@
-"""How a position loop that sets a duty, as in smart servos and in BAM, is written as a pulse servo."""
+"""How a position loop that sets a duty, as in smart servos and in BAM, is written as a pulse servo and as firmware."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 from servotwin.errors import InputError
 from servotwin.units import is_finite
@@ -27,11 +28,14 @@ class BamConvention:
         s_µ [s/rad].
     centre : float
         Pulse width at angle 0; angles reach from −centre/s_µ to +centre/s_µ, ±10 rad [s].
+    largest_duty : float
+        Most of the supply that the servo gets, in BAM's code: 1 for the XL330, 0.97 for the STS3215, 0.9625 for MX. The
+        firmware has it, the pulse servo not.
 
     Raises
     ------
     InputError
-        If a number is not positive, or a pulse is not shorter than its frame.
+        If a number is not positive, a pulse is not shorter than its frame, or the duty is more than 1.
 
     Notes
     -----
@@ -50,6 +54,7 @@ class BamConvention:
     frame_period: float = 1e-3
     pulse_per_angle: float = 1e-6
     centre: float = 1e-5
+    largest_duty: float = 1.0
 
     def __post_init__(self) -> None:
         for f in fields(self):
@@ -58,6 +63,8 @@ class BamConvention:
                 raise InputError(f"BamConvention({f.name})", got=value, allowed="a positive number")
         if 2.0 * self.centre >= self.frame_period:
             raise InputError("BamConvention(centre)", got=self.centre, allowed="less than half of frame_period")
+        if self.largest_duty > 1.0:
+            raise InputError("BamConvention(largest_duty)", got=self.largest_duty, allowed="at most 1")
 
     def stretcher_gain(self, gain: float) -> float:
         """Return K for a firmware gain k_P."""
@@ -89,4 +96,29 @@ class BamConvention:
         if gain is not None and voltage is not None:  # the same law with the mean voltage, for the bounded servo
             made["electronics.bridge_gain"] = gain * self.error_gain * voltage
             made["electronics.comparator_gain"] = 1.0
+        return made
+
+    def firmware(self, gain: float | None = None, ratio: float = 1.0, speed: float | None = None) -> dict[str, Any]:
+        """Return the same loop as numbers of the firmware, by dotted name; the gain only where it is given.
+
+        Parameters
+        ----------
+        gain : float, optional
+            k_P.
+        ratio : float
+            BAM's error_gain_ratio, by which a fit corrects g [1].
+        speed : float, optional
+            BAM's max_velocity, at which the goal moves at most [rad/s].
+
+        Examples
+        --------
+        >>> round(BamConvention().firmware(400)["firmware.proportional_gain"], 6)
+        0.984
+        """
+        made: dict[str, Any] = {"firmware.control_period": self.frame_period, "firmware.duty_limit": self.largest_duty,
+                                "firmware.command_kind": "goal"}
+        if gain is not None:
+            made["firmware.proportional_gain"] = gain * self.error_gain * ratio
+        if speed is not None:
+            made["firmware.speed_limit"] = speed
         return made

@@ -38,7 +38,8 @@ def read_bam_parameters(path: str | Path, *, gain: float | None = None, voltage:
 
     All is at the output shaft: the gear reduction is 1, k_a = k_b = k_t. With the friction law of `servotwin.physics`:
     F_c = friction_base, r = 1 + friction_stribeck/friction_base, v_s = dtheta_stribeck, B_m = friction_viscous, and
-    the shares K_l … K_eq by their names. The position loop is that of `BamConvention`.
+    the shares K_l … K_eq by their names. The position loop is that of `BamConvention`, as pulses and as firmware; as
+    firmware it has BAM's error_gain_ratio and max_velocity where the file gives them.
 
     Parameters
     ----------
@@ -77,9 +78,11 @@ def read_bam_parameters(path: str | Path, *, gain: float | None = None, voltage:
         raise InputError(f"{path}: actuator", got=actuator, allowed="a text")
     rig = {key: _number(path, content, key) for key, value in content.items()
            if key not in (*needed, "model", "actuator") and isinstance(value, int | float)}
+    used = convention or BamConvention()
     loop: dict[str, Any] = {
-        **(convention or BamConvention()).parameters(gain, voltage), "electronics.deadband": 0.0,
-        "electronics.minimum_drive_time": 0.0, "electronics.off_state": "brake"}
+        **used.parameters(gain, voltage), "electronics.deadband": 0.0, "electronics.minimum_drive_time": 0.0,
+        "electronics.off_state": "brake",
+        **used.firmware(gain, rig.get("error_gain_ratio", 1.0), rig.get("max_velocity"))}
     source = f"BAM, friction model {model.upper()}" + (f" of {actuator}" if actuator else "") + f": {Path(path).name}"
     try:
         return _servo(f"{actuator or 'bam'}-{model}", values, loop, source,
@@ -168,7 +171,9 @@ def _servo(name: str, values: Mapping[str, float], loop: Mapping[str, Any], sour
     quantities = {dotted: Quantity(value=float(value), unit=unit_of(dotted), origin="identified", source=source)
                   for dotted, value in values.items()}
     quantities |= {dotted: Quantity(value=value, unit=unit_of(dotted), origin="assumed",
-                                    source="position loop of BAM as pulses") for dotted, value in loop.items()}
+                                    source="position loop of BAM" + ("" if dotted.startswith("firmware.") else
+                                                                     " as pulses"))
+                   for dotted, value in loop.items()}
     return Servo(name=name, title=source, kind="bus", quantities=quantities, sheet=sheet, **made)
 
 

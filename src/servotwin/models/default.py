@@ -17,9 +17,9 @@ _CHIP = ("electronics.stretcher_gain", "electronics.one_shot_slope")
 def default_class(servo: Servo) -> type[Model]:
     """Return the class of the model that stands for a servo where none is named.
 
-    It follows the servo's `kind`: `PulseServo` for an analog servo, `DigitalServo` for a digital or bus servo. Where the
-    servo's file says nothing of a chip, or of firmware, it is `BoundedServo`; a digital servo without firmware but with
-    a chip is computed as an analog one.
+    It follows the servo's `kind`: `PulseServo` for an analog servo, `DigitalServo` for a digital or bus servo, which is
+    computed as an analog one where its file has no firmware. Where the file says nothing of a chip either it is
+    `BoundedServo`.
 
     Parameters
     ----------

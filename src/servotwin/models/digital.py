@@ -117,7 +117,7 @@ class DigitalServo(SwitchedServo):
         return super().command(signal)
 
     def framed(self, signal: Signal, until: float) -> Signal:
-        """Return a command as its pulses come; on a bus a silence is a time without a write, over which a goal stays."""
+        """Return a command as its pulses come; on a bus a goal stays over a silence, a time without a write."""
         return signal if self.takes_goals else super().framed(signal, until)
 
     def start_angle(self, drive: float) -> float:

@@ -18,11 +18,19 @@ from servotwin.parameters.groups import (
 from servotwin.parameters.output_file import write_file
 from servotwin.parameters.printed import PrintedPoint, printed_fact, printed_flags, printed_points
 from servotwin.parameters.quantity import ORIGINS, Quantity
+from servotwin.parameters.registers import (
+    REGISTER_FAMILIES,
+    dynamixel_ax,
+    dynamixel_mx,
+    dynamixel_x,
+    feetech_sts,
+)
 from servotwin.parameters.servo import KINDS, Servo, dimension_of, servo_from_values, unit_of
 
 __all__ = [
-    "GROUPS", "KINDS", "ORIGINS", "Dataset", "Electronics", "Firmware", "Friction", "Gear", "Group", "Motor",
-    "Potentiometer", "PrintedPoint", "Quantity", "Servo", "Stops", "Supply", "Thermal", "catalog_names",
-    "dataset_names", "dimension_of", "load_dataset", "load_servo", "printed_fact", "printed_flags", "printed_points",
-    "servo_from_values", "unit_of", "write_file",
+    "GROUPS", "KINDS", "ORIGINS", "REGISTER_FAMILIES", "Dataset", "Electronics", "Firmware", "Friction", "Gear",
+    "Group", "Motor", "Potentiometer", "PrintedPoint", "Quantity", "Servo", "Stops", "Supply", "Thermal",
+    "catalog_names", "dataset_names", "dimension_of", "dynamixel_ax", "dynamixel_mx", "dynamixel_x", "feetech_sts",
+    "load_dataset", "load_servo", "printed_fact", "printed_flags", "printed_points", "servo_from_values", "unit_of",
+    "write_file",
 ]

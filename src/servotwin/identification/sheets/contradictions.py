@@ -272,10 +272,10 @@ def torque_question(sheet: Sheet) -> str | None:
 
 
 def _silent(sheet: Sheet) -> Sequence[str]:
-    missing = [words for words, there in (
+    missing = [] if sheet.modulation == "bus" else [words for words, there in (
         ("deadband", sheet.deadband is not None), ("pulse range", sheet.pulse_min is not None),
         ("travel", any(x is not None for x in (sheet.travel, sheet.angle_per_pulse)))) if not there]
     said = [f"{', '.join(missing)} not given"] if missing else []
     if len({point.supply_voltage for point in sheet.main}) == 1:
         said.append("one voltage only")
-    return [sheet.modulation, *said] if sheet.modulation == "digital" else said
+    return [sheet.modulation, *said] if sheet.modulation in ("digital", "bus") else said

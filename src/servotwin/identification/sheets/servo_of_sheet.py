@@ -16,10 +16,11 @@ from servotwin.identification.sheets.contradictions import (
     sheet_flags,
     torque_question,
 )
+from servotwin.identification.sheets.firmware_of_sheet import digital_firmware
 from servotwin.identification.sheets.motor_range import MotorRange, Range, motor_range
 from servotwin.identification.sheets.sheet import Sheet
 from servotwin.identification.sheets.sheet_file import sheet_table
-from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, unit_of
+from servotwin.parameters import GROUPS, KINDS, REGISTER_FAMILIES, Quantity, Servo, unit_of
 from servotwin.physics import averaged_bridge_gain, load_share
 
 _NEUTRAL = 1.5e-3  # s
@@ -87,6 +88,8 @@ def servo_from_sheet(sheet: Sheet, *, load_friction: bool = True, backlash: bool
     -------
     Servo
         Angle 0 is the middle position. Ranges hold all combinations of what is assumed, all voltages and all sources.
+        A digital servo has a firmware that is assumed, with wide ranges; a bus servo the factory's registers, an
+        encoder at its output, and neither chip nor potentiometer.
 
     Warns
     -----
@@ -115,14 +118,22 @@ def servo_from_sheet(sheet: Sheet, *, load_friction: bool = True, backlash: bool
         warnings.warn(f"sheet of {sheet.name!r}: a stall torque of {question}", stacklevel=2)
     made = _Made(sheet=sheet, motor=motor_range(sheet), load_friction=load_friction, backlash=backlash)
     quantities: dict[str, Quantity] = {}
-    for part in (_motor, _gear, _friction, _electronics, _potentiometer, _supply, _stops):
+    for part in _parts(sheet):
         quantities |= dict(part(made))
     groups: dict[str, Any] = {}
     for group, kind in GROUPS.items():
         values = {name.partition(".")[2]: q.value for name, q in quantities.items() if name.startswith(f"{group}.")}
         groups[group] = kind(**values)
-    return Servo(name=sheet.name, title=sheet.title, kind=sheet.modulation or KINDS[0], notes=_notes(made, found),
-                 quantities=quantities, sheet=sheet_table(sheet, sheet_flags(sheet)), **groups)
+    servo = Servo(name=sheet.name, title=sheet.title, kind=sheet.modulation or KINDS[0], notes=_notes(made, found),
+                  quantities=quantities, sheet=sheet_table(sheet, sheet_flags(sheet)), **groups)
+    return REGISTER_FAMILIES[sheet.registers]({}, servo=servo) if sheet.modulation == "bus" else servo
+
+
+def _parts(sheet: Sheet) -> tuple[Callable[[_Made], _Found], ...]:
+    if sheet.modulation == "bus":  # a sheet without stops is of one that turns without end
+        return (_motor, _gear, _friction, _supply, *((_stops,) if sheet.stop_travel is not None else ()))
+    firmware = (_firmware,) if sheet.modulation == "digital" else ()
+    return (_motor, _gear, _friction, _electronics, _potentiometer, *firmware, _supply, _stops)
 
 
 def _quantity(name: str, value: float | Range | str, origin: str, source: str, *,
@@ -276,6 +287,11 @@ def _potentiometer(made: _Made) -> _Found:
                     f"angle 0 at {1e6 * neutral:.4g} us, s_r = 0.85 V/ms, assumed", by=lambda s_r: s_r * neutral)
 
 
+def _firmware(made: _Made) -> _Found:
+    rate, said = _rate(made.sheet)
+    yield from digital_firmware(made.sheet, rate.value, said)
+
+
 def _supply(made: _Made) -> _Found:
     drop = made.motor.drop_voltage
     yield _quantity("supply.open_circuit_voltage", made.voltage, "datasheet",
@@ -314,9 +330,13 @@ def _capital(text: str) -> str:
 
 def _notes(made: _Made, found: tuple[Contradiction, ...]) -> str:
     sheet, m = made.sheet, made.motor
-    said = [sheet.note.strip(), f"Angle 0 is the middle position, {1e6 * (sheet.neutral_pulse or _NEUTRAL):.4g} us."]
+    middle = f"the middle position, {1e6 * (sheet.neutral_pulse or _NEUTRAL):.4g} us"
+    said = [sheet.note.strip(), f"Angle 0 is {'the middle count' if sheet.modulation == 'bus' else middle}."]
     if sheet.modulation == "digital":
-        said.append("Digital; here with an analog chip's electronics.")
+        said.append("Digital: its firmware is assumed, with wide ranges; so are the electronics of an analog chip, "
+                    "with which the models of analog servos compute it.")
+    if sheet.modulation == "bus":
+        said.append("A bus servo with the registers of the factory.")
     if not m.current_from_sheet:
         said.append("The sheet gives no running current: resistance, torque constant and friction are uncertain.")
     if found:

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 
 from servotwin import units
-from servotwin.errors import InputError
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.parameters import REGISTER_FAMILIES
 
-MODULATIONS = ("analog", "digital", "")
+MODULATIONS = ("analog", "digital", "bus", "")
 _USUAL_VOLTAGE = 6.0  # where makers print most
 # What no servo has, from the smallest to the largest: a figure outside it is one in another unit
 _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
@@ -109,7 +110,9 @@ class Sheet:
         Total play at the output [rad].
     motor_type : str
         Such as ``"3-pole"`` or ``"coreless"``.
-    modulation : {"analog", "digital", ""}
+    modulation : {"analog", "digital", "bus", ""}
+    registers : {"feetech-sts", "dynamixel-x", "dynamixel-mx", "dynamixel-ax", ""}
+        Of a bus servo, and only of one: whose registers it has; the firmware is the factory's.
     source : str
         Where the figures were read.
     sources : mapping of str to str
@@ -145,6 +148,7 @@ class Sheet:
     backlash: float | None = None
     motor_type: str = ""
     modulation: str = ""
+    registers: str = ""
     source: str = ""
     sources: Mapping[str, str] = field(default_factory=dict)
     note: str = ""
@@ -155,7 +159,11 @@ class Sheet:
                              allowed='a short id of letters, digits, "-", "_" and ".", such as "my-servo"')
         _check(self)
         if self.modulation not in MODULATIONS:
-            raise InputError("modulation", got=self.modulation, allowed="analog, digital, or nothing")
+            raise InputError("modulation", got=self.modulation, allowed="analog, digital, bus, or nothing")
+        if self.modulation == "bus" and self.registers not in REGISTER_FAMILIES:
+            raise UnknownNameError("family of registers", self.registers, REGISTER_FAMILIES)
+        if self.modulation != "bus" and self.registers:
+            raise InputError("registers", got=self.registers, allowed='nothing, for modulation is not "bus"')
         if (self.pulse_min is None) != (self.pulse_max is None) or not (self.pulse_min or 0.0) < (self.pulse_max or 1):
             raise InputError("pulse range", got=f"{self.pulse_min} to {self.pulse_max} s",
                              allowed="two pulse widths, the shorter one first")
@@ -197,7 +205,9 @@ class Sheet:
 
     @property
     def nominal(self) -> SheetPoint:
-        """The point whose voltage becomes the supply of the servo: that nearest 6 V."""
+        """The point whose voltage becomes the supply of the servo: that nearest 6 V; of a bus servo the first one."""
+        if self.modulation == "bus":
+            return next(point for point in self.own if point.complete)
         return min(self.main, key=lambda point: abs(point.supply_voltage - _USUAL_VOLTAGE))
 
     def at(self, supply_voltage: float) -> Sheet:

@@ -14,7 +14,7 @@ from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, dimension_of, u
 from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE, figure, printed
 
 _FLAGS, _NOTE = "flags", "note"
-_WORDS = ("motor_type", "modulation")
+_WORDS = ("motor_type", "modulation", "registers")
 # parameters whose SI unit makes awkward numbers
 _UNITS = {"motor.armature_inductance": "mH", "motor.torque_constant": "mN m/A", "motor.back_emf_constant": "mV s/rad",
           "motor.rotor_inertia": "g cm2", "gear.backlash": "deg", "gear.output_inertia": "g cm2",
@@ -113,6 +113,8 @@ def _read(servo: Servo, row: Mapping[str, Any], keys: Mapping[str, tuple[str, st
 def servo_file_text(servo: Servo) -> str:
     """Return a servo file as the catalog has them: one line for each value, units that people use, six digits.
 
+    Numbers of the firmware have all their digits.
+
     Examples
     --------
     >>> from servotwin.parameters import servo_from_values
@@ -180,6 +182,8 @@ def _line(name: str, quantity: Quantity) -> str:
     def number(x: Any) -> Any:
         if not isinstance(x, float):
             return [number(item) for item in x] if isinstance(x, tuple) else x
+        if name.startswith("firmware."):  # of whole counts and steps: a digit less would change what it computes
+            return x
         return float(f"{units.from_si(x, unit, dimension):.6g}") + 0.0  # a range may end at -0
 
     entry: dict[str, Any] = {"value": number(quantity.value)}

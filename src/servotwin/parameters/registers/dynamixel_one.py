@@ -1,0 +1,213 @@
+"""Registers of Dynamixel's MX and AX series, protocol 1, by the names of the e-manual with underscores."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from servotwin.errors import ParameterError
+from servotwin.parameters.registers.table import Family, Raw, Register, Setting, on, set_registers
+from servotwin.parameters.servo import Servo
+
+_TICK = 1e-3  # s
+_RPM = math.pi / 30.0
+_DEG = math.pi / 180.0
+_GUESS = "assumed"
+_by_voltage, _by_heat, _by_load = on(0, "Shutdown"), on(2, "Shutdown"), on(5, "Shutdown")
+_SLOPES = (2, 4, 8, 16, 32, 64, 128)  # what the servo takes a compliance slope for, each up to the next
+_OTHER_NAMES = {"Alarm_Shutdown": "Shutdown", "Goal_Speed": "Moving_Speed"}
+
+
+def _common(last: int, *, temperature: int) -> dict[str, Register]:
+    feedback = {name: Register(address, 0, 65535, 0) for name, address in (
+        ("Model_Number", 0), ("Firmware_Version", 2), ("Goal_Position", 30), ("Present_Position", 36),
+        ("Present_Speed", 38), ("Present_Load", 40), ("Present_Voltage", 42), ("Present_Temperature", 43),
+        ("Registered", 44), ("Moving", 46))}
+    return {
+        "CW_Angle_Limit": Register(6, 0, last, 0),
+        "CCW_Angle_Limit": Register(8, 0, last, last),
+        "Temperature_Limit": Register(11, 0, 150, temperature),
+        "Min_Voltage_Limit": Register(12, 50, 250, 60),
+        "Max_Torque": Register(14, 0, 1023, 1023),
+        "Torque_Limit": Register(34, 0, 1023, 1023),
+        "Moving_Speed": Register(32, 0, 1023, 0),
+        "Shutdown": Register(18, 0, 127, 36),
+        # without effect on the control of the angle
+        "ID": Register(3, 0, 253, 1),
+        "Baud_Rate": Register(4, 0, 254, 1),
+        "Return_Delay_Time": Register(5, 0, 254, 250),
+        "Max_Voltage_Limit": Register(13, 50, 250, 160),
+        "Status_Return_Level": Register(16, 0, 2, 2),
+        "Alarm_LED": Register(17, 0, 127, 36),
+        "Torque_Enable": Register(24, 0, 1, 0),
+        "LED": Register(25, 0, 1, 0),
+        "Lock": Register(47, 0, 1, 0),
+        **feedback,
+    }
+
+
+MX_REGISTERS: dict[str, Register] = {
+    "P_Gain": Register(28, 1, 254, 32, why="without P the servo does not control its angle"),
+    "I_Gain": Register(27, 0, 254, 0),
+    "D_Gain": Register(26, 0, 254, 0),
+    "Punch": Register(48, 0, 1023, 0),
+    "Goal_Acceleration": Register(73, 0, 254, 0),
+    **_common(4095, temperature=80),
+    "Resolution_Divider": Register(22, 1, 4, 1, (1,), "only the finest resolution is computed"),
+    "Torque_Control_Mode_Enable": Register(70, 0, 1, 0, (0,), "control of the torque is not computed"),
+    "Multi_Turn_Offset": Register(20, -24576, 24576, 0),
+    "Drive_Mode": Register(10, 0, 3, 0),
+    "Realtime_Tick": Register(50, 0, 32767, 0),
+    "Current": Register(68, 0, 4095, 0),
+    "Goal_Torque": Register(71, 0, 2047, 0),
+}
+AX_REGISTERS: dict[str, Register] = {
+    "CW_Compliance_Margin": Register(26, 0, 255, 1),
+    "CCW_Compliance_Margin": Register(27, 0, 255, 1),
+    "CW_Compliance_Slope": Register(28, 0, 254, 32),
+    "CCW_Compliance_Slope": Register(29, 0, 254, 32),
+    "Punch": Register(48, 0, 1023, 32),
+    **_common(1023, temperature=70),
+}
+_MARGINS = ("CW_Compliance_Margin", "CCW_Compliance_Margin")
+_COMPLIANCE = ("CW_Compliance_Slope", "CCW_Compliance_Slope")
+
+
+def dynamixel_mx(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
+    """Return a servo with registers of Dynamixel's MX series, protocol 1, set into its firmware.
+
+    Parameters
+    ----------
+    registers : mapping of str to int
+        Raw values by the e-manual's names with underscores, such as ``{"P_Gain": 32}``. Angle 0 is at count 2048.
+    servo : str, Path or Servo
+        Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such register: the nearest are suggested.
+    ParameterError
+        If a value is not whole, out of range or not computed.
+
+    Examples
+    --------
+    >>> knee = dynamixel_mx({"P_Gain": 16}, servo="dynamixel-mx-64")
+    >>> round(knee.firmware.proportional_gain, 4)
+    2.5465
+    """
+    return set_registers(_MX, registers, servo)
+
+
+def dynamixel_ax(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
+    """Return a servo with registers of Dynamixel's AX series set into its firmware.
+
+    Parameters
+    ----------
+    registers : mapping of str to int
+        Raw values by the e-manual's names with underscores, such as ``{"CW_Compliance_Slope": 64}``. Angle 0 is at
+        count 512, of 300°/1023.
+    servo : str, Path or Servo
+        Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such register: the nearest are suggested.
+    ParameterError
+        If a value is not whole, out of range or not computed.
+
+    Warns
+    -----
+    UserWarning
+        If margins or slopes of both ways differ: the larger ones count for both.
+
+    Examples
+    --------
+    >>> soft = {"CW_Compliance_Slope": 64, "CCW_Compliance_Slope": 64}
+    >>> round(dynamixel_ax(soft, servo="dynamixel-ax-12a").firmware.proportional_gain, 3)
+    2.957
+    """
+    return set_registers(_AX, registers, servo)
+
+
+def _check_limits(label: str, last: int, raw: Raw) -> None:
+    low, high = raw["CW_Angle_Limit"], raw["CCW_Angle_Limit"]
+    if low == high == 0:
+        raise ParameterError(f"registers CW_Angle_Limit and CCW_Angle_Limit of {label}", got=0,
+                             allowed="not 0 for both: a wheel has no position loop")
+    if low >= high and not low == high == last:
+        raise ParameterError(f"register CW_Angle_Limit of {label}", got=low,
+                             allowed=f"less than CCW_Angle_Limit = {high}")
+
+
+def _shared(count: float, last: int, speed: float) -> tuple[Setting, ...]:
+    """Return what both series have: `count` [rad], the last count, and the unit of Moving_Speed [rad/s]."""
+    middle = (last + 1) // 2
+
+    def goal(name: str, register: str) -> Setting:
+        return Setting(name, lambda raw, _: None if raw["CW_Angle_Limit"] == raw["CCW_Angle_Limit"] else
+                       (raw[register] - middle) * count, ("CW_Angle_Limit", "CCW_Angle_Limit"),
+                       f"angle 0 at count {middle}; {last} twice: turns without end")
+
+    return (
+        Setting("control_period", lambda raw, _: _TICK, said="a guess", origin=_GUESS, bounds=(5e-4, 5e-3)),
+        Setting("compute_delay", lambda raw, _: 0.0, said="a guess", origin=_GUESS, bounds=(0.0, _TICK)),
+        Setting("angle_quantum", lambda raw, _: count, said=f"{count / _DEG:.3g} degrees a count"),
+        Setting("command_kind", lambda raw, _: "goal", said="goals on the bus"),
+        Setting("torque_limit", lambda raw, _: raw["Torque_Limit"] / 1023.0, ("Torque_Limit",),
+                "1/1023, from Max_Torque at power-up"),
+        Setting("minimum_duty", lambda raw, _: raw["Punch"] / 1023.0, ("Punch",), "1/1023"),
+        goal("lower_goal", "CW_Angle_Limit"),
+        goal("upper_goal", "CCW_Angle_Limit"),
+        Setting("speed_limit", lambda raw, _: raw["Moving_Speed"] * speed or None, ("Moving_Speed",),
+                f"{speed / _RPM:.3g} rpm; 0: none"),
+        Setting("overload_output", lambda raw, _: 0.0 if _by_load(raw) else None, ("Shutdown",), "torque off"),
+        Setting("overload_latches", lambda raw, _: "yes" if _by_load(raw) else "no", ("Shutdown",), "till a restart"),
+        Setting("trip_temperature", lambda raw, _: raw["Temperature_Limit"] + 273.15 if _by_heat(raw) else None,
+                ("Temperature_Limit", "Shutdown"), "deg C"),
+        Setting("undervoltage", lambda raw, _: raw["Min_Voltage_Limit"] * 0.1 if _by_voltage(raw) else None,
+                ("Min_Voltage_Limit", "Shutdown"), "0.1 V"),
+        Setting("undervoltage_action", lambda raw, _: "stop", ("Shutdown",)),
+        Setting("signal_loss", lambda raw, _: "hold", said="keeps its last goal"),
+    )
+
+
+def _margin(raw: Raw) -> int:
+    return max(raw[name] for name in _MARGINS)
+
+
+def _slope(raw: Raw) -> int:
+    """Return the slope that the servo takes the written one for."""
+    written = max(raw[name] for name in _COMPLIANCE)
+    return max((step for step in _SLOPES if step <= written), default=_SLOPES[0])
+
+
+_MX_GAIN = 4.0 / math.pi  # duty per rad and unit of the manual's K_p = P/8
+_AX_COUNT = 300.0 / 1023.0 * _DEG
+_MX = Family(
+    label="Dynamixel MX", reference="e-manual of the MX series, protocol 1", registers=MX_REGISTERS,
+    settings=(
+        Setting("proportional_gain", lambda raw, _: raw["P_Gain"] / (2.0 * math.pi), ("P_Gain",),
+                "P/(2 pi) of duty a radian, as an oscilloscope showed the authors of BAM"),
+        Setting("integral_gain", lambda raw, _: raw["I_Gain"] * 1000.0 / 2048.0 * _MX_GAIN, ("I_Gain",),
+                "I 1000/2048 in the manual, where P is P/8", _GUESS, (0.5, 2.0)),
+        Setting("derivative_gain", lambda raw, _: raw["D_Gain"] * 4.0 / 1000.0 * _MX_GAIN, ("D_Gain",),
+                "D 4/1000 in the manual, where P is P/8", _GUESS, (0.5, 2.0)),
+        Setting("duty_limit", lambda raw, _: 0.9625, said="as an oscilloscope showed the authors of BAM"),
+        Setting("acceleration_limit", lambda raw, _: raw["Goal_Acceleration"] * 8.583 * _DEG or None,
+                ("Goal_Acceleration",), "8.583 degrees/s2; 0: none"),
+        *_shared(2.0 * math.pi / 4096.0, 4095, 0.114 * _RPM)),
+    other_names=_OTHER_NAMES, copied={"Torque_Limit": "Max_Torque"},
+    check=lambda raw: _check_limits("Dynamixel MX", 4095, raw))
+_AX = Family(
+    label="Dynamixel AX", reference="e-manual of the AX series", registers=AX_REGISTERS,
+    settings=(
+        Setting("proportional_gain", lambda raw, _: (1.0 - raw["Punch"] / 1023.0) / (_slope(raw) * 0.29326 * _DEG),
+                (*_COMPLIANCE, "Punch"), "from Punch to all of the duty over the slope, the larger one, of 0.29326 "
+                "degrees a count"),
+        Setting("deadband_angle", lambda raw, _: _margin(raw) * _AX_COUNT, _MARGINS, "counts, the larger one"),
+        *_shared(_AX_COUNT, 1023, 0.111 * _RPM)),
+    other_names=_OTHER_NAMES, copied={"Torque_Limit": "Max_Torque"}, pairs=(_MARGINS, _COMPLIANCE),
+    check=lambda raw: _check_limits("Dynamixel AX", 1023, raw))

@@ -1,0 +1,228 @@
+"""Registers of Dynamixel's X series (XL330, XL430, XM430 …), by the names of the e-manual with underscores."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from servotwin.errors import ParameterError
+from servotwin.parameters.catalog import load_servo
+from servotwin.parameters.registers.table import Family, Raw, Register, Setting, on, set_registers
+from servotwin.parameters.servo import Servo
+
+_COUNT = 2.0 * math.pi / 4096.0  # rad
+_MIDDLE = 2048  # counts at angle 0
+_TICK = 1e-3  # s
+_FULL = 885.0  # PWM steps of the whole duty
+_RPM = math.pi / 30.0
+_SPEED, _ACCELERATION = 0.229 * _RPM, 214.577 * _RPM / 60.0  # rad/s and rad/s2 a step
+_GUESS = "assumed"
+_POSITION, _TURNS, _BY_CURRENT = 3, 4, 5
+_by_voltage, _by_heat, _by_load = on(0, "Shutdown"), on(2, "Shutdown"), on(5, "Shutdown")
+_NO_SCALE = "the scale of the feed-forward is not published; set firmware.velocity_feedforward and the like instead"
+_FEEDBACK = tuple((name, address) for name, address in (
+    ("Model_Information", 2), ("Firmware_Version", 6), ("Hardware_Error_Status", 70), ("Goal_Velocity", 104),
+    ("Goal_Position", 116), ("Realtime_Tick", 120), ("Moving", 122), ("Moving_Status", 123), ("Present_PWM", 124),
+    ("Present_Current", 126), ("Present_Load", 126), ("Present_Velocity", 128), ("Present_Position", 132),
+    ("Velocity_Trajectory", 136), ("Position_Trajectory", 140), ("Present_Input_Voltage", 144),
+    ("Present_Temperature", 146), ("Backup_Ready", 147)))
+REGISTERS: dict[str, Register] = {
+    "Position_P_Gain": Register(84, 1, 16383, 800, why="without P the servo does not control its angle"),
+    "Position_I_Gain": Register(82, 0, 16383, 0),
+    "Position_D_Gain": Register(80, 0, 16383, 0),
+    "Feedforward_2nd_Gain": Register(88, 0, 16383, 0, (0,), _NO_SCALE),
+    "Feedforward_1st_Gain": Register(90, 0, 16383, 0, (0,), _NO_SCALE),
+    "Operating_Mode": Register(11, 0, 16, _POSITION, (_POSITION, _TURNS, _BY_CURRENT),
+                               "only the position modes are computed"),
+    "Drive_Mode": Register(10, 0, 13, 0, (0, 1, 8, 9), "profiles by time are not computed"),
+    "Profile_Velocity": Register(112, 0, 32767, 0),
+    "Profile_Acceleration": Register(108, 0, 32767, 0),
+    "PWM_Limit": Register(36, 0, 885, 885),
+    "Goal_PWM": Register(100, 0, 885, 885),
+    "Current_Limit": Register(38, 0, 2047, 1193),
+    "Goal_Current": Register(102, 1, 2047, 1193),
+    "Temperature_Limit": Register(31, 0, 100, 80),
+    "Min_Voltage_Limit": Register(34, 0, 160, 95),
+    "Shutdown": Register(63, 0, 255, 52),
+    "Bus_Watchdog": Register(98, 0, 127, 0),
+    "PWM_Slope": Register(62, 1, 255, 140),
+    "Min_Position_Limit": Register(52, 0, 4095, 0),
+    "Max_Position_Limit": Register(48, 0, 4095, 4095),
+    "Model_Number": Register(0, 0, 65535, 0),
+    # without effect on the control of the angle
+    "ID": Register(7, 0, 252, 1),
+    "Baud_Rate": Register(8, 0, 7, 1),
+    "Return_Delay_Time": Register(9, 0, 254, 250),
+    "Secondary_ID": Register(12, 0, 255, 255),
+    "Protocol_Type": Register(13, 1, 22, 2),
+    "Homing_Offset": Register(20, -1044479, 1044479, 0),
+    "Moving_Threshold": Register(24, 0, 1023, 10),
+    "Max_Voltage_Limit": Register(32, 0, 160, 160),
+    "Acceleration_Limit": Register(40, 0, 32767, 32767),
+    "Velocity_Limit": Register(44, 0, 2047, 200),
+    "Startup_Configuration": Register(60, 0, 3, 0),
+    "Torque_Enable": Register(64, 0, 1, 0),
+    "LED": Register(65, 0, 1, 0),
+    "Status_Return_Level": Register(68, 0, 2, 2),
+    "Registered_Instruction": Register(69, 0, 1, 0),
+    "Velocity_I_Gain": Register(76, 0, 16383, 1920),
+    "Velocity_P_Gain": Register(78, 0, 16383, 100),
+    **{name: Register(address, -2**31, 2**31 - 1, 0) for name, address in _FEEDBACK},
+}
+
+
+@dataclass(frozen=True)
+class _Variant:
+    """What differs between models.
+
+    Parameters
+    ----------
+    factory : mapping of str to int
+        Values that the e-manual gives for it.
+    current_unit : float, optional
+        Of Goal_Current [A]; None: it has none.
+    current_sense : {"motor", "bus"}
+    slope : bool
+        Whether it has PWM_Slope.
+    measured : bool
+        Whether the scale of its P is known.
+    """
+
+    factory: Mapping[str, int]
+    current_unit: float | None = 2.69e-3
+    current_sense: str = "motor"
+    slope: bool = False
+    measured: bool = False
+
+
+_X330 = _Variant({"Position_P_Gain": 400, "Temperature_Limit": 70, "Min_Voltage_Limit": 35, "Current_Limit": 1750,
+                  "Goal_Current": 1750, "Shutdown": 53}, current_unit=1e-3, current_sense="bus", slope=True,
+                 measured=True)
+_XL430 = _Variant({"Position_P_Gain": 640, "Position_D_Gain": 4000, "Temperature_Limit": 72, "Min_Voltage_Limit": 60},
+                  current_unit=None)
+_X = _Variant({})
+_OF_CURRENT, _OF_SLOPE = ("Current_Limit", "Goal_Current", "Present_Current"), ("PWM_Slope",)
+_BY_NAME = {"xl330": _X330, "xc330": _X330, "xl430": _XL430, "xc430": _XL430}
+_BY_NUMBER = {1190: _X330, 1200: _X330, 1060: _XL430, 1070: _XL430}
+
+
+def dynamixel_x(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
+    """Return a servo with registers of Dynamixel's X series set into its firmware.
+
+    Which model it is, and with it the factory's values and the unit of the current, follows from Model_Number or the
+    servo's name; a name that tells none counts as an XM430.
+
+    Parameters
+    ----------
+    registers : mapping of str to int
+        Raw values by the e-manual's names with underscores, such as ``{"Position_P_Gain": 400}``; all of a dump may be
+        given. Angle 0 is at count 2048.
+    servo : str, Path or Servo
+        Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no such register: the nearest are suggested.
+    ParameterError
+        If a value is not whole, out of range or not computed, or the model does not have the register.
+
+    Examples
+    --------
+    >>> leg = dynamixel_x({"Position_P_Gain": 200}, servo="dynamixel-xl330-m288")
+    >>> round(leg.firmware.proportional_gain, 5)
+    0.57548
+    """
+    base = servo if isinstance(servo, Servo) else load_servo(servo)
+    number = registers.get("Model_Number", 0) if isinstance(registers, Mapping) else 0
+    variant = _BY_NUMBER.get(number) or next(
+        (found for name, found in _BY_NAME.items() if name in base.name.lower()), _X)
+    if "PWM_Slope" in registers and base.supply.open_circuit_voltage is None:
+        raise ParameterError(f"register PWM_Slope of Dynamixel X for {base.name!r}, whose supply voltage is not given")
+    return set_registers(_family(variant), registers, base)
+
+
+def _family(variant: _Variant) -> Family:
+    lacking = (*(() if variant.current_unit else _OF_CURRENT), *(() if variant.slope else _OF_SLOPE))
+    registers = {name: replace(register, factory=variant.factory.get(name, register.factory))
+                 for name, register in REGISTERS.items() if name not in lacking}
+    settings = tuple(setting for setting in (*_control(variant), *_LIMITS, *_TRIPS)
+                     if not any(name in lacking for name in setting.registers))
+    return Family(
+        label="Dynamixel X", reference="e-manual of the X series", registers=registers, settings=settings,
+        other_names={"Secondary_Shadow_ID": "Secondary_ID"},
+        copied={"Goal_PWM": "PWM_Limit", "Goal_Current": "Current_Limit"},
+        check=lambda raw: _check(variant, raw))
+
+
+def _check(variant: _Variant, raw: Raw) -> None:
+    if raw["Operating_Mode"] == _BY_CURRENT and variant.current_unit is None:
+        raise ParameterError("register Operating_Mode of Dynamixel X", got=_BY_CURRENT,
+                             allowed="3 or 4: this model does not sense its current")
+    for goal, limit in (("Goal_PWM", "PWM_Limit"), ("Goal_Current", "Current_Limit")):
+        if goal in raw and raw[goal] > raw[limit]:
+            raise ParameterError(f"register {goal} of Dynamixel X", got=raw[goal], allowed=f"at most {limit} = "
+                                 f"{raw[limit]}")
+    low, high = raw["Min_Position_Limit"], raw["Max_Position_Limit"]
+    if low >= high:
+        raise ParameterError("register Min_Position_Limit of Dynamixel X", got=low,
+                             allowed=f"less than Max_Position_Limit = {high}")
+
+
+def _goal(name: str, register: str) -> Setting:
+    return Setting(name, lambda raw, _: None if raw["Operating_Mode"] == _TURNS else (raw[register] - _MIDDLE) * _COUNT,
+                   (register, "Operating_Mode"), "angle 0 at count 2048; mode 4 turns without end")
+
+
+def _control(variant: _Variant) -> tuple[Setting, ...]:
+    unit = variant.current_unit or 0.0
+    return (
+        Setting("control_period", lambda raw, _: _TICK, said="a guess", origin=_GUESS, bounds=(5e-4, 2e-3)),
+        Setting("compute_delay", lambda raw, _: 0.0, said="a guess", origin=_GUESS, bounds=(0.0, _TICK)),
+        Setting("angle_quantum", lambda raw, _: _COUNT, said="4096 counts a turn"),
+        Setting("filter_weight", lambda raw, _: 1.0, said="a guess: no filter", origin=_GUESS, bounds=(0.2, 1.0)),
+        Setting("proportional_gain", lambda raw, _: raw["Position_P_Gain"] / (256.0 * _FULL * _COUNT),
+                ("Position_P_Gain",), "P/256 steps of PWM a count, " + (
+                    "as recordings of an XL330 show; the manual says 128" if variant.measured else
+                    "as of the XL330; the manual says 128"),
+                *(() if variant.measured else (_GUESS, (1.0, 2.0)))),
+        Setting("integral_gain", lambda raw, _: raw["Position_I_Gain"] / (2.0 * 65536.0 * _FULL * _COUNT * _TICK),
+                ("Position_I_Gain",), "I/131072 steps of PWM a count and tick, a guess", _GUESS, (0.5, 2.0)),
+        Setting("derivative_gain", lambda raw, _: raw["Position_D_Gain"] * _TICK / (32.0 * _FULL * _COUNT),
+                ("Position_D_Gain",), "D/32 steps of PWM a count in a tick, a guess", _GUESS, (0.5, 2.0)),
+        Setting("duty_quantum", lambda raw, _: 1.0 / _FULL, said="PWM in 885 steps"),
+        Setting("command_kind", lambda raw, _: "goal", ("Operating_Mode",), "goals on the bus"),
+        Setting("current_limit", lambda raw, _: raw["Goal_Current"] * unit
+                if raw["Operating_Mode"] == _BY_CURRENT else None,
+                ("Goal_Current", "Operating_Mode"), f"{1e3 * unit:.3g} mA, in mode 5"),
+        Setting("current_sense",
+                lambda raw, _: variant.current_sense if raw["Operating_Mode"] == _BY_CURRENT else None,
+                ("Operating_Mode", "Goal_Current"), "in mode 5"),
+        Setting("duty_slew", lambda raw, servo: raw["PWM_Slope"] * 1.977 / servo.supply.open_circuit_voltage
+                if servo.supply.open_circuit_voltage else None,
+                ("PWM_Slope",), "1.977 V/s over the supply, a guess", _GUESS, (0.5, 2.0)),
+    )
+
+
+_LIMITS = (
+    Setting("torque_limit", lambda raw, _: raw["Goal_PWM"] / _FULL, ("Goal_PWM",), "1/885, from PWM_Limit at power-up"),
+    Setting("duty_limit", lambda raw, _: raw["PWM_Limit"] / _FULL, ("PWM_Limit",), "1/885"),
+    _goal("lower_goal", "Min_Position_Limit"),
+    _goal("upper_goal", "Max_Position_Limit"),
+    Setting("speed_limit", lambda raw, _: raw["Profile_Velocity"] * _SPEED or None, ("Profile_Velocity",), "0.229 rpm"),
+    Setting("acceleration_limit", lambda raw, _: raw["Profile_Acceleration"] * _ACCELERATION or None,
+            ("Profile_Acceleration",), "214.577 rev/min2"),
+)
+_TRIPS = (
+    Setting("overload_output", lambda raw, _: 0.0 if _by_load(raw) else None, ("Shutdown",), "torque off"),
+    Setting("overload_latches", lambda raw, _: "yes" if _by_load(raw) else "no", ("Shutdown",), "until a reboot"),
+    Setting("trip_temperature", lambda raw, _: raw["Temperature_Limit"] + 273.15 if _by_heat(raw) else None,
+            ("Temperature_Limit", "Shutdown"), "deg C"),
+    Setting("undervoltage", lambda raw, _: raw["Min_Voltage_Limit"] * 0.1
+            if _by_voltage(raw) and raw["Min_Voltage_Limit"] else None, ("Min_Voltage_Limit", "Shutdown"), "0.1 V"),
+    Setting("undervoltage_action", lambda raw, _: "stop", ("Shutdown",)),
+    Setting("signal_timeout", lambda raw, _: raw["Bus_Watchdog"] * 0.02 or None, ("Bus_Watchdog",), "20 ms"),
+    Setting("signal_loss", lambda raw, _: "hold", said="stops where it is"),
+)

@@ -1,0 +1,255 @@
+"""What a table of registers is, and the one reader that makes a firmware group of raw values."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+from servotwin.errors import ParameterError, UnknownNameError
+from servotwin.parameters.catalog import load_servo
+from servotwin.parameters.quantity import Quantity
+from servotwin.parameters.servo import Servo, unit_of
+from servotwin.units import is_finite
+
+Raw = Mapping[str, int]
+Value = float | str | None
+_AS_WRITTEN = re.compile(r"(\w+) \((\d+)\) = (\d+)")  # in sources: P_Coefficient (21) = 32
+
+
+@dataclass(frozen=True)
+class Register:
+    """A register: where it stands, and what may be written into it.
+
+    Parameters
+    ----------
+    address : int
+    lower, upper : int
+        Range of the raw value.
+    factory : int
+        What it holds when the servo is new, or after power-up.
+    only : tuple of int
+        The values that are computed, where they are not all of the range; empty: all.
+    why : str
+        What to say of the others.
+    """
+
+    address: int
+    lower: int
+    upper: int
+    factory: int
+    only: tuple[int, ...] = ()
+    why: str = ""
+
+    def allows(self, value: int) -> bool:
+        """Return whether a raw value is in its range, and computed."""
+        return value in self.only if self.only else self.lower <= value <= self.upper
+
+    @property
+    def allowed(self) -> str:
+        """What may be written, in words."""
+        values = " or ".join(str(value) for value in self.only) or f"a whole number from {self.lower} to {self.upper}"
+        return f"{values}; {self.why}" if self.why else values
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A number of the firmware, and how registers make it.
+
+    Parameters
+    ----------
+    name : str
+        Of the firmware group.
+    value : callable
+        From all raw values by name, and the servo, to the number (SI) or word; None: absent.
+    registers : tuple of str
+        Those it is made of; empty for what no register changes.
+    said : str
+        How it follows, for the source.
+    origin : str
+        One of `servotwin.parameters.ORIGINS`.
+    factors : tuple of float
+        Ends of the range over the value, where the law is not known for sure.
+    bounds : tuple of float
+        Ends of the range themselves (SI).
+    """
+
+    name: str
+    value: Callable[[Raw, Servo], Value]
+    registers: tuple[str, ...] = ()
+    said: str = ""
+    origin: str = "literature"
+    factors: tuple[float, float] | None = None
+    bounds: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Family:
+    """Servos with the same registers.
+
+    Parameters
+    ----------
+    label : str
+        What people call them, such as ``"Feetech STS"``.
+    registers : mapping of str to Register
+    settings : tuple of Setting
+    reference : str
+        Where the registers are described.
+    other_names : mapping of str to str
+        Further names of registers.
+    copied : mapping of str to str
+        Register that power-up writes, and the one that it is copied from.
+    pairs : tuple of pair of str
+        Registers for the two ways of turning, of which the larger value counts.
+    check : callable
+        Raises ParameterError where raw values do not go together.
+    """
+
+    label: str
+    registers: Mapping[str, Register]
+    settings: tuple[Setting, ...]
+    reference: str
+    other_names: Mapping[str, str] = field(default_factory=dict)
+    copied: Mapping[str, str] = field(default_factory=dict)
+    pairs: tuple[tuple[str, str], ...] = ()
+    check: Callable[[Raw], None] = lambda raw: None
+
+
+def set_registers(family: Family, registers: Mapping[str, int], servo: str | Path | Servo) -> Servo:
+    """Return a servo whose firmware group follows from registers.
+
+    What is given makes the numbers that depend on it. The other numbers stay as the servo has them; where it has none
+    of this family, they follow from the factory's values.
+
+    Parameters
+    ----------
+    family : Family
+    registers : mapping of str to int
+        Raw values by name.
+    servo : str, Path or Servo
+        Catalog id, path of a servo file, or the servo itself.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is no register of this name: the nearest are suggested.
+    ParameterError
+        If a value is not whole or out of range, values do not go together, or the servo has the firmware of another
+        family.
+
+    Warns
+    -----
+    UserWarning
+        If two registers differ that say the same for either way of turning, and one number stands for both.
+    """
+    base = servo if isinstance(servo, Servo) else load_servo(servo)
+    given = read_registers(family, registers)
+    own = _is_own(family, base)
+    raw = {name: register.factory for name, register in family.registers.items()}
+    raw |= {name: value for name, value in _written(base).items() if own and name in raw}
+    raw |= given
+    raw |= {name: raw[source] for name, source in family.copied.items() if source in given and name not in given}
+    family.check(raw)
+    _warn_of_pairs(family, given, raw)
+    numbers: dict[str, Any] = {}
+    quantities = dict(base.quantities)
+    for setting in family.settings:
+        stays = own or base.get(f"firmware.{setting.name}") is not None
+        if not stays or any(name in given or family.copied.get(name) in given for name in setting.registers):
+            quantity = _quantity(family, setting, raw, base)
+            numbers[setting.name] = None if quantity is None else quantity.value
+            if quantity is not None:
+                quantities[f"firmware.{setting.name}"] = quantity
+    return replace(base, kind="bus", firmware=replace(base.firmware, **numbers), quantities=quantities)
+
+
+def read_registers(family: Family, registers: Any) -> dict[str, int]:
+    """Return raw values by the family's own names, each checked.
+
+    Raises
+    ------
+    UnknownNameError, ParameterError
+        As `set_registers` does.
+    """
+    if not isinstance(registers, Mapping):
+        raise ParameterError(f"registers of {family.label}", got=registers, allowed="a mapping of names to raw values")
+    found: dict[str, int] = {}
+    for written, value in registers.items():
+        name = family.other_names.get(str(written).strip(), str(written).strip())
+        if name not in family.registers:
+            raise UnknownNameError(f"register of {family.label}", str(written),
+                                   (*family.registers, *family.other_names),
+                                   allowed=f"the name of a register, such as {next(iter(family.registers))}")
+        register = family.registers[name]
+        what = f"register {name} ({register.address}) of {family.label}"
+        if not _is_whole(value) or not register.allows(int(value)):
+            raise ParameterError(what, got=value, allowed=register.allowed)
+        if found.setdefault(name, int(value)) != int(value):
+            raise ParameterError(f"{what}, given by two names", got=value, allowed=f"one value, as {found[name]}")
+    return found
+
+
+def on(bit: int, mask: str) -> Callable[[Raw], bool]:
+    """Return a function that tells whether a bit of a register is set."""
+    return lambda raw: bool(raw[mask] >> bit & 1)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, Real) and is_finite(value) and float(value).is_integer()
+
+
+def _of_firmware(servo: Servo) -> Iterator[str]:
+    for name in servo.names():
+        if name.startswith("firmware."):
+            yield servo.source(name).source or ""
+
+
+def _is_own(family: Family, servo: Servo) -> bool:
+    """Return whether the servo has numbers of this family; raise if they are another's."""
+    sources = list(_of_firmware(servo))
+    other = next((text for text in sources if _family_of(text) not in ("", family.label)), None)
+    if other is not None:
+        raise ParameterError(f"registers of {family.label} for {servo.name!r}, which has those of {_family_of(other)}")
+    return any(_family_of(text) for text in sources)
+
+
+def _family_of(source: str) -> str:
+    """Return the family that a source names; empty where it names none."""
+    label, found, _ = source.partition(" firmware: ")
+    return label if found else ""
+
+
+def _written(servo: Servo) -> dict[str, int]:
+    """Return the raw values that the sources of a servo name, so that one register may follow another in later calls.
+
+    Numbers that were replaced since have another source, and name none.
+    """
+    return {name: int(value) for text in _of_firmware(servo) if _family_of(text)
+            for name, _, value in _AS_WRITTEN.findall(text)}
+
+
+def _warn_of_pairs(family: Family, given: Iterable[str], raw: Raw) -> None:
+    for one, two in family.pairs:
+        if raw[one] != raw[two] and (one in given or two in given):
+            warnings.warn(f"registers {one} = {raw[one]} and {two} = {raw[two]} of {family.label} differ by the way of "
+                          f"turning: computed with {max(raw[one], raw[two])} for both", stacklevel=4)
+
+
+def _quantity(family: Family, setting: Setting, raw: Raw, servo: Servo) -> Quantity | None:
+    value = setting.value(raw, servo)
+    if value is None:
+        return None
+    named = ", ".join(f"{name} ({family.registers[name].address}) = {raw[name]}" for name in setting.registers)
+    parts = [f"register{'s' if len(setting.registers) > 1 else ''} {named}" if named else "", setting.said,
+             family.reference]
+    spread: dict[str, float] = {}
+    if setting.bounds is not None:
+        spread = {"lower": setting.bounds[0], "upper": setting.bounds[1]}
+    elif setting.factors is not None and isinstance(value, float) and value != 0.0:
+        spread = {"lower": setting.factors[0] * value, "upper": setting.factors[1] * value}
+    return Quantity(value=value, unit=unit_of(f"firmware.{setting.name}"), origin=setting.origin,
+                    source=f"{family.label} firmware: " + "; ".join(part for part in parts if part), **spread)

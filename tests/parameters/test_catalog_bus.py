@@ -1,0 +1,135 @@
+"""Bus and digital servos of the catalog: their firmware is complete, and each number says where it comes from."""
+
+import math
+from importlib import resources
+
+import pytest
+
+from servotwin.identification import motor_range, servo_file_text, servo_from_sheet, sheet_contradictions, sheet_of
+from servotwin.parameters import REGISTER_FAMILIES, catalog_names, load_servo, unit_of
+
+BUS = ("dynamixel-ax-12a", "dynamixel-mx-106", "dynamixel-mx-28", "dynamixel-mx-64", "dynamixel-xl330-m077",
+       "dynamixel-xl330-m288", "dynamixel-xl430-w250", "feetech-sts3215-12v", "feetech-sts3215-7v4", "feetech-sts3250")
+DIGITAL = ("dsservo-ds3218", "dsservo-rds3115", "emax-es08md", "feetech-ft-15m0", "feetech-ft-2806", "feetech-ft-7235",
+           "hitec-hs-5485hb", "jx-pdi-6221mg", "towerpro-mg995", "towerpro-mg996r", "towerpro-sg92r")
+IMPOSSIBLE = ("dynamixel-xl330-m077",)
+MEASURED = {"feetech-sts3215-12v": ("gear.backlash",)}
+# kt [N m/A], R [ohm], armature [kg m2], friction_base [N m], friction_viscous [N m s/rad], load_friction_base, as
+# BAM publishes them for its friction model M3, all at the output
+PLANTS = {
+    "feetech-sts3215-7v4": (1.264970308604636, 2.4529072783070904, 0.023496913022039195, 0.05564449100757786,
+                            0.031494638163238914, 0.21155430308651182),
+    "dynamixel-xl330-m288": (0.3807112096806716, 3.042577837095542, 0.001961730123669368, 0.011302412891443533,
+                             0.0044129336093419475, 0.12341835796790665),
+    "dynamixel-mx-64": (1.631491787799071, 3.5708899455080743, 0.011237906702031345, 0.10216727649779266,
+                        0.0006300275797440622, 0.07580074806755707),
+    "dynamixel-mx-106": (2.204165397088512, 2.653346939680077, 0.02484689556730746, 0.1133532996239035,
+                         0.01194450384263248, 0.10824037267470683),
+}
+NEEDED = ("control_period", "compute_delay", "angle_quantum", "proportional_gain")
+
+
+def test_these_are_the_bus_and_the_digital_servos():
+    kinds = {name: load_servo(name).kind for name in catalog_names()}
+    assert {name for name, kind in kinds.items() if kind == "bus"} == set(BUS)
+    assert {name for name, kind in kinds.items() if kind == "digital"} == set(DIGITAL)
+    for name, kind in kinds.items():
+        assert (kind in load_servo(name).sheet["flags"]) is (kind != "analog"), name
+        assert any(key.startswith("firmware.") for key in load_servo(name).names()) is (kind != "analog"), name
+
+
+@pytest.mark.parametrize("name", [*BUS, *DIGITAL])
+def test_the_firmware_is_complete_and_says_where_it_comes_from(name):
+    servo = load_servo(name)
+    for key in NEEDED:
+        assert getattr(servo.firmware, key) is not None, key
+    for key in servo.names():
+        quantity = servo.source(key)
+        assert quantity.source, key
+        without = isinstance(quantity.value, str) or quantity.value == 0.0 or key == "electronics.comparator_gain"
+        if quantity.origin in ("assumed", "identified") and not without:
+            assert quantity.spread, key
+
+
+@pytest.mark.parametrize("name", DIGITAL)
+def test_the_firmware_of_a_digital_servo_is_a_guess_about_its_own_sheet(name):
+    servo = load_servo(name)
+    assert {servo.source(key).origin for key in servo.names() if key.startswith("firmware.")} == {"assumed"}
+    gain = servo.source("firmware.proportional_gain")
+    assert (gain.lower, gain.upper) == (3.0, 20.0)
+    rate = servo.electronics.pulse_to_voltage_gain / servo.potentiometer.feedback_gain
+    w = servo.electronics.deadband if "deadband" in servo.sheet else 2e-6
+    assert servo.firmware.deadband_angle == pytest.approx(0.5 * w * rate, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", BUS)
+def test_a_bus_servo_has_the_factorys_registers_and_an_encoder(name):
+    servo = load_servo(name)
+    assert REGISTER_FAMILIES[servo.sheet["registers"]]({}, servo=servo) == servo
+    groups = {key.partition(".")[0] for key in servo.names()}
+    assert groups == {"motor", "gear", "friction", "firmware", "supply"}
+    assert servo.firmware.command_kind == "goal"
+
+
+@pytest.mark.parametrize("name", BUS)
+def test_each_file_is_what_its_own_sheet_makes_but_for_what_was_identified(name):
+    servo = load_servo(name)
+    made = servo_from_sheet(sheet_of(servo), allow_impossible=True)
+    if name not in PLANTS and name not in MEASURED:
+        file = resources.files("servotwin.parameters") / "catalog" / f"{name}.toml"
+        assert servo_file_text(made) == file.read_text(encoding="utf-8")
+    own = {key for key in servo.names() if servo.source(key).origin in ("identified", "measured")}
+    if name in PLANTS:
+        own |= {"supply.bridge_drop_voltage", "friction.load_friction_motor", "friction.load_friction_external"}
+    for key in {*servo.names(), *made.names()} - own:
+        value = made.get(key)
+        assert servo.get(key) == (pytest.approx(value, rel=1e-5, abs=1e-12) if isinstance(value, float) else value), key
+        assert servo.source(key).source == made.source(key).source, key
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_plants_of_bam_are_as_published(name):
+    servo = load_servo(name)
+    N, motor, friction = servo.gear.gear_reduction, servo.motor, servo.friction
+    found = (N * motor.torque_constant, motor.armature_resistance, N * N * motor.rotor_inertia,
+             N * friction.coulomb_torque_forward, N * N * motor.motor_viscous_friction, friction.load_friction)
+    assert found == pytest.approx(PLANTS[name], rel=1e-5)  # the files hold six digits
+    assert motor.back_emf_constant == motor.torque_constant
+    assert friction.coulomb_torque_backward == friction.coulomb_torque_forward
+    for key in ("motor.torque_constant", "motor.armature_resistance", "motor.rotor_inertia", "friction.load_friction"):
+        assert servo.source(key).origin == "identified"
+        assert "Rhoban/bam" in servo.source(key).source
+
+
+def full_speed(servo):
+    """Speed without load at full duty, of the DC motor with Coulomb and viscous friction [rad/s]."""
+    N, motor, friction = servo.gear.gear_reduction, servo.motor, servo.friction
+    K, R = N * motor.torque_constant, motor.armature_resistance
+    share = 1.0 - (friction.load_friction or friction.load_friction_motor or 0.0)
+    U = (servo.firmware.duty_limit or 1.0) * servo.supply.open_circuit_voltage - servo.supply.bridge_drop_voltage
+    F, B = N * friction.coulomb_torque_forward, N * N * motor.motor_viscous_friction
+    return (share * K * U / R - F) / (share * K * K / R + B)
+
+
+@pytest.mark.parametrize("name", BUS)
+def test_each_turns_about_as_fast_as_its_sheet_says(name):
+    """Those made of their sheet within what the duty leaves; the identified ones within 12 %."""
+    servo = load_servo(name)
+    printed = sheet_of(servo).nominal.no_load_speed
+    assert full_speed(servo) == pytest.approx(printed, rel=0.12)
+    assert servo.supply.open_circuit_voltage == sheet_of(servo).nominal.supply_voltage
+
+
+def test_impossible_sheets_are_known_and_flagged():
+    for name in BUS:
+        found = sheet_contradictions(sheet_of(load_servo(name)))
+        assert bool(found) is (name in IMPOSSIBLE), name
+        assert motor_range(sheet_of(load_servo(name))).possible is (name not in IMPOSSIBLE), name
+
+
+def test_the_printed_torque_constant_of_the_sts3250_is_within_reach():
+    """Its sheet prints 11 kgf cm/A at the output; speed and currents make more, for they count the driver too."""
+    servo = load_servo("feetech-sts3250")
+    assert servo.gear.gear_reduction * servo.motor.torque_constant == pytest.approx(11 * 0.0980665, rel=0.3)
+    assert unit_of("motor.torque_constant") == "N m/A"
+    assert math.isclose(servo.motor.back_emf_constant, servo.motor.torque_constant)
