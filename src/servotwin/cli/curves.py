@@ -14,9 +14,11 @@ from servotwin.cli.terminal import emit_json, pairs, patience, show, table
 if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
     from servotwin.datasheet import DataSheet
+    from servotwin.models import Model
 
-_MODELS = ("pulse", "pulse-inductive", "bounded")
+_MODELS = ("digital", "pulse", "pulse-inductive", "bounded")
 _PICTURES = (".png", ".svg", ".pdf")
+_ENDINGS = {"--out": (".html", ".htm"), "--csv": (".csv",)}
 _ZERO_CELSIUS = 273.15
 _ASKED = "What to compute"
 
@@ -41,16 +43,20 @@ def curves(
         "--quick", help="Leave out the bandwidth, which takes longer than everything else.",
         rich_help_panel=_ASKED)] = False,
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: by the kind of the servo).",
+        metavar="MODEL", help="digital, pulse, pulse-inductive or bounded (default: by the kind of the servo).",
         rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable.",
         rich_help_panel=shared.PLANT)] = None,
+    register: shared.RegisterOption = None,
     out: Annotated[Path | None, typer.Option(
         metavar="FILE.html", help="Write a page with tables and pictures.", rich_help_panel=shared.OUTPUT)] = None,
     plot: Annotated[Path | None, typer.Option(
         metavar="FILE", help="Draw the curves: .png, .svg or .pdf; for several servos, torque and current "
         "side by side.", rich_help_panel=shared.OUTPUT)] = None,
+    loop: Annotated[Path | None, typer.Option(
+        metavar="FILE", help="Draw the torque of a digital or bus servo over its error: .png, .svg or .pdf.",
+        rich_help_panel=shared.OUTPUT)] = None,
     csv: Annotated[Path | None, typer.Option(
         "--csv", metavar="FILE.csv", help="Write the curves, a row per point.", rich_help_panel=shared.OUTPUT)] = None,
     force: Annotated[bool, typer.Option(
@@ -62,8 +68,10 @@ def curves(
     from servotwin.cli.lift_words import loads_of
 
     asked = loads_of(lift, arm, load or [])
-    targets = _targets(out, plot, csv, servos, force=force)
-    sheets = _computed(servos, model, change or [], {
+    targets = _targets({"--out": out, "--plot": plot, "--loop": loop, "--csv": csv}, servos, force=force)
+    models = _models(servos, model, change or [], register or [])
+    _check_loop(loop, models)
+    sheets = _computed(models, {
         "voltage": _voltages(voltage), "lift": asked.lift, "hot": hot + _ZERO_CELSIUS, "bandwidth": not quick})
     _write(sheets, targets, asked.torque, force=force)
     files = [str(target.path) for target in targets]
@@ -76,16 +84,15 @@ def curves(
         show(pairs([("written", name) for name in files]))
 
 
-def _targets(out: Path | None, plot: Path | None, csv: Path | None, servos: list[str], *,
-             force: bool) -> list[Target]:
+def _targets(paths: dict[str, Path | None], servos: list[str], *, force: bool) -> list[Target]:
     from servotwin.cli.outputs import Target, check_targets
     from servotwin.errors import InputError
 
     repeated = next((name for name in servos if servos.count(name) > 1), None)
     if repeated is not None:
         raise InputError("servos", got=f"{repeated!r} twice", allowed="each once")
-    targets = [Target(option=option, path=path, endings=endings) for option, path, endings in (
-        ("--out", out, (".html", ".htm")), ("--plot", plot, _PICTURES), ("--csv", csv, (".csv",))) if path is not None]
+    targets = [Target(option=option, path=path, endings=_ENDINGS.get(option, _PICTURES))
+               for option, path in paths.items() if path is not None]
     check_targets(targets, force=force, inputs=[Path(servo) for servo in servos])
     return targets
 
@@ -99,13 +106,26 @@ def _voltages(words: list[str] | None) -> list[float] | None:
             for word in words for part in word.split(",")]
 
 
-def _computed(servos: list[str], model: str | None, change: list[str], options: dict[str, Any]) -> list[DataSheet]:
+def _models(servos: list[str], model: str | None, change: list[str], register: list[str]) -> list[Model]:
     from servotwin.cli.model_words import model_of
-    from servotwin.datasheet import curves as compute
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # which model stands for which kind is said in the notes
-        models = [model_of(servo, model, change, _MODELS) for servo in servos]
+        return [model_of(servo, model, change, _MODELS, register) for servo in servos]
+
+
+def _check_loop(path: Path | None, models: list[Model]) -> None:
+    from servotwin.errors import InputError
+    from servotwin.models import DigitalServo
+
+    if path is not None and not (len(models) == 1 and isinstance(models[0], DigitalServo)):
+        names = ", ".join(model.servo.name for model in models)
+        raise InputError("--loop", got=names, allowed="one digital or bus servo, whose file has a program")
+
+
+def _computed(models: list[Model], options: dict[str, Any]) -> list[DataSheet]:
+    from servotwin.datasheet import curves as compute
+
     found = []
     for each in models:
         with patience(f"computing {each.servo.name}"):
@@ -122,6 +142,10 @@ def _write(sheets: list[DataSheet], targets: list[Target], torque: float | None,
                 from servotwin.cli.curves_page import page
 
                 draft.write_text(page(sheets, torque), encoding="utf-8", newline="\n")
+            elif target.option == "--loop":
+                from servotwin import plotting
+
+                plotting.save(plotting.loop_curve([part.loop for part in sheets[0].voltages if part.loop]), draft)
             elif target.option == "--plot":
                 from servotwin import plotting
 
@@ -146,6 +170,7 @@ def _write_points(sheets: list[DataSheet], path: Path) -> None:
 
 def _show(sheet: DataSheet, torque: float | None) -> None:
     from servotwin.cli.curves_words import hot_words, lift_pairs, notes, rows
+    from servotwin.cli.loop_words import loop_pairs
     from servotwin.cli.summary import model_name
     from servotwin.parameters import printed_points
 
@@ -155,6 +180,8 @@ def _show(sheet: DataSheet, torque: float | None) -> None:
     for part in sheet.voltages:
         head = (f"at {part.voltage:g} V", "cold", "hot", "sheet", "off")
         parts += ["", table(head, rows(part, points, torque))]
+        if part.loop is not None:
+            parts += ["", "the loop at rest", pairs(loop_pairs(part.loop, torque))]
         if part.lift is not None:
             parts += ["", pairs(lift_pairs(part.lift))]
     parts += [f"cold: 25 deg C; hot: {hot_words(sheet.voltages[0])}", ""]

@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin import units
+from servotwin.cli.loop_words import loop_facts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -114,7 +115,8 @@ def _standing(part: VoltageSheet) -> list[CurveRow]:
     for share in _SHARES:
         each = held.get(share)
         if each is not None:
-            said = f"{math.degrees(each.error):.1f} deg, {each.current:.2f} A" if each.stands else "does not hold"
+            said = (f"{math.degrees(each.error):.1f} deg, {each.current:.2f} A" if each.stands else
+                    f"does not hold: it trips by {each.trip}" if each.trip else "does not hold")
             found.append(CurveRow(f"holding {each.torque:.2g} N m, error", said))
     for band in part.bandwidth:
         said = ("below 1 Hz" if band.frequency == 0.0 else
@@ -132,7 +134,8 @@ def lift_pairs(lift: Lift) -> list[tuple[str, str]]:
                                       "from rest"),
                   ("current moving", f"{lift.swing.mean_current:.2f} A in the mean of that")]
     if not lift.held.stands:
-        return [*found, ("holds", "not with the arm horizontal: it sinks")]
+        why = f"it trips by {lift.held.trip}" if lift.held.trip else "it sinks"
+        return [*found, ("holds", f"not with the arm horizontal: {why}")]
     found.append(("current holding", f"{lift.held.current:.2f} A, {math.degrees(lift.held.error):.1f} deg below its "
                                      "command"))
     return [*found, ("after ten minutes", _warm(lift))]
@@ -169,15 +172,21 @@ def _while(seconds: float) -> str:
 
 def notes(sheet: DataSheet) -> list[str]:
     """Return what one has to know to read a sheet: flags of what the maker prints, and what the model is."""
+    from servotwin.cli.summary import names
     from servotwin.datasheet.conditions import highest_voltage
-    from servotwin.models import BoundedServo
+    from servotwin.models import BoundedServo, DigitalServo
     from servotwin.parameters import printed_flags
 
     servo, most = sheet.servo, highest_voltage(sheet.servo)
     found = [f"{part.voltage:g} V is above what the sheet prints ({most:g} V)" for part in sheet.voltages
              if 0.0 < most < part.voltage]
-    if servo.kind != "analog":
-        found.append(f"a {servo.kind} servo, computed as an analog one: its firmware is not modelled")
+    digital = isinstance(sheet.model, DigitalServo)
+    if servo.kind != "analog" and not digital:
+        found.append(f"a {servo.kind} servo, computed as an analog one: its program is left out")
+    if digital:
+        guessed = [name for name in servo.names()
+                   if name.startswith("firmware.") and servo.source(name).origin == "assumed"]
+        found += [f"guessed of its program: {names(guessed)}"] if guessed else []
     if isinstance(sheet.model, BoundedServo):
         found.append("computed as a bounded servo, with the mean voltage of its pulses")
     return found + [f"its sheet: {flag}" for flag in printed_flags(servo) if flag != servo.kind]
@@ -206,6 +215,8 @@ def _facts(part: VoltageSheet, torque: float | None) -> dict[str, Any]:
         "bandwidth": [{"amplitude": band.amplitude, "frequency": band.frequency,
                        "beyond": math.isinf(band.frequency)} for band in part.bandwidth],
         "printed": [dataclasses.asdict(point) for point in part.printed]}
+    if part.loop is not None:
+        found["loop"] = loop_facts(part.loop, torque)
     if part.lift is not None:
         found["lift"] = _lift(part.lift)
     return found

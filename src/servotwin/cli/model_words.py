@@ -38,7 +38,8 @@ def class_of(name: str, among: Sequence[str] | None = None) -> type[Model]:
     return MODELS[name]
 
 
-def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequence[str] | None = None) -> Model:
+def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequence[str] | None = None,
+             register: Sequence[str] = ()) -> Model:
     """Return the model of a servo.
 
     Parameters
@@ -51,11 +52,13 @@ def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequenc
         Words of `--set`.
     among : sequence of str, optional
         Names that are allowed; all unless given.
+    register : sequence of str
+        Words of `--register`; they come first.
 
     Raises
     ------
     ServotwinError
-        If servo, model or a changed parameter is not known or not possible.
+        If servo, model, a register or a changed parameter is not known or not possible.
 
     Examples
     --------
@@ -65,20 +68,21 @@ def model_of(servo: str, name: str | None, change: Sequence[str], among: Sequenc
     from servotwin.models import default_model
 
     kind = None if name is None else class_of(name, among)
-    changed = servo_of(servo, change)
+    changed = servo_of(servo, change, register)
     return default_model(changed) if kind is None else kind(changed)
 
 
-def servo_of(servo: str, change: Sequence[str]) -> Servo:
-    """Return a servo with the parameters that `--set` changes.
+def servo_of(servo: str, change: Sequence[str], register: Sequence[str] = ()) -> Servo:
+    """Return a servo with the registers that `--register` sets, and then the parameters that `--set` changes.
 
     Examples
     --------
     >>> servo_of("hitec-hs-755hb", ["motor.armature_resistance=3.1"]).motor.armature_resistance
     3.1
     """
+    from servotwin.cli.register_words import with_registers
     from servotwin.cli.settings import settings
     from servotwin.parameters import load_servo
 
-    loaded = load_servo(servo)
+    loaded = with_registers(load_servo(servo), register)
     return loaded.replace(settings(change), source="set by --set") if change else loaded

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import MissingParameterError, ServotwinError
 from servotwin.loads import as_load
-from servotwin.models import MODELS, default_model
+from servotwin.models import MODELS, DigitalServo, default_model
 from servotwin.models.engine.currents import stall_current
+from servotwin.models.terms.duty import at_duty
 from servotwin.parameters import printed_flags, printed_points
 from servotwin.physics import stall_torque
 
@@ -50,9 +51,12 @@ def twin_torque(servo: Servo) -> float | None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         try:
-            plant = default_model(at).pack(as_load(None))
+            model = default_model(at)
+            plant = model.pack(as_load(None))
         except ServotwinError:
             return None
+    if isinstance(model, DigitalServo):
+        plant = at_duty(plant, float(model.most_duty))
     current = stall_current(plant, plant.source.V)
     return float(stall_torque(current, plant.motor.K, plant.friction.F_forward, plant.friction.K_m, plant.friction.K_e))
 

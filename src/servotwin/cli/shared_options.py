@@ -43,6 +43,9 @@ ColumnOption = Annotated[str | None, typer.Option(
     rich_help_panel=COMMAND)]
 DurationOption = Annotated[float, typer.Option(
     metavar="SECONDS", help="Time to simulate.", rich_help_panel=OUTPUT)]
+RegisterOption = Annotated[list[str] | None, typer.Option(
+    metavar="NAME=VALUE", help="Write a register of a bus servo (Feetech STS, Dynamixel), such as P_Coefficient=16; "
+    "repeatable, or with commas.", rich_help_panel=PLANT)]
 SchedulerOption = Annotated[str | None, typer.Option(
     metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.", rich_help_panel=OUTPUT)]
 AccuracyOption = Annotated[float, typer.Option(

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from servotwin.cli.command_words import CommandWords
     from servotwin.cli.outputs import Target
     from servotwin.models import Model
+    from servotwin.signals import Signal
     from servotwin.simulation import Result
 
 _MOST_FRAMES = 1e6  # they take an hour, and each is kept for metrics and energy
@@ -39,8 +40,8 @@ def simulate(
     hold: shared.HoldOption = None,
     column: shared.ColumnOption = None,
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive, bounded, averaged, averaged-inductive, geared-motor or "
-        "dc-motor (default: pulse; bounded if the servo file has no chip).",
+        metavar="MODEL", help="digital, pulse, pulse-inductive, bounded, averaged, averaged-inductive, geared-motor or "
+        "dc-motor (default: by the kind of the servo, pulse or digital; bounded if its file has no chip).",
         rich_help_panel=shared.PLANT)] = None,
     load: Annotated[list[str] | None, typer.Option(
         metavar="PART=VALUE", help="Load on the shaft, repeatable or with commas, in SI or with a unit: inertia=, "
@@ -51,8 +52,9 @@ def simulate(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, or add one that the servo lacks, such as "
         "supply.current_limit=1A; repeatable; with a unit, or in SI units.",
         rich_help_panel=shared.PLANT)] = None,
+    register: shared.RegisterOption = None,
     seed: Annotated[int, typer.Option(
-        metavar="NUMBER", help="Seed for a pulse servo's noise.", rich_help_panel=shared.PLANT)] = 0,
+        metavar="NUMBER", help="Seed for the noise of the potentiometer.", rich_help_panel=shared.PLANT)] = 0,
     duration: shared.DurationOption = 1.5,
     output_step: Annotated[float | None, typer.Option(
         metavar="SECONDS", help="Time between output samples (default 0.001); does not change the solution.",
@@ -72,7 +74,7 @@ def simulate(
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     targets = _checked_targets(out, plot, servo, words, load or [], force=force)
-    result = _run(model_of(servo, model, change or []), words, load or [], duration, output_step, seed)
+    result = _run(model_of(servo, model, change or [], register=register or []), words, load or [], duration, output_step, seed)
     found = _write(result, targets, force=force)
     found |= {"command": words.described(duration), "load": load_words.described(load or []),
               "files": [str(target.path) for target in targets]}
@@ -94,7 +96,6 @@ def _checked_targets(out: Path | None, plot: Path | None, servo: str, words: Com
 
 
 
-
 def _run(model: Model, words: CommandWords, load: list[str], duration: float, output_step: float | None,
          seed: int) -> Result:
     from servotwin.cli.load_words import load_from
@@ -106,13 +107,21 @@ def _run(model: Model, words: CommandWords, load: list[str], duration: float, ou
     if output_step is not None and not (math.isfinite(output_step) and output_step > 0.0):
         raise InputError("--output-step", got=output_step, allowed="a positive number of seconds")
     signal = words.signal(duration)
-    chip = model.chip(signal)
-    if chip is not None and signal.edges is None and duration > _MOST_FRAMES * chip.frame_period:
-        raise InputError("--duration", got=duration,
-                         allowed=f"at most {_MOST_FRAMES:g} frames of {1e3 * chip.frame_period:g} ms")
+    _check_length(model, signal, duration)
     result = run(model, signal, duration=duration, load=load_from(load, model), output_step=output_step, seed=seed,
                  progress=True)
     return result.raise_if_failed()
+
+
+def _check_length(model: Model, signal: Signal, duration: float) -> None:
+    """Raise InputError if a run has more frames or ticks than anybody waits for."""
+    from servotwin.errors import InputError
+
+    chip, firmware = model.chip(signal), model.firmware(signal)
+    for one, period, what in ((chip, 0.0 if chip is None or signal.edges is not None else chip.frame_period, "frames"),
+                              (firmware, 0.0 if firmware is None else firmware.T_c, "ticks")):
+        if one is not None and period > 0.0 and duration > _MOST_FRAMES * period:
+            raise InputError("--duration", got=duration, allowed=f"at most {_MOST_FRAMES:g} {what} of {1e3 * period:g} ms")
 
 
 def _write(result: Result, targets: list[Target], *, force: bool) -> dict[str, Any]:

@@ -18,8 +18,9 @@ from servotwin.loads import Load, as_load
 from servotwin.models.engine import contacts, currents
 from servotwin.models.engine.memory import started
 from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Mode, Vector
+from servotwin.models.digital import DigitalServo
 from servotwin.models.terms import bridge as bridge_term
-from servotwin.models.terms import source
+from servotwin.models.terms import duty, source
 from servotwin.models.terms.heat import NO_HEAT
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import NO_PLAY
@@ -60,12 +61,12 @@ class Swing(NamedTuple):
 
 @dataclass(frozen=True)
 class FullDrive:
-    """The steady motion of a servo whose bridge drives without a pause.
+    """The steady motion of a servo whose bridge drives without a pause, or at the most duty that its program gives.
 
     Parameters
     ----------
     model : Model
-        With a supply: `PulseServo`, `PulseServoInductive` or `BoundedServo`.
+        With a supply: `PulseServo`, `PulseServoInductive`, `BoundedServo` or `DigitalServo`.
 
     Raises
     ------
@@ -87,7 +88,7 @@ class FullDrive:
         plant = self._plant
         if not (source.present(plant.source) or math.isfinite(plant.follower.V_max)):
             raise InputError(f"full drive of {type(self.model).__name__}",
-                             allowed="a model with a supply: PulseServo, PulseServoInductive or BoundedServo")
+                             allowed="a model with a supply: PulseServo, PulseServoInductive, BoundedServo or DigitalServo")
         voltage = self.model.value("supply.open_circuit_voltage")
         if not self.acceleration(0.0, 0.0) > 0.0:
             raise InputError(f"{name} does not turn at {voltage:g} V",
@@ -100,9 +101,20 @@ class FullDrive:
     def loaded(self, load: Load | Part | None) -> Numbers:
         """Return the numbers of servo and load, without what an endless steady motion does not meet."""
         packed = self.model.pack(as_load(load))
+        if isinstance(self.model, DigitalServo):
+            packed = duty.at_duty(packed, self._duty)
         return packed._replace(
             motor=packed.motor._replace(L=0.0), follower=packed.follower._replace(half_deadband=0.0), stops=NO_STOPS,
             play=NO_PLAY, sensor=NO_SENSOR, heat=NO_HEAT)
+
+    @cached_property
+    def _duty(self) -> float:
+        return float(self.model.most_duty) if isinstance(self.model, DigitalServo) else 1.0
+
+    @cached_property
+    def _share(self) -> float:
+        """How much of the supply's voltage, and of the motor's current in the supply, there is at that duty."""
+        return duty.share_of(self._plant.bridge, self._duty) if duty.present(self._plant.bridge) else 1.0
 
     @cached_property
     def voltage(self) -> float:
@@ -111,7 +123,10 @@ class FullDrive:
         return plant.source.V if source.present(plant.source) else 2.0 * plant.follower.V_max / plant.follower.gain
 
     def current(self, speed: float) -> float:
-        """Return the current of the supply and the motor [A] at a speed [rad/s]."""
+        """Return the current of the supply [A] at a speed [rad/s]; that of the motor is the same at full duty."""
+        return self._share * self._motor_current(speed)
+
+    def _motor_current(self, speed: float) -> float:
         zone = currents.zone_of(self._plant, self.voltage, 0.0, 0.0, speed, 0.0)
         return currents.current(self._plant, zone, self.voltage, 0.0, speed)
 
@@ -121,8 +136,8 @@ class FullDrive:
         if plant.source.V == 0.0:
             return self.model.value("supply.open_circuit_voltage")
         zone = currents.zone_of(plant, self.voltage, 0.0, 0.0, speed, 0.0)
-        return bridge_term.bus_voltage(
-            plant.bridge, plant.source, plant.motor, zone, self.voltage, speed, self.current(speed))
+        return bridge_term.bus_voltage(plant.bridge, plant.source, plant.motor, zone, self.voltage, speed,
+                                       self._motor_current(speed)) / self._share
 
     def acceleration(self, speed: float, torque: float) -> float:
         """Return the acceleration [rad/s²] at a speed [rad/s] that is not negative, against a torque [N m]."""
@@ -133,7 +148,7 @@ class FullDrive:
 
     def torque(self, speed: float) -> float:
         """Return the torque [N m] against which the shaft turns steadily at a speed [rad/s]; 0 beyond no load."""
-        most = motor.electromagnetic_torque(self.current(speed), self._plant.motor.K)
+        most = motor.electromagnetic_torque(self._motor_current(speed), self._plant.motor.K)
         if not self.acceleration(speed, 0.0) > 0.0:
             return 0.0
         return _root(lambda tau: self.acceleration(speed, tau), 0.0, most)
@@ -174,7 +189,7 @@ class FullDrive:
     @cached_property
     def starting_torque(self) -> float:
         """The most torque against which the shaft starts from rest [N m]: static friction counts in full."""
-        tau_m = motor.electromagnetic_torque(self.stall_current, self._plant.motor.K)
+        tau_m = motor.electromagnetic_torque(self._motor_current(0.0), self._plant.motor.K)
 
         def beyond(tau: float) -> float:
             return tau_m - tau - contacts.holding_bounds(self._plant, tau_m, -tau)[1]

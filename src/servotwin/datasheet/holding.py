@@ -9,7 +9,7 @@ import numpy as np
 
 from servotwin import loads, physics, signals
 from servotwin.datasheet.conditions import changed
-from servotwin.models import mid_travel
+from servotwin.models import DigitalServo, mid_travel
 from servotwin.models.outputs import warm_plant
 from servotwin.simulation.simulator import simulate
 
@@ -20,16 +20,17 @@ if TYPE_CHECKING:
     from servotwin.models.samples import Samples
     from servotwin.simulation import Result
 
-SETTLE, LOOK = 1.5, 0.5  # s: what is told of standing holds for the mean of the last half second of two
+SETTLE, LOOK = 1.5, 0.5  # s: what is told of standing holds for the mean of the last half second of two, or more
 _STANDS = math.radians(2.0)  # rad/s: what goes faster at the end does not stand
 _FURTHEST_STEP = math.radians(20.0)
 _WAIT = 0.2  # s, in which a command either moves the shaft or does not
 _MOVED = 1e-9  # rad
 _HALVINGS = 18
+_TRIPS = "trips by "  # begins the events of a protection
 
 
 class Held(NamedTuple):
-    """A servo under a constant torque, 1.5 to 2 s after that was put on.
+    """A servo under a constant torque, 1.5 to 2 s after that was put on, or longer by what a protection waits.
 
     Parameters
     ----------
@@ -41,12 +42,15 @@ class Held(NamedTuple):
         Mean of the supply [A].
     heat : float
         Mean of i² R in the winding [W].
+    trip : str
+        What a digital servo trips by under it, "overload" or "current"; empty where it does not.
     """
 
     torque: float
     error: float
     current: float
     heat: float
+    trip: str = ""
 
     @property
     def stands(self) -> bool:
@@ -56,14 +60,26 @@ class Held(NamedTuple):
 
 def hold(model: Model, torque: float, *, inertia: float = 0.0) -> Held:
     """Return how a servo holds a constant torque [N m] in mid-travel; `inertia` is the load's [kg m²]."""
-    end, asked = SETTLE + LOOK, mid_travel(model)
+    asked, settle = mid_travel(model), SETTLE + _patience(model)
+    end = settle + LOOK
     result = simulate(_without_stops(model), signals.constant(asked, unit="rad"), duration=end,
-                      load=loads.Constant(torque) + loads.Inertia(inertia), output_times=[SETTLE, end])
+                      load=loads.Constant(torque) + loads.Inertia(inertia), output_times=[settle, end])
+    trip = next((event.kind.removeprefix(_TRIPS) for event in result.events if event.kind.startswith(_TRIPS)), "")
     before, after = result["output_angle"].tolist()
-    if not (result.status.ok and abs(after - before) <= _STANDS * LOOK):
-        return Held(torque, math.nan, math.nan, math.nan)
-    angle, current, heat = _means(result, SETTLE)
+    if trip or not (result.status.ok and abs(after - before) <= _STANDS * LOOK):
+        return Held(torque, math.nan, math.nan, math.nan, trip)
+    angle, current, heat = _means(result, settle)
     return Held(torque, asked - angle, current, heat)
+
+
+def _patience(model: Model) -> float:
+    """Return for how long [s] a protection of a digital servo waits before it acts."""
+    if not isinstance(model, DigitalServo):
+        return 0.0
+    of = model.servo.firmware
+    waits = [time for threshold, time in ((of.overload_duty, of.overload_time), (of.trip_current, of.trip_time))
+             if threshold is not None and time is not None]
+    return max(waits, default=0.0)
 
 
 def holding_errors(model: Model, stall_torque: float, shares: tuple[float, ...] = (0.1, 0.25, 0.5, 0.75, 0.9)

@@ -13,6 +13,7 @@ from servotwin.datasheet.conditions import at_temperatures, at_voltage, warned_o
 from servotwin.datasheet.curve import SpeedCurve, speed_curve
 from servotwin.datasheet.holding import Held, holding_errors, smallest_move
 from servotwin.datasheet.lift import Lift, lift_of
+from servotwin.datasheet.loop import Loop, loop_of
 from servotwin.datasheet.warming import HOT_WINDING, MAGNET_COEFFICIENT, masses_by_mass, thermal_masses
 from servotwin.errors import InputError
 from servotwin.linear import frequency_response
@@ -67,6 +68,8 @@ class VoltageSheet:
         What the sheet prints for this voltage, one a source; empty where it does not.
     lift : Lift, optional
         Where a mass was given.
+    loop : Loop, optional
+        Of a digital servo.
     """
 
     voltage: float
@@ -78,6 +81,7 @@ class VoltageSheet:
     bandwidth: tuple[Bandwidth, ...]
     printed: tuple[PrintedPoint, ...]
     lift: Lift | None
+    loop: Loop | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,12 +123,12 @@ def curves(model: Model, voltage: float | Iterable[float] | None = None, lift: t
     """Compute the sheet of a servo from its parameters.
 
     Speed, torque and current come from the steady motion of the model at full drive, load friction, bridge, source and
-    current limit included; what the servo does around standing still is simulated, pulse by pulse for a pulse servo.
+    current limit included; what the servo does around standing still is simulated, pulse by pulse or tick by tick.
 
     Parameters
     ----------
     model : Model
-        `PulseServo`, `PulseServoInductive` or `BoundedServo`.
+        `PulseServo`, `PulseServoInductive`, `BoundedServo` or `DigitalServo`.
     voltage : float or sequence of float, optional
         Supply voltages; the servo's own unless given [V].
     lift : tuple of float, optional
@@ -197,7 +201,7 @@ def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: flo
         bandwidth=bandwidths(model) if bandwidth else (),
         printed=tuple(point for point in printed_points(servo)
                       if point.supply_voltage is not None and abs(point.supply_voltage - voltage) < _SAME_VOLTAGE),
-        lift=None if lift is None else lift_of(model, *lift))
+        lift=None if lift is None else lift_of(model, *lift), loop=loop_of(model))
 
 
 def _as_pulse(model: Model, angle: float) -> float:

@@ -12,11 +12,12 @@ from servotwin.datasheet.conditions import at_voltage, highest_voltage
 from servotwin.datasheet.full_drive import FullDrive
 from servotwin.datasheet.lift import check_lift, swing_up
 from servotwin.errors import InputError
-from servotwin.models import default_model
+from servotwin.models import DigitalServo, default_model
 from servotwin.parameters import catalog_names, load_servo, printed_fact, printed_flags
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
+    from servotwin.models import Model
     from servotwin.parameters import Servo
 
 
@@ -128,13 +129,14 @@ def _judged(servo: Servo, mass: float, arm: float, voltage: float, time: float |
                        f"takes {swing.time:.2f} s")
     weight = printed_fact(servo.sheet, "mass")
     return Lifter(servo=servo, mass=math.nan if weight is None else weight, most_torque=capable,
-                     margin=capable / torque, time=swing.time, notes=_notes(servo, voltage, most))
+                     margin=capable / torque, time=swing.time, notes=_notes(drive.model, voltage, most))
 
 
-def _notes(servo: Servo, voltage: float, most: float) -> tuple[str, ...]:
+def _notes(model: Model, voltage: float, most: float) -> tuple[str, ...]:
+    servo = model.servo
     notes = [f"its sheet ends at {most:g} V"] if 0.0 < most < voltage else []
     if servo.kind != "analog":
-        notes.append(f"{servo.kind}, computed as analog")
+        notes.append(servo.kind if isinstance(model, DigitalServo) else f"{servo.kind}, computed as analog")
     flags = printed_flags(servo)
     notes += ["impossible sheet"] if any(flag.startswith("impossible") for flag in flags) else []
     notes += ["sources disagree"] if any(flag.startswith("sources disagree") for flag in flags) else []

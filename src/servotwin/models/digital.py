@@ -131,6 +131,11 @@ class DigitalServo(SwitchedServo):
         """Return the command as an angle, or what else stands for a pulse width [s]."""
         return drive if self.takes_goals else super().command_signal(name, drive)
 
+    @property
+    def most_duty(self) -> Any:
+        """The most duty that the bridge gets while nothing has tripped [1]."""
+        return np.minimum(self.value_or("firmware.torque_limit", 1.0), self.value_or("firmware.duty_limit", 1.0))
+
     def loop_stiffness(self) -> Any:
         """Return the stiffness of the loop at rest, within its limits: k_p V K_out/R [N m/rad].
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from servotwin import signals
 from servotwin.errors import InputError
+from servotwin.models.digital import DigitalServo
 
 if TYPE_CHECKING:
     from servotwin.models.base import Model
@@ -24,7 +25,8 @@ def mid_travel(model: Model) -> float:
     Returns
     -------
     float
-        Half-way between the end stops; where the servo lacks one, the angle of a pulse of 1500 us [rad].
+        Half-way between the end stops; where the servo lacks one, the angle of a pulse of 1500 us, and on a bus that
+        of the goal 0, the middle of its counts [rad].
 
     Raises
     ------
@@ -43,4 +45,6 @@ def mid_travel(model: Model) -> float:
     lower, upper = model.servo.stops.lower_angle, model.servo.stops.upper_angle
     if lower is not None and upper is not None:
         return 0.5 * (lower + upper)
+    if isinstance(model, DigitalServo) and model.takes_goals:
+        return float(model.start_angle(0.0))
     return float(model.start_angle(model.command(signals.constant(_NEUTRAL, unit="us")).table[0].value))

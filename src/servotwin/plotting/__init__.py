@@ -16,6 +16,7 @@ from servotwin.plotting.characteristics import (
 from servotwin.plotting.diagram import Diagram
 from servotwin.plotting.files import save
 from servotwin.plotting.formula import Formula, formula_svg
+from servotwin.plotting.loops import loop_curve
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
 from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
 from servotwin.plotting.tornado import metric_shown, tornado
@@ -39,6 +40,7 @@ __all__ = [
     "formula_svg",
     "holding_curves",
     "lift_curve",
+    "loop_curve",
     "metric_shown",
     "pulses",
     "readable",

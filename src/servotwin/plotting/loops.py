@@ -1,0 +1,132 @@
+"""The torque of a digital servo over the error that stands: dead zone, startup force, friction, cap and trips."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin.errors import InputError
+from servotwin.look import COLOURS, LINES, context, finished, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from servotwin.datasheet import Loop
+
+_BEYOND = 1.2  # times the error of the cap
+_POINTS = 1201
+_MOST = 1e3  # N m: what friction holds beyond is not drawn
+
+
+def loop_curve(loops: Sequence[Loop], *, width: float = 8.4, height: float = 3.9) -> Figure:
+    """Return the torque of one servo over its error, both ways: the whole, and large around no error.
+
+    Between what it lifts and what it holds friction keeps the shaft wherever it is.
+
+    Parameters
+    ----------
+    loops : sequence of Loop
+        Of one servo, at one voltage or several: the first one is drawn in full, of the others what the motor gives.
+    width, height : float
+        [inch]
+
+    Raises
+    ------
+    InputError
+        If there is none, or more than can be told apart.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> sheet = st.curves(st.DigitalServo(st.load_servo("feetech-sts3215-12v")), bandwidth=False)
+    >>> len(loop_curve([sheet.voltages[0].loop]).axes)
+    2
+    """
+    if not 1 <= len(loops) <= len(LINES) - 2:
+        raise InputError("loops in one picture", got=len(loops), allowed=f"1 to {len(LINES) - 2}")
+    first = loops[0]
+    far = _BEYOND * max(each.cap_error for each in loops if not math.isnan(each.cap_error))
+    near = min(far, 2.2 * (first.dead_zone + first.friction_error) + 3.0 * first.count)
+    with context():
+        figure = new_figure(width, height)
+        axes = list(figure.subplots(1, 2))
+        for ax, reach in zip(axes, (far, near), strict=True):
+            _torques(ax, loops, reach)
+        _cap(axes[0], first)
+        _middle(axes[1], first, near)
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), handlelength=3.2)
+        axes[0].set_ylabel("torque (N m)")
+        servo = first.model.servo
+        figure.suptitle(f"{servo.title or servo.name}: {first.stiffness:.3g} N m/rad", fontsize=9)
+    return finished(figure)
+
+
+def _torques(ax: Axes, loops: Sequence[Loop], reach: float) -> None:
+    errors = np.linspace(-reach, reach, _POINTS)
+    over = loops[0].over(np.abs(errors))
+    motor = np.copysign(over[0], errors)
+    up, down = np.where(errors < 0.0, -over[2], over[1]), np.where(errors < 0.0, -over[1], over[2])
+    down, up = np.minimum(down, _MOST), np.maximum(up, -_MOST)
+    ax.fill_between(np.degrees(errors), up, down, color=COLOURS["grey"], alpha=0.18, linewidth=0.0,
+                    label="friction holds")
+    for k, (values, label) in enumerate(((motor, _volts("motor", loops[0])), (up, "goes to +"), (down, "goes to −"))):
+        ax.plot(np.degrees(errors), values, color=LINES[k][0], linestyle=LINES[k][1],
+                linewidth=1.8 if k == 0 else 1.2, label=label)
+    for k, loop in enumerate(loops[1:], start=3):
+        values = np.copysign(loop.over(np.abs(errors))[0], errors)
+        ax.plot(np.degrees(errors), values, color=LINES[k][0], linestyle=LINES[k][1], label=_volts("motor", loop))
+    ax.axhline(0.0, color=COLOURS["grey"], linewidth=0.6)
+    ax.axvline(0.0, color=COLOURS["grey"], linewidth=0.6)
+    ax.set_xlabel("error, goal less angle (°)")
+    ax.set_xlim(-math.degrees(reach), math.degrees(reach))
+    most = 1.25 * float(np.max(np.abs(motor))) + 1.5 * loops[0].friction_torque
+    ax.set_ylim(-most, most)
+
+
+def _volts(words: str, loop: Loop) -> str:
+    return f"{words}, {loop.model.value('supply.open_circuit_voltage'):g} V"
+
+
+def _cap(ax: Axes, loop: Loop) -> None:
+    """Name the cap, and mark where the overload starts and what it leaves."""
+    at = math.degrees(loop.cap_error)
+    ax.annotate(f"cap: {loop.cap_torque:.3g} N m\nfrom {at:.3g}° on", (at, loop.cap_torque), xytext=(-8.0, 10.0),
+                textcoords="offset points", ha="right", va="bottom", fontsize=7.5)
+    overload = next((each for each in loop.protections if each.kind == "overload"), None)
+    if overload is None or math.isnan(overload.error):
+        return
+    for sign in (-1.0, 1.0):
+        ax.plot([sign * math.degrees(overload.error)], [sign * overload.torque], marker="D", markersize=5.5,
+                markerfacecolor="white", markeredgecolor=COLOURS["black"], linestyle="none", zorder=5)
+        ax.axhline(sign * overload.left_torque, color=COLOURS["black"], linewidth=0.9, linestyle=(0, (1, 1.6)))
+    ax.annotate(f"trips here\nafter {overload.time:g} s", (-math.degrees(overload.error), -overload.torque),
+                xytext=(9.0, -3.0), textcoords="offset points", va="top", fontsize=7.5)
+    ax.annotate("left of it once tripped", (-math.degrees(_BEYOND * loop.cap_error), overload.left_torque),
+                xytext=(3.0, 2.5), textcoords="offset points", fontsize=7.5)
+
+
+def _middle(ax: Axes, loop: Loop, reach: float) -> None:
+    """Mark dead zone and startup force around no error."""
+    top = 1.9 * max(loop.friction_torque, loop.at(0.6 * reach).motor)
+    ax.set_ylim(-top, top)
+    if loop.dead_zone > 0.0:
+        zone = math.degrees(loop.dead_zone)
+        ax.axvspan(-zone, zone, facecolor="none", edgecolor=COLOURS["black"], hatch="////", linewidth=0.6)
+        ax.annotate(f"dead zone ±{zone:.2g}°", (-zone, -0.97 * top), xytext=(-4.0, 0.0), textcoords="offset points",
+                    ha="right", va="bottom", fontsize=7.5)
+    if loop.minimum_duty > 0.0:
+        force = loop.motor_torque(loop.minimum_duty)
+        ax.annotate(f"startup force {force:.2g} N m", (math.degrees(loop.dead_zone), force),
+                    xytext=(0.97 * math.degrees(reach), -0.28 * top), ha="right", va="top", fontsize=7.5,
+                    arrowprops={"arrowstyle": "-", "linewidth": 0.7})
+    if not math.isnan(loop.start_error):
+        start = math.degrees(loop.start_error)
+        ax.plot([start], [0.0], marker="o", markersize=4.5, markerfacecolor="white",
+                markeredgecolor=COLOURS["black"], zorder=5)
+        ax.annotate(f"free shaft moves\nfrom {start:.2g}° on", (start, 0.0), xytext=(2.0, -5.0),
+                    textcoords="offset points", ha="center", va="top", fontsize=7.5)
