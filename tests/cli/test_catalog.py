@@ -6,6 +6,8 @@ import servotwin as st
 from servotwin.models import MODELS
 
 SERVO = "hitec-hs-755hb"
+OF_PULSES = {"averaged", "averaged-inductive", "bounded", "pulse", "pulse-inductive"}
+MISSING = {"analog": {"digital"}, "digital": set(), "bus": OF_PULSES}  # models that a kind of servo has no numbers for
 
 
 def test_list_has_every_servo(cli):
@@ -41,11 +43,12 @@ def test_show_takes_a_file_and_a_table_of_numbers(cli, tmp_path):
 
 
 @pytest.mark.parametrize("name", st.catalog_names())
-def test_check_finds_the_catalog_ready_for_every_model(cli, tmp_path, name):
+def test_check_finds_the_catalog_ready_for_every_model_of_its_kind(cli, tmp_path, name):
     st.load_servo(name).save(tmp_path / "copy.toml")
     ended = cli("catalog", "check", "copy.toml", "--json")
     assert ended.code == 0
-    assert {model: found["runs"] for model, found in ended.data["models"].items()} == dict.fromkeys(MODELS, True)
+    runs = {model for model, found in ended.data["models"].items() if found["runs"]}
+    assert runs == set(MODELS) - MISSING[st.load_servo(name).kind]
     assert ended.data["warnings"] == []
 
 

@@ -61,10 +61,15 @@ def test_page_picture_and_points(cli, sheet, tmp_path):
     assert "exists already" in cli("curves", SERVO, "--quick", "--out", "page.html").error
 
 
-def test_a_digital_servo_says_once_that_it_is_computed_as_analog(cli):
-    ended = cli("curves", "towerpro-mg996r", "--voltage", "5", "--quick")
+def test_a_digital_servo_says_once_that_it_is_computed_as_analog_where_that_is_asked_for(cli):
+    words = ["curves", "towerpro-mg996r", "--voltage", "5", "--quick"]
+    ended = cli(*words, "--model", "pulse")
     assert ended.err == ""
     assert ended.out.count("analog") == 1
+    digital = cli(*words).out
+    assert "model digital" in digital
+    assert "analog" not in digital
+    assert "guessed of its program: control_period" in digital
 
 
 @pytest.mark.parametrize(("words", "said"), [

@@ -119,11 +119,12 @@ def test_which_servos_lift_is_what_each_of_them_says():
     assert all(each.margin > 1.0 and each.time <= 0.5 for each in found.found)
     assert {each.kind for each in found.refused} == {"torque", "time"}
     best = found.found[0]
-    drive = st.datasheet.FullDrive(at_voltage(st.PulseServo(best.servo), 5.0))
+    drive = st.datasheet.FullDrive(at_voltage(st.models.default_model(best.servo), 5.0))
     assert best.most_torque == min(drive.stall_torque, drive.starting_torque)
-    digital = [each for each in found.found if each.servo.kind == "digital"]
-    assert digital
-    assert all("digital, computed as analog" in each.notes for each in digital)
+    for kind in ("digital", "bus"):
+        those = [each for each in found.found if each.servo.kind == kind]
+        assert those
+        assert all(kind in each.notes for each in those)
 
 
 def test_which_knows_voltages_and_unknown_masses():

@@ -1,5 +1,6 @@
 """Which model stands for a servo where none is named."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -37,10 +38,25 @@ def test_without_chip_and_mean_it_is_the_pulse_servo_that_says_what_it_lacks():
 @pytest.mark.parametrize("name", st.catalog_names())
 def test_the_catalog_runs_by_default_and_says_which_servos_are_digital(recwarn, name):
     servo = st.load_servo(name)
-    assert default_class(servo) is st.PulseServo
-    assert len(recwarn) == (servo.kind == "digital")
-    flagged = "digital" in servo.sheet["flags"]
-    assert flagged == (servo.kind == "digital")
+    assert default_class(servo) is (st.PulseServo if servo.kind == "analog" else st.DigitalServo)
+    assert not recwarn
+    for kind in ("digital", "bus"):
+        assert (kind in servo.sheet["flags"]) == (servo.kind == kind)
+
+
+@pytest.mark.filterwarnings("ignore:.*data sheet contradicts itself")
+@pytest.mark.parametrize("name", [name for name in st.catalog_names() if st.load_servo(name).kind != "analog"])
+def test_every_digital_and_bus_servo_of_the_catalog_makes_a_small_step(name):
+    model = default_model(st.load_servo(name))
+    goal = st.models.mid_travel(model) + math.radians(10.0)
+    result = st.simulate(model, st.signals.step(goal - math.radians(10.0), goal, at=0.1, unit="rad"), duration=1.5)
+    assert result.status.ok
+    assert not result.remarks
+    loop = st.datasheet.Loop(model)
+    droop = loop.start_error + loop.count + model.value_or("gear.backlash", 0.0)
+    assert abs(result["output_angle"][-1] - goal) <= droop < math.radians(4.0)
+    assert result["duty"].max() > 0.0
+    assert result["trip"].max() == 0.0
 
 
 def test_a_fit_follows_it_too(recwarn):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from servotwin import plotting
 from servotwin.cli.curves_words import CurveRow, hot_words, lift_pairs, notes, rows
+from servotwin.cli.loop_words import loop_pairs
 from servotwin.look import document, escape, picture, table, to_bytes
 from servotwin.parameters import printed_points
 
@@ -25,6 +26,7 @@ figure img.drawing{width:100%}figure.wide img.drawing{width:100%;max-width:54rem
 @media print{section.servo{break-before:page}section.servo:first-of-type{break-before:auto}}
 """
 _MOST_COMPARED = 5
+_MOST_LOOPS = 3
 
 
 def page(sheets: Sequence[DataSheet], torque: float | None = None) -> str:
@@ -59,7 +61,12 @@ def _servo(sheet: DataSheet, torque: float | None, *, alone: bool) -> str:
                     f"({escape(_degrees(hot_words(sheet.voltages[0])))}). Open marks are what the sheet prints.",
                     wide=True)
     small = _figure(plotting.holding_curves(sheet), "How far a constant load pulls the servo off its command, 1.5 to "
-                    "2 s after it was put on.")
+                    "2 s after it was put on, or longer by what a protection waits.")
+    loops = [part.loop for part in sheet.voltages if part.loop is not None]
+    if loops:
+        drawn += _figure(plotting.loop_curve(loops[:_MOST_LOOPS]), "The torque that the program gives while an error "
+                         "stands. A load in the grey stays where it is, held by friction; the right half is the middle "
+                         "of the left one.", wide=True)
     if any(part.bandwidth for part in sheet.voltages):
         small += _figure(plotting.bandwidth_curves(sheet), "Up to which frequency the free servo follows sines within "
                          "3 dB, over their amplitude. What is not followed at 1 Hz has no mark.")
@@ -77,7 +84,7 @@ def _voltage(sheet: DataSheet, part: VoltageSheet, torque: float | None) -> str:
     cells = [[escape(_degrees(cell)) for cell in _minus(row)] for row in found]
     drawn = table(["", "cold", "hot", "the sheet prints", "off"], cells,
                   caption=f"At {part.voltage:g} V. Cold: 25 °C. Hot: {escape(_degrees(hot_words(part)))}.")
-    return f'<h3>At {part.voltage:g} V</h3>\n{_cards(part)}<div class="sheet">{drawn}</div>\n{_lift(part)}'
+    return f'<h3>At {part.voltage:g} V</h3>\n{_cards(part)}<div class="sheet">{drawn}</div>\n{_loop(part, torque)}{_lift(part)}'
 
 
 def _cards(part: VoltageSheet) -> str:
@@ -88,6 +95,14 @@ def _cards(part: VoltageSheet) -> str:
         shown.append((f"{math.degrees(part.smallest_move):.2f}°", "smallest move"))
     listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in shown)
     return f'<ul class="numbers">{listed}</ul>\n'
+
+
+def _loop(part: VoltageSheet, torque: float | None) -> str:
+    if part.loop is None:
+        return ""
+    said = table(["The loop at rest", ""], [[escape(_degrees(words)) for words in pair]
+                                            for pair in loop_pairs(part.loop, torque)], text_columns=2)
+    return f'<div class="pairs">{said}</div>\n'
 
 
 def _lift(part: VoltageSheet) -> str:
@@ -116,7 +131,8 @@ def _figure(figure: Figure, words: str, *, wide: bool = False) -> str:
 
 
 _READING = """<ul>
-<li><b>Full drive.</b> Far from its goal a servo drives without a pause. Speed, torque and current are those
+<li><b>Full drive.</b> Far from its goal a servo drives without a pause, a digital one at the most duty that its
+program gives. Speed, torque and current are those
 of steady motion: motor, bridge, source, current limit and the friction of the gear, which grows with the load.</li>
 <li><b>Stall torque.</b> Where the shaft just stands. Sheets print the same, some rounded up, some impossible.</li>
 <li><b>Time for 60°.</b> At the speed without load, as sheets print it; a real step also speeds up and settles.</li>
@@ -125,7 +141,7 @@ say.</li>
 <li><b>Smallest move.</b> The smallest step of the command that moves the free shaft, from where there is no
 error.</li>
 <li><b>Holding.</b> The load is put on where there is no error; an analog servo gives way until its pulses are long
-enough.</li>
+enough, a digital one until its duty is large enough, or it trips.</li>
 <li><b>After ten minutes.</b> Where the file has no thermal numbers they are assumed by mass: 5 % of it copper, the rest
 800 J/(kg K), time constants of 17 s and 8.7 min at 45 g that grow with the cube root of mass.</li></ul>
 """

@@ -172,7 +172,6 @@ def _while(seconds: float) -> str:
 
 def notes(sheet: DataSheet) -> list[str]:
     """Return what one has to know to read a sheet: flags of what the maker prints, and what the model is."""
-    from servotwin.cli.summary import names
     from servotwin.datasheet.conditions import highest_voltage
     from servotwin.models import BoundedServo, DigitalServo
     from servotwin.parameters import printed_flags
@@ -184,9 +183,9 @@ def notes(sheet: DataSheet) -> list[str]:
     if servo.kind != "analog" and not digital:
         found.append(f"a {servo.kind} servo, computed as an analog one: its program is left out")
     if digital:
-        guessed = [name for name in servo.names()
+        guessed = [name.removeprefix("firmware.") for name in servo.names()
                    if name.startswith("firmware.") and servo.source(name).origin == "assumed"]
-        found += [f"guessed of its program: {names(guessed)}"] if guessed else []
+        found += [f"guessed of its program: {', '.join(guessed)}"] if guessed else []
     if isinstance(sheet.model, BoundedServo):
         found.append("computed as a bounded servo, with the mean voltage of its pulses")
     return found + [f"its sheet: {flag}" for flag in printed_flags(servo) if flag != servo.kind]

@@ -65,7 +65,7 @@ def _protection(each: Protection) -> str:
                 "needs thermal numbers")
     if each.kind == "undervoltage":
         return f"below {each.threshold:.3g} V at the servo"
-    after = f" for {each.time:.3g} s" if each.time > 0.0 else ""
+    after = f" over {each.time:.3g} s" if each.time > 0.0 else ""
     where = "which a fast shaft never draws" if math.isnan(each.error) else (
         f"held fast {_deg(each.error)} off, {each.torque:.3g} N m")
     if each.kind == "current":

@@ -12,8 +12,8 @@ import numpy as np
 from servotwin.errors import InputError
 from servotwin.loads import as_load
 from servotwin.models import DigitalServo
-from servotwin.models.engine import contacts, currents
-from servotwin.models.terms import duty
+from servotwin.models.engine import contacts
+from servotwin.models.standing import standing_current
 from servotwin.physics import motor
 from servotwin.physics.firmware import NEARLY, cut, duty_of, error_beyond_zone, started_duty
 
@@ -160,8 +160,8 @@ class Loop:
 
     @cached_property
     def cap_error(self) -> float:
-        """The smallest error at which the bridge gets all that it may [rad]."""
-        return self._first(lambda e: self.duty_of(e) >= self.most_duty * (1.0 - NEARLY))
+        """The smallest error at which the motor gives all that duty and current may be [rad]."""
+        return self._first(lambda e: self.at(e).motor >= self.cap_torque * (1.0 - NEARLY))
 
     @cached_property
     def cap_torque(self) -> float:
@@ -251,11 +251,7 @@ class Loop:
         return float(self._firmware.quantum if self._firmware.whole > 0.0 else 0.0)
 
     def _current(self, d: float) -> float:
-        """Return the current of the standing motor at a duty [A]."""
-        if d == 0.0:
-            return 0.0
-        plant = duty.at_duty(self._plant, d)
-        return math.copysign(currents.stall_current(plant, plant.source.V), d)
+        return standing_current(self._plant, self._firmware, d)
 
     def _lifted(self, tau_m: float) -> float:
         return self._where(lambda tau: tau_m - tau - contacts.holding_bounds(self._plant, tau_m, -tau)[1], tau_m)

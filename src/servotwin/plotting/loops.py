@@ -74,7 +74,7 @@ def _torques(ax: Axes, loops: Sequence[Loop], reach: float) -> None:
     down, up = np.minimum(down, _MOST), np.maximum(up, -_MOST)
     ax.fill_between(np.degrees(errors), up, down, color=COLOURS["grey"], alpha=0.18, linewidth=0.0,
                     label="friction holds")
-    for k, (values, label) in enumerate(((motor, _volts("motor", loops[0])), (up, "goes to +"), (down, "goes to −"))):
+    for k, (values, label) in enumerate(((motor, _volts("motor", loops[0])), (up, "load below: turns to +"), (down, "load above: turns to −"))):
         ax.plot(np.degrees(errors), values, color=LINES[k][0], linestyle=LINES[k][1],
                 linewidth=1.8 if k == 0 else 1.2, label=label)
     for k, loop in enumerate(loops[1:], start=3):
@@ -93,40 +93,39 @@ def _volts(words: str, loop: Loop) -> str:
 
 
 def _cap(ax: Axes, loop: Loop) -> None:
-    """Name the cap, and mark where the overload starts and what it leaves."""
-    at = math.degrees(loop.cap_error)
-    ax.annotate(f"cap: {loop.cap_torque:.3g} N m\nfrom {at:.3g}° on", (at, loop.cap_torque), xytext=(-8.0, 10.0),
-                textcoords="offset points", ha="right", va="bottom", fontsize=7.5)
+    """Tell the cap, and mark where the overload starts and what it leaves."""
+    said = [f"cap: {loop.cap_torque:.3g} N m from {math.degrees(loop.cap_error):.3g}° on"]
     overload = next((each for each in loop.protections if each.kind == "overload"), None)
-    if overload is None or math.isnan(overload.error):
-        return
-    for sign in (-1.0, 1.0):
-        ax.plot([sign * math.degrees(overload.error)], [sign * overload.torque], marker="D", markersize=5.5,
-                markerfacecolor="white", markeredgecolor=COLOURS["black"], linestyle="none", zorder=5)
-        ax.axhline(sign * overload.left_torque, color=COLOURS["black"], linewidth=0.9, linestyle=(0, (1, 1.6)))
-    ax.annotate(f"trips here\nafter {overload.time:g} s", (-math.degrees(overload.error), -overload.torque),
-                xytext=(9.0, -3.0), textcoords="offset points", va="top", fontsize=7.5)
-    ax.annotate("left of it once tripped", (-math.degrees(_BEYOND * loop.cap_error), overload.left_torque),
-                xytext=(3.0, 2.5), textcoords="offset points", fontsize=7.5)
+    if overload is not None and not math.isnan(overload.error):
+        for sign in (-1.0, 1.0):
+            ax.plot([sign * math.degrees(overload.error)], [sign * overload.torque], marker="D", markersize=5.5,
+                    markerfacecolor="white", markeredgecolor=COLOURS["black"], linestyle="none", zorder=5)
+            ax.axhline(sign * overload.left_torque, color=COLOURS["black"], linewidth=0.9, linestyle=(0, (1, 1.6)))
+        said += [f"◇ overload: trips after {overload.time:g} s",
+                 f"⋯ left of it once tripped: {overload.left_torque:.3g} N m"]
+    _tell(ax, said)
 
 
 def _middle(ax: Axes, loop: Loop, reach: float) -> None:
-    """Mark dead zone and startup force around no error."""
+    """Tell dead zone and startup force, and mark them around no error."""
     top = 1.9 * max(loop.friction_torque, loop.at(0.6 * reach).motor)
     ax.set_ylim(-top, top)
-    if loop.dead_zone > 0.0:
-        zone = math.degrees(loop.dead_zone)
-        ax.axvspan(-zone, zone, facecolor="none", edgecolor=COLOURS["black"], hatch="////", linewidth=0.6)
-        ax.annotate(f"dead zone ±{zone:.2g}°", (-zone, -0.97 * top), xytext=(-4.0, 0.0), textcoords="offset points",
-                    ha="right", va="bottom", fontsize=7.5)
-    if loop.minimum_duty > 0.0:
-        force = loop.motor_torque(loop.minimum_duty)
-        ax.annotate(f"startup force {force:.2g} N m", (math.degrees(loop.dead_zone), force),
-                    xytext=(0.97 * math.degrees(reach), -0.28 * top), ha="right", va="top", fontsize=7.5,
-                    arrowprops={"arrowstyle": "-", "linewidth": 0.7})
+    said = []
     if not math.isnan(loop.start_error):
         start = math.degrees(loop.start_error)
         ax.plot([start], [0.0], marker="o", markersize=4.5, markerfacecolor="white",
                 markeredgecolor=COLOURS["black"], zorder=5)
-        ax.annotate(f"free shaft moves\nfrom {start:.2g}° on", (start, 0.0), xytext=(2.0, -5.0),
-                    textcoords="offset points", ha="center", va="top", fontsize=7.5)
+        said.append(f"○ free shaft moves from {start:.2g}° on")
+    if loop.minimum_duty > 0.0:
+        said.append(f"startup force: {loop.motor_torque(loop.minimum_duty):.2g} N m")
+    if loop.dead_zone > 0.0:
+        zone = math.degrees(loop.dead_zone)
+        ax.axvspan(-zone, zone, facecolor="none", edgecolor=COLOURS["black"], hatch="////", linewidth=0.6)
+        said.append(f"hatched: dead zone ±{zone:.2g}°")
+    _tell(ax, said)
+
+
+def _tell(ax: Axes, said: Sequence[str]) -> None:
+    """Write lines where no curve passes: at positive errors and negative torques."""
+    ax.annotate("\n".join(said), (0.985, 0.03), xycoords="axes fraction", ha="right", va="bottom", fontsize=7.5,
+                linespacing=1.5, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5})

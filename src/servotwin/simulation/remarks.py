@@ -1,4 +1,4 @@
-"""What a completed run leaves to be said: pulses that were refused, an end stop, a load that is too much.
+"""What a completed run leaves to be said: pulses that were refused, an end stop, a load that is too much, trips.
 
 A remark is no failure: the run reached its end, and `Status` says so. One look at the end of the run finds it.
 """
@@ -10,8 +10,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from servotwin.models import DigitalServo
 from servotwin.models.engine import ending
+from servotwin.models.standing import standing_current
+from servotwin.models.terms import heat
 from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.numbers import at_temperature
+from servotwin.physics.motor import electromagnetic_torque
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
@@ -19,13 +24,25 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from servotwin.models.samples import Samples
+    from servotwin.models.terms.firmware import Firmware
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.simulation.result import Result
 
 REFUSED, ON_STOP, CANNOT_HOLD = KINDS = ("pulses refused", "ended on a stop", "cannot hold")
 COLUMNS = {kind: kind.replace(" ", "_") for kind in KINDS}
 """Name of a table's column that holds the time of a kind."""
 
+TRIPS = ("overload", "current", "heat", "undervoltage")
+"""What a digital servo trips by; the number of one in the signal `trip` is its place from 1 on."""
+STAYS_TRIPPED = "stays tripped"
+_TRIPPED = {f"tripped by {kind}": f"trips by {kind}" for kind in TRIPS}  # kinds, and the events that they are of
+
 _MARKS = {ON_STOP: ending.ON_STOP, CANNOT_HOLD: ending.CANNOT_HOLD}
+
+
+_AT_STOP = 1e-6  # rad, relative beyond 1 rad: as in `ending`
+_ROUNDING = 1e-9  # rad
 
 
 class Remark(NamedTuple):
@@ -38,8 +55,10 @@ class Remark(NamedTuple):
         "ended on a stop": it rests on an end stop, and its command asks for an angle elsewhere.
         "cannot hold": it is off its command, and full drive from a standstill does not turn the load towards it, where
         the shaft stands or where it was sent.
+        "tripped by overload", "… current", "… heat", "… undervoltage": a protection of a digital servo has acted.
+        "stays tripped": one still does.
     time : float
-        Of the first such pulse; otherwise the end of the run, of which the remark speaks [s].
+        Of the first such pulse, or the first such trip; otherwise the end of the run, of which the remark speaks [s].
 
     Examples
     --------
@@ -82,7 +101,8 @@ def words(kind: str, time: str = "") -> str:
     """
     text, before, after = {
         REFUSED: ("all pulses refused", "from", "on"), ON_STOP: ("ended on a stop that it was not sent to", "at", ""),
-        CANNOT_HOLD: ("cannot hold its load", "at", "")}[kind]
+        CANNOT_HOLD: ("cannot hold its load", "at", ""), STAYS_TRIPPED: ("a protection still acts", "at", ""),
+        **{tripped: (tripped, "at", "") for tripped in _TRIPPED}}[kind]
     return " ".join(filter(None, (text, before, time, after))) if time else text
 
 
@@ -91,19 +111,68 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
     if not result.status.ok:
         return ()
     model, load, end = result.model, result.load, result.ended
-    numbers, chip, edges = model.plant(load), model.chip(result.command), model.edges(result.command) or ()
-    period = 0.0 if chip is None or model.edges(result.command) is not None else chip.frame_period
-    refused = math.nan if chip is None else ending.refused_from(chip, result.drive.rows, period, edges, end)
     last = result.trajectory.at(np.array([end]))
-    source = numbers.source.V
-    if last.bus is not None:  # what is left by the other servos
-        own = float(model.output("supply_current", last, result.drive, load)[0])
-        source = float(last.bus[0]) + numbers.source.R_b * own
+    numbers = _under_sag(result, model.plant(load), last)
+    chip, firmware = model.chip(result.command), model.firmware(result.command)
+    if isinstance(model, DigitalServo) and firmware is not None:
+        pulsed, accepts = not model.takes_goals, NO_CHIP._replace(shortest=firmware.shortest, longest=firmware.longest)
+        period = firmware.T_f
+    else:
+        pulsed, accepts, period = chip is not None, chip or NO_CHIP, 0.0 if chip is None else chip.frame_period
+    own = model.edges(result.command) if pulsed else None
+    edges, period = own or (), period if own is None else 0.0
+    rows = result.drive.rows
+    refused = ending.refused_from(accepts, rows, period, edges, end) if pulsed else math.nan
     tau = piece_value(ending.piece_before(load.torque_pieces.rows, end, False), end)
     final = [float(values[0]) for values in (last.angle, last.speed, last.winding, last.housing)]
-    marks = ending.marks(chip is not None, numbers, chip or NO_CHIP, result.drive.rows, tau, period, edges, end, source,
-                         not math.isnan(refused), final)
-    return tuple(Remark(remark.kind, remark.time) for remark in lane_remarks([refused], [marks], end))
+    if firmware is not None:
+        marks = _program_marks(numbers, firmware, last, tau, final)
+    else:
+        marks = ending.marks(pulsed, numbers, accepts, rows, tau, period, edges, end, numbers.source.V,
+                             not math.isnan(refused), final)
+    said = tuple(Remark(remark.kind, remark.time) for remark in lane_remarks([refused], [marks], end))
+    return said if firmware is None else (*said, *_trips(result, last))
+
+
+def _under_sag(result: Result, numbers: Numbers, last: Samples) -> Numbers:
+    """Return the numbers of a plant whose source is what the other servos on a bus leave of it."""
+    if last.bus is None:
+        return numbers
+    own = float(result.model.output("supply_current", last, result.drive, result.load)[0])
+    source = numbers.source
+    return numbers._replace(source=source._replace(V=float(last.bus[0]) + source.R_b * own))
+
+
+def _program_marks(numbers: Numbers, firmware: Firmware, last: Samples, tau: float, final: Sequence[float]) -> int:
+    """Return what is so at the end of a digital servo's run, as `ending.marks` does: judged by its goal and its cap."""
+    if last.goal is None or last.duty is None or last.trip is None:
+        return 0
+    (q, w, T_w, T_h), goal, trip = final, float(last.goal[0]), int(last.trip[0])
+    if abs(goal - q) <= firmware.h + firmware.quantum + _ROUNDING:
+        return 0
+    upper, lower = numbers.stops.upper, numbers.stops.lower
+    at_stop = q >= upper - _AT_STOP * max(abs(upper), 1.0) or q <= lower + _AT_STOP * max(abs(lower), 1.0)
+    found = ending.ON_STOP if w == 0.0 and at_stop else 0
+    if abs(float(last.duty[0])) > 1.0 or trip > 1:  # without torque, as it is told
+        return found
+    if heat.present(numbers.heat):
+        numbers = at_temperature(numbers, T_w, T_h)
+    most = min(firmware.torque_limit, firmware.duty_limit, firmware.overload_output if trip == 1 else 1.0)
+    torque = electromagnetic_torque(standing_current(numbers, firmware, most), numbers.motor.K)
+    forward, sent = goal > q, min(max(goal, lower), upper)
+    able = all(ending.starts(numbers, forward, torque, tau, at) for at in (q, sent))
+    return found if able else found + ending.CANNOT_HOLD
+
+
+def _trips(result: Result, last: Samples) -> tuple[Remark, ...]:
+    """Return by what a digital servo tripped, when first, and whether something still acts."""
+    said = []
+    for kind, named in _TRIPPED.items():
+        first = next((event.time for event in result.events if event.kind == named), None)
+        if first is not None:
+            said.append(Remark(kind, first))
+    acts = last.trip is not None and last.trip[0] != 0.0
+    return (*said, *([Remark(STAYS_TRIPPED, result.ended)] if acts else []))
 
 
 def lane_remarks(refused: ArrayLike, marks: ArrayLike, end: float) -> tuple[LaneRemark, ...]:

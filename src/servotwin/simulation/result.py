@@ -136,7 +136,7 @@ class Result:
 
     @cached_property
     def remarks(self) -> tuple[Remark, ...]:
-        """What a completed run leaves to be said, (kind, time [s]): pulses refused, ended on a stop, cannot hold."""
+        """What a completed run leaves to be said, (kind, time [s]): refused pulses, a stop, a load too heavy, trips."""
         return remarks_of(self)
 
     @cached_property

@@ -1,0 +1,50 @@
+"""What a digital servo that stands draws at a duty, its limit of current included."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from servotwin.models.engine import currents
+from servotwin.models.terms import duty
+from servotwin.physics.firmware import duty_for_bus_current, duty_for_motor_current
+
+if TYPE_CHECKING:
+    from servotwin.models.terms.firmware import Firmware
+    from servotwin.models.terms.numbers import Numbers
+
+_ROUNDS = 30  # until a soft supply and a limit of current agree
+
+
+def standing_current(numbers: Numbers, firmware: Firmware, d: float) -> float:
+    """Return the current [A] of a motor that stands, at a duty that is asked for.
+
+    Parameters
+    ----------
+    numbers : Numbers
+        Of the plant, as at full duty.
+    firmware : Firmware
+        Whose limit of current holds, if it has one.
+    d : float
+        [1]
+    """
+    i = _at(numbers, d)
+    if not firmware.I_m < math.inf:
+        return i
+    path, source = numbers.bridge, numbers.source
+    R = path.R_drive - source.R_b
+    V_bus, given = source.V, abs(d)
+    for _ in range(_ROUNDS):
+        most = (duty_for_bus_current(firmware.I_m, 0.0, R, V_bus, 1.0) if firmware.senses_bus > 0.0 else
+                duty_for_motor_current(firmware.I_m, 0.0, R, V_bus))
+        given = min(abs(d), most)
+        i = _at(numbers, math.copysign(given, d))
+        V_bus = max(source.V - source.R_b * duty.share_of(path, given) * abs(i), 0.5 * source.V)
+    return i
+
+
+def _at(numbers: Numbers, d: float) -> float:
+    if d == 0.0:
+        return 0.0
+    plant = duty.at_duty(numbers, d)
+    return math.copysign(currents.stall_current(plant, plant.source.V), d)
