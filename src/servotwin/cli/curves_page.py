@@ -84,7 +84,8 @@ def _voltage(sheet: DataSheet, part: VoltageSheet, torque: float | None) -> str:
     cells = [[escape(_degrees(cell)) for cell in _minus(row)] for row in found]
     drawn = table(["", "cold", "hot", "the sheet prints", "off"], cells,
                   caption=f"At {part.voltage:g} V. Cold: 25 °C. Hot: {escape(_degrees(hot_words(part)))}.")
-    return f'<h3>At {part.voltage:g} V</h3>\n{_cards(part)}<div class="sheet">{drawn}</div>\n{_loop(part, torque)}{_lift(part)}'
+    below = _loop(part, torque) + _lift(part)
+    return f'<h3>At {part.voltage:g} V</h3>\n{_cards(part)}<div class="sheet">{drawn}</div>\n{below}'
 
 
 def _cards(part: VoltageSheet) -> str:

@@ -74,7 +74,8 @@ def simulate(
     words = CommandWords(step=step, ramp=ramp, sine=sine, chirp=chirp, prbs=prbs, constant=constant, pulses=pulses,
                          command=command, unit=unit, at=at, over=over, hold=hold, column=column)
     targets = _checked_targets(out, plot, servo, words, load or [], force=force)
-    result = _run(model_of(servo, model, change or [], register=register or []), words, load or [], duration, output_step, seed)
+    made = model_of(servo, model, change or [], register=register or [])
+    result = _run(made, words, load or [], duration, output_step, seed)
     found = _write(result, targets, force=force)
     found |= {"command": words.described(duration), "load": load_words.described(load or []),
               "files": [str(target.path) for target in targets]}
@@ -121,7 +122,8 @@ def _check_length(model: Model, signal: Signal, duration: float) -> None:
     for one, period, what in ((chip, 0.0 if chip is None or signal.edges is not None else chip.frame_period, "frames"),
                               (firmware, 0.0 if firmware is None else firmware.T_c, "ticks")):
         if one is not None and period > 0.0 and duration > _MOST_FRAMES * period:
-            raise InputError("--duration", got=duration, allowed=f"at most {_MOST_FRAMES:g} {what} of {1e3 * period:g} ms")
+            raise InputError("--duration", got=duration,
+                             allowed=f"at most {_MOST_FRAMES:g} {what} of {1e3 * period:g} ms")
 
 
 def _write(result: Result, targets: list[Target], *, force: bool) -> dict[str, Any]:

@@ -9,6 +9,8 @@ from servotwin.datasheet.sheet import Bandwidth, DataSheet, VoltageSheet, curves
 from servotwin.datasheet.warming import Masses, Warming, thermal_masses
 from servotwin.datasheet.which import Lifter, Lifters, Refused, servos_that_lift
 
-__all__ = ["Bandwidth", "DataSheet", "FullDrive", "Held", "Lift", "Lifter", "Lifters", "Loop", "Masses", "OperatingPoint",
-           "Protection", "Refused", "SpeedCurve", "Standing", "Swing", "VoltageSheet", "Warming", "curves", "lift_of", "servos_that_lift",
-           "thermal_masses"]
+__all__ = [
+    "Bandwidth", "DataSheet", "FullDrive", "Held", "Lift", "Lifter", "Lifters", "Loop", "Masses", "OperatingPoint",
+    "Protection", "Refused", "SpeedCurve", "Standing", "Swing", "VoltageSheet", "Warming", "curves", "lift_of",
+    "servos_that_lift", "thermal_masses",
+]

@@ -15,10 +15,10 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.loads import Load, as_load
+from servotwin.models.digital import DigitalServo
 from servotwin.models.engine import contacts, currents
 from servotwin.models.engine.memory import started
 from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Mode, Vector
-from servotwin.models.digital import DigitalServo
 from servotwin.models.terms import bridge as bridge_term
 from servotwin.models.terms import duty, source
 from servotwin.models.terms.heat import NO_HEAT
@@ -87,12 +87,12 @@ class FullDrive:
         name = self.model.servo.name
         plant = self._plant
         if not (source.present(plant.source) or math.isfinite(plant.follower.V_max)):
-            raise InputError(f"full drive of {type(self.model).__name__}",
-                             allowed="a model with a supply: PulseServo, PulseServoInductive, BoundedServo or DigitalServo")
+            raise InputError(f"full drive of {type(self.model).__name__}", allowed=
+                             "a model with a supply: PulseServo, PulseServoInductive, BoundedServo or DigitalServo")
         voltage = self.model.value("supply.open_circuit_voltage")
-        if not self.acceleration(0.0, 0.0) > 0.0:
+        if self._duty == 0.0 or not self.acceleration(0.0, 0.0) > 0.0:
             raise InputError(f"{name} does not turn at {voltage:g} V",
-                             allowed="a supply that overcomes bridge, brushes and friction")
+                             allowed="a supply and a most duty that overcome bridge, brushes and friction")
 
     @cached_property
     def _plant(self) -> Numbers:

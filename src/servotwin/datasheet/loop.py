@@ -150,7 +150,7 @@ class Loop:
 
     @cached_property
     def friction_error(self) -> float:
-        """What that friction is worth as an error, dead zone apart: half of the band in which the shaft sticks [rad]."""
+        """What that friction is worth as an error, dead zone apart: half of the band in which it sticks [rad]."""
         return self.friction_torque / self.stiffness
 
     @cached_property
@@ -174,7 +174,7 @@ class Loop:
         return self._lifted(self.cap_torque)
 
     def asked(self, error: float) -> float:
-        """Return the duty w that the program asks for while an error [rad] stands: of P, dead zone and startup alone."""
+        """Return the duty w that the program asks for while an error [rad] stands, of P and startup alone."""
         firmware = self._firmware
         h = cut(firmware.h, self._count)
         z = error_beyond_zone(cut(error, self._count), h, firmware.gate > 0.0)

@@ -74,7 +74,8 @@ def _torques(ax: Axes, loops: Sequence[Loop], reach: float) -> None:
     down, up = np.minimum(down, _MOST), np.maximum(up, -_MOST)
     ax.fill_between(np.degrees(errors), up, down, color=COLOURS["grey"], alpha=0.18, linewidth=0.0,
                     label="friction holds")
-    for k, (values, label) in enumerate(((motor, _volts("motor", loops[0])), (up, "load below: turns to +"), (down, "load above: turns to −"))):
+    drawn = (motor, _volts("motor", loops[0])), (up, "load below: turns to +"), (down, "load above: turns to −")
+    for k, (values, label) in enumerate(drawn):
         ax.plot(np.degrees(errors), values, color=LINES[k][0], linestyle=LINES[k][1],
                 linewidth=1.8 if k == 0 else 1.2, label=label)
     for k, loop in enumerate(loops[1:], start=3):

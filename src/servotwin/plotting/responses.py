@@ -9,6 +9,7 @@ from servotwin import units
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.look import LINES, axes_grid, context
 from servotwin.models.outputs import SIGNALS
+from servotwin.simulation.remarks import TRIPS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,6 +36,9 @@ SHOWN: dict[str, Shown] = {
     "pulse_width": Shown("pulse width", r"$t_a$", "µs", "us", "time"),
     "armature_voltage": Shown("armature voltage", r"$v_a$", "V", "V", "voltage"),
     "armature_current": Shown("armature current", r"$i_a$", "A", "A", "current"),
+    "duty": Shown("duty", r"$d$", "%", "%", "number"),
+    "goal_angle": Shown("goal", r"$g$", "°", "deg", "angle"),
+    "reference_angle": Shown("reference", r"$r$", "°", "deg", "angle"),
     "motor_angle": Shown("motor angle", r"$q_m$", "°", "deg", "angle"),
     "motor_speed": Shown("motor speed", r"$\dot{q}_m$", "rpm", "rpm", "speed"),
     "motor_torque": Shown("motor torque", r"$\tau_o$", "mN m", "mN m", "torque"),
@@ -46,8 +50,11 @@ SHOWN: dict[str, Shown] = {
 """By signal name; a signal that is not here is shown in its SI unit."""
 
 # Beside the shaft's angle its command; then what moves it.
-_DEFAULT = ("output_angle", "motor_angle", "output_speed", "motor_speed", "armature_voltage", "armature_current")
+_DEFAULT = ("output_angle", "motor_angle", "output_speed", "motor_speed", "duty", "armature_voltage",
+            "armature_current")
 _WITH = {"output_angle": "command_angle"}
+_PROFILE = {"output_angle": ("reference_angle", "goal_angle")}  # drawn too where the reference is not the goal
+_TRIPS = ("", *TRIPS)
 
 
 def shown(name: str, values: ArrayLike) -> NDArray[np.float64]:
@@ -73,8 +80,9 @@ def time_response(result: Result, signals: Sequence[str] | None = None) -> Figur
     result : Result
         Of `simulate`.
     signals : sequence of str, optional
-        Signal names; unless given, angle with command, speed, armature voltage and current. A servo's angle brings
-        its command along.
+        Signal names; unless given, angle with command, speed, armature voltage or duty, and current. A servo's angle
+        brings its command along, and the reference of its profile; while a protection acts the panel of the duty is
+        shaded.
 
     Raises
     ------
@@ -109,6 +117,7 @@ def _names(result: Result, signals: Sequence[str] | None) -> list[str]:
     if signals is None:
         has_output = "output_angle" in result.names
         skip = {"motor_angle", "motor_speed"} if has_output else set()
+        skip |= {"armature_voltage"} if "duty" in result.names else set()
         return [name for name in _DEFAULT if name in result.names and name not in skip]
     names = [signals] if isinstance(signals, str) else list(signals)
     if not names:
@@ -129,7 +138,32 @@ def _panel(ax: Axes, result: Result, name: str) -> None:
         levels = all(p.slope == 0.0 and p.amplitude == 0.0 for p in result.command.pieces.table)
         ax.plot(result.time, shown(companion, result[companion]), color=LINES[1][0], linestyle=LINES[1][1],
                 linewidth=1.1, label="command", drawstyle="steps-post" if levels else "default")
+    lines = _profile(ax, result, name)
     ax.plot(result.time, shown(name, result[name]), color=LINES[0][0], linestyle=LINES[0][1],
             label=SHOWN[name].words if name in SHOWN else name)
-    if companion in result.names:
+    trips = _shade(ax, result) if name == "duty" else 0
+    if companion in result.names or lines or trips:
         ax.legend(loc="lower right")
+
+
+def _profile(ax: Axes, result: Result, name: str) -> int:
+    """Draw the reference of a profile beside an angle; return how many lines that makes."""
+    reference, goal = _PROFILE.get(name, ("", ""))
+    if reference not in result.names or (result[reference] == result[goal]).all():
+        return 0
+    ax.plot(result.time, shown(reference, result[reference]), color=LINES[2][0], linestyle=LINES[2][1], linewidth=1.1,
+            label=SHOWN[reference].words)
+    return 1
+
+
+def _shade(ax: Axes, result: Result) -> int:
+    """Shade where a protection acts, named in the legend; return how many kinds do."""
+    import numpy as np
+
+    trip, acting = result["trip"], 0
+    for k, words in enumerate(_TRIPS):
+        if k > 0 and (trip == k).any():
+            ax.fill_between(result.time, 0.0, 1.0, where=np.asarray(trip == k), transform=ax.get_xaxis_transform(),
+                            color=LINES[k][0], alpha=0.25, linewidth=0.0, label=f"tripped by {words}")
+            acting += 1
+    return acting
