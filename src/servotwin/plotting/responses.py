@@ -45,6 +45,8 @@ SHOWN: dict[str, Shown] = {
     "output_angle": Shown("output angle", r"$q$", "°", "deg", "angle"),
     "output_speed": Shown("output speed", r"$\dot{q}$", "°/s", "deg/s", "speed"),
     "load_torque": Shown("load torque", r"$\tau_L$", "N m", "N m", "torque"),
+    "bus_voltage": Shown("supply voltage", r"$V_{bus}$", "V", "V", "voltage"),
+    "supply_current": Shown("supply current", r"$i_s$", "A", "A", "current"),
     "feedback_voltage": Shown("feedback voltage", r"$v_o$", "V", "V", "voltage"),
 }
 """By signal name; a signal that is not here is shown in its SI unit."""
@@ -143,7 +145,7 @@ def _panel(ax: Axes, result: Result, name: str) -> None:
             label=SHOWN[name].words if name in SHOWN else name)
     trips = _shade(ax, result) if name == "duty" else 0
     if companion in result.names or lines or trips:
-        ax.legend(loc="lower right")
+        ax.legend(loc="upper left" if trips else "lower right")
 
 
 def _profile(ax: Axes, result: Result, name: str) -> int:
