@@ -37,8 +37,8 @@ def sweep(
     hold: shared.HoldOption = None,
     column: shared.ColumnOption = None,
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: pulse; bounded if the servo file has "
-        "no chip).", rich_help_panel=shared.PLANT)] = None,
+        metavar="MODEL", help="digital, pulse, pulse-inductive or bounded (default: by the kind of the servo, pulse or "
+        "digital; bounded if its file has no chip).", rich_help_panel=shared.PLANT)] = None,
     load: Annotated[list[str] | None, typer.Option(
         metavar="PART=VALUE", help="Load on the shaft, as in servotwin simulate.",
         rich_help_panel=shared.PLANT)] = None,
