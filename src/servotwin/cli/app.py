@@ -47,7 +47,9 @@ app.command("simulate", help="Simulate one servo under one command and one load.
                    "Example: servotwin simulate my-servo.toml --sine 1500:200:2 --unit us --out run.csv")(simulate)
 app.command("curves", help="Compute the data sheets of servos: torque, speed, current, holding, lifting, warming.",
             epilog="Example: servotwin curves towerpro-mg996r --voltage 4.8,6 --out mg996r.html\n\n"
-                   "Example: servotwin curves towerpro-mg996r hitec-hs-422 --voltage 5 --lift 0.5kg --arm 10cm")(curves)
+                   "Example: servotwin curves towerpro-mg996r hitec-hs-422 --voltage 5 --lift 0.5kg --arm 10cm\n\n"
+                   "Example: servotwin curves feetech-sts3215-12v --register P_Coefficient=16 --quick --loop loop.png"
+            )(curves)
 app.command("sweep", help="Draw random parameters for a servo, simulate all, and show which of them matter.",
             epilog="Example: servotwin sweep hitec-hs-755hb --step 0:60 --vary motor.torque_constant=normal:10% "
                    "--vary electronics.deadband=uniform:4us..8us --lanes 10000 --out study --plot")(sweep)

@@ -54,15 +54,15 @@ def loop_curve(loops: Sequence[Loop], *, width: float = 8.4, height: float = 3.9
     with context():
         figure = new_figure(width, height)
         axes = list(figure.subplots(1, 2))
-        for ax, reach in zip(axes, (far, near), strict=True):
-            _torques(ax, loops, reach)
+        _torques(axes[0], loops, far)
+        _torques(axes[1], loops, near)
         _cap(axes[0], first)
         _middle(axes[1], first, near)
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), handlelength=3.2)
         axes[0].set_ylabel("torque (N m)")
-        servo = first.model.servo
-        figure.suptitle(f"{servo.title or servo.name}: {first.stiffness:.3g} N m/rad", fontsize=9)
+        title = first.model.servo.title or first.model.servo.name
+        figure.suptitle(f"{title}: {first.stiffness:.3g} N m/rad", fontsize=9)
     return finished(figure)
 
 
