@@ -98,6 +98,22 @@ def test_torque_is_switched_lane_by_lane_and_a_reset_switches_it_on():
         sims.set(torque_enable=1)
 
 
+def test_a_bus_voltage_that_is_imposed_is_that_of_a_stiff_supply():
+    firmware = {"proportional_gain": 6.0, "current_limit": 1.5}
+    sims = st.VectorSimulator(digital(firmware, supply=HUNGRY), lanes=2, load=LOAD)
+    stiff = digital(firmware, supply={**HUNGRY, "internal_resistance": 0.0, "open_circuit_voltage": 9.5})
+    alone = st.VectorSimulator(stiff, lanes=1, load=LOAD)
+    for some in (sims, alone):
+        some.reset(command_angle=0.0)
+    sims.set(bus_voltage=9.5, lanes=[1])
+    for _ in range(40):
+        for some in (sims, alone):
+            some.advance(2e-3, command_angle=0.8)
+    assert sims["output_angle"][1] == pytest.approx(alone["output_angle"][0], abs=1e-12)
+    assert sims["bus_voltage"][1] == pytest.approx(9.5)
+    assert abs(sims["output_angle"][0] - sims["output_angle"][1]) > 1e-3
+
+
 def test_goals_outside_are_refused_lane_by_lane():
     sims = st.VectorSimulator(digital({"proportional_gain": 6.0, "lower_goal": -1.0, "upper_goal": 1.0}), lanes=2)
     with pytest.raises(st.errors.CommandError, match="lane 1.*the goals of test"):
