@@ -47,7 +47,14 @@ EVERYTHING = {
 }
 
 
-@pytest.fixture(params=[*MODELS, "pulse with everything", "pulse-inductive with everything"], scope="session")
+# What a program adds to an analog servo that makes a digital one of it
+FIRMWARE = {"firmware.control_period": 1e-3, "firmware.proportional_gain": 6.0, "firmware.compute_delay": 7e-4,
+            "firmware.derivative_gain": 0.02, "firmware.angle_quantum": 1e-3}
+
+
+@pytest.fixture(params=[*MODELS, "pulse with everything", "pulse-inductive with everything",
+                        "digital with everything"], scope="session")
 def model(request, servo):
     name, _, more = request.param.partition(" with ")
+    servo = servo.replace(FIRMWARE) if name == "digital" else servo
     return MODELS[name](servo.replace(EVERYTHING) if more else servo)

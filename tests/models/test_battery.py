@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
+from conftest import FIRMWARE
 from servotwin import loads
 from servotwin.errors import CommandError, UnknownNameError
 from servotwin.models import MODELS
@@ -149,7 +150,7 @@ def test_an_external_torque_of_a_call_equals_a_constant_load(model):
 @pytest.mark.parametrize("name", [name for name, kind in MODELS.items() if "load_torque" in kind.signals])
 def test_power_at_the_spindle_is_what_the_load_gets(servo, name):
     """Work of load_torque = kinetic energy of the load + its losses."""
-    model = MODELS[name](servo)
+    model = MODELS[name](servo.replace(FIRMWARE) if name == "digital" else servo)
     load = loads.Inertia(3e-3) + loads.Viscous(1e-2)
     result = st.simulate(model, st.signals.step(0.7, 1.6, at=0.05, unit="V"), duration=0.5, load=load, output_step=2e-5)
     work = np.trapezoid(result["load_torque"] * result["output_speed"], result.time)

@@ -24,7 +24,8 @@ COLUMNS = {
     "load_torque_Nm": ("load_torque", 1.0), "feedback_voltage_V": ("feedback_voltage", 1.0),
     "error_time_us": ("error_time", 1e6), "drive": ("drive", 1.0), "bus_voltage_V": ("bus_voltage", 1.0),
     "supply_current_A": ("supply_current", 1.0), "winding_temperature_K": ("winding_temperature", 1.0),
-    "housing_temperature_K": ("housing_temperature", 1.0),
+    "housing_temperature_K": ("housing_temperature", 1.0), "duty": ("duty", 1.0), "trip": ("trip", 1.0),
+    "goal_angle_deg": ("goal_angle", 180.0 / math.pi), "reference_angle_deg": ("reference_angle", 180.0 / math.pi),
 }
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from servotwin.errors import InputError, LoadError, UnknownNameError
 from servotwin.loads import as_load
-from servotwin.models import DCMotor, GearedMotor, Model, PulseServo, PulseServoInductive
+from servotwin.models import DCMotor, DigitalServo, GearedMotor, Model, PulseServo, PulseServoInductive
 from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:
@@ -120,6 +120,10 @@ def check_model(model: Model, frame_period: float | None) -> None:
     """Raise InputError unless it is a model, and one with frames where a frame period is given."""
     if not isinstance(model, Model):
         raise InputError("model", got=model, allowed="a model of a servo, such as PulseServo(load_servo(...))")
+    if isinstance(model, DigitalServo):
+        raise InputError("model of a linear system", got=model,
+                         allowed="a motor, a mean-voltage servo or a pulse servo: ticks and counts have no transfer "
+                         "function")
     if frame_period is not None and not isinstance(model, PulseServo | PulseServoInductive):
         raise InputError(f"frame_period of {type(model).__name__}", got=frame_period,
                          allowed="none: only the pulse servos have frames")

@@ -200,5 +200,7 @@ def _put(record: Any, values: Any) -> None:
     for (name, _), value in zip(fields_of(type(values)), values, strict=True):
         if hasattr(value, "_fields"):
             _put(record[name], value)
+        elif name == "firm":  # one in a sequence
+            _put(record[name], value[0])
         else:
             record[name] = value

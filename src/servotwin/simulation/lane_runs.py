@@ -58,9 +58,9 @@ _BY_COILS = _side("by_coils", ("COILS",), (*_NO_SIDE, _PLAY, *_STRIDING, *_BANDE
     "CORE", *_PLAYED, "LINEAR", "LINEAR_BACKWARD", "LIMITED_FORWARD", "LIMITED_BACKWARD", "SHORT_FORWARD",
     "SHORT_BACKWARD"))
 _BY_GAPS = _side("by_gaps", ("GAPS",), _NOT_IN_GAPS, ("CORE",))
+_NOT_PLAIN = ("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE")
 PLAIN_RUNS = Recipe(
-    "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep", *_PROGRAM),
-    never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))
+    "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep", *_PROGRAM), never=_NOT_PLAIN)
 PENDULUM_RUNS = Recipe(
     "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep", *_PROGRAM),
     never=("SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))
@@ -71,7 +71,9 @@ LOOK_SIDE_BY_SIDE = Recipe("look_side_by_side", ("servotwin.models.engine.sights
     "friction.kappa", "follower", *_PROGRAM))
 LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",), absent=_PROGRAM)
 LOOK_DIGITAL = Recipe("look_digital", LOOK_ONE_BY_ONE.entries, absent=_NO_DIGITAL, present=_DIGITAL)
-DIGITAL_RUNS = Recipe("digital_runs", _ENTRIES, absent=_NO_DIGITAL, present=_DIGITAL)
+ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, absent=_NO_DIGITAL, present=_DIGITAL)
+PLAIN_DIGITAL = Recipe("plain_digital_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, *_NO_DIGITAL), never=_NOT_PLAIN,
+                       present=_DIGITAL)
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, absent=_PROGRAM)
 _SHARED = ("pieces", "edges", "accuracy", "firmware")  # by all lanes, or by all that run side by side
 _TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
@@ -206,7 +208,10 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     """
     bridge, own = numbers.bridge, numbers.friction
     if np.any(bridge.pwm > 0.0):
-        return [OneByOne(np.arange(lanes), DIGITAL_RUNS)]
+        rare = _either(_any_differs(numbers, (*_RARE, _PENDULUM)), recorded.any() and recorded)
+        digital = [OneByOne(_where(True, _without(True, rare), lanes), PLAIN_DIGITAL),
+                   OneByOne(_where(True, rare, lanes), ALL_DIGITAL)]
+        return [kind for kind in digital if len(kind.which)]
     slack, swinging = _differs(numbers, "sensor.half_slack"), _differs(numbers, _PENDULUM)
     waving = swept.any() and swept
     alone = _either(_either(waving, recorded.any() and recorded), _differs(numbers, "friction.kappa"))
@@ -250,7 +255,7 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
 
 def looking(recipe: Recipe) -> Recipe:
     """Return how lanes are looked at that run one by one in this way."""
-    return LOOK_DIGITAL if recipe == DIGITAL_RUNS else LOOK_ONE_BY_ONE
+    return LOOK_DIGITAL if recipe in (PLAIN_DIGITAL, ALL_DIGITAL) else LOOK_ONE_BY_ONE
 
 
 def _without(some: Any, *others: Any) -> Any:

@@ -39,11 +39,16 @@ class Trajectory:
         if not self.segments:
             nothing = np.full(t.size, math.nan)
             return Samples.make(t, np.tile(nothing, (7, 1)), nothing, np.zeros((5, t.size)), *np.zeros((3, t.size)))
-        if self.segments[0].motion.numbers.bridge.pwm > 0.0:  # sums of ticks may end a rounding late
-            begun = self._starts[np.minimum(np.searchsorted(self._starts, t * (1.0 + _LATE)), len(self._starts)) - 1]
-            t = np.where(abs(begun - t) <= _LATE * t, np.maximum(begun, t), t)
-        index = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
-        return self._states(t, index)
+        now = self._since_ticks(t)
+        index = np.maximum(np.searchsorted(self._starts, now, side="right") - 1, 0)
+        return replace(self._states(now, index), time=t)
+
+    def _since_ticks(self, t: Array) -> Array:
+        """Return times [s] of which those next to a tick are not before it: sums of ticks may end a rounding late."""
+        if not self.segments[0].motion.numbers.bridge.pwm > 0.0:
+            return t
+        begun = self._starts[np.minimum(np.searchsorted(self._starts, t * (1.0 + _LATE)), len(self._starts)) - 1]
+        return np.where(abs(begun - t) <= _LATE * t, np.maximum(begun, t), t)
 
     def since(self, start: float) -> Trajectory:
         """Return what is left of it from a time [s] on."""

@@ -72,7 +72,8 @@ class LaneNumbers:
         commands = Commands(inputs)
         self.chunks = [Chunk(own, commands, part) for which in groups(inputs, commands)
                        for own, part in supplies.parts(inputs, which)]
-        self.pulsed, self.digital = (LAWS[type(inputs.model)] == law for law in ("pulse", "digital"))
+        law = LAWS[type(inputs.model)]
+        self.pulsed, self.digital = law != "bounded", law == "digital"  # whether there is a bridge, and a program
         self.curve = np.array(inputs.model.curve(), np.float64).reshape(2, -1)
         self.neutral = np.empty(self.count)
         self.columns, self.torque = self._packed()

@@ -37,23 +37,49 @@ def next_due(firmware: Firmware, firm: Any, frames: int) -> float:
 
 def serve(numbers: Numbers, inputs: Inputs, memory: Memory) -> None:
     """Do all that is due now; what the program remembers changes in place."""
-    firmware, firm, frames, time = inputs.firmware[0], of(memory), memory.frames, memory.point.time
-    latest = time + SAME * firmware.T_c
-    if next_due(firmware, firm, frames) > latest:
+    firmware, firm, point = inputs.firmware[0], of(memory), memory.point
+    latest = point.time + SAME * firmware.T_c
+    apply(firmware, firm, memory.frames, latest)
+    if not is_due(firmware, firm, memory.frames, latest):
         return
-    _apply(firmware, firm, frames, latest)
-    if firmware.t_phi + (firm.tick - frames) * firmware.T_c > latest:
-        return
-    listen(inputs, memory)
-    firm.duties[firm.head] = control.tick(firmware, firm, _angle(numbers, inputs, memory), _sensed(
-        numbers, firmware, firm, memory.point.y), origin_of(memory) + time - firm.heard)
+    now = origin_of(memory) + point.time
+    if has_news(firmware, firm, now):
+        listen(inputs, firm, now)
+    angle = point.y[0]
+    if firmware.per_volt != 0.0:
+        v = sensed_voltage(numbers.sensor, inputs.curve, point.wiper)
+        angle = angle_of(firmware, firm, v, numbers.sensor.b_o, inputs.seed)
+    sensed = sensed_by(numbers, firm, point.y) if control.senses(firmware) else NOTHING_SENSED
+    decide(firmware, firm, angle, sensed, now)
+    apply(firmware, firm, memory.frames, latest)
+
+
+def is_due(firmware: Firmware, firm: Any, frames: int, latest: float) -> bool:
+    """Tell whether a tick comes by a time after so many frames [s]."""
+    return bool(firmware.t_phi + (firm.tick - frames) * firmware.T_c <= latest)
+
+
+def has_news(firmware: Firmware, firm: Any, now: float) -> bool:
+    """Tell whether a command may have come by now."""
+    return bool(now >= firm.hears - SAME * firmware.T_c)
+
+
+def decide(firmware: Firmware, firm: Any, angle: float, sensed: Sensed, now: float) -> None:
+    """Let a tick decide on a duty, which then waits to be applied."""
+    firm.duties[firm.head] = control.tick(firmware, firm, angle, sensed, now - firm.heard)
     firm.head = (firm.head + 1) % WAITING
     firm.waiting += 1
     firm.tick += 1
-    _apply(firmware, firm, frames, latest)
 
 
-def _apply(firmware: Firmware, firm: Any, frames: int, latest: float) -> None:
+def angle_of(firmware: Firmware, firm: Any, voltage: float, offset: float, seed: int) -> float:
+    """Return the angle [rad] that a potentiometer shows by its voltage, before it is counted."""
+    noise = firmware.noise * gaussian(seed, firm.draws) if firmware.noise > 0.0 else 0.0
+    firm.draws += 1
+    return (voltage - offset + noise) * firmware.per_volt
+
+
+def apply(firmware: Firmware, firm: Any, frames: int, latest: float) -> None:
     """Put the duties whose time has come on the bridge."""
     while firm.waiting > 0 and (firmware.t_phi + (firm.tick - firm.waiting - frames) * firmware.T_c
                                 + firmware.T_d <= latest):
@@ -61,22 +87,8 @@ def _apply(firmware: Firmware, firm: Any, frames: int, latest: float) -> None:
         firm.waiting -= 1
 
 
-def _angle(numbers: Numbers, inputs: Inputs, memory: Memory) -> float:
-    """Return what the servo measures of its output [rad], before it is counted."""
-    firmware, firm = inputs.firmware[0], of(memory)
-    if firmware.per_volt == 0.0:
-        return memory.point.y[0]
-    v = sensed_voltage(numbers.sensor, inputs.curve, memory.point.wiper) - numbers.sensor.b_o
-    if firmware.noise > 0.0:
-        v += firmware.noise * gaussian(inputs.seed, firm.draws)
-    firm.draws += 1
-    return v * firmware.per_volt
-
-
-def _sensed(numbers: Numbers, firmware: Firmware, firm: Any, y: Vector) -> Sensed:
+def sensed_by(numbers: Numbers, firm: Any, y: Vector) -> Sensed:
     """Return what the program measures besides, under the duty of now."""
-    if not control.senses(firmware):
-        return NOTHING_SENSED
     numbers = warm(numbers, y)
     V_bus, i = on_supply(duty.at_duty(numbers, firm.duty), firm.duty, y)
     cold = numbers.bridge.R_drive - numbers.source.R_b
@@ -92,20 +104,21 @@ def on_supply(numbers: Numbers, now: float, y: Vector) -> tuple[float, float]:
     return V / duty.share_of(numbers.bridge, now), i / duty.on_share_of(numbers.bridge, now)
 
 
-def listen(inputs: Inputs, memory: Memory) -> None:
-    """Take the commands that have come by now."""
-    firmware, firm = inputs.firmware[0], of(memory)
-    time = origin_of(memory) + memory.point.time
+def listen(inputs: Inputs, firm: Any, time: float) -> None:
+    """Take the commands that have come by a time since the start [s]."""
+    firmware = inputs.firmware[0]
     if firmware.goals > 0.0:
         _read_bus(inputs, firm, time)
         return
     slack = SAME * firmware.T_c
     while True:
+        edge = _edge(inputs, firm.frame)
         if firm.falls <= time + slack:
             _take_pulse(firmware, firm)
-        elif _edge(inputs, firm.frame) <= time + slack:
+        elif edge <= time + slack:
             rise(inputs, firm)
         else:
+            firm.hears = min(firm.falls, edge)
             return
 
 
@@ -119,6 +132,7 @@ def _read_bus(inputs: Inputs, firm: Any, time: float) -> None:
         firm.known -= 1
     else:
         goal = _goal(inputs, written)
+        firm.hears = _stays(inputs, written) + firmware.latency
     if goal != NOWHERE and goal != firm.written:
         firm.written, firm.heard, firm.tripped = goal, _since(inputs, written) + firmware.latency, 0
         control.aim(firmware, firm, goal)
@@ -131,6 +145,12 @@ def _goal(inputs: Inputs, time: float) -> float:
         return NOWHERE
     piece, _ = in_force(inputs.command, 0.0, time + SAME * firmware.T_c, 0.0)
     return counted(piece_value(piece, time), firmware.quantum)
+
+
+def _stays(inputs: Inputs, time: float) -> float:
+    """Return until when what is written at a time stays what it is [s]: not at all where it moves."""
+    piece, end = in_force(inputs.command, 0.0, time + SAME * inputs.firmware[0].T_c, 0.0)
+    return end if piece.slope == 0.0 and piece.amplitude == 0.0 and piece.start <= time else time
 
 
 def _since(inputs: Inputs, time: float) -> float:
@@ -153,6 +173,7 @@ def resume(inputs: Inputs, memory: Memory) -> None:
     """Find the next tick and pulse of a program that goes on, under commands that may be others than before."""
     firmware, firm = inputs.firmware[0], of(memory)
     time = origin_of(memory) + memory.point.time
+    firm.hears = -math.inf
     firm.tick = max(0, math.ceil((time - firmware.t_phi) / firmware.T_c - SAME))
     if firmware.goals > 0.0:
         return

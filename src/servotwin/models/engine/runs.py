@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import controller, motion
+from servotwin.models.engine import controller, glides, motion
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
@@ -144,6 +144,10 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
             memory = counted_anew(memory)
             until = instant(pulsed, inputs, memory, until - (origin_of(memory) - origin))
             origin = origin_of(memory)
+        if firmware.present(inputs.firmware[0]) and glides.possible(numbers, inputs):
+            memory, done = glides.go(numbers, inputs, memory, until, times, done, outputs)
+            if memory.point.time >= until or due(memory):
+                continue
         t, wiper = memory.point.time, memory.point.wiper
         after, m, _, status = step(numbers, chip, inputs, memory, m, until)
         if status != COMPLETED:

@@ -52,8 +52,8 @@ class Bridge(NamedTuple):
     off: Off  # as it is between drives
     silence: Off  # as it is while no pulses come
     V_br: float
-    pwm: float  # `duty.BRAKE` … `duty.COAST` of one that is switched many times a tick; 0: it drives or does not
-    one_way: float  # 1: the current flows in the sense of the drive alone
+    pwm: float = 0.0  # `duty.BRAKE` … `duty.COAST` of one that is switched many times a tick; 0: it drives or does not
+    one_way: float = 0.0  # 1: the current flows in the sense of the drive alone
 
 
 NO_BRIDGE = Bridge(0.0, 0.0, Off(0.0, 0.0, 0.0), Off(0.0, 0.0, 0.0), 0.0, 0.0, 0.0)

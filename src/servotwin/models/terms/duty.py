@@ -43,28 +43,30 @@ def voltage(source: Source, duty: float) -> float:
     return math.copysign(source.V, duty) if drives(duty) else 0.0
 
 
-def at_duty(numbers: Numbers, duty: float) -> Numbers:
-    """Return the numbers of a servo whose bridge has this duty, or is `OPEN` or `BRAKED`."""
-    path, motor, source = numbers.bridge, numbers.motor, numbers.source
+def at(path: Bridge, motor: Motor, source: Source, duty: float) -> tuple[Bridge, Source]:
+    """Return bridge and source as they are at a duty, or where the bridge is `OPEN` or `BRAKED`."""
     if not drives(duty):
         brakes = Off(path.V_br, motor.R, 0.0)
         off = path.off if duty == 0.0 else brakes if duty == BRAKED else path.silence
-        resting = Bridge(path.D_drive, path.R_drive, off, path.silence, path.V_br, path.pwm, 0.0)
-        return Numbers(motor, resting, source, numbers.follower, numbers.shaft, numbers.friction, numbers.load,
-                       numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+        return Bridge(path.D_drive, path.R_drive, off, path.silence, path.V_br, path.pwm, 0.0), source
     d, R_b = abs(duty), source.R_b
     V_ce0, r_c = path.D_drive - path.V_br, path.R_drive - motor.R - R_b
     one_way = 0.0 if path.pwm == BRAKE else 1.0
     if path.pwm == COAST:
-        chopped = chopped_resistance(d, motor.R, r_c)
-        bridge = Bridge(path.D_drive, chopped + R_b, path.off, path.silence, path.V_br, path.pwm, one_way)
-        own, supply = Motor(motor.K, motor.K_b, motor.R / d, motor.L), source
-    else:
-        bridge = Bridge(averaged_drop(d, V_ce0, path.V_br), averaged_resistance(d, motor.R, r_c, R_b), path.off,
-                        path.silence, path.V_br, path.pwm, one_way)
-        own, supply = motor, Source(d * source.V, d * d * R_b, source.I_max / d)
-    return Numbers(own, bridge, supply, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops,
-                   numbers.play, numbers.sensor, numbers.heat)
+        R = chopped_resistance(d, motor.R, r_c) + R_b
+        return Bridge(path.D_drive, R, path.off, path.silence, path.V_br, path.pwm, one_way), source
+    D, R = averaged_drop(d, V_ce0, path.V_br), averaged_resistance(d, motor.R, r_c, R_b)
+    return (Bridge(D, R, path.off, path.silence, path.V_br, path.pwm, one_way),
+            Source(d * source.V, d * d * R_b, source.I_max / d))
+
+
+def at_duty(numbers: Numbers, duty: float) -> Numbers:
+    """Return the numbers of a servo whose bridge has this duty, or is `OPEN` or `BRAKED`."""
+    motor = numbers.motor
+    bridge, source = at(numbers.bridge, motor, numbers.source, duty)
+    R = motor.R / on_share_of(numbers.bridge, duty)  # of the mean current, which flows for a part of the time
+    return Numbers(Motor(motor.K, motor.K_b, R, motor.L), bridge, source, numbers.follower, numbers.shaft,
+                   numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
 
 
 def share_of(bridge: Bridge, duty: float) -> float:
