@@ -116,5 +116,5 @@ def test_a_bus_voltage_that_is_imposed_is_that_of_a_stiff_supply():
 
 def test_goals_outside_are_refused_lane_by_lane():
     sims = st.VectorSimulator(digital({"proportional_gain": 6.0, "lower_goal": -1.0, "upper_goal": 1.0}), lanes=2)
-    with pytest.raises(st.errors.CommandError, match="lane 1.*the goals of test"):
+    with pytest.raises(st.errors.CommandError, match=r"lane 1.*the goals of test"):
         sims.advance(1e-3, command_angle=[0.5, 1.5])

@@ -211,6 +211,7 @@ class Firmware:
         u = (self._step(f["proportional_gain"] * z * self.unit) + self._integral(z, travel) + self._derivative(z)
              + self._step(f.get("velocity_feedforward", 0.0) * rate)
              + self._step(f.get("acceleration_feedforward", 0.0) * bend))
+        u = self._step(u)  # a sum of whole steps is one, but for rounding
         if abs(u) > WHOLE * (f.get("duty_quantum") or 0.0):
             u += math.copysign(f.get("minimum_duty", 0.0), u)
         w = clip(u, f.get("torque_limit", 1.0))

@@ -229,7 +229,7 @@ def _asked_for(firmware: Firmware, firm: Any) -> float:
         u += duty_of(firmware.k_v, firm.rate, delta)
     if firmware.k_a > 0.0:
         u += duty_of(firmware.k_a, (firm.rate - rate) / firmware.T_c, delta)
-    u = started_duty(u, firmware.minimum)
+    u = started_duty(cut(u, delta), firmware.minimum)  # a sum of whole steps is one, whatever floats make of it
     w = min(max(u, -firmware.torque_limit), firmware.torque_limit)
     firm.excess = (u - w) + (J - integral)
     return w
