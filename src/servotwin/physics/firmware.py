@@ -84,7 +84,7 @@ def filtered_angle(before: float, angle: float, filter_weight: float) -> float:
     return (1.0 - filter_weight) * before + filter_weight * angle
 
 
-def error_beyond_zone(error: float, deadband_angle: float, gate: bool) -> float:
+def error_beyond_zone(error: float, deadband_angle: float, gate: bool = False) -> float:
     """Return what a dead zone leaves of an error.
 
     Parameters

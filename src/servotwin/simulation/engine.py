@@ -39,7 +39,6 @@ from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
 from servotwin.models.terms import control, duty, firmware, frame
 from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import NO_CHIP, Chip
-from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.numbers import Numbers
@@ -222,7 +221,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
         if due(memory):
             memory = counted_anew(memory)
             end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
-        before, trip = memory, memory.firm[0].trip
+        before, trip = memory, memory.firm[0].trip if plan.digital else 0
         try:
             memory, m, event, status = step(numbers, chip, inputs, before, m, end)
         except ArithmeticError:  # numbers beyond what a float holds
@@ -254,12 +253,12 @@ def _keep(record: Record, plan: Plan, before: Memory, trip: int, memory: Memory,
         if (plan.refuses and memory.chip.number > before.chip.number
                 and not frame.accepted(plan.chip, pulse_width(plan.inputs, before))):
             record.events.append(Event(start, "pulse refused", angle))
-    if memory.firm[0].trip != trip:
+    if plan.digital and memory.firm[0].trip != trip:
         record.events.append(Event(start, _TRIPS[memory.firm[0].trip], angle))
     if now > start or not record.segments:
         drive = sign_of(memory.firm[0].duty) if plan.digital else memory.chip.drive
         record.segments.append(Segment(start, now, m, memory.chip.error, was.wiper, drive,
-                                       memory.chip.silent, origin, *told_by(plan, memory.firm[0])))
+                                       memory.chip.silent, origin, *told_by(plan, memory)))
     if record.tell is not None:
         record.tell(now)
     if event >= 0 and event not in guards.KINKS:
@@ -279,10 +278,11 @@ def sign_of(now: float) -> float:
     return math.copysign(1.0, now) if duty.drives(now) else 0.0
 
 
-def told_by(plan: Plan, firm: Firm) -> tuple[float, float, float, int]:
+def told_by(plan: Plan, memory: Memory) -> tuple[float, float, float, int]:
     """Return what shows of a program: its duty, or `OPEN`, `BRAKED`; goal and reference [rad]; its trip."""
     if not plan.digital:
         return 0.0, 0.0, 0.0, 0
+    firm = memory.firm[0]
     return firm.duty, firm.r if firm.goal == control.NOWHERE else firm.goal, firm.r, firm.trip
 
 

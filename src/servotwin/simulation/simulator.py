@@ -174,7 +174,7 @@ class Simulator:
             load = load + Constant(external_torque)
         y, chip = np.array(state.memory.point.y)[:, None], state.memory.chip
         mode = np.array(mode_of(plan.numbers, plan.chip, plan.inputs, state.memory))[:, None]
-        told = np.array(told_by(plan, state.memory.firm[0]))[:, None]
+        told = np.array(told_by(plan, state.memory))[:, None]
         drive = sign_of(state.memory.firm[0].duty) if plan.digital else chip.drive
         samples = Samples.make(np.array([state.time]), y, np.array([state.memory.point.wiper]), mode,
                                np.array([drive]), np.array([chip.error]), np.array([chip.silent]), None, told)
