@@ -18,6 +18,7 @@ from servotwin.parameters.groups import Supply
 from servotwin.simulation.lane_inputs import pick
 
 if TYPE_CHECKING:
+    from servotwin.loads import Load
     from servotwin.simulation.lane_inputs import Lanes
 
 Indices = NDArray[np.int64]
@@ -41,6 +42,14 @@ def source_of(supply: Supply) -> Source:
     """Return a supply as the engine has it."""
     V_oc, R_b, I_max = supply.open_circuit_voltage, supply.internal_resistance, supply.current_limit
     return Source(V_oc or 0.0, R_b or 0.0, math.inf if I_max is None else I_max)
+
+
+def check_rigid(what: str, model: Model, loads: Sequence[Load]) -> None:
+    """Raise InputError if a servo that shall share a supply has a spring between two bodies."""
+    elastic = "gear.stiffness" if model.servo.get("gear.stiffness") is not None else None
+    if elastic or any(load.flexibles for load in loads):
+        raise InputError(what, got=elastic or "a body behind an elastic shaft",
+                         allowed="a stiff gear and shaft: servos on one supply have no springs between two bodies")
 
 
 def on_supply(model: Model, supply: Supply) -> Model:

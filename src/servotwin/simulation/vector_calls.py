@@ -106,7 +106,7 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
         "impose": [call_of(TICKS, "impose_on_records", room.has, room.given, store.columns.numbers, which,
                            np.arange(len(which)), store.work, rows)],
         "advance": advance, "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
-        "look": [call_of(lane_runs.LOOK_ONE_BY_ONE, "one_by_one", store.columns, *store.inputs, which, rows,
+        "look": [call_of(lane_runs.looking(some.recipe), "one_by_one", store.columns, *store.inputs, which, rows,
                          room.seen)]}
     if store.numbers.torque.count[which].any():
         found["clock"] = [call_of(TICKS, "read_clocks", which, store.status, store.ended, rows, room.clock)]

@@ -66,7 +66,7 @@ class LaneNumbers:
     def __init__(self, inputs: Lanes, accuracy: float, supplies: Supplies, imposed: Imposed | None = None) -> None:
         self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
         self.accuracy, self.supplies = accuracy, supplies
-        self.available = inputs.model.available
+        self.available = inputs.model.signals_with(*inputs.loads)
         nothing = np.full(self.count, math.nan)
         self.imposed = Imposed(nothing, nothing.copy())
         commands = Commands(inputs)

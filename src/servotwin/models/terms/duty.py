@@ -51,7 +51,7 @@ def at_duty(numbers: Numbers, duty: float) -> Numbers:
         off = path.off if duty == 0.0 else brakes if duty == BRAKED else path.silence
         resting = Bridge(path.D_drive, path.R_drive, off, path.silence, path.V_br, path.pwm, 0.0)
         return Numbers(motor, resting, source, numbers.follower, numbers.shaft, numbers.friction, numbers.load,
-                       numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+                       numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
     d, R_b = abs(duty), source.R_b
     V_ce0, r_c = path.D_drive - path.V_br, path.R_drive - motor.R - R_b
     one_way = 0.0 if path.pwm == BRAKE else 1.0
@@ -64,7 +64,7 @@ def at_duty(numbers: Numbers, duty: float) -> Numbers:
                         path.silence, path.V_br, path.pwm, one_way)
         own, supply = motor, Source(d * source.V, d * d * R_b, source.I_max / d)
     return Numbers(own, bridge, supply, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops,
-                   numbers.play, numbers.sensor, numbers.heat)
+                   numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
 
 
 def share_of(bridge: Bridge, duty: float) -> float:
