@@ -9,5 +9,6 @@ from servotwin.loads.load import Load, Part, as_load
 from servotwin.loads.parts import Constant, Coulomb, Flexible, Free, Inertia, Pendulum, Recorded, Spring, Viscous
 
 __all__ = [
-    "Constant", "Coulomb", "Flexible", "Free", "Inertia", "Load", "Part", "Pendulum", "Recorded", "Spring", "Viscous", "as_load",
+    "Constant", "Coulomb", "Flexible", "Free", "Inertia", "Load", "Part", "Pendulum", "Recorded", "Spring", "Viscous",
+    "as_load",
 ]

@@ -49,8 +49,9 @@ class _Pulsed(SwitchedServo):
     """What both pulse servos share: the chip and the bridge."""
 
     optional = (
-        "gear.output_inertia", *elastic.READS, *friction.READS, *chip.READS, *bridge.READS, *sensor.READS, *source.READS,
-        *stops.READS, *heat.READS, "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset",
+        "gear.output_inertia", *elastic.READS, *friction.READS, *chip.READS, *bridge.READS, *sensor.READS,
+        *source.READS, *stops.READS, *heat.READS, "electronics.voltage_to_pulse_gain",
+        "electronics.command_pulse_offset",
     )
     signals = (
         "command_voltage", "command_angle", "pulse_width", "error_time", "drive", "armature_voltage",

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.models import Model, PulseServo, PulseServoInductive
+from servotwin.models.terms.elastic import Elastic, behind, present
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.simulation.lane_inputs import pick
 
 if TYPE_CHECKING:
-    from servotwin.loads import Load
     from servotwin.simulation.lane_inputs import Lanes
 
 Indices = NDArray[np.int64]
@@ -44,12 +44,11 @@ def source_of(supply: Supply) -> Source:
     return Source(V_oc or 0.0, R_b or 0.0, math.inf if I_max is None else I_max)
 
 
-def check_rigid(what: str, model: Model, loads: Sequence[Load]) -> None:
+def check_rigid(what: str, numbers: Elastic) -> None:
     """Raise InputError if a servo that shall share a supply has a spring between two bodies."""
-    elastic = "gear.stiffness" if model.servo.get("gear.stiffness") is not None else None
-    if elastic or any(load.flexibles for load in loads):
-        raise InputError(what, got=elastic or "a body behind an elastic shaft",
-                         allowed="a stiff gear and shaft: servos on one supply have no springs between two bodies")
+    if present(numbers):
+        raise InputError(what, got="a body behind an elastic shaft" if behind(numbers) else "gear.stiffness",
+                         allowed="a stiff gear and shaft: on a shared supply there are no springs between two bodies")
 
 
 def on_supply(model: Model, supply: Supply) -> Model:

@@ -66,8 +66,8 @@ def with_numbers(load: Load, numbers: Mapping[str, float]) -> Load:
 
 def structure(load: Load) -> tuple[object, ...]:
     """Return what two loads must share to stand in one column: their parts, and which numbers these have."""
-    bodies = (*load.pendulums, *load.flexibles)
-    return len(load.springs), len(load.pendulums), tuple(body.inertia is None for body in bodies)
+    return (len(load.springs), tuple(p.inertia is None for p in load.pendulums),
+            tuple(body.inertia is None for body in load.flexibles))
 
 
 def column_load(loads: Sequence[Load], load_of: Indices, numbers: Mapping[str, Array]) -> Load:

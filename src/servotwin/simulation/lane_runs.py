@@ -74,14 +74,17 @@ LOOK_SIDE_BY_SIDE = Recipe("look_side_by_side", ("servotwin.models.engine.sights
 LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",), absent=_APART)
 LOOK_DIGITAL = Recipe("look_digital", LOOK_ONE_BY_ONE.entries, absent=(*_NO_DIGITAL, "elastic"), present=_DIGITAL)
 DIGITAL_RUNS = Recipe("digital_runs", _ENTRIES, absent=(*_NO_DIGITAL, "elastic"), present=_DIGITAL)
-_ELASTIC = {
-    digital: {"absent": (*(_NO_DIGITAL if digital else _PROGRAM), *_NOT_SPRUNG),
-              "present": (*(_DIGITAL if digital else ()), _SPRUNG), "never": ("APART", "CREEP", "CORE")}
-    for digital in (False, True)}
-ELASTIC_RUNS = {digital: Recipe("elastic_runs" + "_digital" * digital, _ENTRIES, **own)
-                for digital, own in _ELASTIC.items()}
-LOOK_ELASTIC = {digital: Recipe("look_elastic" + "_digital" * digital, LOOK_ONE_BY_ONE.entries, **own)
-                for digital, own in _ELASTIC.items()}
+
+
+def _sprung(name: str, entries: tuple[str, ...]) -> dict[bool, Recipe]:
+    """Return the recipes of servos with a spring between two bodies, analog and digital."""
+    return {digital: Recipe(name + "_digital" * digital, entries, never=("APART", "CREEP", "CORE"), absent=(
+        *(_NO_DIGITAL if digital else _PROGRAM), *_NOT_SPRUNG), present=(*(_DIGITAL if digital else ()), _SPRUNG))
+        for digital in (False, True)}
+
+
+ELASTIC_RUNS = _sprung("elastic_runs", _ENTRIES)
+LOOK_ELASTIC = _sprung("look_elastic", LOOK_ONE_BY_ONE.entries)
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, absent=_PROGRAM)
 _SHARED = ("pieces", "edges", "accuracy", "firmware")  # by all lanes, or by all that run side by side
 _TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}

@@ -140,7 +140,8 @@ def simulate_lanes(
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     times = np.array(times_asked(duration, output_step, output_times))  # a copy: it becomes read-only
-    asked = Asked(float(duration), times, _outputs(lanes.model, lanes.loads, outputs), real_type(dtype), accuracy_of(accuracy))
+    names = _outputs(lanes.model, lanes.loads, outputs)
+    asked = Asked(float(duration), times, names, real_type(dtype), accuracy_of(accuracy))
     lanes = framed(lanes, asked.duration)
     commands = Commands(lanes)
     packs = _packs(lanes, commands, asked, chunk, workers_of(executor))
@@ -211,8 +212,8 @@ def _axis(name: str, values: ArrayLike) -> NDArray[Any]:
     return axis
 
 
-def _outputs(model: Model, loads: Sequence[Load], outputs: Sequence[str]) -> tuple[str, ...]:
-    available = model.signals_with(*loads)
+def _outputs(model: Model, bodies: Sequence[loads.Load], outputs: Sequence[str]) -> tuple[str, ...]:
+    available = model.signals_with(*bodies)
     names = (outputs,) if isinstance(outputs, str) else outputs
     try:
         asked = dict.fromkeys(names)

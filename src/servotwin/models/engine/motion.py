@@ -192,7 +192,7 @@ def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y:
     h = min(step, most)
     h = min(h, period(u, tau, t0, t0 + h) / 3.0)
     if elastic.present(numbers.elastic):
-        h = min(h, elastic.ringing_period(numbers.elastic, numbers.shaft))
+        h = min(h, elastic.longest_step(numbers.elastic, numbers.shaft))
     for _ in range(60):
         y1, error = dormand_prince.step(numbers, mode, u, tau, t0, y, h)
         size = error / (FINE * accuracy)

@@ -206,9 +206,8 @@ def observed(numbers: Numbers, curve: Sequence[Sequence[float]] | NDArray[np.flo
     else:
         shaft = torques(numbers, mode, w, w_motor, circuit.armature_current, against)
     return Observed(circuit.armature_voltage, circuit.armature_current, circuit.bus_voltage, circuit.supply_current,
-                    shaft.motor, shaft.load, q_motor, w_motor,
-                    other if elastic.behind(numbers.elastic) else q, sensed_voltage(numbers.sensor, curve, wiper), error,
-                    drive, T_w, T_h, 0.0, 0.0, 0.0, 0.0)
+                    shaft.motor, shaft.load, q_motor, w_motor, other if elastic.behind(numbers.elastic) else q,
+                    sensed_voltage(numbers.sensor, curve, wiper), error, drive, T_w, T_h, 0.0, 0.0, 0.0, 0.0)
 
 
 def told_by(path: Bridge, firm: Any, shown: Observed) -> Observed:
@@ -218,8 +217,8 @@ def told_by(path: Bridge, firm: Any, shown: Observed) -> Observed:
     return Observed(
         shown.armature_voltage, shown.armature_current / duty.on_share_of(path, firm.duty), shown.bus_voltage / share,
         shown.supply_current * share, shown.motor_torque, shown.load_torque, shown.motor_angle, shown.motor_speed,
-        shown.load_angle, shown.feedback_voltage, 0.0, bridge.direction(now), shown.winding_temperature, shown.housing_temperature, now,
-        goal, firm.r, float(firm.trip))
+        shown.load_angle, shown.feedback_voltage, 0.0, bridge.direction(now), shown.winding_temperature,
+        shown.housing_temperature, now, goal, firm.r, float(firm.trip))
 
 
 def on_bus(numbers: Numbers, V_bus: float) -> Numbers:

@@ -87,8 +87,8 @@ def damper_loss(elastic: Elastic, torque: float, twist: float, rate: float) -> f
     return (torque - twist_torque(stretch_beyond_play(twist, elastic.half), 0.0, elastic.k, 0.0)) * rate
 
 
-def ringing_period(elastic: Elastic, shaft: Shaft) -> float:
-    """Return a part of the time in which the two bodies ring, undamped [s]."""
+def longest_step(elastic: Elastic, shaft: Shaft) -> float:
+    """Return the longest step that follows the ringing of the two bodies [s]: a third of its period, undamped."""
     first = shaft.J if elastic.J > 0.0 else shaft.J - shaft.J_out
     second = elastic.J if elastic.J > 0.0 else shaft.J_out
     return 2.0 * math.pi / (_PART * math.sqrt(elastic.k / first + elastic.k / second))
