@@ -16,7 +16,6 @@ from models.elastic_servos import (
     SMOOTH,
     STEP,
     STIFF,
-    STOPS,
     N,
     bodies,
     referred,
@@ -82,16 +81,16 @@ def test_a_braked_linear_pair_moves_by_the_modes_of_its_matrix(name):
 
 @pytest.mark.parametrize("kind", [st.PulseServo, st.DigitalServo])
 def test_a_stiffer_gear_comes_nearer_to_a_rigid_one_at_first_order(kind):
-    load = st.loads.Inertia(2e-3) + st.loads.Constant(0.1)
+    load = st.loads.Inertia(2e-3)  # without friction: what sticks while the gear rings depends on its phase
 
     def angle(changes):
-        model = kind(servo(DIGITAL | {"electronics.stretcher_gain": 1e4} | changes))
+        model = kind(servo(DIGITAL | SMOOTH | {"electronics.stretcher_gain": 1e4} | changes))
         return st.simulate(model, STEP, duration=0.1, load=load, output_times=[0.1])["output_angle"][0]
 
     rigid = angle(STIFF)
     off = [abs(angle({"gear.stiffness": k, "gear.damping": 0.5}) - rigid) for k in (2e3, 4e3, 8e3)]
-    assert off[0] / off[1] == pytest.approx(2.0, abs=0.15)
-    assert off[1] / off[2] == pytest.approx(2.0, abs=0.15)
+    assert off[0] / off[1] == pytest.approx(2.0, abs=0.02)
+    assert off[1] / off[2] == pytest.approx(2.0, abs=0.02)
 
 
 def test_an_output_rings_on_a_motor_that_stands():
@@ -122,7 +121,7 @@ def test_an_arm_on_a_shaft_that_is_held_rings_at_16_hertz():
 
 
 @pytest.mark.parametrize(("name", "kind", "more"), [
-    ("play, much damping", st.PulseServo, STOPS | {"stops.upper_angle": 0.6}),
+    ("stops", st.PulseServo, {"gear.backlash": 0.02, "gear.damping": 0.3}),
     ("pendulum", st.PulseServo, {"friction.breakaway_ratio": 1.5, "friction.stribeck_speed": 20.0}),
     ("play", st.PulseServoInductive, {"motor.armature_inductance": 1e-3}),
     ("load that sticks", st.PulseServo, {"thermal.winding_capacity": 5.0, "thermal.housing_capacity": 20.0,

@@ -26,7 +26,10 @@ _OF_LOAD = {
     "load.coulomb_torque": "torque", "load.pendulum.mass": "mass", "load.pendulum.length": "length",
     "load.pendulum.inertia": "inertia", "load.pendulum.hanging_angle": "angle",
     "load.pendulum.gravity": "acceleration", "load.spring.stiffness": "torque per angle",
-    "load.spring.rest_angle": "angle",
+    "load.spring.rest_angle": "angle", "load.flexible.stiffness": "torque per angle",
+    "load.flexible.inertia": "inertia", "load.flexible.damping": "torque per speed",
+    "load.flexible.viscous_friction": "torque per speed", "load.flexible.mass": "mass",
+    "load.flexible.length": "length", "load.flexible.hanging_angle": "angle", "load.flexible.gravity": "acceleration",
 }
 
 
