@@ -60,6 +60,35 @@ CASES = {
 }
 
 
+def random_case(seed: int) -> Case:
+    """Return a servo and a load with some of everything, the same for the same seed."""
+    rng = np.random.default_rng(seed)
+    changes: dict[str, Any] = {}
+    load = Inertia(10.0 ** rng.uniform(-3.5, -2.0)) + Coulomb(rng.choice([0.0, rng.uniform(0.0, 0.15)]))
+    load += Constant(rng.choice([0.0, rng.uniform(-0.3, 0.3)]))
+    if rng.random() < 0.3:
+        load += st.loads.Pendulum(mass=0.1, length=rng.uniform(0.05, 0.2), hanging_angle=rng.uniform(-2.0, 2.0))
+    if rng.random() < 0.3:
+        load += st.loads.Spring(rng.uniform(0.1, 1.0), rng.uniform(-0.3, 0.3))
+    damping = rng.choice([0.0, 10.0 ** rng.uniform(-3.0, 0.0)])
+    if rng.random() < 0.35:
+        changes |= STIFF
+        load += Flexible(stiffness=10.0 ** rng.uniform(1.0, 2.5), inertia=10.0 ** rng.uniform(-3.0, -1.7),
+                         damping=damping, viscous_friction=rng.choice([0.0, 1e-3]), mass=rng.choice([0.0, 0.1]),
+                         length=0.1)
+    else:
+        changes |= {"gear.stiffness": 10.0 ** rng.uniform(1.3, 2.7), "gear.damping": damping,
+                    "gear.backlash": rng.choice([0.0, rng.uniform(2e-3, 0.06)])}
+    changes["supply.bridge_drop_voltage"] = rng.choice([0.0, 0.4])
+    if rng.random() < 0.5:
+        changes["friction.breakaway_ratio"] = rng.uniform(1.0, 2.0)
+    else:
+        changes["friction.load_friction"] = rng.uniform(0.05, 0.5)
+    against = rng.random() < 0.5
+    changes |= STOPS | {"stops.restitution": rng.choice([0.0, rng.uniform(0.0, 0.9)])} if against else {}
+    return Case(changes, load, AGAINST_STOP if against else STEP)
+
+
 def servo(changes: dict[str, Any]) -> st.Servo:
     """Return the servo of VALUES with some numbers changed."""
     return st.servo_from_values("elastic", VALUES).replace(changes)

@@ -18,6 +18,7 @@ from models.elastic_servos import (
     STIFF,
     N,
     bodies,
+    random_case,
     referred,
     servo,
 )
@@ -50,6 +51,15 @@ def test_both_bodies_move_as_the_reference_says(name):
     q = found.states[:, 0 if result.load.flexibles else 2][TIMES == 0.48]
     width = result["pulse_width"][-1]
     assert result["error_time"][-1] == pytest.approx(float(width - 1.3e-3 * (0.44 * q + 0.5)[0]), abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_mixture_of_everything_moves_as_the_reference_says(seed):
+    case = random_case(seed)
+    result = st.simulate(st.PulseServo(servo(case.changes)), case.command, duration=0.3, load=case.load,
+                         output_times=TIMES[:151], accuracy=1e-11).raise_if_failed()
+    assert np.abs(bodies(result) - referred(result).states[:, [0, 2]]).max() < 1e-8
+    assert abs(result.energy.residual) < 1e-9
 
 
 LINEAR = {

@@ -128,16 +128,19 @@ class _Run:
 
     def decide(self, y: Array, before: Ways | None, freed: tuple[int, int] = (0, 0)) -> Ways:
         p = self.p
-        x = self.volts(y)
-        current = (1 if x > p.drop else -1 if x < -p.drop else 0) if self.drive else 0
-        push = 2 if p.play else 0
+        push, current = 2 if p.play else 0, self.flows(y)
         if before is not None:
-            push = before.push
+            push, current = before.push, before.current
         ways = Ways(1, 1, push, current)
         one, two, _ = self.nets(y, ways)
         forward, backward, dry = self.budgets(y, ways, static=True)
         return Ways(self.way(float(y[0]), float(y[1]), one, forward, backward, freed[0], stops=not p.at_gear),
                     self.way(float(y[2]), float(y[3]), two, dry, dry, freed[1], stops=p.at_gear), push, current)
+
+    def flows(self, y: Array) -> int:
+        """Return the sign of the current; without a drop it is one law either way."""
+        x, drop = self.volts(y), self.p.drop
+        return 0 if not self.drive else 1 if x > drop or drop == 0.0 else -1 if x < -drop else 0
 
     def way(self, q: float, w: float, net: float, forward: float, backward: float, freed: int, *, stops: bool) -> int:
         if w != 0.0:
@@ -174,7 +177,7 @@ class _Run:
             for side in (1, -1):
                 found.append((f"meets {side}", lambda y, side=side: max(
                     0.5 * p.play - side * float(y[0] - y[2]), -side * self.between(y, side))))
-        if self.drive:
+        if self.drive and p.drop:
             if ways.current:
                 found.append(("current", lambda y: ways.current * self.volts(y) - p.drop))
             else:
@@ -202,15 +205,15 @@ def solve(pair: Pair, schedule: Sequence[tuple[float, int]], start: Sequence[flo
     """Return the states at increasing times, under drives that begin at the times of the schedule."""
     y, found, events = np.array(start, dtype=float), np.zeros((len(times), 4)), []
     bounds = [*(t for t, _ in schedule[1:]), float(times[-1])]
-    ways: Ways | None = None
+    before: Ways | None = None
     found[times <= schedule[0][0]] = y
     for (t, drive), end in zip(schedule, bounds, strict=True):
         run, now, freed = _Run(pair, drive), t, (0, 0)
+        before = before and before._replace(current=run.flows(y))
         while now < end:
-            ways = run.decide(y, ways, freed)
+            ways = run.decide(y, before, freed)
             now, y, freed = _leg(run, ways, now, end, y, times, found, events)
-            if now < end and events[-1][1] in _PUSHES:
-                ways = ways._replace(push=_PUSHES[events[-1][1]])
+            before = ways if now >= end else _after(run, ways, events[-1][1], y)
     return Trace(found, events)
 
 
@@ -241,6 +244,15 @@ def _leg(run: _Run, ways: Ways, start: float, end: float, y: Array, times: Array
             events.append((first, kind))
             return first, *_happen(run, kind, np.array(dense(first)))
     return end, solver.y, (0, 0)
+
+
+def _after(run: _Run, ways: Ways, kind: str, y: Array) -> Ways:
+    """Return the ways with what an event says of spring and current."""
+    if kind in _PUSHES:
+        return ways._replace(push=_PUSHES[kind])
+    if kind == "current":
+        return ways._replace(current=0 if ways.current else 1 if run.volts(y) > 0.0 else -1)
+    return ways._replace(current=run.flows(y)) if kind in ("upper", "lower") else ways
 
 
 def _happen(run: _Run, kind: str, y: Array) -> tuple[Array, tuple[int, int]]:

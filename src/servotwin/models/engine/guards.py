@@ -56,10 +56,9 @@ EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper st
 
 def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
     """Return the mode of a state in a zone; `smooth` keeps a smoothed friction in one piece."""
-    numbers = warm(numbers, y)
     if elastic.present(numbers.elastic):
-        return twist.settled(numbers, zone, u, tau, y, mesh)
-    return contacts.settled(numbers, zone, u, tau, y, mesh, smooth)
+        return twist.settled(warm(numbers, y), zone, u, tau, y, mesh)
+    return contacts.settled(warm(numbers, y), zone, u, tau, y, mesh, smooth)
 
 
 def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:

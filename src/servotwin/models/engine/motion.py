@@ -96,8 +96,8 @@ def is_step(motion: Motion) -> bool:
 def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
           limit: float, accuracy: float) -> Motion:
     """Return the motion from y at t0 [s]: exact, or one step of at most `limit` [s] that is accurate enough [rad]."""
-    apart = mode.mesh == INSIDE or elastic.present(numbers.elastic)
-    still = at_rest(mode.contact) and (not apart or at_rest(mode.motor))
+    still = at_rest(mode.contact) and (
+        (mode.mesh != INSIDE and not elastic.present(numbers.elastic)) or at_rest(mode.motor))
     on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
     if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
         return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)

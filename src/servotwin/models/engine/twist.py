@@ -149,8 +149,12 @@ def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: 
 
 def accelerations(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:
     """Return ẇ [rad/s²] of the output, and of the motor or of what hangs behind an elastic shaft."""
-    if not elastic.present(numbers.elastic):
-        return contacts.accelerations(numbers, mode, u, tau, y)
+    if elastic.present(numbers.elastic):
+        return _of_two(numbers, mode, u, tau, y)
+    return contacts.accelerations(numbers, mode, u, tau, y)
+
+
+def _of_two(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:
     driving, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y[0])
     between = torque(numbers, mode.mesh, y)
     if elastic.behind(numbers.elastic):
