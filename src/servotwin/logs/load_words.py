@@ -20,8 +20,8 @@ def load_from_words(content: object) -> Load:
     Parameters
     ----------
     content : mapping
-        `inertia`, `viscous_friction`, `torque`, `coulomb_torque` and the parts `pendulum`, `spring`, `recorded`, `flexible`;
-        each part a mapping of its fields, or a list of such.
+        `inertia`, `viscous_friction`, `torque`, `coulomb_torque` and the parts `pendulum`, `spring`, `recorded`,
+        `flexible`; each part a mapping of its fields, or a list of such.
 
     Raises
     ------
