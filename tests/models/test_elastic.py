@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,12 +17,15 @@ from models.elastic_servos import (
     SMOOTH,
     STEP,
     STIFF,
+    Coulomb,
+    Flexible,
     N,
     bodies,
     random_case,
     referred,
     servo,
 )
+from servotwin.logs import Log
 
 DURATION = 0.5
 TIMES = np.linspace(0.0, DURATION, 251)  # every edge of a frame among them
@@ -184,6 +188,19 @@ def test_lanes_and_ticks_move_as_one_servo_does(name, kind):
         ticks.advance(0.01, command_angle=math.radians(40.0))
     for signal in ("output_angle", "motor_speed", *signals[-3:]):
         assert ticks[signal][1] == pytest.approx(result[signal][-1], abs=1e-9 * (1.0 + abs(result[signal][-1])))
+
+
+def test_a_measured_angle_of_the_load_is_compared():
+    case, both = CASES["arm"], ("output_angle", "load_angle")
+    result = run("arm", times=np.linspace(0.0, DURATION, 101))
+    log = Log(name="arm", time=result.time, command=result["pulse_width"], command_kind="pulse_width", load=case.load,
+              measured={name: result[name] for name in both})
+    softer = Flexible(stiffness=70.0, inertia=0.01, damping=0.01) + Coulomb(0.02)
+    same, other = (st.validate([one], servo(case.changes), sensors=both).noise
+                   for one in (log, replace(log, load=softer)))
+    assert same.keys() == set(both)
+    assert max(same.values()) < 1e-8
+    assert other["load_angle"] > 1e-4
 
 
 def test_what_is_imposed_keeps_the_twist():
