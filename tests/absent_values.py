@@ -20,6 +20,7 @@ ABSENT = {
     "potentiometer.quantisation": 2e-3, "supply.current_limit": 1.0, "thermal.winding_capacity": 0.2,
     "thermal.housing_capacity": 5.0, "thermal.winding_to_housing": 10.0, "thermal.housing_to_ambient": 20.0,
     "thermal.ambient": 300.0, "thermal.magnet_coefficient": 1e-3, "motor.armature_inductance": 5e-4,
+    "gear.stiffness": 60.0, "gear.damping": 0.03,
 }
 TABLES = ("potentiometer.linearity_angle", "potentiometer.linearity_error")
 HEAT = [f"thermal.{name}" for name in ("winding_capacity", "housing_capacity", "winding_to_housing",

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 import servotwin
 from servotwin import loads
 from servotwin.errors import InputError, LoadError
-from servotwin.loads import Constant, Coulomb, Free, Inertia, Load, Pendulum, Recorded, Spring, Viscous
+from servotwin.loads import Constant, Coulomb, Flexible, Free, Inertia, Load, Pendulum, Recorded, Spring, Viscous
+from servotwin.logs.load_words import load_from_words, words_of_load
 
 sizes = st.one_of(st.just(0.0), st.floats(1e-6, 10.0))
 angles = st.floats(-7.0, 7.0)
@@ -262,6 +263,25 @@ def test_a_record_does_not_follow_its_arrays():
     record = Recorded(t, y)
     y[:] = 7.0
     assert record.torque == (0.0, 1.0)
+
+
+def test_a_body_behind_a_spring_is_not_on_the_shaft():
+    load = Inertia(1e-3) + Flexible(stiffness=50.0, mass=0.1, length=0.2, damping=0.1)
+    assert load.total_inertia == 1e-3
+    assert load.flexible.moment_of_inertia == pytest.approx(4e-3)
+    assert load.flexible.gravity_torque == pytest.approx(0.1 * 9.80665 * 0.2)
+    assert load_from_words(words_of_load(load)) == load
+    refused(lambda: load + Flexible(stiffness=1.0, inertia=1.0), "at most one")
+    refused(lambda: Inertia(1.0).as_load().flexible, "exactly one")
+
+
+@pytest.mark.parametrize(("words", "what"), [
+    ({"stiffness": 0.0, "inertia": 1.0}, "Flexible(stiffness)"), ({"stiffness": -1.0, "inertia": 1.0}, "positive"),
+    ({"stiffness": 1.0}, "Flexible(inertia)"), ({"stiffness": 1.0, "inertia": 0.0}, "Flexible(inertia)"),
+    ({"stiffness": 1.0, "inertia": 1.0, "damping": -1.0}, "Flexible(damping)"),
+    ({"stiffness": math.nan, "inertia": 1.0}, "Flexible(stiffness)")])
+def test_a_body_behind_a_spring_is_checked(words, what):
+    refused(lambda: Flexible(**words), what)
 
 
 @pytest.mark.parametrize("thing", [3.0, "inertia", [Inertia(1.0)], Inertia, {}, servotwin])

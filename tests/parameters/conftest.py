@@ -16,7 +16,8 @@ _OTHER_LAW = ("load_friction", "load_friction_stribeck")
 
 MASSES = {"winding_capacity": 2.0, "housing_capacity": 30.0, "winding_to_housing": 8.0, "housing_to_ambient": 16.0}
 FIRMWARE_ALONE = ("compute_delay", "derivative_ticks", "whole_counts", "integral_at_rest", "signal_loss")
-COMPANIONS = {"friction.stribeck_exponent": {"stribeck_speed": 10.0}, "thermal.magnet_coefficient": MASSES,
+COMPANIONS = {"friction.stribeck_exponent": {"stribeck_speed": 10.0}, "gear.damping": {"stiffness": 50.0},
+              "thermal.magnet_coefficient": MASSES,
               **{f"thermal.{name}": {key: MASSES[key] for key in MASSES if key != name} for name in MASSES}}
 
 
@@ -36,6 +37,8 @@ def group_values(draw, kind):
                 del values[low]
     if "stribeck_speed" not in values:
         values.pop("stribeck_exponent", None)
+    if kind is GROUPS["gear"] and "stiffness" not in values:
+        values.pop("damping", None)
     if any(name in values for name in _OTHER_LAW):
         values = {k: v for k, v in values.items() if not k.startswith("load_friction") or k in _OTHER_LAW}
     if kind is GROUPS["thermal"]:

@@ -18,7 +18,7 @@ from .conftest import COMPANIONS, MASSES
 NAMES = {
     "motor": "armature_resistance armature_inductance torque_constant back_emf_constant rotor_inertia "
              "motor_viscous_friction brush_drop_voltage",
-    "gear": "gear_reduction backlash output_inertia",
+    "gear": "gear_reduction backlash output_inertia stiffness damping",
     "friction": "coulomb_torque_forward coulomb_torque_backward zero_crossing_slope breakaway_ratio stribeck_speed "
                 "stribeck_exponent load_friction load_friction_stribeck load_friction_motor load_friction_external "
                 "load_friction_motor_stribeck load_friction_external_stribeck load_friction_motor_quad "
@@ -152,6 +152,7 @@ def test_off_state_refuses(word):
     ("electronics", {"pulse_width_min": 2e-3, "pulse_width_max": 1e-3}, "electronics.pulse_width_max"),
     ("supply", {"open_circuit_voltage": 6.0, "bridge_drop_voltage": 6.0}, "supply.open_circuit_voltage"),
     ("friction", {"stribeck_exponent": 2.0}, "friction.stribeck_speed"),
+    ("gear", {"damping": 0.1}, "gear.stiffness"),
     ("thermal", {"winding_capacity": 2.0}, "thermal.housing_to_ambient"),
     ("thermal", {name: MASSES[name] for name in list(MASSES)[1:]}, "thermal.winding_capacity"),
     ("thermal", {"magnet_coefficient": -0.001}, "thermal.winding_capacity"),

@@ -167,8 +167,11 @@ def test_the_spread_of_the_file(model):
 
 def test_every_number_of_a_load_can_be_varied(model):
     load = st.loads.Inertia(1e-3) + st.loads.Pendulum(mass=0.1, length=0.2) + st.loads.Spring(0.3, 0.1)
+    load += st.loads.Flexible(stiffness=20.0, mass=0.1, length=0.1)
     found = {name: parameter(name, model, load) for name in LOAD_NAMES}
     assert found["load.pendulum.inertia"].nominal == pytest.approx(0.1 * 0.2**2)
+    assert found["load.flexible.inertia"].nominal == pytest.approx(0.1 * 0.1**2)
+    assert found["load.flexible.stiffness"].lower > 0.0
     assert found["load.spring.rest_angle"].lower == -math.inf
     assert found["load.inertia"].lower == 0.0
     assert {dimension_of(name) for name in LOAD_NAMES} <= set(st.units.DIMENSIONS)

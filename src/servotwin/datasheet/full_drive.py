@@ -21,6 +21,7 @@ from servotwin.models.engine.memory import started
 from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Mode, Vector
 from servotwin.models.terms import bridge as bridge_term
 from servotwin.models.terms import duty, source
+from servotwin.models.terms.elastic import NO_ELASTIC
 from servotwin.models.terms.heat import NO_HEAT
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import NO_PLAY
@@ -105,7 +106,7 @@ class FullDrive:
             packed = duty.at_duty(packed, self._duty)
         return packed._replace(
             motor=packed.motor._replace(L=0.0), follower=packed.follower._replace(half_deadband=0.0), stops=NO_STOPS,
-            play=NO_PLAY, sensor=NO_SENSOR, heat=NO_HEAT)
+            play=NO_PLAY, sensor=NO_SENSOR, heat=NO_HEAT, elastic=NO_ELASTIC)
 
     @cached_property
     def _duty(self) -> float:

@@ -6,8 +6,9 @@ A positive external torque pushes the shaft towards −q (docs/theory).
 """
 
 from servotwin.loads.load import Load, Part, as_load
-from servotwin.loads.parts import Constant, Coulomb, Free, Inertia, Pendulum, Recorded, Spring, Viscous
+from servotwin.loads.parts import Constant, Coulomb, Flexible, Free, Inertia, Pendulum, Recorded, Spring, Viscous
 
 __all__ = [
-    "Constant", "Coulomb", "Free", "Inertia", "Load", "Part", "Pendulum", "Recorded", "Spring", "Viscous", "as_load",
+    "Constant", "Coulomb", "Flexible", "Free", "Inertia", "Load", "Part", "Pendulum", "Recorded", "Spring", "Viscous",
+    "as_load",
 ]

@@ -18,7 +18,7 @@ from servotwin.units import is_finite
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from servotwin.loads.parts import Pendulum, Recorded, Spring
+    from servotwin.loads.parts import Flexible, Pendulum, Recorded, Spring
 
 
 class Part(ABC):
@@ -53,6 +53,8 @@ class Load:
     springs : tuple of Spring
     pendulums : tuple of Pendulum
     recorded : tuple of Recorded
+    flexibles : tuple of Flexible
+        At most one: a body behind a spring on the shaft, which is none of the above.
 
     Examples
     --------
@@ -71,6 +73,7 @@ class Load:
     springs: tuple[Spring, ...] = ()
     pendulums: tuple[Pendulum, ...] = ()
     recorded: tuple[Recorded, ...] = ()
+    flexibles: tuple[Flexible, ...] = ()
 
     def __post_init__(self) -> None:
         for name in self.not_negative:
@@ -79,6 +82,8 @@ class Load:
                 raise LoadError(f"load.{name}", got=value, allowed="a finite number of at least 0")
         if not is_finite(self.torque):
             raise LoadError("load.torque", got=self.torque, allowed="a finite number [N m]")
+        if len(self.flexibles) > 1:
+            raise LoadError("load.flexible", got=f"{len(self.flexibles)} bodies behind springs", allowed="at most one")
         first, last = self.time_span
         if not first < last:
             raise LoadError("recorded torques", got="recordings that do not overlap", allowed="a common time span")
@@ -93,6 +98,7 @@ class Load:
             springs=tuple(sorted(self.springs + more.springs, key=repr)),
             pendulums=tuple(sorted(self.pendulums + more.pendulums, key=repr)),
             recorded=tuple(sorted(self.recorded + more.recorded, key=repr)),
+            flexibles=self.flexibles + more.flexibles,
         )
 
     @property
@@ -109,9 +115,16 @@ class Load:
             raise LoadError("load.pendulum", got=f"{len(self.pendulums)} pendulums", allowed="exactly one")
         return self.pendulums[0]
 
+    @property
+    def flexible(self) -> Flexible:
+        """The body behind a spring, where the load has one."""
+        if not self.flexibles:
+            raise LoadError("load.flexible", got="no body behind a spring", allowed="exactly one")
+        return self.flexibles[0]
+
     @cached_property
     def total_inertia(self) -> float:
-        """Moment of inertia of all parts, pendulums included [kg m²]."""
+        """Moment of inertia of all that turns with the shaft, pendulums included [kg m²]."""
         return self.inertia + sum(p.moment_of_inertia for p in self.pendulums)
 
     @cached_property

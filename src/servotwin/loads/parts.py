@@ -21,6 +21,7 @@ class _Numbers(Part):
     """A part that is given by numbers: all finite, kept as floats, and summed by name unless it says otherwise."""
 
     not_negative: ClassVar[tuple[str, ...]] = ()
+    positive: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
         for f in fields(self):  # type: ignore[arg-type]
@@ -32,6 +33,8 @@ class _Numbers(Part):
             object.__setattr__(self, f.name, float(value))  # a float32 would lower the precision of all that it meets
             if f.name in self.not_negative and not value >= 0.0:
                 raise LoadError(f"{type(self).__name__}({f.name})", got=value, allowed="a number of at least 0")
+            if f.name in self.positive and not value > 0.0:
+                raise LoadError(f"{type(self).__name__}({f.name})", got=value, allowed="a positive number")
 
     def as_load(self) -> Load:
         """Return this part alone, in normal form."""
@@ -178,6 +181,76 @@ class Pendulum(_Numbers):
     def gravity_torque(self) -> float:
         """Amplitude m g l [N m]."""
         return self.mass * self.gravity * self.length
+
+
+@dataclass(frozen=True)
+class Flexible(_Numbers):
+    """A body behind a spring on the shaft, such as a long arm: torque k (q − q_l) + c (q̇ − q̇_l) against the shaft.
+
+    What else the load has turns with the shaft. At the start the spring is not twisted.
+
+    Parameters
+    ----------
+    stiffness : float
+        k, positive [N m/rad].
+    inertia : float, optional
+        Moment of inertia of the body about the shaft, positive [kg m²]; m l² unless given.
+    damping : float
+        c, at least 0 [N m s/rad].
+    viscous_friction : float
+        Of the body's own motion, at least 0 [N m s/rad].
+    mass : float
+        m, whose weight pulls at the body as at a pendulum, at least 0 [kg].
+    length : float
+        Distance l of the centre of mass from the shaft, at least 0 [m].
+    hanging_angle : float
+        Angle q_l at which it hangs straight down [rad].
+    gravity : float
+        g [m/s²].
+
+    Examples
+    --------
+    >>> arm = Flexible(stiffness=100.0, inertia=0.01)
+    >>> round(arm.held_frequency, 3)
+    15.915
+    """
+
+    not_negative: ClassVar[tuple[str, ...]] = ("damping", "viscous_friction", "mass", "length", "gravity")
+    positive: ClassVar[tuple[str, ...]] = ("stiffness", "inertia")
+
+    stiffness: float
+    inertia: float | None = None
+    damping: float = 0.0
+    viscous_friction: float = 0.0
+    mass: float = 0.0
+    length: float = 0.0
+    hanging_angle: float = 0.0
+    gravity: float = STANDARD_GRAVITY
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.moment_of_inertia > 0.0:
+            raise LoadError("Flexible(inertia)", got=self.moment_of_inertia,
+                            allowed="a positive number, or mass and length that make one")
+
+    def as_load(self) -> Load:
+        """Return this part alone, in normal form."""
+        return Load(flexibles=(self,))
+
+    @property
+    def moment_of_inertia(self) -> float:
+        """About the shaft [kg m²]."""
+        return self.mass * self.length**2 if self.inertia is None else self.inertia
+
+    @property
+    def gravity_torque(self) -> float:
+        """Amplitude m g l [N m]."""
+        return self.mass * self.gravity * self.length
+
+    @property
+    def held_frequency(self) -> float:
+        """Frequency at which it would ring, undamped, on a shaft that is held [Hz]."""
+        return float(np.sqrt(self.stiffness / self.moment_of_inertia) / (2.0 * np.pi))
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 TIME, SWITCH = "time", "torque_on"
 # column -> (kind of command, SI unit); where a file has several, the first of these counts
 COMMANDS = {"pulse_width": "pulse_width", "command_angle": "angle", "command_voltage": "voltage"}
-UNITS = {**{name: output.unit for name, output in SIGNALS.items()}, "load_angle": "rad"}
+UNITS = {name: output.unit for name, output in SIGNALS.items()}
 """SI unit of each signal that a log may hold; one behind the shaft may be measured before a model has it."""
 NAMES = (TIME, *COMMANDS, SWITCH, *(name for name in UNITS if name not in COMMANDS))
 _OF_SI = {"s": "time", "V": "voltage", "A": "current", "rad": "angle", "rad/s": "speed", "N m": "torque",

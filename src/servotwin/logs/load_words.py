@@ -7,10 +7,10 @@ from dataclasses import MISSING, fields
 from typing import Any
 
 from servotwin.errors import LoadError, UnknownNameError
-from servotwin.loads import Load, Pendulum, Recorded, Spring
+from servotwin.loads import Flexible, Load, Pendulum, Recorded, Spring
 
 _PARTS: dict[str, tuple[str, Any]] = {"pendulum": ("pendulums", Pendulum), "spring": ("springs", Spring),
-                                      "recorded": ("recorded", Recorded)}
+                                      "recorded": ("recorded", Recorded), "flexible": ("flexibles", Flexible)}
 _NUMBERS = ("inertia", "viscous_friction", "torque", "coulomb_torque")
 
 
@@ -20,8 +20,8 @@ def load_from_words(content: object) -> Load:
     Parameters
     ----------
     content : mapping
-        `inertia`, `viscous_friction`, `torque`, `coulomb_torque` and the parts `pendulum`, `spring`, `recorded`; each
-        part a mapping of its fields, or a list of such.
+        `inertia`, `viscous_friction`, `torque`, `coulomb_torque` and the parts `pendulum`, `spring`, `recorded`,
+        `flexible`; each part a mapping of its fields, or a list of such.
 
     Raises
     ------

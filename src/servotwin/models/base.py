@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, final
 import numpy as np
 
 from servotwin import physics
-from servotwin.errors import CommandError, InputError, MissingParameterError, UnknownNameError
+from servotwin.errors import CommandError, InputError, LoadError, MissingParameterError, UnknownNameError
 from servotwin.models import outputs
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.models.terms import load as load_term
@@ -65,6 +65,9 @@ class Model(ABC):
     """Signal names of all states that the class can have, angle and speed first."""
     signals: ClassVar[tuple[str, ...]]
     """Names of all output signals that the class can have, `time` apart."""
+
+    bears_flexible: ClassVar[bool] = False
+    """Whether the class follows a body behind an elastic shaft."""
 
     _packed: tuple[Load, Numbers] | None = None
 
@@ -137,7 +140,16 @@ class Model(ABC):
         return load.total_inertia + own
 
     def body(self, load: Load, reduction: float, inductance: float = 0.0) -> Numbers:
-        """Return motor, shaft and load at the output shaft; all else is absent."""
+        """Return motor, shaft and load at the output shaft; all else is absent.
+
+        Raises
+        ------
+        LoadError
+            If the load has a body behind an elastic shaft, and the model follows none.
+        """
+        if load.flexibles and not self.bears_flexible:
+            raise LoadError(f"load.flexible of {type(self).__name__}", got="a body behind an elastic shaft",
+                            allowed="PulseServo, PulseServoInductive or DigitalServo, which follow two bodies")
         return Numbers(motor=motor.pack(self, reduction, inductance), load=load_term.pack(load),
                        shaft=shaft.pack(self, load, self.load_inertia(load), reduction))
 
@@ -151,6 +163,12 @@ class Model(ABC):
         if gain in self.optional and self.servo.get(gain) is None:
             return tuple(name for name in self.signals if name != "command_voltage")
         return self.signals
+
+    @final
+    def signals_with(self, *loads: Load) -> tuple[str, ...]:
+        """Return names of the output signals under some loads: `load_angle` too where one is behind a spring."""
+        more = ("load_angle",) if any(load.flexibles for load in loads) else ()
+        return (*self.available, *more)
 
     @property
     def states(self) -> tuple[Place, ...]:
@@ -194,8 +212,9 @@ class Model(ABC):
         """
         if name == "time":
             return samples.time
-        if name not in self.available:
-            raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *self.available))
+        names = self.signals_with(load)
+        if name not in names:
+            raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *names))
         return outputs.SIGNALS[name].compute(self, samples, drive, load)
 
     def firmware(self, signal: Signal | None = None) -> Firmware | None:

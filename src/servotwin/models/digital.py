@@ -10,7 +10,7 @@ import numpy as np
 from servotwin.errors import CommandError, MissingParameterError
 from servotwin.models.base import check_goals, check_travel, clipped
 from servotwin.models.switched import HIDDEN, MOTOR, SHAFT, SwitchedServo
-from servotwin.models.terms import duty, firmware, friction, heat, play, sensor, source, stops
+from servotwin.models.terms import duty, elastic, firmware, friction, heat, play, sensor, source, stops
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import Numbers
 
@@ -50,7 +50,7 @@ class DigitalServo(SwitchedServo):
 
     requires = (*MOTOR, "firmware.control_period", "firmware.proportional_gain")
     optional = (
-        "gear.output_inertia", *play.READS, *friction.READS, *duty.READS, *firmware.READS, *sensor.READS,
+        "gear.output_inertia", *elastic.READS, *friction.READS, *duty.READS, *firmware.READS, *sensor.READS,
         *source.READS, *stops.READS, *heat.READS, *_PULSES, "potentiometer.noise", "electronics.one_shot_offset",
         "electronics.deadband", "electronics.frame_period", "electronics.pulse_width_min",
         "electronics.pulse_width_max", "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset",
@@ -81,7 +81,7 @@ class DigitalServo(SwitchedServo):
         return self.body(load, N)._replace(
             bridge=duty.pack(self), source=source.pack(self), friction=friction.pack(self, N),
             play=play.pack(self, self.load_inertia(load)), stops=stops.pack(self), sensor=self._sensor(),
-            heat=heat.pack(self))
+            heat=heat.pack(self), elastic=elastic.pack(self, load, self.load_inertia(load)))
 
     def _sensor(self) -> sensor.Sensor:
         return sensor.NO_SENSOR if self.servo.get("potentiometer.feedback_gain") is None else sensor.pack_pulsed(self)

@@ -28,10 +28,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_electrical, _armature_current, _torques, _on_bus, _off_now, _at_temperature, _at_duty, _share_of, _on_share_of = (
+_electrical, _armature_current, _torques, _torques_of_two, _on_bus, _off_now, _at_temperature = (
     array_form(law, __name__) for law in (
-        observe.electrical, observe.armature_current, observe.torques, observe.on_bus, off_now, at_temperature,
-        duty.at_duty, duty.share_of, duty.on_share_of))
+        observe.electrical, observe.armature_current, observe.torques, observe.torques_of_two, observe.on_bus, off_now,
+        at_temperature))
+_at_duty, _share_of, _on_share_of = (
+    array_form(law, __name__) for law in (duty.at_duty, duty.share_of, duty.on_share_of))
 
 
 class Shown(Protocol):
@@ -97,8 +99,18 @@ def _circuit(plant: Numbers, samples: Samples, drive: Pieces) -> tuple[Numbers, 
     shared = getattr(samples, "bus", None)
     if shared is not None:
         plant = _on_bus(plant, shared * _share_of(plant.bridge, samples.duty) if _digital(plant) else shared)
-    w = samples.motor_speed if np.any(plant.play.half) else samples.speed
+    w = motor_speed_of(plant, samples)
     return plant, samples.drive * plant.source.V, 0.0, w, i
+
+
+def _apart(plant: Numbers) -> bool:
+    """Tell whether the motor may turn otherwise than the output: in a gear with play, or in an elastic one."""
+    return bool(np.any(plant.play.half) or (np.any(plant.elastic.k) and not np.any(plant.elastic.J)))
+
+
+def motor_speed_of(plant: Numbers, samples: Samples) -> Array:
+    """Return the speed of the motor at the output shaft [rad/s]."""
+    return samples.motor_speed if _apart(plant) else samples.speed
 
 
 def torques_of(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Torques:
@@ -107,9 +119,12 @@ def torques_of(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Tor
     i = _armature_current(*_circuit(plant, samples, drive))
     external = load.external_torque(samples.time, samples.angle)
     mode: Any = Mode(0, cast("Any", samples.contact), RIGID, FREE, 0)
-    if not np.any(plant.play.half):
+    if not np.any(plant.play.half) and not np.any(plant.elastic.k):
         return cast("Torques", _torques(plant, mode, w, w, i, external))
     mode = mode._replace(mesh=samples.mesh, motor=samples.motor)
+    if np.any(plant.elastic.k):
+        y = (samples.angle, w, 0.0, 0.0, 0.0, samples.motor_angle, samples.motor_speed)
+        return cast("Torques", _torques_of_two(plant, mode, y, i, external))
     return cast("Torques", _torques(plant, mode, w, samples.motor_speed, i, external))
 
 
@@ -151,12 +166,16 @@ def _feedback(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Arra
 
 
 def _of_motor(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
-    """Angle or speed of the motor: that of the output but inside the play of a gear."""
+    """Angle or speed of the motor: that of the output but in a gear with play or an elastic one."""
     def compute(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
-        play = np.any(model.plant(load).play.half)
-        values: Array = getattr(samples, f"motor_{name}" if play else name)
+        values: Array = getattr(samples, f"motor_{name}" if _apart(model.plant(load)) else name)
         return np.asarray(physics.motor_from_output(values, _reduction(model)))
     return compute
+
+
+def _load_angle(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
+    """Angle of the body behind an elastic shaft; that of the output where there is none."""
+    return samples.motor_angle if np.any(model.plant(load).elastic.J) else samples.angle
 
 
 def _commanded(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
@@ -201,6 +220,7 @@ SIGNALS: dict[str, Output] = {
     "motor_torque": Output("N m", "electromagnetic torque τ_o = k_a i_a", _motor_torque),
     "output_angle": Output("rad", "output shaft angle q", _sampled("output_angle")),
     "output_speed": Output("rad/s", "output shaft speed", _sampled("output_speed")),
+    "load_angle": Output("rad", "angle of the load behind an elastic shaft", _load_angle),
     "load_torque": Output("N m", "torque τ_L delivered to the load", _load_torque),
     "feedback_voltage": Output("V", "potentiometer voltage v_o", _feedback),
     "bus_voltage": Output("V", "voltage of the supply under load", _electrical_signal("bus_voltage")),

@@ -14,7 +14,7 @@ from servotwin.loads import as_load
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.engine.currents import stall_current
 from servotwin.models.switched import HIDDEN, MOTOR, SHAFT, SwitchedServo
-from servotwin.models.terms import bridge, chip, friction, heat, play, sensor, source, stops
+from servotwin.models.terms import bridge, chip, elastic, friction, heat, play, sensor, source, stops
 from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.numbers import Numbers
@@ -49,8 +49,9 @@ class _Pulsed(SwitchedServo):
     """What both pulse servos share: the chip and the bridge."""
 
     optional = (
-        "gear.output_inertia", *play.READS, *friction.READS, *chip.READS, *bridge.READS, *sensor.READS, *source.READS,
-        *stops.READS, *heat.READS, "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset",
+        "gear.output_inertia", *elastic.READS, *friction.READS, *chip.READS, *bridge.READS, *sensor.READS,
+        *source.READS, *stops.READS, *heat.READS, "electronics.voltage_to_pulse_gain",
+        "electronics.command_pulse_offset",
     )
     signals = (
         "command_voltage", "command_angle", "pulse_width", "error_time", "drive", "armature_voltage",
@@ -70,7 +71,7 @@ class _Pulsed(SwitchedServo):
         return self.body(load, N, inductance)._replace(
             bridge=self._bridge(), source=source.pack(self), friction=friction.pack(self, N),
             play=play.pack(self, self.load_inertia(load)), stops=stops.pack(self), sensor=sensor.pack_pulsed(self),
-            heat=heat.pack(self))
+            heat=heat.pack(self), elastic=elastic.pack(self, load, self.load_inertia(load)))
 
     def chip(self, signal: Signal | None = None) -> Chip:
         """Return the numbers of the frame logic; the frame period is that of the command where it gives one."""

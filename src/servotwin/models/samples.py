@@ -24,7 +24,8 @@ class Samples:
     winding, housing : ndarray
         Temperatures [K], where they are states.
     motor_angle, motor_speed : ndarray
-        At the output shaft [rad], [rad/s]; those of the output but inside the play of the gear.
+        At the output shaft [rad], [rad/s]; those of the output but in a gear with play or an elastic one. Behind an
+        elastic shaft they are the load's.
     wiper : ndarray
         Angle of the potentiometer [rad].
     zone, contact, mesh, motor : ndarray of int

@@ -32,6 +32,8 @@ _HEAT = ("winding_temperature", "housing_temperature")
 class SwitchedServo(Model):
     """A servo whose motor hangs behind a switched bridge and which is told by pulses."""
 
+    bears_flexible = True
+
     @property
     def available(self) -> tuple[str, ...]:
         """Names of the output signals that can be computed for this servo, `time` apart."""
@@ -52,7 +54,7 @@ class SwitchedServo(Model):
             places.append(Place("armature_current", 2, 1.0))
         if self.heats:
             places += [Place("winding_temperature", 3, 1.0), Place("housing_temperature", 4, 1.0)]
-        if self.servo.get("gear.backlash") is not None:
+        if self.servo.get("gear.backlash") is not None or self.servo.get("gear.stiffness") is not None:
             places += [Place("motor_angle", 5, N), Place("motor_speed", 6, N)]
         return tuple(places)
 

@@ -51,6 +51,11 @@ class Gear(Group):
     gear_reduction: float | None = parameter("N = 1/n", "number", AT_LEAST_ONE, "motor turns per output turn (18)")
     backlash: float | None = parameter("", "angle", NOT_NEGATIVE, "total play between motor and output, at the output")
     output_inertia: float | None = parameter("", "inertia", NOT_NEGATIVE, "inertia of gear wheel and horn")
+    stiffness: float | None = parameter("k_g", "torque per angle", POSITIVE, "stiffness between motor and output")
+    damping: float | None = parameter("", "torque per speed", NOT_NEGATIVE, "damping beside that stiffness")
+
+    def _relations(self) -> Iterator[Relation]:
+        yield from self._only_with("damping", ("stiffness",))
 
 
 _ONE_SHARE = ("load_friction", "load_friction_stribeck")

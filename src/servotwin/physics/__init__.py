@@ -142,7 +142,10 @@ load_torque = array_form(shaft.load_torque)
 pendulum_stiffness = array_form(shaft.pendulum_stiffness)
 pendulum_torque = array_form(shaft.pendulum_torque)
 shaft_acceleration = array_form(shaft.shaft_acceleration)
+spring_energy = array_form(shaft.spring_energy)
 spring_torque = array_form(shaft.spring_torque)
+stretch_beyond_play = array_form(shaft.stretch_beyond_play)
+twist_torque = array_form(shaft.twist_torque)
 
 bridge_supply_current = array_form(supply.bridge_supply_current)
 conduction = array_form(supply.conduction)
@@ -273,6 +276,7 @@ __all__ = [
     "smoothed_coulomb_torque",
     "source_voltage",
     "spindle_torque",
+    "spring_energy",
     "spring_torque",
     "stall_current_for",
     "stall_torque",
@@ -281,11 +285,13 @@ __all__ = [
     "steady_armature_current",
     "steady_temperatures",
     "sticks",
+    "stretch_beyond_play",
     "stribeck_factor",
     "supply_current",
     "thermal_time_constants",
     "torque_on_gear",
     "torque_share",
+    "twist_torque",
     "two_mass_temperatures",
     "unbounded_armature_voltage",
     "undamped_creep_speed",

@@ -173,3 +173,76 @@ def pendulum_stiffness(angle: float, gravity_torque: float, hanging_angle: float
     0.5
     """
     return gravity_torque * math.cos(angle - hanging_angle)
+
+
+def twist_torque(twist: float, twist_rate: float, stiffness: float, damping: float) -> float:
+    """Return the torque of a spring and a damper between two bodies.
+
+    Parameters
+    ----------
+    twist : float or array
+        x, by how much the first body is ahead of the second, play apart [rad].
+    twist_rate : float or array
+        δ̇, the speed of the first body less that of the second [rad/s].
+    stiffness : float or array
+        k [N m/rad].
+    damping : float or array
+        c [N m s/rad].
+
+    Returns
+    -------
+    float or array
+        k x + c δ̇, which pushes the second body towards +q and the first towards −q [N m].
+
+    Examples
+    --------
+    >>> twist_torque(0.5, 2.0, 4.0, 0.25)
+    2.5
+    """
+    return stiffness * twist + damping * twist_rate
+
+
+def stretch_beyond_play(twist: float, half_play: float) -> float:
+    """Return by how much a spring behind a play is stretched.
+
+    Parameters
+    ----------
+    twist : float or array
+        δ, by how much the first body is ahead of the second [rad].
+    half_play : float or array
+        b/2, at least 0 [rad].
+
+    Returns
+    -------
+    float or array
+        δ ∓ b/2 beyond the play, 0 inside it [rad].
+
+    Examples
+    --------
+    >>> stretch_beyond_play(0.5, 0.25), stretch_beyond_play(-0.5, 0.25), stretch_beyond_play(0.125, 0.25)
+    (0.25, -0.25, 0.0)
+    """
+    return max(twist - half_play, 0.0) + min(twist + half_play, 0.0)
+
+
+def spring_energy(stretch: float, stiffness: float) -> float:
+    """Return the energy in a stretched spring.
+
+    Parameters
+    ----------
+    stretch : float or array
+        x [rad].
+    stiffness : float or array
+        k [N m/rad].
+
+    Returns
+    -------
+    float or array
+        k x²/2 [J].
+
+    Examples
+    --------
+    >>> spring_energy(2.0, 3.0)
+    6.0
+    """
+    return 0.5 * stiffness * stretch * stretch

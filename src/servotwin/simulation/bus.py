@@ -25,7 +25,7 @@ from servotwin.parameters.groups import Supply
 from servotwin.signals import Signal
 from servotwin.simulation import bus_run, files, frames
 from servotwin.simulation.bus_rows import events_of, segments_of
-from servotwin.simulation.bus_supply import MODELS, check_supply, on_supply, source_of
+from servotwin.simulation.bus_supply import MODELS, check_rigid, check_supply, on_supply, source_of
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
 from servotwin.simulation.oddities import warn_of
@@ -123,7 +123,7 @@ class Fleet(Mapping[str, Result]):
     @cached_property
     def _signals(self) -> dict[str, Array]:
         """All signals of the servos, shape (servos, n); nan where a servo lacks one."""
-        names = dict.fromkeys(name for result in self.results.values() for name in result.model.available)
+        names = dict.fromkeys(name for result in self.results.values() for name in result.names if name != "time")
         none = np.full(len(self.time), np.nan)
         return {name: np.array([result[name] if name in result else none for result in self.results.values()])
                 for name in names if name not in _BUS_UNITS}
@@ -243,6 +243,7 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     for k, (name, (model, command, load)) in enumerate(given.items()):
         sim = Simulator(on_supply(model, supply), load, int(seed) + k)
         sim.load.check_span(0.0, duration)
+        check_rigid(f"servo {name!r} on a bus", sim.model.plant(sim.load).elastic)
         states.append(sim.initial(command, (initial or {}).get(name)))
         plans.append(sim.plan(command))
         sims[name] = sim

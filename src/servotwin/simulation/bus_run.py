@@ -29,7 +29,7 @@ from servotwin.simulation.lane_runs import PLAIN_RUNS, programs_of
 Array = NDArray[np.float64]
 
 _ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("go_on", "look"))
-ALL_BUSES = Recipe("buses", _ENTRIES)
+ALL_BUSES = Recipe("buses", _ENTRIES, absent=("elastic",))
 PLAIN_BUSES = Recipe("plain_buses", _ENTRIES, absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never)
 SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 

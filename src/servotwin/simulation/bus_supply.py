@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.models import Model, PulseServo, PulseServoInductive
+from servotwin.models.terms.elastic import Elastic, behind, present
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.simulation.lane_inputs import pick
@@ -41,6 +42,13 @@ def source_of(supply: Supply) -> Source:
     """Return a supply as the engine has it."""
     V_oc, R_b, I_max = supply.open_circuit_voltage, supply.internal_resistance, supply.current_limit
     return Source(V_oc or 0.0, R_b or 0.0, math.inf if I_max is None else I_max)
+
+
+def check_rigid(what: str, numbers: Elastic) -> None:
+    """Raise InputError if a servo that shall share a supply has a spring between two bodies."""
+    if present(numbers):
+        raise InputError(what, got="a body behind an elastic shaft" if behind(numbers) else "gear.stiffness",
+                         allowed="a stiff gear and shaft: on a shared supply there are no springs between two bodies")
 
 
 def on_supply(model: Model, supply: Supply) -> Model:

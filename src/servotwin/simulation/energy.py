@@ -10,7 +10,7 @@ import numpy as np
 from servotwin import physics
 from servotwin.models.engine import motion
 from servotwin.models.engine.observe import stored_energy
-from servotwin.models.outputs import electrical_of, torques_of, warm_plant
+from servotwin.models.outputs import electrical_of, motor_speed_of, torques_of, warm_plant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -39,13 +39,14 @@ class Energy:
     conversion : float
         Mechanical power that k_a ≠ k_b makes of electrical power; zero for an ideal motor.
     friction : float
-        Heat in motor and gear, viscous and dry.
+        Heat in motor and gear, viscous and dry, and in the damper of an elastic gear.
     stops : float
         Lost in impacts, on the end stops and at the ends of the gear's play.
     load : float
-        Given to the load: its damping, dry friction and external torque (its inertia counts as stored).
+        Given to the load: its damping, dry friction and external torque (its inertia counts as stored, and so does a
+        spring between shaft and load).
     stored : float
-        Increase of kinetic and magnetic energy.
+        Increase of kinetic and magnetic energy, and of that in a spring between two bodies.
     residual : float
         What does not balance; rounding and quadrature.
     """
@@ -67,7 +68,7 @@ def energy_of(model: Model, trajectory: Trajectory, drive: Pieces, load: Load) -
     def powers(samples: Samples) -> NDArray[np.float64]:
         plant = warm_plant(model, samples, load)
         circuit = electrical_of(plant, samples, drive)
-        i, w_m = circuit.armature_current, samples.motor_speed
+        i, w_m = circuit.armature_current, motor_speed_of(plant, samples)
         torques = torques_of(model, samples, drive, load)
         converted = physics.back_emf(w_m, plant.motor.K_b) * i - torques.motor * w_m
         return np.array(np.broadcast_arrays(

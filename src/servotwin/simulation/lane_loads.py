@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import LoadError
-from servotwin.loads import Load, Pendulum, Spring
+from servotwin.loads import Flexible, Load, Pendulum, Spring
 from servotwin.models.columns import LanePieces
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Kind = TypeVar("Kind")
 
-_PARTS: dict[str, type[Pendulum] | type[Spring]] = {"pendulum": Pendulum, "spring": Spring}
+_PARTS: dict[str, type[Pendulum] | type[Spring] | type[Flexible]] = {
+    "pendulum": Pendulum, "spring": Spring, "flexible": Flexible}
 _OWN = ("inertia", "viscous_friction", "torque", "coulomb_torque")
 
 LOAD_NAMES = (*(f"load.{name}" for name in _OWN),
@@ -29,6 +30,8 @@ def check_number(name: str, values: Any) -> None:
     _, *part, key = name.split(".")
     kind = _PARTS[part[0]] if part else Load
     good, allowed = np.isfinite(values), "a finite number"
+    if key in getattr(kind, "positive", ()):
+        good, allowed = good & (np.asarray(values) > 0.0), "a finite positive number"
     if key in kind.not_negative:
         good, allowed = good & (np.asarray(values) >= 0.0), "a finite number of at least 0"
     if np.all(good):
@@ -45,7 +48,7 @@ def with_numbers(load: Load, numbers: Mapping[str, float]) -> Load:
     Raises
     ------
     LoadError
-        If a name is that of a pendulum or spring, and the load has not exactly one.
+        If a name is that of a pendulum, a spring or a flexible body, and the load has not exactly one.
 
     Examples
     --------
@@ -63,7 +66,8 @@ def with_numbers(load: Load, numbers: Mapping[str, float]) -> Load:
 
 def structure(load: Load) -> tuple[object, ...]:
     """Return what two loads must share to stand in one column: their parts, and which numbers these have."""
-    return len(load.springs), tuple(p.inertia is None for p in load.pendulums)
+    return (len(load.springs), tuple(p.inertia is None for p in load.pendulums),
+            tuple(body.inertia is None for body in load.flexibles))
 
 
 def column_load(loads: Sequence[Load], load_of: Indices, numbers: Mapping[str, Array]) -> Load:

@@ -26,22 +26,24 @@ Mask = NDArray[np.bool_]
 _SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
 _PROGRAM = ("firmware", "bridge.pwm", "bridge.one_way")  # what only digital servos have
-ALL_RUNS = Recipe("runs", _ENTRIES, absent=_PROGRAM)  # everything
+_APART = (*_PROGRAM, "elastic")  # what has kernels of its own, one lane after the other
+ALL_RUNS = Recipe("runs", _ENTRIES, absent=_APART)  # everything else
 _FORMS = ("ONE_FORMULA", "ARCS", "BANDS", "STRIDES", "COILS", "GAPS")
 _PENDULUM, _COIL, _PLAY = "load.gravity", "motor.L", "play"
 _BANDED = ("friction.varies", "source.I_max")
 _STRIDING = ("heat", _PENDULUM, "load.stiffness")
 _PLAYED = ("INSIDE", "ON_FORWARD", "ON_BACKWARD", "APART")  # with play alone
-_NO_SIDE = ("friction.kappa", "follower", "sweep", *_PROGRAM)  # what no lanes side by side have
+_NO_SIDE = ("friction.kappa", "follower", "sweep", *_APART)  # what no lanes side by side have
 _NOT_IN_STRIDES = (*_NO_SIDE, _PLAY, _COIL)
 _NOT_IN_BANDS = (*_NOT_IN_STRIDES, *_STRIDING)
 _NOT_IN_GAPS = (*_NO_SIDE, _COIL, *_STRIDING, "friction.varies")
 _RARE = (*_BANDED, "friction.kappa", _PLAY, "heat", _COIL, "sensor.half_slack")
 _DIGITAL = ("firmware.T_c", "bridge.pwm")  # what each of them has
 _NO_DIGITAL = ("friction.kappa", "follower", "chip", _COIL)  # what no digital servo has
+_SPRUNG, _NOT_SPRUNG = "elastic.k", ("friction.kappa", "follower", _PLAY)  # what springs have, and what not
 
 
-def _side(name: str, forms: tuple[str, ...], absent: tuple[str, ...] = _PROGRAM, never: tuple[str, ...] = (),
+def _side(name: str, forms: tuple[str, ...], absent: tuple[str, ...] = _APART, never: tuple[str, ...] = (),
           single: bool = False) -> Recipe:
     """Return the recipe of lanes that go side by side in some forms."""
     return Recipe(name, _SIDE, vector=True, single=single, absent=absent,
@@ -60,20 +62,31 @@ _BY_COILS = _side("by_coils", ("COILS",), (*_NO_SIDE, _PLAY, *_STRIDING, *_BANDE
 _BY_GAPS = _side("by_gaps", ("GAPS",), _NOT_IN_GAPS, ("CORE",))
 _NOT_PLAIN = ("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE")
 PLAIN_RUNS = Recipe(
-    "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep", *_PROGRAM), never=_NOT_PLAIN)
+    "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep", *_APART), never=_NOT_PLAIN)
 PENDULUM_RUNS = Recipe(
-    "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep", *_PROGRAM),
+    "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep", *_APART),
     never=("SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))
 GAP_RUNS = Recipe(
     "gap_runs", _ENTRIES, absent=_NOT_IN_GAPS,
     never=("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", "CREEP", "CORE"))
 LOOK_SIDE_BY_SIDE = Recipe("look_side_by_side", ("servotwin.models.engine.sights:side_by_side",), absent=(
-    "friction.kappa", "follower", *_PROGRAM))
-LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",), absent=_PROGRAM)
-LOOK_DIGITAL = Recipe("look_digital", LOOK_ONE_BY_ONE.entries, absent=_NO_DIGITAL, present=_DIGITAL)
-ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, absent=_NO_DIGITAL, present=_DIGITAL)
-PLAIN_DIGITAL = Recipe("plain_digital_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, *_NO_DIGITAL), never=_NOT_PLAIN,
-                       present=_DIGITAL)
+    "friction.kappa", "follower", *_APART))
+LOOK_ONE_BY_ONE = Recipe("look_one_by_one", ("servotwin.models.engine.sights:one_by_one",), absent=_APART)
+LOOK_DIGITAL = Recipe("look_digital", LOOK_ONE_BY_ONE.entries, absent=(*_NO_DIGITAL, "elastic"), present=_DIGITAL)
+ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, absent=(*_NO_DIGITAL, "elastic"), present=_DIGITAL)
+PLAIN_DIGITAL = Recipe("plain_digital_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, *_NO_DIGITAL, "elastic"),
+                       never=_NOT_PLAIN, present=_DIGITAL)
+
+
+def _sprung(name: str, entries: tuple[str, ...]) -> dict[bool, Recipe]:
+    """Return the recipes of servos with a spring between two bodies, analog and digital."""
+    return {digital: Recipe(name + "_digital" * digital, entries, never=("APART", "CREEP", "CORE"), absent=(
+        *(_NO_DIGITAL if digital else _PROGRAM), *_NOT_SPRUNG), present=(*(_DIGITAL if digital else ()), _SPRUNG))
+        for digital in (False, True)}
+
+
+ELASTIC_RUNS = _sprung("elastic_runs", _ENTRIES)
+LOOK_ELASTIC = _sprung("look_elastic", LOOK_ONE_BY_ONE.entries)
 _ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, absent=_PROGRAM)
 _SHARED = ("pieces", "edges", "accuracy", "firmware")  # by all lanes, or by all that run side by side
 _TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
@@ -207,11 +220,15 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     potentiometers have a table.
     """
     bridge, own = numbers.bridge, numbers.friction
-    if np.any(bridge.pwm > 0.0):
+    sprung, digital = _differs(numbers, "elastic"), bool(np.any(bridge.pwm > 0.0))
+    if np.any(sprung) or digital:
+        rigid = np.logical_not(sprung)
         rare = _either(_any_differs(numbers, (*_RARE, _PENDULUM)), recorded.any() and recorded)
-        digital = [OneByOne(_where(True, _without(True, rare), lanes), PLAIN_DIGITAL),
-                   OneByOne(_where(True, rare, lanes), ALL_DIGITAL)]
-        return [kind for kind in digital if len(kind.which)]
+        some = [OneByOne(_where(sprung, True, lanes), ELASTIC_RUNS[digital])]
+        if digital:
+            some.append(OneByOne(_where(rigid, _without(True, rare), lanes), PLAIN_DIGITAL))
+        some.append(OneByOne(_where(rigid, rare if digital else True, lanes), ALL_DIGITAL if digital else ALL_RUNS))
+        return [kind for kind in some if len(kind.which)]
     slack, swinging = _differs(numbers, "sensor.half_slack"), _differs(numbers, _PENDULUM)
     waving = swept.any() and swept
     alone = _either(_either(waving, recorded.any() and recorded), _differs(numbers, "friction.kappa"))
@@ -255,6 +272,9 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
 
 def looking(recipe: Recipe) -> Recipe:
     """Return how lanes are looked at that run one by one in this way."""
+    for digital, own in ELASTIC_RUNS.items():
+        if recipe == own:
+            return LOOK_ELASTIC[digital]
     return LOOK_DIGITAL if recipe in (PLAIN_DIGITAL, ALL_DIGITAL) else LOOK_ONE_BY_ONE
 
 

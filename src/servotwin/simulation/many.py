@@ -140,7 +140,8 @@ def simulate_lanes(
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     times = np.array(times_asked(duration, output_step, output_times))  # a copy: it becomes read-only
-    asked = Asked(float(duration), times, _outputs(lanes.model, outputs), real_type(dtype), accuracy_of(accuracy))
+    names = _outputs(lanes.model, lanes.loads, outputs)
+    asked = Asked(float(duration), times, names, real_type(dtype), accuracy_of(accuracy))
     lanes = framed(lanes, asked.duration)
     commands = Commands(lanes)
     packs = _packs(lanes, commands, asked, chunk, workers_of(executor))
@@ -211,18 +212,19 @@ def _axis(name: str, values: ArrayLike) -> NDArray[Any]:
     return axis
 
 
-def _outputs(model: Model, outputs: Sequence[str]) -> tuple[str, ...]:
+def _outputs(model: Model, bodies: Sequence[loads.Load], outputs: Sequence[str]) -> tuple[str, ...]:
+    available = model.signals_with(*bodies)
     names = (outputs,) if isinstance(outputs, str) else outputs
     try:
         asked = dict.fromkeys(names)
     except TypeError:
         raise InputError("outputs", got=outputs, allowed="names of signals") from None
     for name in asked:
-        if name != "time" and name not in model.available:
-            raise UnknownNameError(f"signal of {type(model).__name__}", name, ("time", *model.available))
+        if name != "time" and name not in available:
+            raise UnknownNameError(f"signal of {type(model).__name__}", name, ("time", *available))
     asked.pop("time", None)  # it is always there
     if not asked:
-        raise InputError("outputs", got=outputs, allowed="at least one of " + ", ".join(model.available))
+        raise InputError("outputs", got=outputs, allowed="at least one of " + ", ".join(available))
     return tuple(asked)
 
 

@@ -77,14 +77,18 @@ class Result:
     cause: str
 
     @property
+    def _signals(self) -> tuple[str, ...]:
+        return self.model.signals_with(self.load)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of all signals, `time` first."""
-        return ("time", *self.model.available)
+        return ("time", *self._signals)
 
     @property
     def units(self) -> Mapping[str, str]:
         """SI unit of each signal."""
-        return {"time": "s", **{name: SIGNALS[name].unit for name in self.model.available}}
+        return {"time": "s", **{name: SIGNALS[name].unit for name in self._signals}}
 
     @cached_property
     def _samples(self) -> Samples:
@@ -180,7 +184,7 @@ class Result:
             import pandas as pd
         except ImportError:
             raise MissingExtraError("pandas", "data") from None
-        frame = pd.DataFrame({name: self[name] for name in self.model.available},
+        frame = pd.DataFrame({name: self[name] for name in self._signals},
                              index=pd.Index(self.time, name="time"))
         frame.attrs["units"] = dict(self.units)
         return frame
@@ -192,7 +196,7 @@ class Result:
         except ImportError:
             raise MissingExtraError("xarray", "data") from None
         data = {name: ("time", self[name], {"units": self.units[name], "long_name": SIGNALS[name].meaning})
-                for name in self.model.available}
+                for name in self._signals}
         return xr.Dataset(data, coords={"time": ("time", self.time, {"units": "s"})},
                           attrs={"model": type(self.model).__name__, "servo": self.model.servo.name})
 

@@ -12,7 +12,7 @@ import numpy as np
 from servotwin.errors import CommandError, InputError, SimulationError, UnknownNameError
 from servotwin.loads import Constant, as_load
 from servotwin.models import DigitalServo, Model
-from servotwin.models.engine.memory import ACCURACY, Memory, started, with_play
+from servotwin.models.engine.memory import ACCURACY, Memory, started, with_bodies
 from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.runs import mode_of
 from servotwin.models.samples import Samples
@@ -218,7 +218,7 @@ class Simulator:
         changes = tuple(sorted({**dict(state.changes), **parameters}.items()))
         own = self._with(changes)
         self._check(state, "changed(parameters)", own.model)
-        memory = with_play(state.memory, own._numbers.play.half > 0.0)
+        memory = with_bodies(state.memory, own._numbers.play.half, own._numbers.elastic.k > 0.0)
         return replace(state, changes=changes, places=own.model.states, memory=memory)
 
     def _with(self, changes: tuple[tuple[str, Any], ...]) -> Simulator:

@@ -9,6 +9,7 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.models.base import Place
+from servotwin.models.terms import elastic
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE
 from servotwin.units import is_finite
@@ -42,15 +43,16 @@ def start_vector(places: Sequence[Place], plant: Numbers, angle: Any, initial: M
     Returns
     -------
     tuple
-        Seven numbers or columns; the motor in the middle of its play unless `initial` says otherwise.
+        Seven numbers or columns; the motor in the middle of its play, and no spring twisted, unless `initial` says
+        otherwise.
     """
-    y: list[Any] = [angle, 0.0, 0.0, plant.heat.T_amb, plant.heat.T_amb, None, 0.0]
+    y: list[Any] = [angle, 0.0, 0.0, plant.heat.T_amb, plant.heat.T_amb, None, None if np.any(plant.elastic.k) else 0.0]
     moved = {place.at: initial[place.name] / place.factor for place in places if place.name in initial}
     for index, value in moved.items():
         y[index] = value
     if y[5] is None:
         y[5] = y[0]
-    if not np.any(plant.play.half):
+    if y[6] is None or (not np.any(plant.play.half) and not np.any(plant.elastic.k)):
         y[6] = y[1]
     return tuple(y)
 
@@ -65,7 +67,7 @@ def check_start(places: Sequence[Place], plant: Numbers, y: Sequence[float]) -> 
                          allowed=f"more than {COLDEST_WINDING:.2f} K, where copper's law has no resistance left")
     if plant.heat.C_w > 0.0 and not y[4] > 0.0:
         raise InputError("initial housing_temperature", got=y[4], allowed="a positive number of kelvin")
-    if abs(y[5] - y[0]) > plant.play.half + _SLACK:
+    if abs(y[5] - y[0]) > plant.play.half + _SLACK and not elastic.present(plant.elastic):
         N = next(place.factor for place in places if place.at == 5)
         raise InputError("initial motor_angle", got=N * y[5],
                          allowed=f"{N * (y[0] - plant.play.half):.6g} to {N * (y[0] + plant.play.half):.6g} rad, "

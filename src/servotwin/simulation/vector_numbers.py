@@ -16,10 +16,11 @@ from servotwin.models.engine.records import columns_of, put_columns, tiles_with
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.tiles import Lanes as Columns
 from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import NO_FIRMWARE
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.simulation import lane_runs
-from servotwin.simulation.bus_supply import Supplies
+from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
 from servotwin.simulation.lane_memory import RECORD
@@ -66,7 +67,7 @@ class LaneNumbers:
     def __init__(self, inputs: Lanes, accuracy: float, supplies: Supplies, imposed: Imposed | None = None) -> None:
         self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
         self.accuracy, self.supplies = accuracy, supplies
-        self.available = inputs.model.available
+        self.available = inputs.model.signals_with(*inputs.loads)
         nothing = np.full(self.count, math.nan)
         self.imposed = Imposed(nothing, nothing.copy())
         commands = Commands(inputs)
@@ -83,6 +84,8 @@ class LaneNumbers:
             self.load_total[chunk.which] = flat(chunk.load.total_inertia)
             self.reduction[chunk.which] = flat(chunk.model.value("gear.gear_reduction"))
             self.V_oc[chunk.which] = flat(chunk.model.value("supply.open_circuit_voltage"))
+        for k in np.concatenate([*supplies.lanes, np.zeros(0, np.int64)]).tolist():
+            check_rigid(f"lane {k} on a bus", Elastic(*(x[0] for x in self.now("elastic", np.array([k])))))
         self.given = self.columns.numbers.copy()
         if imposed is not None:
             hung, fed = (np.flatnonzero(~np.isnan(values)) for values in imposed)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
-from servotwin.models.engine.modes import INSIDE, RIGID
+from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID
 from servotwin.models.engine.records import TILE, columns_of, room
 from servotwin.models.engine.ticks import ANGLE, SPEED
 from servotwin.models.terms.chip import Chip
@@ -132,12 +132,14 @@ class Store:
 
     def _go_on_from(self, memory: NDArray[Any], others: Indices, common: Common | None) -> None:
         """Take the memories of all lanes, of which some have other numbers than when they were made."""
-        play = self.numbers.now("play").half > 0.0
+        play, sprung = self.numbers.now("play").half > 0.0, self.numbers.now("elastic").k > 0.0
         point = memory["point"]
         point["anchor_time"][others] = math.inf
         mesh = point["mode"]["mesh"]
-        point["mode"]["mesh"] = np.where(play, np.where(mesh == RIGID, INSIDE, mesh), RIGID)
-        point["y"][~play, 5:7] = point["y"][~play, 0:2]
+        point["mode"]["mesh"] = np.where(
+            play, np.where((mesh == RIGID) | (mesh > ON_BACKWARD), INSIDE, mesh), np.where(sprung, mesh, RIGID))
+        rigid = ~(play | sprung)
+        point["y"][rigid, 5:7] = point["y"][rigid, 0:2]
         anchors = point["anchor_time"].copy()
         if common is not None:
             point["anchor_time"][common.joined >= 0] = math.inf  # unless their bus is the same as then

@@ -26,7 +26,10 @@ _OF_LOAD = {
     "load.coulomb_torque": "torque", "load.pendulum.mass": "mass", "load.pendulum.length": "length",
     "load.pendulum.inertia": "inertia", "load.pendulum.hanging_angle": "angle",
     "load.pendulum.gravity": "acceleration", "load.spring.stiffness": "torque per angle",
-    "load.spring.rest_angle": "angle",
+    "load.spring.rest_angle": "angle", "load.flexible.stiffness": "torque per angle",
+    "load.flexible.inertia": "inertia", "load.flexible.damping": "torque per speed",
+    "load.flexible.viscous_friction": "torque per speed", "load.flexible.mass": "mass",
+    "load.flexible.length": "length", "load.flexible.hanging_angle": "angle", "load.flexible.gravity": "acceleration",
 }
 
 
@@ -114,7 +117,8 @@ def _of_joint(name: str, together: Together, model: Model) -> Parameter:
 def _of_load(name: str, load: Load) -> Parameter:
     _, *part, key = name.split(".")
     owner: Any = getattr(load, part[0]) if part else load
-    lower = 0.0 if key in (_PARTS[part[0]] if part else type(load)).not_negative else -math.inf
-    allowed = "a finite number" + (" of at least 0" if lower == 0.0 else "")
-    nominal = owner.moment_of_inertia if name == "load.pendulum.inertia" else getattr(owner, key)
+    kind = _PARTS[part[0]] if part else type(load)
+    lower = TINY if key in getattr(kind, "positive", ()) else 0.0 if key in kind.not_negative else -math.inf
+    allowed = "a finite positive number" if lower > 0.0 else "a finite number" + " of at least 0" * (lower == 0.0)
+    nominal = owner.moment_of_inertia if part and key == "inertia" else getattr(owner, key)
     return Parameter(name, _OF_LOAD[name], lower, math.inf, f"{allowed} [{si_unit(_OF_LOAD[name])}]", nominal)

@@ -72,17 +72,18 @@ def usual_free(model: Model) -> tuple[str, ...]:
 def checked_sensors(logs: Sequence[Log], sensors: Sequence[str] | None, model: Model) -> tuple[str, ...]:
     """Return the names of measured signals that are compared."""
     there = dict.fromkeys(name for log in logs for name in log.measured)
+    known = model.signals_with(*(log.load for log in logs))
     if sensors is not None:
         if isinstance(sensors, str) or not isinstance(sensors, Sequence):
             raise InputError("sensors", got=sensors, allowed="a list of " + ", ".join(there))
         for name in sensors:
-            if name not in there or name not in model.available:
+            if name not in there or name not in known:
                 got = f"{name}, which {type(model).__name__} does not have" if name in there else name
-                raise InputError("sensors", got=got, allowed=", ".join(n for n in there if n in model.available))
+                raise InputError("sensors", got=got, allowed=", ".join(n for n in there if n in known))
         if not any(name in ("output_angle", "feedback_voltage") for name in sensors):
             raise InputError("sensors", got=", ".join(sensors), allowed="output_angle or feedback_voltage among them")
         return tuple(dict.fromkeys(sensors))
-    found = [name for name in _FITTED if name in there and name in model.available]
+    found = [name for name in _FITTED if name in there and name in known]
     without_angle = any("output_angle" not in log.measured for log in logs)
     return tuple(name for name in found if name != "feedback_voltage" or without_angle or "output_angle" not in found)
 

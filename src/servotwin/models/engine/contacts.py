@@ -34,9 +34,9 @@ from servotwin.physics.backlash import rebound_speed
 from servotwin.physics.friction import smoothed_coulomb_torque
 from servotwin.physics.load_friction import torque_on_gear
 
-_REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
-_NEXT_TO_NOTHING = 1e-300  # N m: where a current is about to flow
-_REST_HEIGHT = 4e-15  # relative to the angle: a rebound this low is rounding
+REST_SPEED = 1e-6  # rad/s: below this a rebound from a stop comes to rest
+NEXT_TO_NOTHING = 1e-300  # N m: where a current is about to flow
+REST_HEIGHT = 4e-15  # relative to the angle: a rebound this low is rounding
 
 
 def has_friction(numbers: Numbers) -> bool:
@@ -106,7 +106,7 @@ def share_sign(numbers: Numbers, zone: int, contact: int, u: float, tau: float, 
     """Return the sign of what the torques through a gear add to its friction before its magnitude is taken."""
     if (contact != FORWARD and contact != BACKWARD) or not friction.shared(numbers.friction):
         return 0
-    tau_m = drive_torque(numbers, zone, u, y) or sign_of(zone) * _NEXT_TO_NOTHING
+    tau_m = drive_torque(numbers, zone, u, y) or sign_of(zone) * NEXT_TO_NOTHING
     return 1 if through_gear(numbers, tau_m, tau, y) >= 0.0 else -1
 
 
@@ -180,8 +180,8 @@ def rebound(numbers: Numbers, mode: Mode, upper: bool, u: float, tau: float, y: 
         back = output_acceleration(numbers, sliding(w > 0.0, holds(numbers)), external_torque(numbers.load, tau, q), w)
     else:
         back = acceleration(numbers, Mode(zone, sliding(w > 0.0, has_friction(numbers)), mesh, FREE, 0), u, tau, after)
-    low = back * w < 0.0 and 0.5 * w * w < abs(back) * _REST_HEIGHT * max(abs(q), 1.0)
-    if abs(w) < _REST_SPEED or low:
+    low = back * w < 0.0 and 0.5 * w * w < abs(back) * REST_HEIGHT * max(abs(q), 1.0)
+    if abs(w) < REST_SPEED or low:
         after = (q, 0.0, y[2], y[3], y[4], after[5], after[6] if mesh == INSIDE else 0.0)
         if source.present(numbers.source):
             zone = currents.zone_of(numbers, u, 0.0, q, after[6], y[2])

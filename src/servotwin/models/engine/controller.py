@@ -15,6 +15,7 @@ from servotwin.models.engine.modes import Vector
 from servotwin.models.engine.noise import gaussian
 from servotwin.models.terms import bridge, control, duty
 from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE, WAITING, Sensed
+from servotwin.models.terms.elastic import turning
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import sensed_voltage
@@ -92,12 +93,12 @@ def sensed_by(numbers: Numbers, firm: Any, y: Vector) -> Sensed:
     numbers = warm(numbers, y)
     V_bus, i = on_supply(duty.at_duty(numbers, firm.duty), firm.duty, y)
     cold = numbers.bridge.R_drive - numbers.source.R_b
-    return Sensed(i, V_bus, back_emf(y[6], numbers.motor.K_b), cold, y[4])
+    return Sensed(i, V_bus, back_emf(turning(numbers.elastic, y), numbers.motor.K_b), cold, y[4])
 
 
 def on_supply(numbers: Numbers, now: float, y: Vector) -> tuple[float, float]:
     """Return the voltage of the bus [V], and the current while it flows [A], of numbers at the duty of `now`."""
-    u, w = duty.voltage(numbers.source, now), y[6]
+    u, w = duty.voltage(numbers.source, now), turning(numbers.elastic, y)
     zone = currents.zone_of(numbers, u, 0.0, y[0], w, y[2])
     i = currents.flowing(numbers, zone, u, y[0], w, y[2])
     V = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)

@@ -13,11 +13,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine import contacts, currents
+from servotwin.models.engine import contacts, currents, twist
 from servotwin.models.engine.contacts import friction_torque
-from servotwin.models.engine.guards import SHARE, SPEED, ZONE_DOWN, ZONE_UP, creeping, geared
-from servotwin.models.engine.modes import BACKWARD, FORWARD, INSIDE, Mode, Vector, slides
+from servotwin.models.engine.guards import SHARE, SPEED, ZONE_DOWN, ZONE_UP, creeping, geared, turns_alone
+from servotwin.models.engine.modes import BACKWARD, FORWARD, Mode, Vector, slides
 from servotwin.models.terms import shaft
+from servotwin.models.terms.elastic import behind
 from servotwin.models.terms.friction import creeping_speed, fades, share, static_share
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.numbers import Numbers, warm
@@ -92,7 +93,7 @@ def longest_step(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) 
     if not creeping(numbers, mode, y):
         return math.inf
     slow = creeping_speed(numbers.friction)
-    fast = slow if geared(mode) == FORWARD else -slow
+    fast = slow if geared(numbers, mode) == FORWARD else -slow
     most = max(_gain(numbers, mode, u, tau, y, 0.0), _gain(numbers, mode, u, tau, y, fast))
     return 2.0 * slow / most if most > 0.0 else math.inf
 
@@ -102,18 +103,18 @@ def part_before(numbers: Numbers, mode: Mode, before: Vector, after: Vector) -> 
 
     What of a step lies beyond would not be seen, and spoils what lies before.
     """
-    if not fades(numbers.friction) or not slides(geared(mode)) or creeping(numbers, mode, before):
+    if not fades(numbers.friction) or not slides(geared(numbers, mode)) or creeping(numbers, mode, before):
         return 1.0
-    by, way = 6 if mode.mesh == INSIDE else 1, 1.0 if geared(mode) == FORWARD else -1.0
+    by, way = 6 if turns_alone(numbers, mode) else 1, 1.0 if geared(numbers, mode) == FORWARD else -1.0
     w, w_after, slow = way * before[by], way * after[by], creeping_speed(numbers.friction)
     return 1.0 if w_after >= _INTO * slow else (w - 0.5 * (1.0 + _INTO) * slow) / (w - w_after)
 
 
 def _gain(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: float) -> float:
     """Return the magnitude of the acceleration [rad/s²] that a body sliding in the gear has at a speed."""
-    inside = mode.mesh == INSIDE
-    at: Vector = (y[0], y[1] if inside else w, y[2], y[3], y[4], y[5], w)
-    output, motor = contacts.accelerations(warm(numbers, at), mode, u, tau, at)
+    inside = turns_alone(numbers, mode)
+    at: Vector = (y[0], y[1] if inside else w, y[2], y[3], y[4], y[5], y[6] if behind(numbers.elastic) else w)
+    output, motor = twist.accelerations(warm(numbers, at), mode, u, tau, at)
     return abs(motor if inside else output)
 
 

@@ -6,6 +6,7 @@ import math
 
 from servotwin.models.engine.modes import CONDUCTING, NO_CURRENT, Vector, constant_current, in_linear_zone, sign_of
 from servotwin.models.terms import bridge, follower, source
+from servotwin.models.terms.elastic import turning
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import error_of, error_rate
@@ -114,7 +115,8 @@ def current_slope(numbers: Numbers, zone: int, du: float) -> float:
 
 def drive_torque(numbers: Numbers, zone: int, u: float, y: Vector) -> float:
     """Return the motor's torque N k_a i [N m]."""
-    return motor.electromagnetic_torque(flowing(numbers, zone, u, y[0], y[6], y[2]), numbers.motor.K)
+    i = flowing(numbers, zone, u, y[0], turning(numbers.elastic, y), y[2])
+    return motor.electromagnetic_torque(i, numbers.motor.K)
 
 
 def stall_current(numbers: Numbers, V: float) -> float:

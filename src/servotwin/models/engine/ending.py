@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from servotwin.models.engine import contacts, currents
 from servotwin.models.engine.tiles import chip_of, numbers_of
-from servotwin.models.terms import frame, heat
+from servotwin.models.terms import elastic, frame, heat
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.numbers import Numbers, at_temperature
@@ -18,6 +18,7 @@ from servotwin.physics.electronics import control_voltage_from_pulse
 from servotwin.physics.motor import electromagnetic_torque
 from servotwin.physics.pieces import Piece, piece_value
 from servotwin.physics.potentiometer import angle_from_voltage
+from servotwin.physics.shaft import pendulum_torque
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -94,6 +95,8 @@ def told(pulsed: bool, numbers: Numbers, chip: Chip, command: NDArray[np.float64
 def starts(numbers: Numbers, forward: bool, torque: float, tau: float, q: float) -> bool:
     """Tell whether a motor's torque [N m] turns a shaft that stands at q, against friction and load."""
     against = external_torque(numbers.load, tau, q)
+    if elastic.behind(numbers.elastic):
+        against += pendulum_torque(q, numbers.elastic.gravity, numbers.elastic.hanging_angle)
     if forward:
         return torque - against > contacts.holding_bounds(numbers, torque, -against)[1]
     return -torque - against < -contacts.holding_bounds(numbers, -torque, -against)[0]

@@ -25,7 +25,7 @@ from servotwin.models.engine.modes import (
     at_rest,
     limited,
 )
-from servotwin.models.terms import bridge, control, duty, friction, heat, load, motor, play, sensor, shaft
+from servotwin.models.terms import bridge, control, duty, elastic, friction, heat, load, motor, play, sensor, shaft
 from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE
 from servotwin.models.terms.motor import Motor
@@ -70,7 +70,9 @@ def possible(numbers: Numbers, inputs: Inputs) -> bool:
     """Tell whether a servo always moves so, stops and limits apart."""
     if friction.smoothed(numbers.friction) or friction.varying(numbers.friction) or play.present(numbers.play):
         return False
-    if motor.inductive(numbers.motor) or heat.present(numbers.heat) or sensor.slack(numbers.sensor):
+    if elastic.present(numbers.elastic) or motor.inductive(numbers.motor):
+        return False
+    if heat.present(numbers.heat) or sensor.slack(numbers.sensor):
         return False
     return not (load.swings(numbers.load) or load.springy(numbers.load)) and len(inputs.torque) == 0
 

@@ -7,24 +7,29 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine import contacts, currents
+from servotwin.models.engine import contacts, currents, twist
 from servotwin.models.engine.modes import (
     BACKWARD,
     CORE,
     FORWARD,
     FREE,
     INSIDE,
+    LOOSE,
     ON_BACKWARD,
     ON_FORWARD,
     ON_LOWER,
     ON_UPPER,
+    PUSH_BACKWARD,
+    PUSH_FORWARD,
     STUCK,
+    TRAIL_BACKWARD,
+    TRAIL_FORWARD,
     Mode,
     Vector,
     at_rest,
     slides,
 )
-from servotwin.models.terms import play, source
+from servotwin.models.terms import elastic, play, source
 from servotwin.models.terms.friction import core_speed, creeping_speed, fades, holding_friction, smoothed, varying
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.motor import inductive
@@ -51,6 +56,8 @@ EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper st
 
 def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
     """Return the mode of a state in a zone; `smooth` keeps a smoothed friction in one piece."""
+    if elastic.present(numbers.elastic):
+        return twist.settled(warm(numbers, y), zone, u, tau, y, mesh)
     return contacts.settled(warm(numbers, y), zone, u, tau, y, mesh, smooth)
 
 
@@ -70,7 +77,7 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
     elif shaft != FREE:
         kinds |= 1 << SPEED
         kinds |= 1 << SHARE if mode.share != 0 else 0
-    if fades(numbers.friction) and slides(geared(mode)):
+    if fades(numbers.friction) and slides(geared(numbers, mode)):
         kinds |= 1 << CREEPS
     low, high = currents.zone_limits(numbers, zone, u)
     if high < math.inf:
@@ -81,7 +88,9 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
         kinds |= 1 << UPPER
     if numbers.stops.lower > -math.inf and (shaft == FREE or shaft == BACKWARD or shaft == CORE):
         kinds |= 1 << LOWER
-    if mode.mesh == INSIDE:
+    if elastic.present(numbers.elastic):
+        kinds |= _of_spring(numbers, mode)
+    elif mode.mesh == INSIDE:
         kinds |= MEETINGS
         if mode.motor == STUCK:
             kinds |= _MOTOR_RELEASE
@@ -92,16 +101,41 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
     return kinds
 
 
-def geared(mode: Mode) -> int:
-    """Return the contact of the body that moves against the friction of the gear: inside the play the motor."""
-    return mode.motor if mode.mesh == INSIDE else mode.contact
+def _of_spring(numbers: Numbers, mode: Mode) -> int:
+    """Return what else can end a mode of two bodies with a spring between them, as a sum of 1 << kind."""
+    kinds = 1 << SHARE if mode.share != 0 else 0
+    if not elastic.geared(numbers.elastic):
+        return kinds
+    if mode.motor == STUCK:
+        kinds |= _MOTOR_RELEASE
+    elif mode.motor != FREE:
+        kinds |= 1 << MOTOR_SPEED
+    if mode.mesh == LOOSE:
+        kinds |= MEETINGS
+    elif mode.mesh == PUSH_FORWARD or mode.mesh == PUSH_BACKWARD:
+        kinds |= 1 << PART
+    elif mode.mesh == TRAIL_FORWARD:
+        kinds |= 1 << PART | 1 << MEET_FORWARD
+    elif mode.mesh == TRAIL_BACKWARD:
+        kinds |= 1 << PART | 1 << MEET_BACKWARD
+    return kinds
+
+
+def turns_alone(numbers: Numbers, mode: Mode) -> bool:
+    """Tell whether the motor turns on its own, inside the play or before an elastic gear."""
+    return mode.mesh == INSIDE or elastic.geared(numbers.elastic)
+
+
+def geared(numbers: Numbers, mode: Mode) -> int:
+    """Return the contact of the body that moves against the friction of the gear: the motor where it turns alone."""
+    return mode.motor if turns_alone(numbers, mode) else mode.contact
 
 
 def creeping(numbers: Numbers, mode: Mode, y: Vector) -> bool:
     """Tell whether a body moves at speeds at which its friction fades."""
-    if not fades(numbers.friction) or not slides(geared(mode)):
+    if not fades(numbers.friction) or not slides(geared(numbers, mode)):
         return False
-    return abs(y[6] if mode.mesh == INSIDE else y[1]) <= creeping_speed(numbers.friction)
+    return abs(y[6] if turns_alone(numbers, mode) else y[1]) <= creeping_speed(numbers.friction)
 
 
 def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
@@ -113,8 +147,8 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
         sign = 1.0 if shaft == FORWARD else -1.0
         return sign * w - core_speed(numbers.friction), sign * dw
     if kind == CREEPS:
-        sign = 1.0 if geared(mode) == FORWARD else -1.0
-        by = 6 if mode.mesh == INSIDE else 1
+        sign = 1.0 if geared(numbers, mode) == FORWARD else -1.0
+        by = 6 if turns_alone(numbers, mode) else 1
         return sign * y[by] - creeping_speed(numbers.friction), sign * dy[by]
     if kind == CORE_FORWARD:
         return core_speed(numbers.friction) - w, -dw
@@ -126,13 +160,18 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
         return q - numbers.stops.lower, w
     numbers = warm(numbers, y)
     if kind == ZONE_UP or kind == ZONE_DOWN:
-        x = currents.zone_variable(numbers, zone, u, q, y[6], y[2])
-        rate = currents.zone_rate(numbers, zone, du, y[6], dy[6], dy[2])
+        w_m, dw_m = elastic.turning(numbers.elastic, y), elastic.turning(numbers.elastic, dy)
+        x = currents.zone_variable(numbers, zone, u, q, w_m, y[2])
+        rate = currents.zone_rate(numbers, zone, du, w_m, dw_m, dy[2])
         low, high = currents.zone_limits(numbers, zone, u)
         return (high - x, -rate) if kind == ZONE_UP else (x - low, rate)
     if kind == SHARE:
         tau_m = currents.drive_torque(numbers, zone, u, y)
+        if elastic.present(numbers.elastic):
+            return mode.share * twist.through_gear(numbers, mode.mesh, tau_m, tau, y), math.nan
         return mode.share * contacts.through_gear(numbers, tau_m, tau, y), math.nan
+    if elastic.present(numbers.elastic):
+        return _spring_guard(numbers, mode, kind, u, du, tau, dtau, y, dy)
     if play.present(numbers.play) and kind >= MEET_FORWARD:
         return _play_guard(numbers, mode, kind, u, tau, dtau, y, dy)
     return _release_guard(numbers, mode, kind, u, du, tau, dtau, y, dy)
@@ -166,6 +205,40 @@ def _release_guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float,
     return torque - against + backward, rate
 
 
+def _spring_guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
+                  dy: Vector) -> tuple[float, float]:
+    mesh, slope = mode.mesh, twist.torque_slope(numbers, mode.mesh, y, dy)
+    if kind == MOTOR_SPEED:
+        sign = 1.0 if mode.motor == FORWARD else -1.0
+        return sign * y[6], sign * dy[6]
+    if kind == MEET_FORWARD or kind == MEET_BACKWARD or kind == PART:
+        return _meeting(numbers, mesh, kind, y, dy)
+    di = dy[2] if inductive(numbers.motor) else currents.current_slope(numbers, mode.zone, du)
+    rate = motor.electromagnetic_torque(di, numbers.motor.K) - slope
+    if kind == MOTOR_RELEASE_FORWARD or kind == MOTOR_RELEASE_BACKWARD:
+        net, backward, forward = twist.at_motor(numbers, mode.zone, mesh, u, y)
+    else:
+        net, backward, forward = twist.at_output(numbers, mode.zone, mesh, u, tau, y)
+        rate = slope - dtau if elastic.geared(numbers.elastic) else rate - dtau
+    rate = math.nan if varying(numbers.friction) else rate
+    if kind == MOTOR_RELEASE_FORWARD or kind == RELEASE_FORWARD:
+        return forward - net, -rate
+    return net + backward, rate
+
+
+def _meeting(numbers: Numbers, mesh: int, kind: int, y: Vector, dy: Vector) -> tuple[float, float]:
+    """Return the guard of a spring behind play that begins or ceases to push, and its rate."""
+    half, ahead, rate = numbers.elastic.half, twist.twist(numbers, y), twist.twist_rate(numbers, y)
+    if mesh == LOOSE:
+        return (half - ahead, -rate) if kind == MEET_FORWARD else (half + ahead, rate)
+    forward = mesh == PUSH_FORWARD or mesh == TRAIL_FORWARD
+    if kind == PART and (mesh == TRAIL_FORWARD or mesh == TRAIL_BACKWARD):  # it comes back into the play
+        return (ahead - half, rate) if forward else (-ahead - half, -rate)
+    value, slope = twist.push(numbers, forward, y), twist.torque_slope(numbers, PUSH_FORWARD, y, dy)
+    slope = slope if forward else -slope
+    return (value, slope) if kind == PART else (-value, -slope)
+
+
 def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, dtau: float, y: Vector,
                 dy: Vector) -> tuple[float, float]:
     if kind == MEET_FORWARD:
@@ -197,14 +270,19 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
     if kind == ZONE_UP or kind == ZONE_DOWN:
         if currents.by_current(numbers, zone):
             y = _with_current_at_edge(numbers, zone, kind, u, y)
-            return Mode(currents.zone_of(numbers, u, 0.0, y[0], y[6], y[2]), shaft, mesh, motor, share), y
+            w_m = elastic.turning(numbers.elastic, y)
+            return Mode(currents.zone_of(numbers, u, 0.0, y[0], w_m, y[2]), shaft, mesh, motor, share), y
         return Mode(currents.neighbour(numbers, zone, kind == ZONE_UP), shaft, mesh, motor, share), y
     if kind == SHARE:
         return Mode(zone, shaft, mesh, motor, -share), y
     if kind == CREEPS:
         slow = creeping_speed(numbers.friction)
-        w = slow if geared(mode) == FORWARD else -slow
-        return mode, (y[0], y[1] if mesh == INSIDE else w, y[2], y[3], y[4], y[5], w)
+        w = slow if geared(numbers, mode) == FORWARD else -slow
+        after: Vector = (y[0], y[1] if turns_alone(numbers, mode) else w, y[2], y[3], y[4], y[5],
+                         y[6] if elastic.behind(numbers.elastic) else w)
+        return mode, after
+    if elastic.present(numbers.elastic):
+        return _cross_spring(numbers, mode, kind, u, tau, y)
     if kind == SPEED and smoothed(numbers.friction):
         return Mode(zone, CORE, mesh, motor, 0), y
     if kind == CORE_FORWARD or kind == CORE_BACKWARD:
@@ -242,6 +320,38 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
     else:
         y = (q, 0.0, i, T_w, T_h, q_m, w_m if mesh == INSIDE else 0.0)
     return contacts.settled(numbers, zone, u, tau, y, mesh, False), y
+
+
+def _cross_spring(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
+    """Return mode and state of two bodies with a spring between them after a guard has reached zero."""
+    zone, contact, mesh, motor, _ = mode
+    q, w, i, T_w, T_h, other, w_other = y
+    if kind == UPPER or kind == LOWER:
+        return twist.rebound(numbers, mode, kind == UPPER, u, tau, y)
+    if kind == RELEASE_FORWARD or kind == RELEASE_BACKWARD:
+        forward = kind == RELEASE_FORWARD
+        contact = FREE if not twist.is_dry(numbers) else FORWARD if forward else BACKWARD
+        if forward and q >= numbers.stops.upper:
+            contact = ON_UPPER
+        if not forward and q <= numbers.stops.lower:
+            contact = ON_LOWER
+        return twist.with_share(numbers, Mode(zone, contact, mesh, motor, 0), u, tau, y), y
+    if kind == MOTOR_RELEASE_FORWARD or kind == MOTOR_RELEASE_BACKWARD:
+        motor = FORWARD if kind == MOTOR_RELEASE_FORWARD else BACKWARD
+        return twist.with_share(numbers, Mode(zone, contact, mesh, motor, 0), u, tau, y), y
+    if kind == MOTOR_SPEED:
+        y = (q, w, i, T_w, T_h, other, 0.0)
+    elif kind == SPEED:
+        y = (q, 0.0, i, T_w, T_h, other, w_other)
+    elif kind == MEET_FORWARD or kind == MEET_BACKWARD:
+        mesh = PUSH_FORWARD if kind == MEET_FORWARD else PUSH_BACKWARD
+    elif mesh == PUSH_FORWARD and twist.twist_rate(numbers, y) < 0.0 and numbers.elastic.c > 0.0:
+        mesh = TRAIL_FORWARD
+    elif mesh == PUSH_BACKWARD and twist.twist_rate(numbers, y) > 0.0 and numbers.elastic.c > 0.0:
+        mesh = TRAIL_BACKWARD
+    else:
+        mesh = LOOSE
+    return twist.settled(numbers, zone, u, tau, y, mesh), y
 
 
 def _with_current_at_edge(numbers: Numbers, zone: int, kind: int, u: float, y: Vector) -> Vector:

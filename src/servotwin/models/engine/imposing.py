@@ -35,7 +35,7 @@ def on_known_bus(given: Numbers, V: float, V_oc: float, pulsed: bool) -> Numbers
     follower = Follower(own.gain, own.half_deadband, max(own.V_max + V - V_oc, 0.0))
     return Numbers(
         given.motor, given.bridge, given.source, follower, given.shaft, given.friction, given.load, given.stops,
-        given.play, given.sensor, given.heat)
+        given.play, given.sensor, given.heat, given.elastic)
 
 
 def runs_otherwise(before: Source, V: float, drop: float, pulsed: bool) -> bool:
@@ -43,27 +43,27 @@ def runs_otherwise(before: Source, V: float, drop: float, pulsed: bool) -> bool:
     return pulsed and ((before.V > drop) != (V > drop) or regulated(before))
 
 
-def impulse_work(shaft: Shaft, half_play: float, before: float, after: float) -> float:
-    """Return the kinetic energy [J] that a speed gives which is set [rad/s]; with play the motor keeps its own."""
-    J = shaft.J_out if half_play > 0.0 else shaft.J
+def impulse_work(shaft: Shaft, alone: bool, before: float, after: float) -> float:
+    """Return the kinetic energy [J] that a speed gives which is set [rad/s], to the output `alone` or to motor too."""
+    J = shaft.J_out if alone else shaft.J
     return 0.5 * J * (after * after - before * before)
 
 
 def placed(point: Point, angle: float, speed: float, sets_angle: bool, sets_speed: bool, half_play: float,
-           half_slack: float) -> Point:
+           half_slack: float, sprung: bool) -> Point:
     """Return a point with another angle [rad] or speed [rad/s] of the output, from which a new motion begins.
 
-    Motor and potentiometer go along as far as their play.
+    Motor and potentiometer go along as far as their play. What is at the other end of a spring (`sprung`) goes along
+    so that the twist stays, and keeps its speed.
     """
     q, w, i, T_w, T_h, q_motor, w_motor = point.y
     wiper, play = point.wiper, half_play > 0.0
     if sets_angle:
-        q = angle
-        q_motor = carried(q_motor, angle, half_play) if play else angle
-        wiper = carried(wiper, angle, half_slack)
+        q_motor = q_motor + (angle - q) if sprung else carried(q_motor, angle, half_play) if play else angle
+        q, wiper = angle, carried(wiper, angle, half_slack)
     if sets_speed:
         w = speed
-        w_motor = w_motor if play else speed
+        w_motor = w_motor if play or sprung else speed
     y = (q, w, i, T_w, T_h, q_motor, w_motor)
     mode = Mode(point.mode.zone, point.mode.contact, INSIDE if play else RIGID, point.mode.motor,
                 point.mode.share)

@@ -102,7 +102,7 @@ def impose_on_tiles(has: Indices, given: Floats, numbers: Any, which: Indices, p
             servo.mesh[j] = INSIDE
         if has[SPEED] != 0:
             after = given[SPEED, lane]
-            work[lane] += impulse_work(shaft_at(own.shaft, i), half, 1.0 * servo.w[j], after)
+            work[lane] += impulse_work(shaft_at(own.shaft, i), half > 0.0, 1.0 * servo.w[j], after)
             servo.w[j] = after
             servo.w_m[j] = servo.w_m[j] if half > 0.0 else after
         if has[ANGLE] != 0:
@@ -117,13 +117,14 @@ def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices,
     for k in range(which.size):
         lane, memory = which[k], memory_of(rows[places[k]])
         own, i = numbers[lane // TILE], lane % TILE
-        half, angle = own.play.half[i], 0.0
+        half, angle, sprung = own.play.half[i], 0.0, own.elastic.k[i] > 0.0
         if has[SPEED] != 0:
-            work[lane] += impulse_work(shaft_at(own.shaft, i), half, memory.point.y[1], given[SPEED, lane])
+            alone = half > 0.0 or (sprung and own.elastic.J[i] == 0.0)
+            work[lane] += impulse_work(shaft_at(own.shaft, i), alone, memory.point.y[1], given[SPEED, lane])
         if has[ANGLE] != 0:
             angle = within_stops(own, i, given[ANGLE, lane])
         point = placed(memory.point, angle, given[SPEED, lane], has[ANGLE] != 0, has[SPEED] != 0, half,
-                       own.sensor.half_slack[i])
+                       own.sensor.half_slack[i], sprung)
         put_memory(rows[places[k]], Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end,
                                            memory.tau, memory.tau_end, memory.firm))
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine.modes import INSIDE, RIGID, Mode, Vector
+from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID, Mode, Vector
 from servotwin.models.engine.records import record_reader, record_writer
 from servotwin.models.terms import control, firmware, frame
 from servotwin.models.terms.control import Firm, Programs
@@ -169,12 +169,16 @@ def silent_now(memory: Memory) -> int:
     return memory.chip.silent
 
 
-def with_play(memory: Memory, play: bool) -> Memory:
-    """Return a memory in which no motion has begun, of a servo whose gear has play, or none."""
+def with_bodies(memory: Memory, half_play: float, sprung: bool) -> Memory:
+    """Return a memory in which no motion has begun, of a servo of two bodies, with play or a spring between, or one."""
     p = memory.point
-    q, w, i, T_w, T_h, _, _ = p.y
-    mesh = (p.mode.mesh if p.mode.mesh != RIGID else INSIDE) if play else RIGID
-    y = p.y if play else (q, w, i, T_w, T_h, q, w)
+    q, w, i, T_w, T_h, q_m, _ = p.y
+    mesh = p.mode.mesh if half_play > 0.0 and RIGID < p.mode.mesh <= ON_BACKWARD else INSIDE
+    y = p.y
+    if not sprung:  # a spring may have been twisted beyond a play that is there now
+        y = (q, w, i, T_w, T_h, min(max(q_m, q - half_play), q + half_play), y[6])
+    if half_play == 0.0 and not sprung:
+        mesh, y = RIGID, (q, w, i, T_w, T_h, q, w)
     mode = Mode(p.mode.zone, p.mode.contact, mesh, p.mode.motor, p.mode.share)
     return forgotten(memory._replace(point=p._replace(y=y, mode=mode)))
 

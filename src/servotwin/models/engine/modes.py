@@ -12,6 +12,7 @@ from typing import NamedTuple
 class Mode(NamedTuple):
     """Zone of the voltage law, contact of the shaft, place in the play, contact of the motor inside the play, share.
 
+    A motor behind an elastic gear has a contact of its own as well.
     The share is the sign of the torques through a sliding gear of whose magnitude friction is made; 0 where it is not.
     """
 
@@ -26,7 +27,7 @@ Vector = tuple[float, float, float, float, float, float, float]
 """Angle, speed and current; temperatures of winding and housing; angle and speed of the motor, at the output shaft.
 
 Without inductance the current is kept as 0, without heat the temperatures stay; where motor and output are one body,
-the motor's angle and speed go with the output's.
+the motor's angle and speed go with the output's. A body behind an elastic shaft has the motor's places.
 """
 
 NOWHERE: Vector = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -40,6 +41,8 @@ CURRENT_FORWARD, LIMITED_FORWARD, SHORT_FORWARD = 8, 9, 10
 FREE, FORWARD, BACKWARD, CORE, STUCK, ON_LOWER, ON_UPPER = range(7)
 
 RIGID, INSIDE, ON_FORWARD, ON_BACKWARD = range(4)  # forward: where the motor pushes the output forward
+# A spring behind the shaft, or in the gear; with play it is loose, pushes, or trails behind an output that runs away.
+BEHIND, SPRUNG, LOOSE, PUSH_FORWARD, PUSH_BACKWARD, TRAIL_FORWARD, TRAIL_BACKWARD = range(4, 11)
 
 
 def at_rest(contact: int) -> bool:

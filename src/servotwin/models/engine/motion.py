@@ -30,7 +30,7 @@ from servotwin.models.engine.modes import (
 )
 from servotwin.models.engine.rates import jacobian, rates_of
 from servotwin.models.engine.rodas import Triple, not_constant
-from servotwin.models.terms import follower, friction, heat, load, motor, play, sensor, source
+from servotwin.models.terms import elastic, follower, friction, heat, load, motor, play, sensor, source
 from servotwin.models.terms.dependence import (
     BY_SHARE,
     CURVED_Q,
@@ -96,7 +96,8 @@ def is_step(motion: Motion) -> bool:
 def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
           limit: float, accuracy: float) -> Motion:
     """Return the motion from y at t0 [s]: exact, or one step of at most `limit` [s] that is accurate enough [rad]."""
-    still = at_rest(mode.contact) and (mode.mesh != INSIDE or at_rest(mode.motor))
+    still = at_rest(mode.contact) and (
+        (mode.mesh != INSIDE and not elastic.present(numbers.elastic)) or at_rest(mode.motor))
     on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
     if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
         return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
@@ -139,7 +140,8 @@ def dependence(numbers: Numbers, mode: Mode, u: Piece, still: bool) -> int:
     """Return on what the acceleration depends in a mode, as the terms have it; `still` where nothing moves."""
     return (motor.depends(numbers.motor) | heat.depends(numbers.heat) | load.depends(numbers.load)
             | friction.depends(numbers.friction, mode.contact) | play.depends(mode.mesh, still)
-            | sensor.depends(numbers.sensor, numbers.source) | follower.depends(mode.zone, u))
+            | elastic.depends(numbers.elastic, still) | sensor.depends(numbers.sensor, numbers.source)
+            | follower.depends(mode.zone, u))
 
 
 def _closed(kind: int, numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,
@@ -189,6 +191,8 @@ def _long_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y:
     most = min(limit, creep.longest_step(numbers, mode, piece_value(u, t0), piece_value(tau, t0), y))
     h = min(step, most)
     h = min(h, period(u, tau, t0, t0 + h) / 3.0)
+    if elastic.present(numbers.elastic):
+        h = min(h, elastic.longest_step(numbers.elastic, numbers.shaft))
     for _ in range(60):
         y1, error = dormand_prince.step(numbers, mode, u, tau, t0, y, h)
         size = error / (FINE * accuracy)
@@ -283,7 +287,7 @@ def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:
     """Return the state of one body, at rest inside the play the motor's own."""
     _, _, _, T_w, T_h, q_m, w_m = motion.start
     mesh = motion.mode.mesh
-    if mesh == INSIDE:
+    if mesh == INSIDE or elastic.present(motion.numbers.elastic):
         return q, w, i, T_w, T_h, q_m, w_m
     if mesh == RIGID:
         return q, w, i, T_w, T_h, q, w

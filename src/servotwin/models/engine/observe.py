@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import currents
+from servotwin.models.engine import currents, twist
 from servotwin.models.engine.contacts import joint_friction
 from servotwin.models.engine.modes import INSIDE, Mode, Vector, at_rest
-from servotwin.models.terms import bridge, duty, shaft, source
+from servotwin.models.terms import bridge, duty, elastic, shaft, source
 from servotwin.models.terms.bridge import Bridge, Off
 from servotwin.models.terms.control import NOWHERE
 from servotwin.models.terms.friction import NO_FRICTION, Friction, holding_friction
@@ -22,7 +22,7 @@ from servotwin.models.terms.source import Source
 from servotwin.physics.bridge import bridge_loss, brush_loss
 from servotwin.physics.load_friction import torque_on_gear
 from servotwin.physics.motor import electromagnetic_torque, magnetic_energy
-from servotwin.physics.shaft import kinetic_energy, load_torque
+from servotwin.physics.shaft import kinetic_energy, load_torque, pendulum_torque, spring_energy, stretch_beyond_play
 from servotwin.physics.supply import supply_current
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ class Observed(NamedTuple):
     load_torque: float
     motor_angle: float
     motor_speed: float
+    load_angle: float  # of the body behind an elastic shaft, else of the output
     feedback_voltage: float
     error_time: float
     drive: float
@@ -136,9 +137,41 @@ def torques(numbers: Numbers, mode: Mode, w: float, w_motor: float, i: float, ex
                    ((own.b - own.b_out) * w_motor + servo) * w_motor, (own.b_out * w + of_load + external) * w)
 
 
+def torques_of_two(numbers: Numbers, mode: Mode, y: Vector, i: float, external: float) -> Torques:
+    """Return the same where a spring stands between two bodies; its damper counts as gear, or as load behind it."""
+    own, spring, dry, acceleration = numbers.shaft, numbers.elastic, numbers.load.coulomb, 0.0
+    tau, w, w_motor = electromagnetic_torque(i, numbers.motor.K), y[1], elastic.turning(numbers.elastic, y)
+    ahead, rate = elastic.ahead(spring, y[0], y[5]), elastic.ahead(spring, y[1], y[6])
+    between = elastic.torque_at(spring, mode.mesh, ahead, rate)
+    taken, lost = elastic.damper_loss(spring, between, ahead, rate), 0.0
+    if elastic.behind(spring):
+        against = external + between
+        servo, of_load = _friction(numbers.friction, dry, mode.contact, w, tau, torque_on_gear(against, w, own.b_out),
+                                   tau - against)
+        if not at_rest(mode.contact):
+            acceleration = shaft.acceleration(own, tau, w, servo + of_load, against)
+        lost = taken + (spring.b * y[6] + pendulum_torque(y[5], spring.gravity, spring.hanging_angle)) * y[6]
+        taken = 0.0
+    else:
+        against = external
+        servo, _ = _friction(numbers.friction, 0.0, mode.motor, w_motor, tau, -between, tau - between)
+        _, of_load = _friction(NO_FRICTION, dry, mode.contact, w, 0.0, between - external, between - external)
+        if not at_rest(mode.contact):
+            acceleration = shaft.output_acceleration(own, w, of_load, external - between)
+    return Torques(tau, servo, of_load, external, acceleration,
+                   load_torque(acceleration, w, of_load, against, own.b_out, own.J_out),
+                   ((own.b - own.b_out) * w_motor + servo) * w_motor + taken,
+                   (own.b_out * w + of_load + external) * w + lost)
+
+
 def stored_energy(numbers: Numbers, y: Vector) -> float:
-    """Return the energy [J] in moving masses and in the magnetic field."""
+    """Return the energy [J] in moving masses, in a spring between them, and in the magnetic field."""
     own, (_, w, i, _, _, _, w_motor) = numbers.shaft, y
+    if elastic.present(numbers.elastic):
+        spring = numbers.elastic
+        first, second = (own.J, spring.J) if elastic.behind(spring) else (own.J_out, own.J - own.J_out)
+        return (kinetic_energy(w, first) + kinetic_energy(w_motor, second) + magnetic_energy(i, numbers.motor.L)
+                + spring_energy(stretch_beyond_play(twist.twist(numbers, y), spring.half), spring.k))
     return (kinetic_energy(w, own.J_out) + kinetic_energy(w_motor, own.J - own.J_out)
             + magnetic_energy(i, numbers.motor.L))
 
@@ -164,13 +197,17 @@ def _friction(gear: Friction, dry: float, contact: int, w: float, tau_m: float, 
 def observed(numbers: Numbers, curve: Sequence[Sequence[float]] | NDArray[np.float64], mode: Mode, u: float, tau: float,
              y: Vector, wiper: float, drive: float, error: float) -> Observed:
     """Return all signals of a servo, whose numbers are those of this instant."""
-    q, w, i, T_w, T_h, q_motor, w_motor = y
+    q, w, i, T_w, T_h, other, w_other = y
+    q_motor, w_motor = (q, w) if elastic.behind(numbers.elastic) else (other, w_other)
     circuit = electrical(numbers, u, q, w_motor, i)
     against = external_torque(numbers.load, tau, q)
-    shaft = torques(numbers, mode, w, w_motor, circuit.armature_current, against)
+    if elastic.present(numbers.elastic):
+        shaft = torques_of_two(numbers, mode, y, circuit.armature_current, against)
+    else:
+        shaft = torques(numbers, mode, w, w_motor, circuit.armature_current, against)
     return Observed(circuit.armature_voltage, circuit.armature_current, circuit.bus_voltage, circuit.supply_current,
-                    shaft.motor, shaft.load, q_motor, w_motor, sensed_voltage(numbers.sensor, curve, wiper), error,
-                    drive, T_w, T_h, 0.0, 0.0, 0.0, 0.0)
+                    shaft.motor, shaft.load, q_motor, w_motor, other if elastic.behind(numbers.elastic) else q,
+                    sensed_voltage(numbers.sensor, curve, wiper), error, drive, T_w, T_h, 0.0, 0.0, 0.0, 0.0)
 
 
 def told_by(path: Bridge, firm: Any, shown: Observed) -> Observed:
@@ -180,8 +217,8 @@ def told_by(path: Bridge, firm: Any, shown: Observed) -> Observed:
     return Observed(
         shown.armature_voltage, shown.armature_current / duty.on_share_of(path, firm.duty), shown.bus_voltage / share,
         shown.supply_current * share, shown.motor_torque, shown.load_torque, shown.motor_angle, shown.motor_speed,
-        shown.feedback_voltage, 0.0, bridge.direction(now), shown.winding_temperature, shown.housing_temperature, now,
-        goal, firm.r, float(firm.trip))
+        shown.load_angle, shown.feedback_voltage, 0.0, bridge.direction(now), shown.winding_temperature,
+        shown.housing_temperature, now, goal, firm.r, float(firm.trip))
 
 
 def on_bus(numbers: Numbers, V_bus: float) -> Numbers:
@@ -191,7 +228,7 @@ def on_bus(numbers: Numbers, V_bus: float) -> Numbers:
                   _off_on_bus(path.silence, supply, V_bus), path.V_br, path.pwm, path.one_way)
     return Numbers(
         numbers.motor, path, Source(max(V_bus, _NO_VOLTAGE), 0.0, math.inf), numbers.follower, numbers.shaft,
-        numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+        numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
 
 
 def _off_on_bus(off: Off, supply: Source, V_bus: float) -> Off:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from servotwin.models.engine import contacts, currents
+from servotwin.models.engine import contacts, currents, twist
 from servotwin.models.engine.modes import CORE, Mode, Vector, at_rest, in_linear_zone
 from servotwin.models.terms import heat
+from servotwin.models.terms.elastic import turning
 from servotwin.models.terms.load import stiffness_at
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
@@ -15,7 +16,7 @@ from servotwin.physics import electronics, friction, motor, potentiometer
 def rates_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> Vector:
     """Return the rate of every number of the state."""
     numbers = warm(numbers, y)
-    i, w_m = y[2], y[6]
+    i, w_m = y[2], turning(numbers.elastic, y)
     di = dT_w = dT_h = 0.0
     if inductive(numbers.motor):
         di = currents.current_rate(numbers, mode.zone, u, y[0], w_m, i)
@@ -23,8 +24,8 @@ def rates_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> V
         i = currents.current(numbers, mode.zone, u, y[0], w_m)
     if heat.present(numbers.heat):
         dT_w, dT_h = heat.warming_rates(numbers.heat, numbers.motor.R, i, y[3], y[4])
-    dw, dw_m = contacts.accelerations(numbers, mode, u, tau, y)
-    return y[1], dw, di, dT_w, dT_h, w_m, dw_m
+    dw, dw_m = twist.accelerations(numbers, mode, u, tau, y)
+    return y[1], dw, di, dT_w, dT_h, y[6], dw_m
 
 
 def jacobian(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, q: float, w: float) -> tuple[float, ...]:

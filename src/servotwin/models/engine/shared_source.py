@@ -35,7 +35,7 @@ def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
     return Numbers(
         numbers.motor, Bridge(D, R, path.off, path.silence, path.V_br, path.pwm, path.one_way),
         Source(source.V, 0.0, math.inf), numbers.follower, numbers.shaft, numbers.friction, numbers.load,
-        numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+        numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
 
 
 def sign_on_bus(drive: float, y: Vector) -> float:

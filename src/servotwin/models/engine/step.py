@@ -16,6 +16,7 @@ from servotwin.models.engine.motion import Motion
 from servotwin.models.terms import bridge, duty, firmware, frame
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as chip_present
+from servotwin.models.terms.elastic import turning
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.friction import smoothed
 from servotwin.models.terms.load import swings
@@ -108,7 +109,7 @@ def pulse_width(inputs: Inputs, memory: Memory) -> float:
 def anchored(numbers: Numbers, u: Piece, tau: Piece, time: float, point: Point) -> Point:
     """Return a point whose motion begins now, under inputs that are new."""
     y, v = point.y, piece_value(u, time)
-    zone = currents.zone_of(warm(numbers, y), v, piece_rate(u, time), y[0], y[6], y[2])
+    zone = currents.zone_of(warm(numbers, y), v, piece_rate(u, time), y[0], turning(numbers.elastic, y), y[2])
     mode = guards.settled(numbers, zone, v, piece_value(tau, time), y, point.mode.mesh, in_one_piece(numbers, u))
     return Point(time, y, mode, time, y, point.step, point.wiper)
 
@@ -170,7 +171,7 @@ def at_pulses(numbers: Numbers, silent: int) -> Numbers:
         return numbers
     return Numbers(
         numbers.motor, bridge.off_now(numbers.bridge, silent), numbers.source, numbers.follower, numbers.shaft,
-        numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+        numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
 
 
 def source(numbers: Numbers, now: Frame) -> Piece:
@@ -181,7 +182,7 @@ def source(numbers: Numbers, now: Frame) -> Piece:
 def voltages(numbers: Numbers, u: float, y: Vector) -> tuple[float, float]:
     """Return the voltages at the motor's terminals and of the bus [V], for the voltage u behind the bridge."""
     numbers = warm(numbers, y)
-    w, i = y[6], y[2]
+    w, i = turning(numbers.elastic, y), y[2]
     zone = currents.zone_of(numbers, u, 0.0, y[0], w, i)
     i = currents.flowing(numbers, zone, u, y[0], w, i)
     V_bus = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)

@@ -66,7 +66,8 @@ def at_duty(numbers: Numbers, duty: float) -> Numbers:
     bridge, source = at(numbers.bridge, motor, numbers.source, duty)
     R = motor.R / on_share_of(numbers.bridge, duty)  # of the mean current, which flows for a part of the time
     return Numbers(Motor(motor.K, motor.K_b, R, motor.L), bridge, source, numbers.follower, numbers.shaft,
-                   numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat)
+                   numbers.friction, numbers.load, numbers.stops, numbers.play, numbers.sensor, numbers.heat,
+                   numbers.elastic)
 
 
 def share_of(bridge: Bridge, duty: float) -> float:

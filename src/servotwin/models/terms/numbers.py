@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from servotwin.models.engine.modes import Vector
 from servotwin.models.terms.bridge import NO_BRIDGE, Bridge, Off
+from servotwin.models.terms.elastic import NO_ELASTIC, Elastic
 from servotwin.models.terms.follower import NO_FOLLOWER, Follower
 from servotwin.models.terms.friction import NO_FRICTION, Friction
 from servotwin.models.terms.heat import NO_HEAT, Heat
@@ -33,6 +34,7 @@ class Numbers(NamedTuple):
     play: Play = NO_PLAY
     sensor: Sensor = NO_SENSOR
     heat: Heat = NO_HEAT
+    elastic: Elastic = NO_ELASTIC
 
 
 NEUTRAL = Numbers()
@@ -50,7 +52,7 @@ def at_temperature(numbers: Numbers, T_w: float, T_h: float) -> Numbers:
         Bridge(bridge.D_drive, bridge.R_drive + more, Off(off.D, off.R + more, off.coast),
                Off(silence.D, silence.R + more, silence.coast), bridge.V_br, bridge.pwm, bridge.one_way),
         numbers.source, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play,
-        numbers.sensor, numbers.heat)
+        numbers.sensor, numbers.heat, numbers.elastic)
 
 
 def warm(numbers: Numbers, y: Vector) -> Numbers:

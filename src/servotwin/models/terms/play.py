@@ -15,9 +15,6 @@ from servotwin.physics.backlash import impact_speed
 
 _LAST_IMPACT = 1e-12  # rad/s: an impact of motor and output this slow is the last one of many
 
-READS = ("gear.backlash",)
-"""What may be given of a pulse servo."""
-
 
 class Play(NamedTuple):
     """Numbers of the gear's play."""
@@ -54,13 +51,15 @@ def with_motor(play: Play, mesh: int, y: Vector) -> Vector:
 
 
 def pack(model: Given, load_inertia: Any) -> Play:
-    """Return the play of a model's gear.
+    """Return the play of a model's gear; that of an elastic one belongs to its spring.
 
     Raises
     ------
     ParameterError
         If there is play without inertia behind it.
     """
+    if model.servo.get("gear.stiffness") is not None:
+        return NO_PLAY
     play: Any = model.value_or("gear.backlash", 0.0)
     has_body = np.asarray((np.asarray(play) == 0.0) | (np.asarray(load_inertia) > 0.0)).ravel()
     Relation("gear.backlash", has_body if has_body.size > 1 else bool(has_body[0]), np.broadcast_to(

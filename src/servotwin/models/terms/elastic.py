@@ -1,0 +1,124 @@
+"""A spring between two bodies: of the gear, between motor and output, or between the output and what hangs behind it.
+
+Angle and speed of the second body stand where a gear with play has those of the motor: of the motor in an elastic
+gear, of the load behind an elastic shaft.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from servotwin.errors import LoadError
+from servotwin.loads import Load
+from servotwin.models.engine.modes import PUSH_BACKWARD, PUSH_FORWARD, SPRUNG, Vector
+from servotwin.models.terms.dependence import ON_Q, TWO_BODIES
+from servotwin.models.terms.given import Given
+from servotwin.models.terms.shaft import Shaft
+from servotwin.parameters.group import Relation
+from servotwin.physics.shaft import stretch_beyond_play, twist_torque
+
+READS = ("gear.backlash", "gear.stiffness", "gear.damping")
+"""What may be given of a pulse servo."""
+
+_PART = 3.0  # steps cover at most this part of the time in which the two ring
+
+
+class Elastic(NamedTuple):
+    """Numbers of the spring, and of the body behind the shaft."""
+
+    k: float  # stiffness; 0: there is no spring
+    c: float  # damping
+    half: float  # of the play in which it does not act
+    J: float  # of the body behind the shaft; 0: the spring is the gear's
+    b: float
+    gravity: float  # m g l of that body
+    hanging_angle: float
+
+
+NO_ELASTIC = Elastic(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def present(elastic: Elastic) -> bool:
+    """Tell whether there is a spring between two bodies."""
+    return elastic.k > 0.0
+
+
+def behind(elastic: Elastic) -> bool:
+    """Tell whether the spring is behind the output shaft."""
+    return elastic.J > 0.0
+
+
+def geared(elastic: Elastic) -> bool:
+    """Tell whether the spring is that of the gear, so that the motor turns on its own."""
+    return elastic.k > 0.0 and elastic.J == 0.0
+
+
+def depends(elastic: Elastic, still: bool) -> int:
+    """Return on what the acceleration depends through the spring, unless both bodies stand still."""
+    return TWO_BODIES | ON_Q if elastic.k > 0.0 and not still else 0
+
+
+def turning(elastic: Elastic, y: Vector) -> float:
+    """Return the speed of the motor [rad/s], of its rates the acceleration."""
+    return y[1] if elastic.J > 0.0 else y[6]
+
+
+def ahead(elastic: Elastic, q: float, other: float) -> float:
+    """Return by how much the first of the two bodies is ahead [rad], or of speeds how much faster it is."""
+    return q - other if elastic.J > 0.0 else other - q
+
+
+def stretched(elastic: Elastic, mesh: int, twist: float) -> float:
+    """Return by how much the spring is stretched where it acts in this way [rad]."""
+    return (twist - elastic.half if mesh == PUSH_FORWARD else twist + elastic.half if mesh == PUSH_BACKWARD else twist)
+
+
+def torque_at(elastic: Elastic, mesh: int, twist: float, rate: float) -> float:
+    """Return the torque between the two bodies [N m], positive where it pushes the second one forward."""
+    acts = mesh <= SPRUNG or mesh == PUSH_FORWARD or mesh == PUSH_BACKWARD
+    return twist_torque(stretched(elastic, mesh, twist), rate, elastic.k, elastic.c) if acts else 0.0
+
+
+def damper_loss(elastic: Elastic, torque: float, twist: float, rate: float) -> float:
+    """Return the power that the damper takes [W]: what the torque gives and the spring does not keep."""
+    return (torque - twist_torque(stretch_beyond_play(twist, elastic.half), 0.0, elastic.k, 0.0)) * rate
+
+
+def longest_step(elastic: Elastic, shaft: Shaft) -> float:
+    """Return the longest step that follows the ringing of the two bodies [s]: a third of its period, undamped."""
+    first = shaft.J if elastic.J > 0.0 else shaft.J - shaft.J_out
+    second = elastic.J if elastic.J > 0.0 else shaft.J_out
+    return 2.0 * math.pi / (_PART * math.sqrt(elastic.k / first + elastic.k / second))
+
+
+def pack(model: Given, load: Load, load_inertia: Any) -> Elastic:
+    """Return the spring of a model's gear, or of its load.
+
+    Raises
+    ------
+    ParameterError
+        If the gear is elastic without inertia behind it.
+    LoadError
+        If there is a body behind the shaft, and the gear is elastic or has play.
+    """
+    k: Any = model.servo.get("gear.stiffness")
+    if load.flexibles:
+        for name in ("gear.stiffness", "gear.backlash"):
+            if model.servo.get(name) is not None:
+                raise LoadError("load.flexible", got=f"a servo that gives {name}",
+                                allowed="one whose motor turns with its shaft: two bodies, not three")
+        arm = load.flexible
+        return Elastic(arm.stiffness, arm.damping, 0.0, arm.moment_of_inertia, arm.viscous_friction,
+                       arm.gravity_torque, arm.hanging_angle)
+    if k is None:
+        return NO_ELASTIC
+    has_body = np.asarray(np.asarray(load_inertia) > 0.0).ravel()
+    alone = has_body.size == 1
+    Relation("gear.stiffness", bool(has_body[0]) if alone else has_body,
+             k if alone else np.broadcast_to(np.ravel(k), has_body.shape),
+             "an elastic gear only with inertia behind it: gear.output_inertia, or a load that has some").check()
+    return Elastic(model.value("gear.stiffness"), model.value_or("gear.damping", 0.0),
+                   0.5 * model.value_or("gear.backlash", 0.0), 0.0, 0.0, 0.0, 0.0)
