@@ -6,6 +6,7 @@ on what these leave. A structure with fewer parts is simpler, and the simplest t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -79,7 +80,8 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
     Returns
     -------
     Ladder
-        Its rungs are called such as "digital, diode, M1".
+        Its rungs are called such as "digital, diode, M1". A structure whose search ends where a log cannot be simulated
+        is none of them.
 
     Raises
     ------
@@ -98,9 +100,15 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
         for k, one in enumerate(some):
             fit = _fitted(given, as_structure(servo, one), one, model, free, options,
                           _part(show, k, count, one.named(_BASE)))
-            found[one] = rung_of(one.named(_BASE), fit)
+            if math.isfinite(fit.cost):
+                found[one] = rung_of(one.named(_BASE), fit)
             if fit.interrupted:
-                return ladder_of(tuple(found.values()), select)
+                break
+        if not found:
+            raise InputError("structures", got="none that could be simulated to the end of the logs",
+                             allowed="a servo whose parameters can follow the logs; see its values and bounds")
+        if fit.interrupted:
+            return ladder_of(tuple(found.values()), select)
         best = _best(found, select)
         if not further:
             return ladder_of(tuple(found.values()), select)
