@@ -23,9 +23,10 @@ START = {
     "potentiometer": {"feedback_gain": 0.85 * 4.0 / 3.0 / np.pi, "feedback_offset": 0.85 * 1.5},
     "supply": {"open_circuit_voltage": 6.0, "bridge_drop_voltage": 0.2},
 }
-FIRMWARE = {  # of the digital servo: P and dead zone as of its class, ticks a guess
-    "control_period": 2e-3, "proportional_gain": 4.0, "derivative_gain": 0.1, "deadband_angle": 3e-3}
-DEADBAND = {"firmware.deadband_angle": (3e-3, 1e-3)}  # rad, prior: 0.5 to 2 us of the pulse
+FIRMWARE = {  # of the digital servo; ticks are a guess, the dead zone is the 1 us of its class: runs would have none
+    "control_period": 2e-3, "proportional_gain": 4.0, "derivative_gain": 0.1, "deadband_angle": 2.4e-3}
+DIGITAL = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
+           "firmware.proportional_gain", "firmware.derivative_gain", "potentiometer.feedback_gain")
 BRIDGES = ("brake", "diode")
 M1 = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
       "electronics.stretcher_gain", "electronics.deadband", "potentiometer.feedback_gain")
@@ -74,8 +75,8 @@ def folds_of_digital(logs: list[Log], bridge: str) -> None:
     """Print the errors of a digital servo on runs that were not fitted, and what each fold found."""
     errors, fitted, began = [], [], time.perf_counter()
     for names in folds(logs, FOLDS):
-        fit = st.identify(logs, digital(bridge), priors=DEADBAND, holdout=names, starts=1, intervals=False, noise=NOISE,
-                          diagnose=False, compare_with=())
+        fit = st.identify(logs, digital(bridge), free=DIGITAL, priors=None, holdout=names, starts=1,
+                          intervals=False, noise=NOISE, diagnose=False, compare_with=())
         errors += fit.holdout.errors["DigitalServo"]
         fitted += fit.training.errors["DigitalServo"]
         print("   ", ", ".join(f"{name.rpartition('.')[2]} {value:.4g}" for name, value in fit.estimates.items()),

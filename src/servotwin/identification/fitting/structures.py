@@ -7,7 +7,7 @@ on what these leave. A structure with fewer parts is simpler, and the simplest t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from servotwin.errors import InputError
@@ -75,7 +75,7 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
     progress : bool or callable
         As of `identify`, over all structures.
     **options
-        Of `identify`.
+        Of `identify`; bounds and priors count where a structure searches their number.
 
     Returns
     -------
@@ -177,8 +177,10 @@ def _fitted(logs: Sequence[Log], servo: Servo, structure: Structure, analog: typ
     plain = checks.checked_servo(servo, kind)
     read = (*plain.requires, *plain.optional, *LUMPED, *LOAD_NAMES)
     names = checks.usual_free(plain, logs) if free is None else [name for name in free if name in read]
-    ladder = friction_ladder(logs, servo, kind, names, rungs=(_BASE,), progress=tell, **options)
-    return ladder.fit
+    some = (*names, *RUNGS[_BASE])
+    own = {key: {name: value for name, value in options[key].items() if name in some}
+           for key in ("bounds", "priors") if isinstance(options.get(key), Mapping)}
+    return friction_ladder(logs, servo, kind, names, rungs=(_BASE,), progress=tell, **{**options, **own}).fit
 
 
 def _analog_class(analog: type[Model] | None) -> type[Model]:
@@ -194,9 +196,10 @@ def _climbed(logs: Sequence[Log], fit: Fit, laws: Sequence[str], options: dict[s
              tell: Callable[[float, str], None]) -> Ladder:
     """Return further friction laws on the best loop and bridge, from where its fit ended."""
     names = [name for name in fit.space.names if name not in RUNGS[_BASE]]
+    bounds = {name: span for name, span in (options.get("bounds") or {}).items() if name in fit.space.names}
     priors = {p.name: p.prior for p in fit.space.parameters if p.prior is not None}  # its own end is no further one
     return friction_ladder(logs, fit.servo, type(fit.model), names, rungs=laws, progress=tell,
-                           **{**options, "starts": 1, "priors": priors})
+                           **{**options, "starts": 1, "bounds": bounds, "priors": priors})
 
 
 def _part(show: Any, k: int, count: int, name: str) -> Any:
