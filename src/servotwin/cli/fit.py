@@ -62,8 +62,8 @@ def fit(
     no_priors: Annotated[bool, typer.Option(
         "--no-priors", help="Ignore the spreads in the servo file.", rich_help_panel=_SEARCH)] = False,
     nuisance: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Effects of the rig to fit: delay, log_delay, frame_phase, frame_period, angle_offset, "
-        "angle_sag, initial_state, or none (default: delay, frame_phase, angle_offset, initial_state).",
+        metavar="NAME", help="Effects of the rig to fit: delay, log_delay, frame_phase, frame_period, control_phase, "
+        "angle_offset, angle_sag, initial_state, or none (default: delay, frame_phase, angle_offset, initial_state).",
         rich_help_panel=_SEARCH)] = None,
     starts: Annotated[int, typer.Option(
         metavar="NUMBER", help="Number of searches; all but the first start at random.", rich_help_panel=_SEARCH)] = 3,

@@ -136,7 +136,7 @@ def as_structure(servo: Servo, structure: Structure) -> Servo:
     >>> import servotwin as st
     >>> digital = as_structure(st.load_servo("hitec-hs-755hb"), Structure("digital", "diode"))
     >>> digital.firmware.off_state, round(digital.firmware.proportional_gain, 3)
-    ('diode', 2.307)
+    ('diode', 3.423)
     """
     made: dict[str, Any]
     if structure.kind == "analog":
