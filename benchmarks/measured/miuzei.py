@@ -1,6 +1,7 @@
 """The Miuzei 25 kg servo with an arm: folds by run, each fitted on the others and held against its own."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,11 @@ START = {
     "potentiometer": {"feedback_gain": 0.85 * 4.0 / 3.0 / np.pi, "feedback_offset": 0.85 * 1.5},
     "supply": {"open_circuit_voltage": 6.0, "bridge_drop_voltage": 0.2},
 }
+FIRMWARE = {  # of the digital servo; ticks are a guess, the dead zone is the 1 us of its class: runs would have none
+    "control_period": 2e-3, "proportional_gain": 4.0, "derivative_gain": 0.1, "deadband_angle": 2.4e-3}
+DIGITAL = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
+           "firmware.proportional_gain", "firmware.derivative_gain", "potentiometer.feedback_gain")
+BRIDGES = ("brake", "diode")
 M1 = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque",
       "electronics.stretcher_gain", "electronics.deadband", "potentiometer.feedback_gain")
 EXTERNAL, LEAST = "friction.load_friction_external", "electronics.minimum_drive_time"
@@ -56,12 +62,40 @@ def drops(servo: Servo, logs: list[Log]) -> None:
             print(f"  {state:6} {label:16} {np.sqrt(np.mean(error[silent]**2)):6.1f} {error[-1]:+7.1f}", flush=True)
 
 
+def digital(bridge: str) -> Servo:
+    """Return where the search of a digital servo begins."""
+    electronics = {name: START["electronics"][name] for name in (
+        "one_shot_slope", "one_shot_offset", "frame_period", "pulse_width_min", "pulse_width_max")}
+    made = st.servo_from_values("miuzei-25kg", {**START, "electronics": electronics,
+                                                "firmware": {**FIRMWARE, "off_state": bridge}})
+    return replace(made, kind="digital")
+
+
+def folds_of_digital(logs: list[Log], bridge: str) -> None:
+    """Print the errors of a digital servo on runs that were not fitted, and what each fold found."""
+    errors, fitted, began = [], [], time.perf_counter()
+    for names in folds(logs, FOLDS):
+        fit = st.identify(logs, digital(bridge), free=DIGITAL, priors=None, holdout=names, starts=1,
+                          intervals=False, noise=NOISE, diagnose=False, compare_with=())
+        errors += fit.holdout.errors["DigitalServo"]
+        fitted += fit.training.errors["DigitalServo"]
+        print("   ", ", ".join(f"{name.rpartition('.')[2]} {value:.4g}" for name, value in fit.estimates.items()),
+              flush=True)
+    row(f"digital, {bridge}", errors)
+    row("  on the runs it was fitted to", fitted)
+    middle = np.degrees(np.median([error.rms for error in errors if error.motion == "prbs"]))
+    print(f"  {'':36} prbs, median of the runs {middle:.2f}; {(time.perf_counter() - began) / FOLDS:.0f} s a fit",
+          flush=True)
+
+
 def main(folder: Path) -> None:
     every = st.read_logs(folder / "miuzei_25kg" / "runs.json")
     logs = [log for log in every if log.motion != "drop"]
     servo = st.servo_from_values("miuzei-25kg", START)
     print(f"Miuzei 25 kg: {len(logs)} runs, {FOLDS} folds by run; rms error of runs that were not fitted [deg], over "
           "all samples (mean of the runs)")
+    for bridge in BRIDGES:
+        folds_of_digital(logs, bridge)
     for label, terms in MODELS.items():
         began = time.perf_counter()
         errors, slew, fitted = [], [], []

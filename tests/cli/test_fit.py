@@ -2,13 +2,14 @@
 
 import json
 import re
+from functools import partial
 
 import numpy as np
 import pytest
 
 import servotwin as st
 from cli import fit_logs
-from servotwin.identification import Ladder, Rung, identify, read_logs
+from servotwin.identification import Ladder, Rung, compare_structures, identify, read_logs
 
 QUICK = ["--servo", fit_logs.SERVO, "--model", "bounded", "--free", "output_inertia", "--no-priors", "--starts", "1",
          "--nuisance", "none", "--no-compare"]
@@ -138,6 +139,22 @@ def test_the_ladder_is_shown(fit, folder, monkeypatch):
                         "choose M1 and M2)")
     found = fit(*words, "--json").data["ladder"]
     assert (found["chosen"], found["error"], found["choices"]) == ("M1", 0.013, ["M1", "M2"])
+
+
+def test_structures_are_shown_and_reported(fit, tmp_path, monkeypatch):
+    """Four structures with Coulomb friction: a table in the terminal, in JSON and on the page."""
+    monkeypatch.setattr("servotwin.identification.compare_structures", partial(compare_structures, rungs=("M1",)))
+    ended = fit(*QUICK[:2], "--free", "output_inertia", "--structures", "--holdout", "0", "--starts", "1",
+                "--no-intervals", "--nuisance", "none", "--report", "fit.html")
+    page = (tmp_path / "fit.html").read_text(encoding="utf-8")
+    assert "What was compared" in page
+    for name in ("analog, brake, M1", "analog, coast, M1", "digital, brake, M1", "digital, diode, M1"):
+        assert any(line.startswith(name) for line in ended.out.splitlines())
+        assert name in page
+
+
+def test_the_ladder_and_structures_exclude_each_other(fit):
+    assert "--ladder: got 'also --structures'" in fit(*QUICK[:2], "--ladder", "--structures").error
 
 
 def test_what_is_wrong_with_logs_is_said_and_mended(cli, tmp_path):

@@ -48,8 +48,8 @@ def fit(
     table: Annotated[Path | None, typer.Option(
         metavar="FILE.csv", help="Calibrate from a bench table instead of logs.", rich_help_panel=_LOGS)] = None,
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: pulse; bounded if the servo file has "
-        "no chip).", rich_help_panel=_SEARCH)] = None,
+        metavar="MODEL", help="pulse, pulse-inductive, bounded or digital (default: the one that stands for the "
+        "servo: pulse, or digital if its file says so; bounded if it has no chip).", rich_help_panel=_SEARCH)] = None,
     free: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Parameters to search for, repeatable or with commas: names of servo and load, and "
         "output_torque_constant, output_inertia, output_coulomb_torque.", rich_help_panel=_SEARCH)] = None,
@@ -62,8 +62,8 @@ def fit(
     no_priors: Annotated[bool, typer.Option(
         "--no-priors", help="Ignore the spreads in the servo file.", rich_help_panel=_SEARCH)] = False,
     nuisance: Annotated[list[str] | None, typer.Option(
-        metavar="NAME", help="Effects of the rig to fit: delay, log_delay, frame_phase, frame_period, angle_offset, "
-        "angle_sag, initial_state, or none (default: delay, frame_phase, angle_offset, initial_state).",
+        metavar="NAME", help="Effects of the rig to fit: delay, log_delay, frame_phase, frame_period, control_phase, "
+        "angle_offset, angle_sag, initial_state, or none (default: delay, frame_phase, angle_offset, initial_state).",
         rich_help_panel=_SEARCH)] = None,
     starts: Annotated[int, typer.Option(
         metavar="NUMBER", help="Number of searches; all but the first start at random.", rich_help_panel=_SEARCH)] = 3,
@@ -84,6 +84,9 @@ def fit(
     ladder: Annotated[bool, typer.Option(
         "--ladder", help="Fit friction laws M1 to M6 and choose one by the held-out logs.",
         rich_help_panel=_SEARCH)] = False,
+    structures: Annotated[bool, typer.Option(
+        "--structures", help="Fit analog and digital loops, braking and open bridges, and friction laws M1 to M6, and "
+        "choose the simplest that predicts the held-out logs no worse.", rich_help_panel=_SEARCH)] = False,
     advise: Annotated[bool, typer.Option(
         "--advise", help="Say which experiment to do next; without logs, which one to start with.",
         rich_help_panel=_SEARCH)] = False,
@@ -110,14 +113,15 @@ def fit(
     if not logs:
         _show_advice(_first_advice(search), as_json=as_json)
         return
-    _check_ladder(search.model, ladder=ladder)
+    _check_ladder(search.model, ladder=ladder, structures=structures)
     options = {"holdout": holdout, "mend": mend, "nuisance": nuisance, "sensors": sensors, "starts": starts,
                "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
                "diagnose": diagnose, "accuracy": accuracy}
     chosen = _options(options)
     given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json)
-    found = _run(search, given, chosen, scheduler, ladder=ladder)
-    files = _write(found.fit, targets, force=force)
+    climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures)
+    found = _run(search, given, chosen, scheduler, climbs)
+    files = _write(found, targets, force=force)
     if advise and not found.fit.interrupted and found.fit.doubt is not None:
         found = _Found(found.fit, found.ladder, _advice(found.fit))
     _report(found, files, as_json=as_json)
@@ -161,13 +165,15 @@ def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None,
                          "from-sheet makes one from a data sheet")
 
 
-def _check_ladder(model: Model, *, ladder: bool) -> None:
+def _check_ladder(model: Model, *, ladder: bool, structures: bool) -> None:
     from servotwin.errors import InputError
     from servotwin.models import BoundedServo
 
+    if ladder and structures:
+        raise InputError("--ladder", got="also --structures", allowed="one of them: structures climb the ladder too")
     if ladder and isinstance(model, BoundedServo):
         raise InputError("--ladder", got="a bounded servo",
-                         allowed="pulse or pulse-inductive, which know friction that grows with the load")
+                         allowed="pulse, pulse-inductive or digital, which know friction that grows with the load")
 
 
 def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force: bool) -> list[Target]:
@@ -209,16 +215,29 @@ def _options(given: dict[str, Any]) -> dict[str, Any]:
         "diagnose": given["diagnose"], "compare_with": ("slew", "M1") if given["compare"] else ()}
 
 
-def _run(search: _Search, logs: list[Log], options: dict[str, Any], scheduler: str | None, *, ladder: bool) -> _Found:
+def _climber(search: _Search, *, asked: bool, ladder: bool, structures: bool) -> Callable[..., Ladder] | None:
+    """Return what fits several laws or structures; None where one fit is asked for."""
+    from functools import partial
+
+    from servotwin.identification import compare_structures, friction_ladder
+
+    servo, kind = search.model.servo, type(search.model)
+    if structures:
+        return partial(compare_structures, servo=servo, model=kind, free=search.free if asked else None)
+    return partial(friction_ladder, servo=servo, model=kind, free=search.free) if ladder else None
+
+
+def _run(search: _Search, logs: list[Log], options: dict[str, Any], scheduler: str | None,
+         climbs: Callable[..., Ladder] | None) -> _Found:
     from servotwin.cli.scheduler import executor_at
-    from servotwin.identification import friction_ladder, identify
+    from servotwin.identification import identify
 
     servo, kind = search.model.servo, type(search.model)
     with executor_at(scheduler) as executor, _progress() as progress:
         options = {**options, "bounds": search.bounds, "priors": search.priors, "executor": executor,
                    "progress": progress}
-        if ladder:
-            climbed = friction_ladder(logs, servo, kind, search.free, **options)
+        if climbs is not None:
+            climbed = climbs(logs, **options)
             found = _Found(climbed.fit, climbed)
         else:
             found = _Found(identify(logs, servo, kind, search.free, **options))
@@ -270,15 +289,15 @@ def _further(model: Model) -> list[str]:
     return [name for name in known if name in model.available][:1]
 
 
-def _write(fit: Fit, targets: list[Target], *, force: bool) -> list[str]:
+def _write(found: _Found, targets: list[Target], *, force: bool) -> list[str]:
     from servotwin.cli.outputs import staged
 
     with patience("writing"), staged(targets, force=force) as drafts:
         for target, draft in zip(targets, drafts, strict=True):
             if target.option == "--out":
-                fit.servo.save(draft)
+                found.fit.servo.save(draft)
             else:
-                fit.report(draft)
+                found.fit.report(draft, ladder=found.ladder)
     return [str(target.path) for target in targets]
 
 

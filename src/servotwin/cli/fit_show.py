@@ -162,8 +162,9 @@ def ladder_table(ladder: Ladder) -> list[RenderableType]:
         rows.append((rung.name, str(len(rung.fit.space)), f"{rung.training * factor:.3g}",
                      f"{rung.holdout * factor:.3g}" if math.isfinite(rung.holdout) else "–", f"{rung.criterion:.1f}",
                      ", ".join(said)))
-    return [table(("friction", "parameters", f"fitted ({unit})", f"held out ({unit})", "information criterion", ""),
-                  rows), f"{ladder.chosen}: {ladder.reason}", *_told(ladder, factor, unit), ""]
+    what = "structure" if "," in ladder.chosen else "friction"
+    return [table((what, "parameters", f"fitted ({unit})", f"held out ({unit})", "information criterion", ""), rows),
+            f"{ladder.chosen}: {ladder.reason}", *_told(ladder, factor, unit), ""]
 
 
 def _told(ladder: Ladder, factor: float, unit: str) -> list[str]:

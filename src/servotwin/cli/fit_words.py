@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters import Servo
 
-MODEL_NAMES = ("pulse", "pulse-inductive", "bounded")
+MODEL_NAMES = ("pulse", "pulse-inductive", "bounded", "digital")
 
 
 def names(words: Sequence[str] | None) -> tuple[str, ...] | None:

@@ -9,6 +9,7 @@ from servotwin.identification.fitting.holdout import ErrorTable, LogError
 from servotwin.identification.fitting.identify import identify
 from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder
 from servotwin.identification.fitting.point import LogPart, Point
+from servotwin.identification.fitting.structures import Structure, as_structure, compare_structures
 from servotwin.identification.fitting.uncertainty import Uncertainty
 from servotwin.identification.fitting.validate import Validation, validate
 from servotwin.identification.fitting.verdict import Cause, Verdict
@@ -66,6 +67,7 @@ __all__ = [
     "SheetPoint",
     "Space",
     "Start",
+    "Structure",
     "Trace",
     "Uncertainty",
     "Unidentifiable",
@@ -73,6 +75,8 @@ __all__ = [
     "Verdict",
     "Yielded",
     "advise",
+    "as_structure",
+    "compare_structures",
     "findings",
     "friction_ladder",
     "identify",

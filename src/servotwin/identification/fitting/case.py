@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import LUMPED, Space
+from servotwin.identification.fitting.loop_gain import with_loop_gain
 from servotwin.logs.log import Log
-from servotwin.models import BoundedServo, Model
+from servotwin.models import DigitalServo, Model
 from servotwin.parameters.output_side import N
 
 if TYPE_CHECKING:
@@ -77,6 +79,7 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
     InputError
         If the model cannot follow it, or it sets a parameter that is searched.
     """
+    log = with_loop_gain(log, model)
     searched = {*space.columns(space.start[None, :]), *([N] if any(name in LUMPED for name in space.names) else [])}
     for name in log.parameters:
         if name in searched:
@@ -103,10 +106,12 @@ def make_case(log: Log, model: Model, space: Space, sensors: Sequence[str], *, d
 
 
 def _usable(log: Log, model: Model, name: str) -> NDArray[np.bool_]:
-    """Return where a sensor counts; a model without pulses says nothing once no pulses were sent."""
-    used = log.used(name)
-    if isinstance(model, BoundedServo) and not log.sent.all():
-        used = used & (np.arange(len(log.time)) < int(np.argmin(log.sent)))
+    """Return where a sensor counts; a model without pulses says nothing once none were sent, or torque was off."""
+    used, there = log.used(name), log.sent
+    if isinstance(model, DigitalServo) and model.takes_goals:  # which stay over a silence
+        there = np.ones(len(log.time), np.bool_) if log.torque_on is None else log.torque_on
+    if not has_pulses(model) and not there.all():
+        used = used & (np.arange(len(log.time)) < int(np.argmin(there)))
     return used
 
 
@@ -133,12 +138,12 @@ def _start(log: Log, model: Model) -> tuple[float, float, float, bool]:
 
 def _period(log: Log, model: Model) -> float:
     """Return T_f that log or servo say [s]; 0 of a model without pulses."""
-    if isinstance(model, BoundedServo):
+    if not has_pulses(model):
         return 0.0
     return float(log.parameters.get(_FRAME_PERIOD, getattr(model, "frame_period", 0.0)))
 
 
 def _signal(log: Log, model: Model) -> Signal:
-    """Return the command as a model takes it; only a pulse servo knows missing pulses."""
+    """Return the command as a model takes it; only one with pulses knows missing ones."""
     made = log.signal(_period(log, model) or None)
-    return replace(made, edges=None) if made.edges is not None and isinstance(model, BoundedServo) else made
+    return replace(made, edges=None) if made.edges is not None and not has_pulses(model) else made

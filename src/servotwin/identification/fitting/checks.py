@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.identification.fitting.loop_gain import with_loop_gain
 from servotwin.logs.log import Log
-from servotwin.models import BoundedServo, Model, PulseServo, PulseServoInductive, default_model
+from servotwin.models import BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive, default_model
 from servotwin.parameters import Servo
 from servotwin.simulation.lane_loads import LOAD_NAMES
 from servotwin.simulation.progress import lines, on_terminal
@@ -25,7 +26,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_KINDS = (PulseServo, PulseServoInductive, BoundedServo)
+_KINDS = (PulseServo, PulseServoInductive, BoundedServo, DigitalServo)
+_PLANT = ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque")
+_LOOP_GAIN = "firmware.proportional_gain"
 _FITTED = ("output_angle", "feedback_voltage", "armature_current", "supply_current")
 _TOO_FAST = 4.0  # times the speed without load
 _OVERFITTED = 1.6  # error of new logs over that of the fitted ones
@@ -61,12 +64,26 @@ def checked_servo(servo: Any, kind: Any) -> Model:
     return model
 
 
-def usual_free(model: Model) -> tuple[str, ...]:
-    """Return what is searched unless the caller says: what an angle under command and load can tell."""
+def usual_free(model: Model, logs: Sequence[Log] = ()) -> tuple[str, ...]:
+    """Return what is searched unless the caller says: what an angle under command and load can tell.
+
+    Of a servo on a bus that is the plant, and the gain of its loop where neither registers nor logs say it.
+    """
+    if isinstance(model, DigitalServo):
+        if not model.takes_goals:
+            return (*_PLANT, _LOOP_GAIN, "firmware.derivative_gain", "firmware.deadband_angle",
+                    "potentiometer.feedback_gain")
+        known = _knows_gain(model.servo) or any(_LOOP_GAIN in with_loop_gain(log, model).parameters for log in logs)
+        return (*_PLANT, "motor.motor_viscous_friction", *(() if known else (_LOOP_GAIN,)))
     gain, deadband = (("electronics.bridge_gain", "electronics.voltage_deadband") if isinstance(model, BoundedServo)
                       else ("electronics.stretcher_gain", "electronics.deadband"))
-    return ("motor.armature_resistance", "output_torque_constant", "output_inertia", "output_coulomb_torque", gain,
-            deadband, "potentiometer.feedback_gain")
+    return (*_PLANT, gain, deadband, "potentiometer.feedback_gain")
+
+
+def _knows_gain(servo: Servo) -> bool:
+    """Tell whether a servo's registers say the gain of its loop."""
+    said = servo.source(_LOOP_GAIN) if servo.get(_LOOP_GAIN) is not None else None
+    return said is not None and said.origin in ("literature", "datasheet", "measured")
 
 
 def checked_sensors(logs: Sequence[Log], sensors: Sequence[str] | None, model: Model) -> tuple[str, ...]:

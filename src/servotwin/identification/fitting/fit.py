@@ -21,6 +21,7 @@ from servotwin.parameters import Servo
 if TYPE_CHECKING:
     from servotwin.identification.fitting.draws import Allowed
     from servotwin.identification.fitting.intervals import Ends
+    from servotwin.identification.fitting.ladder import Ladder
     from servotwin.identification.fitting.uncertainty import Uncertainty
     from servotwin.identification.fitting.verdict import Verdict
     from servotwin.identification.fitting.yielding import Yielded
@@ -270,8 +271,10 @@ class Fit:
             x = self.allowed.draw(int(number), np.random.default_rng(seed))[:, :p]
         return self.space.columns(np.clip(x, self.space.lower, self.space.upper))
 
-    def report(self, path: str | Path, *, overwrite: bool = False) -> Path:
+    def report(self, path: str | Path, *, ladder: Ladder | None = None, overwrite: bool = False) -> Path:
         """Write an HTML page: estimates, what is undetermined, errors, measured over simulated, residuals.
+
+        A ladder of friction laws or structures, of which this fit is one, adds a table of all of them.
 
         Raises
         ------
@@ -280,4 +283,4 @@ class Fit:
         """
         from servotwin.identification.report.page import write_report
 
-        return write_report(self, Path(path), overwrite=overwrite)
+        return write_report(self, Path(path), ladder=ladder, overwrite=overwrite)

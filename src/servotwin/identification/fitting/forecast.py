@@ -39,6 +39,8 @@ from servotwin.signals import Signal
 Array = NDArray[np.float64]
 
 _PERIOD = "electronics.frame_period"
+_PHASE = "firmware.control_phase"
+_ANY_TICK = (0.5, 12.0**-0.5)  # of a tick: mean and standard deviation of what may be anywhere in it
 _BEFORE = 5  # pulses: by then a servo hunts as it will
 _HOLDS = 0.5  # of the friction that a servo file says: what it surely holds without drives
 _HELD = 1e-6  # of its scale: how far a number moves that stays
@@ -58,8 +60,9 @@ class Forecast:
     space : Space
     nuisance : sequence of str
         Of "delay" (one for all logs), "log_delay" (what each log adds to it), "frame_phase" (when each log's pulses
-        come), "frame_period" (of all), "angle_offset" (measured less true angle), "angle_sag" (how far the measured
-        angle moves with the bus voltage) and "initial_state" (of each log).
+        come), "frame_period" (of all), "control_phase" (when the program of each log's servo ticks), "angle_offset"
+        (measured less true angle), "angle_sag" (how far the measured angle moves with the bus voltage) and
+        "initial_state" (of each log).
     sensors : sequence of str
         Names of measured signals that are compared.
     running : Running, optional
@@ -82,6 +85,8 @@ class Forecast:
                                         or not model.value_or("supply.internal_resistance", 0.0) > 0.0):
             raise InputError("nuisance: angle_sag", got=f"{model!r} whose bus voltage stays",
                              allowed="a pulse servo with supply.internal_resistance")
+        if "control_phase" in nuisance and _PHASE not in model.optional:
+            raise InputError("nuisance: control_phase", got=f"{model!r} without ticks", allowed="a DigitalServo")
         self.noise = dict.fromkeys(self.sensors, 1.0)
         delayed = any(name in nuisance for name in ("delay", "log_delay", "frame_phase"))
         self.cases = tuple(make_case(log, model, space, self.sensors, delayed=delayed) for log in logs)
@@ -114,6 +119,7 @@ class Forecast:
         names = []
         if "initial_state" in self.nuisance:
             names += ["output_angle", "output_speed"] if case.moving else ["output_angle"]
+        names += ["control_phase"] if "control_phase" in self.nuisance else []
         if self.phased:  # which holds a delay of the log's own too
             return (*names, "frame_phase")
         return (*names, "log_delay") if "log_delay" in self.nuisance else tuple(names)
@@ -121,7 +127,7 @@ class Forecast:
     def own_start(self, case: Case) -> Array:
         """Return a log's own numbers as measured."""
         first = {"output_angle": case.start[0] / OFFSET_SCALE, "output_speed": case.start[1] / SPEED_SCALE,
-                 "log_delay": 0.0, "frame_phase": 0.0}
+                 "log_delay": 0.0, "frame_phase": 0.0, "control_phase": _ANY_TICK[0]}
         if self.phased and len(gaps(case.log, case.period)) > 1:
             first["frame_phase"] = widest(case.log, case.period).phase / DELAY_SCALE
         return np.array([first[name] for name in self.names_of_own(case)])
@@ -130,7 +136,7 @@ class Forecast:
         """Return mean and one over the standard deviation of a log's own numbers (scaled).
 
         The start is believed to be where it was measured, within what the first samples scatter; a log's own delay to
-        be within half a frame or a sample.
+        be within half a frame or a sample, and the phase of its ticks to be anywhere.
         """
         # The start angle is that of when the first command acts: a shaft in motion is elsewhere by then. And what a
         # potentiometer reads is no angle while its gain is searched
@@ -138,7 +144,7 @@ class Forecast:
                                  and any(name in self.space.names for name in _POTENTIOMETER)) or self.lead(case) > 0.0
         spread = {"output_angle": math.inf if unsure else case.scatter / OFFSET_SCALE, "output_speed": math.inf,
                   "log_delay": 0.5 * float(np.median(np.diff(case.log.time))) / DELAY_SCALE,
-                  "frame_phase": math.inf if self.own_phases else _HELD}
+                  "frame_phase": math.inf if self.own_phases else _HELD, "control_phase": _ANY_TICK[1]}
         return self.own_start(case), np.array([1.0 / spread[name] for name in self.names_of_own(case)])
 
     def frames_of(self, point: Point, k: int) -> Frames:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from servotwin.identification.fitting.point import Frames
 from servotwin.logs.log import KINDS, Log
+from servotwin.models import BoundedServo, DigitalServo, Model
 from servotwin.signals.shapes import sampled
 
 if TYPE_CHECKING:
@@ -42,6 +43,11 @@ class Gap(NamedTuple):
     def width(self) -> float:
         """How far apart its ends are [s]."""
         return self.high - self.low
+
+
+def has_pulses(model: Model) -> bool:
+    """Tell whether commands reach a model as pulses: not the mean voltage of the bounded servo, nor goals on a bus."""
+    return not isinstance(model, BoundedServo) and not (isinstance(model, DigitalServo) and model.takes_goals)
 
 
 def changes(log: Log) -> Array:

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ParameterError, UnknownNameError
+from servotwin.identification.fitting.sizes import JUMPS, RANGES, TYPICAL
 from servotwin.models import Model
 from servotwin.parameters import GROUPS, Servo
+from servotwin.parameters.firmware import MOST_WAITING
 from servotwin.parameters.output_side import OUTPUT_SIDE, N, motor_side, output_value
 from servotwin.parameters.servo import check_name, unit_of
 from servotwin.simulation.lane_loads import LOAD_NAMES
@@ -28,19 +30,6 @@ LUMPED: dict[str, tuple[tuple[str, ...], int, str]] = {  # name -> members, powe
 }
 """Parameters at the output shaft, which are what motion alone can tell (physics of a geared motor, no N)."""
 
-_TYPICAL = {  # where a servo gives nothing, or 0: the size at which a parameter begins to matter
-    "friction.breakaway_ratio": 1.3, "friction.stribeck_exponent": 1.0,
-    "friction.load_friction": 0.1, "friction.load_friction_stribeck": 0.1,
-    "friction.load_friction_motor": 0.1, "friction.load_friction_external": 0.1,
-    "friction.load_friction_motor_stribeck": 0.1, "friction.load_friction_external_stribeck": 0.1,
-    "friction.load_friction_motor_quad": 0.05, "friction.load_friction_external_quad": 0.05,
-    "electronics.deadband": 5e-6, "electronics.minimum_drive_time": 2e-4, "electronics.stretcher_time_constant": 0.02,
-    "electronics.back_emf_injection": 0.02, "electronics.supply_coupling": 0.05, "electronics.one_shot_offset": 1e-4,
-    "electronics.voltage_deadband": 5e-3, "electronics.command_offset": 0.05,
-    "potentiometer.feedback_offset": 0.05, "potentiometer.backlash": 5e-3, "gear.backlash": 0.01,
-    "motor.brush_drop_voltage": 0.2, "supply.internal_resistance": 0.3, "supply.bridge_drop_voltage": 0.3,
-    "supply.bridge_drop_resistance": 0.2, "stops.restitution": 0.2,
-}
 _WIDE = 20.0  # default bounds: so many times the nominal value, either way
 _START = 3.0  # default random starts: so many times, either way
 
@@ -219,6 +208,9 @@ def _check_names(model: Model, free: Sequence[str]) -> None:
             if GROUPS[group].__dataclass_fields__[key].metadata["dimension"] == "word" \
                     or GROUPS[group].__dataclass_fields__[key].metadata["rule"] == "table":
                 raise ParameterError(f"free: {name}", got="a word or a table", allowed="a number")
+            if name in JUMPS:
+                raise ParameterError(f"free: {name}", got="a number that acts by jumps",
+                                     allowed="one that acts smoothly; compare fits to choose such a number")
 
 
 def _names_of_servo() -> set[str]:
@@ -254,15 +246,26 @@ def nominal(servo: Servo, name: str) -> float | None:
     """
     if name not in LUMPED:
         value = servo.get(name)
+        if name == "firmware.deadband_angle" and value is None:
+            return _deadband(servo)
         return float(value) if isinstance(value, int | float) else None
     return output_value(servo, name)
+
+
+def _deadband(servo: Servo) -> float | None:
+    """Return the half dead zone of the error that a deadband of pulses is [rad]."""
+    width, slope, gain = (servo.get(name) for name in (
+        "electronics.deadband", "electronics.one_shot_slope", "potentiometer.feedback_gain"))
+    if not all(isinstance(x, int | float) and x > 0.0 for x in (width, slope, gain)):
+        return None
+    return 0.5 * width / (slope * gain)  # type: ignore[operator]
 
 
 def _parameter(servo: Servo, name: str, limits: tuple[float, float] | None, belief: tuple[float, float] | None,
                load: Mapping[str, float]) -> FreeParameter:
     value = load.get(name, 0.0) if name in LOAD_NAMES else nominal(servo, name)
     typical = _typical(servo, name)
-    there = name in _TYPICAL or name == "friction.stribeck_speed"  # else what is absent is 0
+    there = name in TYPICAL or name == "friction.stribeck_speed"  # else what is absent is 0
     start = value if value is not None else typical if there else 0.0
     scale = max(abs(start), typical if start == 0.0 else 0.0) or 1.0
     rule = _rule(name)
@@ -274,6 +277,7 @@ def _parameter(servo: Servo, name: str, limits: tuple[float, float] | None, beli
         lower, upper = start / _WIDE, start * _WIDE
     else:
         lower, upper = max(floor, start - _WIDE * scale), min(ceiling, start + _WIDE * scale)
+    lower, upper = _within(servo, name, start, (lower, upper))
     if limits is not None:
         lower, upper = _limits(name, limits, floor, ceiling, positive=logarithmic)
         start = min(max(start, lower), upper)
@@ -285,10 +289,19 @@ def _parameter(servo: Servo, name: str, limits: tuple[float, float] | None, beli
                          lower=lower, upper=upper, prior=belief, bounded=limits is not None)
 
 
+def _within(servo: Servo, name: str, start: float, wide: tuple[float, float]) -> tuple[float, float]:
+    """Return the range of a search that its own nature narrows; it holds where the search starts."""
+    low, high = RANGES.get(name, wide)
+    tick = nominal(servo, "firmware.control_period")
+    if name in ("firmware.compute_delay", "firmware.bus_latency") and tick is not None:
+        high = min(high, (MOST_WAITING - 1) * tick)
+    return min(low, start), max(high, start)
+
+
 def _typical(servo: Servo, name: str) -> float:
     """Return the size at which a parameter begins to matter beside what the servo has; 0 where none is known."""
-    if name in _TYPICAL:
-        return _TYPICAL[name]
+    if name in TYPICAL:
+        return TYPICAL[name]
     reduction = nominal(servo, N) or 1.0
     gain, resistance = nominal(servo, "output_torque_constant"), nominal(servo, "motor.armature_resistance")
     inertia, voltage = nominal(servo, "output_inertia"), nominal(servo, "supply.open_circuit_voltage")

@@ -70,7 +70,7 @@ def identify(
     servo : Servo
         Gives what is not searched, and where the search begins.
     model : type of Model, optional
-        `PulseServo`, `PulseServoInductive` or `BoundedServo`; the one that stands for the servo
+        `PulseServo`, `PulseServoInductive`, `BoundedServo` or `DigitalServo`; the one that stands for the servo
         (`models.default_class`) unless given.
     free : sequence of str, optional
         What is searched: dotted names of servo and load, and the lumped names `output_torque_constant` (motor and
@@ -79,7 +79,8 @@ def identify(
         Of "delay" (the command acts so much later), "log_delay" (what each log adds to it), "frame_phase" (when the
         pulses of each log come; of models with pulses), "frame_period" (how far apart they are in all logs; added
         where pulses drift), "angle_offset" (measured less true angle), "angle_sag" (the measured angle moves with the
-        bus voltage) and "initial_state" (each log's start; else the servo stands where its first command says).
+        bus voltage), "control_phase" (when each log's servo ticks; of a `DigitalServo`) and "initial_state" (each
+        log's start; else the servo stands where its first command says).
     priors : "servo", mapping or None
         Normal beliefs, mean and standard deviation by name (SI); "servo" takes the spread that the servo file states.
     mend : sequence of str
@@ -146,7 +147,7 @@ def identify(
     read = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, model)
     given, noticed = first_looks(read, plain, mend)
-    names = checks.usual_free(plain) if free is None else checks.checked_list("free", free)
+    names = checks.usual_free(plain, given) if free is None else checks.checked_list("free", free)
     beside = checks.checked_words("compare_with", compare_with, BESIDE)
     level, seed = checks.checked_level(level), checks.checked_count("seed", seed, least=0)
     seen = checks.checked_sensors(given, sensors, plain)

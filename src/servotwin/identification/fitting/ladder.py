@@ -53,12 +53,12 @@ _STRIBECK_SPEED = 0.2  # rad/s at the output, where Stribeck friction begins to 
 
 @dataclass(frozen=True)
 class Rung:
-    """One friction law.
+    """One friction law, or one structure.
 
     Parameters
     ----------
     name : str
-        "M1" to "M6".
+        "M1" to "M6", or such as "digital, diode, M1".
     fit : Fit
     training, holdout : float
         Rms error over all samples [rad]; nan without logs that were held out.
@@ -124,8 +124,8 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
     logs : sequence of Log
     servo : Servo
     model : type of Model, optional
-        One that reads load friction: `PulseServo` or `PulseServoInductive`; for `BoundedServo` only "M1" makes sense.
-        The one that stands for the servo (`models.default_class`) unless given.
+        One that reads load friction: `PulseServo`, `PulseServoInductive` or `DigitalServo`; for `BoundedServo` only
+        "M1" makes sense. The one that stands for the servo (`models.default_class`) unless given.
     free : sequence of str, optional
         What else is searched; friction terms in it are left to the ladder.
     rungs : sequence of str
@@ -151,7 +151,7 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
                          allowed='at least one rung; "holdout" or "criterion"')
     given = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, model)
-    others = [name for name in (free or checks.usual_free(plain))
+    others = [name for name in (free or checks.usual_free(plain, given))
               if name not in _TERMS and name not in _BASE and not name.startswith("friction.")]
     options = {"compare_with": (), **options, "diagnose": False}  # the ladder is the trial
     found: list[Rung] = []
@@ -164,12 +164,24 @@ def friction_ladder(logs: Sequence[Log], servo: Servo, model: type[Model] | None
                 more["starts"] = 1  # it begins at what a simpler law found
             fit = identify(given, start, type(plain), [*others, *RUNGS[name]],
                            progress=_share(show, k, len(ordered), name), **more)
-            found.append(_rung(name, fit))
+            found.append(rung_of(name, fit))
             if fit.interrupted:
                 break
-    chosen, reason = _choice(found, select)
-    told = _told(found, select)
-    return Ladder(tuple(found), chosen, reason, told.error, told.choices)
+    return ladder_of(found, select)
+
+
+def ladder_of(rungs: Sequence[Rung], select: str) -> Ladder:
+    """Return fits to the same logs, the simplest first, with the one that is chosen.
+
+    Parameters
+    ----------
+    rungs : sequence of Rung
+    select : {"holdout", "criterion"}
+        As of `friction_ladder`.
+    """
+    chosen, reason = _choice(rungs, select)
+    told = _told(rungs, select)
+    return Ladder(tuple(rungs), chosen, reason, told.error, told.choices)
 
 
 def _share(show: Any, k: int, count: int, name: str) -> Any:
@@ -199,7 +211,8 @@ def _start(servo: Servo, name: str, before: Sequence[Rung]) -> Servo:
     return base.replace(values, source="where a rung of the friction ladder begins")
 
 
-def _rung(name: str, fit: Fit) -> Rung:
+def rung_of(name: str, fit: Fit) -> Rung:
+    """Return a fit as one of several, under a name."""
     own = type(fit.model).__name__
     training = fit.training.total()[own]
     holdout = fit.holdout.total()[own] if fit.holdout else math.nan
@@ -245,7 +258,7 @@ def _choice(rungs: Sequence[Rung], select: str, some: Sequence[int] | None = Non
         worse, doubt = _difference(rung, best, some)
         if worse <= doubt:
             reason = "smallest error on logs that were held out" if rung is best else (
-                f"simplest law within one standard error of {best.name}, the smallest error on logs that were held out")
+                f"simplest within one standard error of {best.name}, the smallest error on logs that were held out")
             return rung.name, reason
     return best.name, "smallest error on logs that were held out"
 

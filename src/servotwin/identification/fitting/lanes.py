@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 
 _VOLTAGE = "supply.open_circuit_voltage"
 _NOISE = "potentiometer.noise"
+_TICK, _PHASE = "firmware.control_period", "firmware.control_phase"
 _DELAYS = ("log_delay", "frame_phase")  # a log's own: what they change follows from the speed, without a lane
 
 
@@ -53,12 +54,15 @@ class LogLanes:
         angle = own.get("output_angle", self.case.start[0] / OFFSET_SCALE) * OFFSET_SCALE - self.offset
         self.angle = np.full(self.count, angle)
         self.speed = np.full(self.count, own.get("output_speed", 0.0) * SPEED_SCALE)
+        self.tick = np.full(self.count, own.get("control_phase", 0.0))
+        columns = {"output_angle": (self.angle, OFFSET_SCALE), "output_speed": (self.speed, SPEED_SCALE),
+                   "control_phase": (self.tick, 1.0)}
         self.steps = _steps(forecast.space, point.shared[:p], numbers, sides, step)
         for side in range(sides):
             first = 1 + side * numbers
             self.x[np.arange(first, first + p), np.arange(p)] += self.steps[side, :p]
             for i, name in enumerate(self.varied):
-                column, scale = (self.angle, OFFSET_SCALE) if name == "output_angle" else (self.speed, SPEED_SCALE)
+                column, scale = columns[name]
                 column[first + p + i] += self.steps[side, p + i] * scale
         self.signals = [self.case.signal] * self.count
         if forecast.phased:
@@ -95,10 +99,13 @@ class LogLanes:
                if name in LOAD_NAMES or name in read}
         if _NOISE in forecast.model.optional and forecast.model.servo.get(_NOISE):
             own[_NOISE] = np.zeros(self.count)
+        columns = {**forecast.space.columns(self.x), **own}
+        if "control_phase" in self.names:
+            columns[_PHASE] = np.clip(self.tick, 0.0, 1.0) * columns.get(_TICK, forecast.model.value(_TICK))
         asked = np.maximum(np.concatenate([self.times, self.times + self.later]) if self.later else self.times, 0.0)
         starts = "initial_state" in forecast.nuisance
         return Bundle(times=asked, duration=max(float(asked.max()), log.duration), load=log.load, signals=self.signals,
-                      columns={**forecast.space.columns(self.x), **own},
+                      columns=columns,
                       initial={"output_angle": self.angle, "output_speed": self.speed} if starts else {})
 
     def _fail(self) -> None:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-NUISANCES = ("delay", "log_delay", "frame_phase", "frame_period", "angle_offset", "angle_sag", "initial_state")
+NUISANCES = ("delay", "log_delay", "frame_phase", "frame_period", "control_phase", "angle_offset", "angle_sag",
+             "initial_state")
 SHARED = {"delay": (0.01, "s"), "angle_offset": (0.01, "rad"), "angle_sag": (0.1, "rad/V"), "frame_period": (1e-3, "s")}
 """Nuisances that all logs share: the step that matters, and the unit."""
 DELAY_SCALE, OFFSET_SCALE, SAG_SCALE, PERIOD_SCALE = (SHARED[name][0] for name in SHARED)
@@ -38,8 +39,8 @@ class Point(NamedTuple):
     shared : ndarray, shape (p,)
         The searched numbers of `Space`, then those of `SHARED` that are nuisances (scaled).
     own : tuple of ndarray
-        Of each log: angle and speed at its start, its own delay, when its first pulse comes (scaled), as far as they
-        are nuisances.
+        Of each log: angle and speed at its start, its own delay, when its first pulse comes (scaled), and when its
+        servo's program looks at the shaft first (in ticks), as far as they are nuisances.
     frames : tuple of Frames
         Of each log, where pulses have a phase; those that a forecast begins with unless given.
     """

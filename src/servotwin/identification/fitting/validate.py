@@ -100,8 +100,8 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     logs : sequence of Log, or path
     servo : Servo
     model : type of Model, optional
-        `PulseServo`, `PulseServoInductive` or `BoundedServo`; that of the servo file's [fit] unless given, else
-        the one that stands for the servo (`models.default_class`).
+        `PulseServo`, `PulseServoInductive`, `BoundedServo` or `DigitalServo`; that of the servo file's [fit] unless
+        given, else the one that stands for the servo (`models.default_class`).
     mend : sequence of str
         What is put right in the logs first, as of `identify`.
     nuisance : sequence of str

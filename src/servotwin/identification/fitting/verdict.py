@@ -271,6 +271,8 @@ def _between(rows: Sequence[Rows], noise: Noise, numbers: int) -> Excess | None:
         m = len(r.residual)
         g = r.slope[:m] * r.score[:m, None]
         F = r.slope.T @ r.slope
+        if not np.isfinite(F).all():  # a simulation at the edge of what is possible
+            continue
         values, vectors = np.linalg.eigh(F)
         known = vectors[:, values > 1e-6 * max(float(values.max(initial=0.0)), 1e-12)]
         score = (r.slope.T @ r.score) @ known

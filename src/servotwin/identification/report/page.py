@@ -16,8 +16,9 @@ from servotwin.parameters import write_file
 
 if TYPE_CHECKING:
     from servotwin.identification.fitting.fit import Fit
+    from servotwin.identification.fitting.ladder import Ladder
 
-def write_report(fit: Fit, path: Path, *, overwrite: bool = False) -> Path:
+def write_report(fit: Fit, path: Path, *, ladder: Ladder | None = None, overwrite: bool = False) -> Path:
     """Write the report of a fit.
 
     Parameters
@@ -25,6 +26,8 @@ def write_report(fit: Fit, path: Path, *, overwrite: bool = False) -> Path:
     fit : Fit
     path : Path
         Of the HTML file.
+    ladder : Ladder, optional
+        Of friction laws or structures, of which this fit is one.
     overwrite : bool
         Whether a file that is there may be replaced.
 
@@ -37,16 +40,17 @@ def write_report(fit: Fit, path: Path, *, overwrite: bool = False) -> Path:
     OutputExistsError, OutputError
         If the file exists and `overwrite` is false, or it cannot be written.
     """
-    write_file(path, page(fit).encode(), overwrite=overwrite)
+    write_file(path, page(fit, ladder).encode(), overwrite=overwrite)
     return Path(path)
 
 
-def page(fit: Fit) -> str:
+def page(fit: Fit, ladder: Ladder | None = None) -> str:
     """Return the report as HTML."""
     sections = (
         *((("verdict", "Verdict", _verdict(fit)),) if fit.verdict is not None else ()),
         ("summary", "Summary", _summary(fit)), ("estimates", "Parameters", _estimates(fit)),
         ("unknown", "What the logs cannot say", _unknown(fit)),
+        *((("structures", "What was compared", _compared(ladder)),) if ladder is not None else ()),
         ("errors", "Errors beside simpler models", _errors(fit)),
         ("logs", "Measured and simulated", report_parts.trace_list(fit.traces)),
         ("residuals", "What is left", _residuals(fit)),
@@ -147,6 +151,10 @@ def _unknown(fit: Fit) -> str:
         parts.append("<p>This fit was made without intervals, so it does not say what is determined.</p>")
     return "\n".join(parts) or ('<div class="note good"><p>Every searched number is determined, none stands at a '
                                 "bound.</p></div>")
+
+
+def _compared(ladder: Ladder) -> str:
+    return report_tables.rungs(ladder) + f"<p>{escape(ladder.chosen)}: {escape(ladder.reason)}.</p>"
 
 
 def _errors(fit: Fit) -> str:

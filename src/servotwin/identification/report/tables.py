@@ -10,6 +10,7 @@ from servotwin.identification.report.shown import (
     MODELS,
     dimension_of_free,
     error_rows,
+    error_shown,
     error_unit,
     estimate_lines,
     sensor_dimension,
@@ -19,6 +20,7 @@ from servotwin.look import MINUS, escape, figure_in, label_of, number, readable,
 if TYPE_CHECKING:
     from servotwin.identification.fitting.fit import Fit, Trace
     from servotwin.identification.fitting.holdout import ErrorTable
+    from servotwin.identification.fitting.ladder import Ladder
 
 _HOW = {"normal": "normal law", "profile": "profile of the cost", "at bound": "none: at a bound",
         "undetermined": "none: not determined", "not sought": "none: not asked for"}
@@ -101,6 +103,15 @@ def starts(fit: Fit) -> str:
     return table(("start", "cost", "times the best", "converged"), rows,
                  caption="Cost: half the sum of squared residuals in units of noise, large ones in proportion only "
                          "where the loss is Huber's. With several starts these are the rough searches on some logs.")
+
+
+def rungs(ladder: Ladder) -> str:
+    """Return all fits of a ladder, and which one is chosen."""
+    factor, unit = error_shown(ladder.fit.traces)
+    rows = [[escape(rung.name), str(len(rung.fit.space)), f"{_error(rung.training * factor)} {unit}",
+             f"{_error(rung.holdout * factor)} {unit}" if math.isfinite(rung.holdout) else "–",
+             number(rung.criterion, 5), "chosen" if rung.name == ladder.chosen else ""] for rung in ladder.rungs]
+    return table(("structure", "parameters", "fitted", "held out", "information criterion", ""), rows)
 
 
 def bounds(fit: Fit) -> str:

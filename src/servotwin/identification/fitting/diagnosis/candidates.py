@@ -9,10 +9,11 @@ import numpy as np
 
 from servotwin.errors import ServotwinError
 from servotwin.identification.fitting.diagnosis.bench import Setting, TrialBench
+from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import LUMPED, nominal
 from servotwin.loads import Load
 from servotwin.logs.log import Log
-from servotwin.models import BoundedServo, Model
+from servotwin.models import BoundedServo, DigitalServo, Model
 from servotwin.parameters import Servo
 
 _EXACT, _OFF = 2e-3, 0.12  # of a clock: as good as any, and more than any is off
@@ -127,7 +128,7 @@ def _times(load: Load, factor: float) -> Load:
 def like_digital(bench: TrialBench) -> Sequence[Setting]:
     """Return settings of a servo without pulses and deadband that multiplies its error by a gain."""
     old = bench.setting.model
-    if isinstance(old, BoundedServo):
+    if isinstance(old, BoundedServo | DigitalServo):
         return ()
     servo, names = old.servo, bench.old.space.names
     there = dict(zip(names, bench.old.space.values(bench.point.shared[None, :len(names)])[0], strict=True))
@@ -152,7 +153,7 @@ def clocks(more: Sequence[str]) -> Callable[[TrialBench], Sequence[Setting]]:
     """Return the setting with further nuisances of pulses."""
     def settings(bench: TrialBench) -> Sequence[Setting]:
         nuisance = tuple(dict.fromkeys((*bench.old.nuisance, *more)))
-        if set(more) <= set(bench.old.nuisance) or isinstance(bench.setting.model, BoundedServo):
+        if set(more) <= set(bench.old.nuisance) or not has_pulses(bench.setting.model):
             return ()
         return [replace(bench.setting, nuisance=nuisance)]
     return settings

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.identification.fitting.diagnosis.bench import Gain, Told, TrialBench, gain, teaching
+from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.point import Point
 from servotwin.logs.log import Log
-from servotwin.models import BoundedServo
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class _Kind:
 
 def lost_pulses(bench: TrialBench) -> Told | None:
     """Return what pulses that are left out gain."""
-    if isinstance(bench.setting.model, BoundedServo):
+    if not has_pulses(bench.setting.model):
         return None
     period = bench.cases[0].period
 

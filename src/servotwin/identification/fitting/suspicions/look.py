@@ -13,8 +13,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from servotwin.errors import ServotwinError
+from servotwin.identification.fitting.frames import has_pulses
 from servotwin.logs.log import Log
-from servotwin.models import BoundedServo, Model
+from servotwin.models import Model
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -108,7 +109,7 @@ def look(log: Log, model: Model) -> Look | None:
             warnings.simplefilter("ignore")
             here = type(model)(model.servo.replace(own)) if own else model
             made = log.signal(own.get("electronics.frame_period", getattr(here, "frame_period", None)))
-            drives = here.command(replace(made, edges=None) if isinstance(here, BoundedServo) else made)
+            drives = here.command(replace(made, edges=None) if not has_pulses(here) else made)
             speed = _top_speed(here)
     except ServotwinError:
         return None

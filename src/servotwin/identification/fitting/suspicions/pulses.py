@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.suspicions.look import Finding, Look
-from servotwin.models import BoundedServo
 
 
 def refused(looks: Sequence[Look]) -> list[Finding]:
     """Return the logs with pulses outside the limits that the chip takes."""
-    return [finding for one in looks if not isinstance(one.model, BoundedServo) for finding in _refused(one)]
+    return [finding for one in looks if has_pulses(one.model) for finding in _refused(one)]
 
 
 def _refused(one: Look) -> list[Finding]:

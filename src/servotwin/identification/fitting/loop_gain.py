@@ -1,0 +1,57 @@
+"""The gain that a log says its servo's loop had, as the firmware has it: runs at several gains tell of one plant."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from servotwin.logs.log import Log
+from servotwin.models import DigitalServo, Model
+from servotwin.parameters import Servo
+from servotwin.parameters.registers import REGISTER_FAMILIES
+from servotwin.units import is_finite
+
+GAIN = "firmware.proportional_gain"
+_REGISTERS = {"feetech-sts": "P_Coefficient", "dynamixel-x": "Position_P_Gain", "dynamixel-mx": "P_Gain"}
+_LOOP = ("electronics.stretcher_gain", "electronics.one_shot_slope", "electronics.frame_period")
+_OF_PULSES = ("electronics.", "potentiometer.")
+
+
+def with_loop_gain(log: Log, model: Model) -> Log:
+    """Return a log of a servo on a bus with the gain of its loop as a number of the firmware.
+
+    A log's condition `gain` is the register for P: of a servo whose sheet names its registers it makes the duty per
+    angle as they do, and of others as the log's convention of pulses does. What stands for pulses in such a log is left
+    out: a bus servo has none.
+
+    Parameters
+    ----------
+    log : Log
+    model : Model
+        Other models, and logs that say their gain themselves or none at all, are left as they are.
+
+    Raises
+    ------
+    ParameterError
+        If the register cannot have this value.
+    """
+    if not isinstance(model, DigitalServo) or not model.takes_goals:
+        return log
+    own = {name: value for name, value in log.parameters.items() if not name.startswith(_OF_PULSES)}
+    gain = own.get(GAIN, _of_registers(model.servo, log))
+    gain = _of_pulses(log) if gain is None else gain
+    return replace(log, parameters=own if gain is None else {**own, GAIN: gain})
+
+
+def _of_registers(servo: Servo, log: Log) -> float | None:
+    written, family = log.conditions.get("gain"), str(servo.sheet.get("registers", ""))
+    if not is_finite(written) or family not in _REGISTERS:
+        return None
+    value = REGISTER_FAMILIES[family]({_REGISTERS[family]: written}, servo=servo).get(GAIN)  # type: ignore[dict-item]
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _of_pulses(log: Log) -> float | None:
+    """Return the duty per angle of a chip that stretches K s_µ per angle in each frame [1/rad]."""
+    K, s_mu, T_f = (log.parameters.get(name) for name in _LOOP)
+    p = log.parameters.get("potentiometer.feedback_gain")
+    return None if K is None or s_mu is None or T_f is None or p is None else K * s_mu * p / T_f
