@@ -162,6 +162,7 @@ def test_momentum_is_kept_between_two_bodies_that_nothing_else_touches():
     assert np.abs(momentum - 2e-3).max() < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["play", "heavy arm"])
 @pytest.mark.parametrize("kind", [st.PulseServo, st.DigitalServo])
 def test_lanes_and_ticks_move_as_one_servo_does(name, kind):
@@ -203,6 +204,7 @@ def test_a_measured_angle_of_the_load_is_compared():
     assert other["load_angle"] > 1e-4
 
 
+@pytest.mark.slow
 def test_what_is_imposed_keeps_the_twist():
     sims = st.VectorSimulator(st.PulseServo(servo({})), lanes=1, load=st.loads.Inertia(2e-3))
     sims.reset(command_angle=0.0)

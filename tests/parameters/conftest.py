@@ -15,7 +15,7 @@ _NUMBERS = {
 _OTHER_LAW = ("load_friction", "load_friction_stribeck")
 
 MASSES = {"winding_capacity": 2.0, "housing_capacity": 30.0, "winding_to_housing": 8.0, "housing_to_ambient": 16.0}
-FIRMWARE_ALONE = ("compute_delay", "derivative_ticks", "whole_counts", "integral_at_rest", "signal_loss")
+FIRMWARE_ALONE = ("compute_delay", "bus_latency", "derivative_ticks", "whole_counts", "integral_at_rest", "signal_loss")
 COMPANIONS = {"friction.stribeck_exponent": {"stribeck_speed": 10.0}, "gear.damping": {"stiffness": 50.0},
               "thermal.magnet_coefficient": MASSES,
               **{f"thermal.{name}": {key: MASSES[key] for key in MASSES if key != name} for name in MASSES}}

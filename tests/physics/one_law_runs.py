@@ -57,6 +57,8 @@ def cases(st):
         "inductive": (st.PulseServoInductive(servo.replace({**COASTING, **INDUCTIVE})), step, dragging, True),
         "digital": (st.DigitalServo(servo.replace(PROGRAM)), pulses, dragging, True),
         "chopped": (st.DigitalServo(servo.replace(CHOPPED)), pulses, swinging, True),
+        "sprung": (st.PulseServo(servo.replace({"gear.stiffness": 30.0, "gear.damping": 0.02,
+                                                "gear.output_inertia": 1e-3})), pulses, dragging, True),
         "bounded": (st.BoundedServo(servo.replace(MEAN)), volts, dragging, True),
         "bounded pulses": (st.BoundedServo(servo.replace(MEAN)), pulses, st.loads.Spring(stiffness=0.1, rest_angle=0.3),
                            True),

@@ -25,6 +25,7 @@ COLUMNS = {
     "error_time_us": ("error_time", 1e6), "drive": ("drive", 1.0), "bus_voltage_V": ("bus_voltage", 1.0),
     "supply_current_A": ("supply_current", 1.0), "winding_temperature_K": ("winding_temperature", 1.0),
     "housing_temperature_K": ("housing_temperature", 1.0), "duty": ("duty", 1.0), "trip": ("trip", 1.0),
+    "load_angle_deg": ("load_angle", 180.0 / math.pi),
     "goal_angle_deg": ("goal_angle", 180.0 / math.pi), "reference_angle_deg": ("reference_angle", 180.0 / math.pi),
 }
 

@@ -14,6 +14,8 @@ from servotwin.errors import CommandError
 
 from .digital_servos import case_of, command_of, load_of, model_of
 
+pytestmark = pytest.mark.slow
+
 BLOCK = 8
 BOUNDS = {True: 1e-11, False: 1e-9}  # rad, of linear plants and of others
 TIE = 1e-9  # counts: so near to a change of its count an angle may be counted otherwise

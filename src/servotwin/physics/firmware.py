@@ -267,7 +267,7 @@ def braking_distance(speed: float, acceleration: float, control_period: float) -
 
     Examples
     --------
-    >>> braking_distance(3.0, 1.0, 1.0), braking_distance(3.0, math.inf, 1.0)
+    >>> braking_distance(3.0, 1.0, 1.0), braking_distance(3.0, float("inf"), 1.0)
     (3.0, 0.0)
     """
     if acceleration == math.inf:

@@ -1,9 +1,9 @@
 """Digital servos whose every motion is ẇ = f − λ w go from tick to tick in one loop, without a motion being kept.
 
 Between two ticks the duty is constant, so that speed and current change their laws only where the speed reaches a
-level: zero, or where the drops hold the current. When is told outright. Whatever else comes, an end stop that is hit
-or a regulator at its limit, is left to the general way, which goes on from the last tick. Arrays of the inputs are
-looked at only where they are needed: compiled code counts who holds them, which takes longer than a tick.
+level: zero, or where the drops hold the current. When is told outright. An end stop that is hit is left to the general
+way, which goes on from the last tick. Arrays of the inputs are looked at only where they are needed: compiled code
+counts who holds them, which takes longer than a tick.
 """
 
 from __future__ import annotations
@@ -23,9 +23,21 @@ from servotwin.models.engine.modes import (
     Mode,
     Vector,
     at_rest,
-    limited,
 )
-from servotwin.models.terms import bridge, control, duty, elastic, friction, heat, load, motor, play, sensor, shaft
+from servotwin.models.terms import (
+    bridge,
+    control,
+    duty,
+    elastic,
+    friction,
+    heat,
+    load,
+    motor,
+    play,
+    sensor,
+    shaft,
+    source,
+)
 from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE
 from servotwin.models.terms.motor import Motor
@@ -67,10 +79,10 @@ class Way(NamedTuple):
 
 
 def possible(numbers: Numbers, inputs: Inputs) -> bool:
-    """Tell whether a servo always moves so, stops and limits apart."""
+    """Tell whether a servo always moves so, end stops apart."""
     if friction.smoothed(numbers.friction) or friction.varying(numbers.friction) or play.present(numbers.play):
         return False
-    if elastic.present(numbers.elastic) or motor.inductive(numbers.motor):
+    if elastic.present(numbers.elastic) or motor.inductive(numbers.motor) or source.regulated(numbers.source):
         return False
     if heat.present(numbers.heat) or sensor.slack(numbers.sensor):
         return False
@@ -143,7 +155,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
                     rounds = _MOST + 1
             now = now + left if left < end - now else end
             way = following
-        if rounds > _MOST or limited(way.zone) or now < end:
+        if rounds > _MOST or now < end:
             q, w, done = before_q, before_w, before_done
             gone = True
             break
