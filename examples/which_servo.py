@@ -9,7 +9,7 @@ for each in found.found[:5]:
     print(f"  {each.servo.name}: {1e3 * each.mass:.0f} g, {each.margin:.1f} times the torque, {each.time:.2f} s "
           f"{'; '.join(each.notes)}")
 
-model = st.PulseServo(found.found[0].servo)
+model = st.models.default_model(found.found[0].servo)
 sheet = st.curves(model, VOLTAGE, (MASS, ARM), bandwidth=False)
 part = sheet.at(VOLTAGE)
 print(f"{sheet.servo.title}: {part.cold.stall_torque:.2f} N m cold, {part.hot.stall_torque:.2f} N m hot; moving it "
