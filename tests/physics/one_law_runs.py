@@ -78,7 +78,7 @@ def signals_of(st, compiled=False):
         for signal in model.available:
             found[f"plain/{name}/{signal}"] = plain[signal]
         found[f"plain/{name}/energy"] = np.array(astuple(plain.energy))
-        if batched:
+        if batched and not (compiled and name == "sprung"):  # its kernels take minutes
             R = model.value("motor.armature_resistance")
             batch = st.simulate_many(model, command, duration=SECONDS, load=load, output_step=0.005,
                                      outputs=model.available,

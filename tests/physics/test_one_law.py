@@ -29,7 +29,8 @@ REPEATED = {"play": "tiles", "source_voltage": "on a bus", "supply_current": "on
 # Laws of which the balance of energy is made: 1 % off, it cannot close
 BALANCE = {"armature_current_rate", "bridge_loss", "brush_loss", "circuit_current", "copper_loss",
            "driving_voltage", "kinetic_energy", "magnetic_energy", "needed_voltage",
-           "shaft_acceleration", "source_voltage", "steady_armature_current", "supply_current"}
+           "shaft_acceleration", "source_voltage", "spring_energy", "steady_armature_current",
+           "stretch_beyond_play", "supply_current"}
 EDGES = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -2.0)
 
 
