@@ -30,7 +30,7 @@ REPEATED = {"play": "tiles", "source_voltage": "on a bus", "supply_current": "on
 BALANCE = {"armature_current_rate", "bridge_loss", "brush_loss", "circuit_current", "copper_loss",
            "driving_voltage", "kinetic_energy", "magnetic_energy", "needed_voltage",
            "shaft_acceleration", "source_voltage", "spring_energy", "steady_armature_current",
-           "stretch_beyond_play", "supply_current"}
+           "stretch_beyond_play", "supply_current", "twist_torque"}
 EDGES = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -2.0)
 
 
