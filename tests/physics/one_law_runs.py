@@ -27,10 +27,11 @@ LOADED = {"gear.backlash": 0.02, "gear.output_inertia": 1e-3, "friction.stribeck
           "thermal.winding_capacity": 0.5, "thermal.housing_capacity": 5.0, "thermal.winding_to_housing": 10.0,
           "thermal.housing_to_ambient": 20.0, "thermal.magnet_coefficient": -1e-3}
 INDUCTIVE = {"motor.armature_inductance": 5e-4}
+# An acceleration at which 1 % of the braking distance is a tick sooner or later
 PROGRAM = {"firmware.control_period": 2e-3, "firmware.proportional_gain": 9.0, "firmware.derivative_gain": 0.03,
            "firmware.integral_gain": 20.0, "firmware.filter_weight": 0.7, "firmware.angle_quantum": 1.1e-3,
            "firmware.deadband_angle": 2.5e-3, "firmware.minimum_duty": 0.03, "firmware.duty_quantum": 1e-3,
-           "firmware.current_limit": 0.9, "firmware.pulse_resolution": 1.7e-6, "firmware.acceleration_limit": 150.0,
+           "firmware.current_limit": 0.9, "firmware.pulse_resolution": 1.7e-6, "firmware.acceleration_limit": 300.0,
            "motor.brush_drop_voltage": 0.1, "supply.internal_resistance": 0.2, "supply.bridge_drop_voltage": 0.3,
            "supply.bridge_drop_resistance": 0.1}
 CHOPPED = {**PROGRAM, "firmware.off_state": "coast", "firmware.current_sense": "bus", "firmware.whole_counts": "yes"}

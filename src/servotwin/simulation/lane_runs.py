@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import tiles
+from servotwin.models.engine import loops, tiles
 from servotwin.models.engine.records import columns_of, numbers_in, record_of, room, tiles_with
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import NO_CHIP, Chip
@@ -76,6 +76,9 @@ LOOK_DIGITAL = Recipe("look_digital", LOOK_ONE_BY_ONE.entries, absent=(*_NO_DIGI
 ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, absent=(*_NO_DIGITAL, "elastic"), present=_DIGITAL)
 PLAIN_DIGITAL = Recipe("plain_digital_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, *_NO_DIGITAL, "elastic"),
                        never=_NOT_PLAIN, present=_DIGITAL)
+
+BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, absent=PLAIN_DIGITAL.absent,
+                  never=PLAIN_DIGITAL.never, present=_DIGITAL)
 
 
 def _sprung(name: str, entries: tuple[str, ...]) -> dict[bool, Recipe]:
@@ -157,10 +160,9 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
         part, own = which[some], _indices(first[some])
         found = np.zeros((len(part), len(ALL_FIELDS), len(times)))
         status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
-        kernels(recipe).go_on(
-            lanes, np.array(work.curve, np.float64), _rows(work.torque.rows), _indices(work.torque.first),
-            _indices(work.torque.count), part, _own(durations[some], np.float64), times, own, found, records[some],
-            status, ended)
+        go_on(recipe, lanes, np.array(work.curve, np.float64), _rows(work.torque.rows), _indices(work.torque.first),
+              _indices(work.torque.count), part, durations[some].copy(), times, own.copy(), found, records[some],
+              status, ended)
         bad = status != 0
         raw.status[part], raw.ended[part] = status, np.where(bad, ended, work.duration)
         y = records[some]["point"]["y"]
@@ -172,6 +174,14 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
                 with np.errstate(over="ignore"):
                     own_part = np.where(failed, 0 if name in SMALL_FIELDS else np.nan, found[:, k])
                     raw.fields[name][part] = np.where(ahead, own_part, raw.fields[name][part])
+
+
+def go_on(recipe: Recipe, *arguments: Any) -> None:
+    """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads."""
+    *shared, ended = arguments
+    if recipe == PLAIN_DIGITAL:
+        kernels(BY_TICKS).go_on(*shared, loops.tile_room())
+    kernels(recipe).go_on(*shared, ended)
 
 
 class SideBySide(NamedTuple):

@@ -198,7 +198,8 @@ class Chunk:
         frames = np.broadcast_to(self.frames(duration), self.which.shape)
         if (frames > _MOST_FRAMES).any():
             k = int(np.argmax(frames > _MOST_FRAMES))
-            raise InputError(f"duration / frame period of lane {self.which[k]}", got=f"{frames[k]:.3g} frames",
+            period, what = ("frame period", "frames") if self.firmware is None else ("control period", "ticks")
+            raise InputError(f"duration / {period} of lane {self.which[k]}", got=f"{frames[k]:.3g} {what}",
                              allowed=f"at most {_MOST_FRAMES:.0e} in one run")
         if not self.lanes.initial:
             return  # it starts between the stops, and the motor in the middle of its play
@@ -231,7 +232,7 @@ class Chunk:
             return self.model.firmware(cast("Any", self.commands.signal(self.which)))
 
     def frames(self, duration: float) -> Any:
-        """Return how many frames the lanes run through, a number or one per lane; 0 for a model without frames."""
+        """Return through how many frames or ticks the lanes run, a number or one per lane; 0 for models without."""
         if self.firmware is not None:
             with np.errstate(over="ignore"):
                 return duration / np.asarray(flat(self.firmware.T_c), dtype=np.float64)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.models.engine import loops
 from servotwin.models.engine.observe import Observed
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import Recipe
@@ -140,6 +141,9 @@ class _Alone:
         """Return the calls that let the lanes go on and note who has failed."""
         lanes, durations, records = self.some("lanes", "durations", "records")
         how, at = Some(self._how, self.room.number), Some(self._at, self.room.number)
-        return [call_of(recipe, "go_on", store.columns, *store.inputs, lanes, durations, _NONE, self._first,
-                        self._outputs, records, how, at),
-                call_of(TICKS, "note_failures", lanes, how, at, records, store.status, store.ended)]
+        shared = (store.columns, *store.inputs, lanes, durations, _NONE, self._first, self._outputs, records, how)
+        calls = [call_of(recipe, "go_on", *shared, at),
+                 call_of(TICKS, "note_failures", lanes, how, at, records, store.status, store.ended)]
+        if recipe == lane_runs.PLAIN_DIGITAL:
+            calls.insert(0, call_of(lane_runs.BY_TICKS, "go_on", *shared, loops.tile_room()))
+        return calls

@@ -239,12 +239,11 @@ class Store:
         """Let some lanes go on one by one; their memories are changed in place."""
         status, ended = np.zeros(len(which), np.int64), np.zeros(len(which))
         durations = np.full(len(which), duration) if isinstance(duration, float) else duration
-        go_on = kernels(recipe).go_on
-
         def go(part: slice) -> None:
             some = which[part]
-            go_on(self.columns, *self.inputs, some, durations[part], _NONE, np.zeros(len(some), np.int64),
-                  np.zeros((len(some), len(ALL_FIELDS), 0)), records[part], status[part], ended[part])
+            lane_runs.go_on(recipe, self.columns, *self.inputs, some, durations[part], _NONE,
+                            np.zeros(len(some), np.int64), np.zeros((len(some), len(ALL_FIELDS), 0)), records[part],
+                            status[part], ended[part])
 
         workers = min(self._threads, len(which))
         if workers == 1:

@@ -51,6 +51,17 @@ def nearest(x: float) -> float:
     return (x + magic) - magic
 
 
+def floor(x: float) -> float:
+    """Return the next whole number below; compiled, for any number.
+
+    Examples
+    --------
+    >>> floor(-1.5), floor(2.0)
+    (-2.0, 2.0)
+    """
+    return float(math.floor(x))
+
+
 def _reduced(x: float) -> tuple[float, float]:
     """Return k and r with x = k ln 2 + r, |r| ≤ ln 2 / 2."""
     k = nearest(x * _PER_LN2)

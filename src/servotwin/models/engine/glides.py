@@ -89,7 +89,8 @@ def possible(numbers: Numbers, inputs: Inputs) -> bool:
     return not (load.swings(numbers.load) or load.springy(numbers.load)) and len(inputs.torque) == 0
 
 
-def _body(numbers: Numbers, tau: float) -> Body:
+def body_of(numbers: Numbers, tau: float) -> Body:
+    """Return what moves, under a constant external torque [N m]."""
     backward, forward = contacts.holding_bounds(numbers, 0.0, -tau)
     return Body(numbers.motor, numbers.shaft, contacts.has_friction(numbers),
                 contacts.friction_torque(numbers, FORWARD, 0.0, 0.0, 0.0),
@@ -104,7 +105,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     The arguments are those of `runs.run`.
     """
     firmware, firm, frames, origin = inputs.firmware[0], controller.of(memory), memory.frames, origin_of(memory)
-    point, slack, body = memory.point, SAME * inputs.firmware[0].T_c, _body(numbers, inputs.constant_torque)
+    point, slack, body = memory.point, SAME * inputs.firmware[0].T_c, body_of(numbers, inputs.constant_torque)
     p, b_o, seed = numbers.sensor.p, numbers.sensor.b_o, inputs.seed
     straight = numbers.sensor.step == 0.0 and len(inputs.curve[0]) == 0
     measures, senses = firmware.per_volt != 0.0, control.senses(firmware)
@@ -142,15 +143,10 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
                                          or now + left >= end >= until):
                 s = max(0.0, min(times[done] - origin, end) - now)
                 q_o, w_o = (q, w) if at_rest(way.contact) else first_order.propagate(way.rate, way.pull, q, w, s)
-                _show(outputs, done, q_o, w_o, y, way.contact, firm)
+                show(outputs, done, q_o, w_o, y, way.contact, firm)
                 done += 1
             if not at_rest(way.contact):
-                q, w = first_order.propagate(way.rate, way.pull, q, w, left)
-                if following.zone != way.zone:
-                    w = _edge_speed(path, supply, way.zone, following.zone, u, numbers.motor.K_b)
-                elif following.contact != way.contact:
-                    w = 0.0
-                    following = _begun(body, path, supply, u, q, w)
+                q, w, following = _moved(body, path, supply, u, q, w, left, way, following)
                 if not body.lower < q < body.upper:
                     rounds = _MOST + 1
             now = now + left if left < end - now else end
@@ -185,17 +181,26 @@ def _begun(body: Body, path: Bridge, supply: Source, u: float, q: float, w: floa
 
 def _law(body: Body, path: Bridge, supply: Source, u: float, contact: int, zone: int) -> Way:
     """Return how a shaft moves in a contact and a zone of the current."""
-    own, per_volt, torque = body.motor, 0.0, -body.tau
+    per_volt, torque = 0.0, -body.tau
     if contact == FORWARD:
         torque -= body.against_forward
     elif contact == BACKWARD:
         torque -= body.against_backward
     if zone != NO_CURRENT:
         v, R = bridge.loop(path, supply, zone, u)
-        per_volt = electromagnetic_torque(steady_armature_current(1.0, 0.0, R, own.K_b), own.K)
+        per_volt = torque_per_volt(body.motor, R)
         torque += per_volt * v
-    damping = body.shaft.b + per_volt * back_emf(1.0, own.K_b)
-    return Way(contact, zone, shaft.accelerated(body.shaft, damping), shaft.accelerated(body.shaft, torque))
+    return Way(contact, zone, fading(body, per_volt), shaft.accelerated(body.shaft, torque))
+
+
+def torque_per_volt(own: Motor, R: float) -> float:
+    """Return the torque [N m/V] that a voltage makes in a loop of so many ohms."""
+    return electromagnetic_torque(steady_armature_current(1.0, 0.0, R, own.K_b), own.K)
+
+
+def fading(body: Body, per_volt: float) -> float:
+    """Return λ [1/s] of a shaft whose motor has so much torque per volt."""
+    return shaft.accelerated(body.shaft, body.shaft.b + per_volt * back_emf(1.0, body.motor.K_b))
 
 
 def _next(body: Body, path: Bridge, supply: Source, u: float, w: float, way: Way, left: float) -> tuple[float, Way]:
@@ -216,13 +221,24 @@ def _next(body: Body, path: Bridge, supply: Source, u: float, w: float, way: Way
     return found, after
 
 
+def _moved(body: Body, path: Bridge, supply: Source, u: float, q: float, w: float, s: float, way: Way,
+           following: Way) -> tuple[float, float, Way]:
+    """Return angle and speed after s [s], exact at an edge, and how a shaft moves from there."""
+    q, w = first_order.propagate(way.rate, way.pull, q, w, s)
+    if following.zone != way.zone:
+        return q, _edge_speed(path, supply, way.zone, following.zone, u, body.motor.K_b), following
+    if following.contact != way.contact:
+        return q, 0.0, _begun(body, path, supply, u, q, 0.0)
+    return q, w, following
+
+
 def _edge_speed(path: Bridge, supply: Source, zone: int, beyond: int, u: float, K_b: float) -> float:
     """Return the speed [rad/s] at which a zone of the current gives way to its neighbour."""
     low, high = bridge.zone_limits(path, supply, False, zone, u)
     return (u - (high if beyond > zone else low)) / back_emf(1.0, K_b)
 
 
-def _show(outputs: Floats, done: int, q: float, w: float, y: Vector, contact: int, firm: Any) -> None:
+def show(outputs: Floats, done: int, q: float, w: float, y: Vector, contact: int, firm: Any) -> None:
     """Put what shows of a servo into a column of the outputs, in the order of `runs.run`."""
     outputs[0, done], outputs[1, done], outputs[2, done] = q, w, contact
     outputs[3, done] = math.copysign(1.0, firm.duty) if duty.drives(firm.duty) else 0.0

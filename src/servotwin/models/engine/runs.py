@@ -39,6 +39,8 @@ from servotwin.physics.pieces import Piece
 if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
 
+UNDERWAY = -1  # status of a lane that has gone on side by side with others in this call
+
 
 def start(lanes: Lanes, which: Indices, records: Any) -> None:
     """Put the lanes named in `which` into records, as they start."""
@@ -56,22 +58,22 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
     """Let the lanes named in `which`, whose memories the records hold, go on for durations of their own [s].
 
     `outputs` has the shape (n, 18, T), as in `run`, and gets what stands at `times` from the one numbered
-    `first_output` on.
+    `first_output` on. A lane whose status is `UNDERWAY` may be in the middle of a tick.
     """
     for k in range(which.size):
         lane = which[k]
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(records, k), durations[k],
-                          times, first_output[k], outputs[k])
+        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(lanes, records, k),
+                          durations[k], status[k] == UNDERWAY, times, first_output[k], outputs[k])
         status[k] = how
         ended[k] = time_of(memory)
         if how == COMPLETED:
             put_memory(records[k], memory)
 
 
-def memory_at(records: Any, k: int) -> Memory:
+def memory_at(lanes: Lanes, records: Any, k: int) -> Memory:
     """Return what a record holds, with what a program remembers by reference."""
-    if firmware.present(records[k].firm):
+    if firmware.present(lanes.firmware[0]):
         return with_firm(memory_of(records[k]), records["firm"][k:k + 1])
     return memory_of(records[k])
 
@@ -122,10 +124,11 @@ def mode_under(numbers: Numbers, u: Piece, tau: Piece, memory: Memory) -> Mode:
     return anchored(numbers, since(u, origin), since(tau, origin), point.time, point).mode
 
 
-def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, times: Floats,
-        done: int, outputs: Floats) -> tuple[Memory, int]:
+def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, underway: bool,
+        times: Floats, done: int, outputs: Floats) -> tuple[Memory, int]:
     """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
 
+    `underway` is whether a program knows its next tick and pulse.
     What stands at `times` [s], from the one numbered `done` on, goes into `outputs`, shape (18, n): angle, speed,
     contact, drive, error, angle of the potentiometer, and what only few servos have: current, temperatures of winding
     and housing, angle and speed of the motor at the output shaft, place in the play and contact of the motor there,
@@ -133,7 +136,7 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
     """
     pulsed = pulsed_chip(chip)
     memory = resumed(pulsed, inputs, memory, False)
-    if firmware.present(inputs.firmware[0]):
+    if firmware.present(inputs.firmware[0]) and not underway:
         controller.resume(inputs, memory)
     until = instant(pulsed, inputs, memory, memory.point.time + duration)
     origin = origin_of(memory)

@@ -28,7 +28,7 @@ def one_by_one(lanes: Lanes, curve: Floats, torque_rows: Floats, torque_first: I
         lane = which[k]
         numbers, chip = numbers_of(lanes, lane), chip_of(lanes, lane)
         inputs = inputs_of(lanes, curve, torque_rows[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        memory = memory_at(records, k)
+        memory = memory_at(lanes, records, k)
         point, now, time = memory.point, memory.chip, time_of(memory)
         u, tau = told(numbers, pulsed_chip(chip), inputs, memory)
         numbers = as_now(numbers, inputs, memory)

@@ -194,14 +194,24 @@ def _measure(firmware: Firmware, firm: Any, angle: float) -> None:
     if firm.age == 0:
         firm.y = firm.y_then = firm.r = now
         firm.x = -now if firmware.of_measurement > 0.0 else 0.0
-    elif firmware.weight < 1.0:
-        firm.y = cut(filtered_angle(firm.y, now, firmware.weight), _whole(firmware))
     else:
-        firm.y = now
+        firm.y = filtered(firmware, firm.y, now)
     firm.age += 1
     if firm.age % int(firmware.m) == 0:
-        firm.resting = 1 if abs(firm.y - firm.y_then) < firmware.rest_travel * (1.0 - NEARLY) else 0
+        firm.resting = 1 if rests(firmware, firm.y - firm.y_then) else 0
         firm.y_then = firm.y
+
+
+def filtered(firmware: Firmware, before: float, now: float) -> float:
+    """Return y of a tick that follows another, of an angle that has been counted."""
+    if firmware.weight < 1.0:
+        return cut(filtered_angle(before, now, firmware.weight), _whole(firmware))
+    return now
+
+
+def rests(firmware: Firmware, travel: float) -> bool:
+    """Tell whether y has hardly moved."""
+    return abs(travel) < firmware.rest_travel * (1.0 - NEARLY)
 
 
 def _whole(firmware: Firmware) -> float:
@@ -214,8 +224,7 @@ def _asked_for(firmware: Firmware, firm: Any) -> float:
     rate, delta = firm.rate, firmware.delta
     if not trips.stop(firm):
         profile.follow(firmware, firm)
-    error = cut(firm.r, _whole(firmware)) - firm.y
-    z = error_beyond_zone(error, cut(firmware.h, _whole(firmware)), firmware.gate > 0.0)
+    z = beyond_zone(firmware, firm.r, firm.y)
     _renew(firmware, firm, z)
     u = duty_of(firmware.k_p, z, delta)
     J = 0.0
@@ -229,10 +238,22 @@ def _asked_for(firmware: Firmware, firm: Any) -> float:
         u += duty_of(firmware.k_v, firm.rate, delta)
     if firmware.k_a > 0.0:
         u += duty_of(firmware.k_a, (firm.rate - rate) / firmware.T_c, delta)
-    u = started_duty(cut(u, delta), firmware.minimum)  # a sum of whole steps is one, whatever floats make of it
-    w = min(max(u, -firmware.torque_limit), firmware.torque_limit)
+    u, w = limited(firmware, u)
     firm.excess = (u - w) + (J - integral)
     return w
+
+
+def beyond_zone(firmware: Firmware, r: float, y: float) -> float:
+    """Return the error z beyond the dead zone [rad]."""
+    error = cut(r, _whole(firmware)) - y
+    return error_beyond_zone(error, cut(firmware.h, _whole(firmware)), firmware.gate > 0.0)
+
+
+def limited(firmware: Firmware, terms: float) -> tuple[float, float]:
+    """Return u and w for the sum of all terms: with what it takes to start, and within the limit of the torque."""
+    # a sum of whole steps is one, whatever floats make of it
+    u = started_duty(cut(terms, firmware.delta), firmware.minimum)
+    return u, min(max(u, -firmware.torque_limit), firmware.torque_limit)
 
 
 def _renew(firmware: Firmware, firm: Any, z: float) -> None:
@@ -240,10 +261,15 @@ def _renew(firmware: Firmware, firm: Any, z: float) -> None:
     if firmware.k_d == 0.0 or firm.age % int(firmware.m) != 0:
         return
     x = -firm.y if firmware.of_measurement > 0.0 else z
-    change = x - firm.x
+    firm.D = derivative(firmware, x - firm.x)
     firm.x = x
-    held = abs(change) < firmware.threshold * (1.0 - NEARLY)
-    firm.D = 0.0 if held else duty_of(firmware.k_d / (firmware.m * firmware.T_c), change, firmware.delta)
+
+
+def derivative(firmware: Firmware, change: float) -> float:
+    """Return the derivative's term D after a change of x [rad]."""
+    if abs(change) < firmware.threshold * (1.0 - NEARLY):
+        return 0.0
+    return duty_of(firmware.k_d / (firmware.m * firmware.T_c), change, firmware.delta)
 
 
 def _given(firmware: Firmware, firm: Any, w: float, sensed: Sensed) -> float:
@@ -251,14 +277,20 @@ def _given(firmware: Firmware, firm: Any, w: float, sensed: Sensed) -> float:
     most = min(firmware.duty_limit, trips.allowed(firmware, firm))
     if firm.soft < firmware.soft_time - NEARLY * firmware.T_c:
         most = min(most, firmware.soft_duty)
-    d = min(max(w, -most), most)
-    if firmware.slew < math.inf:
-        change = firmware.slew * firmware.T_c
-        d = min(max(d, firm.decided - change), firm.decided + change)
+    d = within(firmware, w, most, firm.decided)
     if firmware.I_m < math.inf and sensed.V_bus > 0.0:
         low, high = _within_current(firmware, sensed)
         d = min(max(d, low), high)
         d = min(max(d, -firmware.duty_limit), firmware.duty_limit)
+    return d
+
+
+def within(firmware: Firmware, w: float, most: float, before: float) -> float:
+    """Return the duty that is left of w within a limit, and as near to the one before as it has to be."""
+    d = min(max(w, -most), most)
+    if firmware.slew < math.inf:
+        change = firmware.slew * firmware.T_c
+        d = min(max(d, before - change), before + change)
     return d
 
 

@@ -3,7 +3,7 @@
 Starting from the entries, every function that is called is collected from its own module under the name
 `package_module__function`; constants come along by value, classes are imported from where they are. A kernel is changed
 in these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out; in the float32
-form every float literal gets that type; in the vector form exponentials, logarithms and sines become the polynomials of
+form every float literal gets that type; in the vector form exponentials, logarithms, sines and floors become those of
 `engine.elementary`, and the sums of functions that a module names `IN_ANY_ORDER` are taken so.
 """
 
@@ -32,8 +32,8 @@ from servotwin.physics.pieces import Piece
 _ELEMENTARY = "servotwin.models.engine.elementary"
 _INTRINSICS, _LINKING = (f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking"))
 _DECIDERS: dict[str, Any] = {"chip": NO_CHIP, "firmware": NO_FIRMWARE}  # rooms beside those of the plant
-_PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest")  # single instructions in the vector form
-_POLYNOMIALS = ("exp", "log", "log1p", "sin")
+_PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest", "floor")  # single instructions in the vector form
+_REPLACED = ("exp", "log", "log1p", "sin", "floor")
 _DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
 _PACKAGE = "servotwin."
 _MODELS = "servotwin.models."
@@ -370,8 +370,9 @@ class _Rewriting(ast.NodeTransformer):
 
     def _of_module(self, module: ModuleType, node: ast.Attribute) -> ast.AST:
         if module is math:
-            if self._work.recipe.vector and node.attr in _POLYNOMIALS and self._module not in _DOUBLE:
-                return ast.copy_location(ast.Name(self._work.function(_ELEMENTARY, node.attr), node.ctx), node)
+            if self._work.recipe.vector and node.attr in _REPLACED and self._module not in _DOUBLE:
+                flat = self._work.value(_ELEMENTARY, node.attr, getattr(import_module(_ELEMENTARY), node.attr))
+                return ast.copy_location(ast.Name(flat, node.ctx), node)
             if isinstance(getattr(math, node.attr), float):
                 return self._typed(node)
             return node

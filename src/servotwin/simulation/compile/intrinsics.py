@@ -39,11 +39,21 @@ def fma(_typing, a, b, c):
 @intrinsic
 def nearest(_typing, x):
     """Return the nearest whole number."""
+    return _rounded("llvm.rint", x)
+
+
+@intrinsic
+def floor(_typing, x):
+    """Return the next whole number below."""
+    return _rounded("llvm.floor", x)
+
+
+def _rounded(name, x):
     kind = _widest((x,))
 
     def generate(_context, builder, signature, arguments):
         (x,) = arguments
-        function = builder.module.declare_intrinsic("llvm.rint", [x.type])
+        function = builder.module.declare_intrinsic(name, [x.type])
         return builder.call(function, [x])
 
     return kind(kind), generate
