@@ -127,7 +127,7 @@ def without_compiler():
         "numba", *(f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking"))))
     linking.Part = None
     numba.njit = lambda **_: lambda function: function
-    for name in ("fma", "two_power", "binary_exponent", "nearest"):
+    for name in ("fma", "two_power", "binary_exponent", "nearest", "floor"):
         setattr(intrinsics, name, getattr(elementary, name))
     sys.modules |= {module.__name__: module for module in (numba, intrinsics, linking)}
     known = {}

@@ -80,7 +80,7 @@ def test_a_fleet_is_a_mapping_of_results(model):
     ([], {}, "a mapping of names"),
     ({"a": 3}, {}, "servo 'a'"),
     ({"a": ("model", "command")}, {}, "model of servo 'a'"),
-    ({"a": "bounded"}, {}, "PulseServo or PulseServoInductive"),
+    ({"a": "bounded"}, {}, "PulseServoInductive or DigitalServo"),
     ({"a": "pulse"}, {"supply": None}, "supply"),
     ({"a": "pulse"}, {"supply": st.Supply(internal_resistance=1.0)}, "open_circuit_voltage"),
     ({"a": "pulse"}, {"supply": st.Supply(open_circuit_voltage=6.0, bridge_drop_voltage=0.2)}, "each servo"),

@@ -214,7 +214,7 @@ def test_bad_buses(servo, bus, message):
 
 @pytest.mark.slow
 def test_what_a_bus_refuses(servo):
-    with pytest.raises(InputError, match="PulseServo or PulseServoInductive"):
+    with pytest.raises(InputError, match="PulseServoInductive or DigitalServo"):
         st.VectorSimulator(st.BoundedServo(st.load_servo("hitec-hs-755hb")), 2, bus=BATTERY)
     sims = st.VectorSimulator(st.PulseServo(servo), 3, bus=[(BATTERY, [1, 2])], threads=1)
     sims.set(bus_voltage=5.0, lanes=[0])

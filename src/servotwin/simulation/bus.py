@@ -19,20 +19,22 @@ from servotwin.models.engine.seats import Mate
 from servotwin.models.engine.step import at_pulses
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
+from servotwin.models.terms import duty
 from servotwin.models.terms.bridge import coasts
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.signals import Signal
 from servotwin.simulation import bus_run, files, frames
 from servotwin.simulation.bus_rows import events_of, segments_of
-from servotwin.simulation.bus_supply import MODELS, check_rigid, check_supply, on_supply, source_of
+from servotwin.simulation.bus_supply import MODEL_NAMES, MODELS, check_rigid, check_supply, on_supply, source_of
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.remarks import ServoRemark
 from servotwin.simulation.result import Result
-from servotwin.simulation.simulator import Simulator, times_asked
+from servotwin.simulation.simulator import Simulator
 from servotwin.simulation.status import Status
+from servotwin.simulation.times import times_asked
 from servotwin.simulation.trajectory import Trajectory
 from servotwin.units import is_finite
 
@@ -208,8 +210,8 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     Parameters
     ----------
     servos : mapping of str to tuple
-        (model, command) or (model, command, load) by a name of your choice; the models are `PulseServo` or
-        `PulseServoInductive`. What their servo files say of the source is replaced by `supply`.
+        (model, command) or (model, command, load) by a name of your choice; the models are `PulseServo`,
+        `PulseServoInductive` or `DigitalServo`. What their servo files say of the source is replaced by `supply`.
     supply : Supply
         Its open_circuit_voltage, internal_resistance and current_limit; the drop of a bridge is the servo's own.
     duration : float
@@ -278,7 +280,7 @@ def _checked(servos: Mapping[str, Sequence[Any]], supply: Supply, duration: floa
         if not isinstance(parts, Sequence) or isinstance(parts, str) or len(parts) not in (2, 3):
             raise InputError(f"servo {name!r}", got=parts, allowed="(model, command) or (model, command, load)")
         if not isinstance(parts[0], MODELS):
-            raise InputError(f"model of servo {name!r}", got=parts[0], allowed="PulseServo or PulseServoInductive")
+            raise InputError(f"model of servo {name!r}", got=parts[0], allowed=MODEL_NAMES)
         command = parts[0].framed(parts[1], duration) if isinstance(parts[1], Signal) else parts[1]
         found[str(name)] = (parts[0], command, parts[2] if len(parts) == 3 else None)
     return found
@@ -298,21 +300,23 @@ class _BusVoltage:
 
     def _at(self, samples: Sequence[Samples], k: int) -> float:
         connected = 0
-        for j, (plan, s) in enumerate(zip(self.plans, samples, strict=True)):
+        for plan, s in zip(self.plans, samples, strict=True):
             y = (s.angle[k], s.speed[k], s.current[k], s.winding[k], s.housing[k], s.motor_angle[k], s.motor_speed[k])
             if not np.isfinite(y[0]):  # after the run has ended
                 return math.nan
-            connected += self._connect(j, plan, y, float(s.drive[k]), int(s.silent[k]), connected)
+            connected += self._connect(plan, y, s, k, connected)
         return shared_source.put_in_zones(self.source, self._mates, connected, self.source.V)[1]
 
-    def _connect(self, j: int, plan: Plan, y: Vector, drive: float, silent: int, place: int) -> int:
+    def _connect(self, plan: Plan, y: Vector, s: Samples, k: int, place: int) -> int:
         """Let a servo take its place among those whose motors are connected to the bus; return 1 if it is."""
-        numbers = at_pulses(plan.numbers, silent)
+        drive, now = float(s.drive[k]), 0.0 if s.duty is None else float(s.duty[k])
+        numbers = duty.at_duty(plan.numbers, now) if plan.digital else at_pulses(plan.numbers, int(s.silent[k]))
         if drive == 0.0 and not (coasts(numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
             return 0
         mate = self._mates[place]
         mate.numbers = shared_source.on_stiff_source(numbers, drive == 0.0)
-        mate.sign, mate.returns, mate.y = shared_source.sign_on_bus(drive, y), int(drive == 0.0), y
+        mate.sign = shared_source.part_on_bus(drive, numbers.bridge, now, y)
+        mate.returns, mate.y = int(drive == 0.0), y
         return 1
 
     @cached_property

@@ -17,8 +17,9 @@ from servotwin.models.engine.rates import jacobian
 from servotwin.models.engine.seats import vector_of
 from servotwin.models.engine.shared_source import on_stiff_source
 from servotwin.models.engine.step import at_pulses
+from servotwin.models.terms import duty
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
-from servotwin.simulation.engine import Event, Plan, Segment, event_name
+from servotwin.simulation.engine import TRIPS, Event, Plan, Segment, event_name
 
 if TYPE_CHECKING:
     from servotwin.simulation.bus_run import Rows
@@ -26,7 +27,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _STEPS = 7  # vectors of a dense output, of seven numbers each
 _WORDS = {tape.DRIVES + 1: "drive forward", tape.DRIVES - 1: "drive backward", tape.DRIVES: "drive ends",
-          tape.SILENCE + 1: "silence begins", tape.SILENCE: "silence ends", tape.REFUSED: "pulse refused"}
+          tape.SILENCE + 1: "silence begins", tape.SILENCE: "silence ends", tape.REFUSED: "pulse refused",
+          **{tape.TRIPS + k: word for k, word in enumerate(TRIPS)}}
 
 
 class Segments(Sequence[Segment]):
@@ -87,9 +89,11 @@ class _Maker:
 
     def __call__(self, row: list[float]) -> Segment:
         (_, how, origin, start, end, error, wiper, drive, silent, zone, contact, mesh, motor, share, u, *rest) = row
+        (now, goal, reference, trip) = rest[28:]
         tau, (kind, length, next_step, first, returns, anchor, step) = Piece(*rest[:7]), rest[7:14]
         mode = Mode(int(zone), int(contact), int(mesh), int(motor), int(share))
-        numbers = at_pulses(self._plan.numbers, int(silent))
+        plain = self._plan.numbers
+        numbers = duty.at_duty(plain, now) if self._plan.digital else at_pulses(plain, int(silent))
         base = motion.nothing(numbers, Piece(value=u), tau)._replace(
             kind=int(kind), mode=mode, t0=anchor, length=length, next_step=next_step, end=vector_of(rest[14:21]),
             start=vector_of(rest[21:28]))
@@ -97,7 +101,8 @@ class _Maker:
             m = _alone(base, step, self._plan.accuracy)
         else:
             m = self._together(base._replace(numbers=on_stiff_source(numbers, returns > 0.0)), int(how), int(first))
-        return Segment(origin + start, origin + end, m, error, wiper, drive, int(silent), origin)
+        return Segment(origin + start, origin + end, m, error, wiper, drive, int(silent), origin, now, goal, reference,
+                       int(trip))
 
     def _together(self, m: Motion, how: int, first: int) -> Motion:
         numbers, mode, u, tau = m.numbers, m.mode, m.u, m.tau

@@ -9,28 +9,31 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import bus, crew, tape
+from servotwin.models.engine import bus, controller, crew, tape
 from servotwin.models.engine.buses import Buses, Tables
-from servotwin.models.engine.memory import Memory, origin_of
+from servotwin.models.engine.memory import Memory, origin_of, resumed
 from servotwin.models.engine.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
 from servotwin.models.engine.seats import ROOM, Mate, Seat, Shared, put_shared
 from servotwin.models.engine.step import DIVERGED
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import at_start
+from servotwin.models.terms import control
 from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.models.terms.source import Source
 from servotwin.simulation.compile import Recipe, is_compiled, kernels
 from servotwin.simulation.engine import Plan, State
 from servotwin.simulation.lane_memory import RECORD
-from servotwin.simulation.lane_runs import PLAIN_RUNS, programs_of
+from servotwin.simulation.lane_runs import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS, programs_of
 
 Array = NDArray[np.float64]
 
 _ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("go_on", "look"))
-ALL_BUSES = Recipe("buses", _ENTRIES, absent=("elastic",))
+ALL_BUSES = Recipe("buses", _ENTRIES, absent=ALL_RUNS.absent)
 PLAIN_BUSES = Recipe("plain_buses", _ENTRIES, absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never)
+DIGITAL_BUSES = Recipe("digital_buses", _ENTRIES, absent=ALL_DIGITAL.absent, present=ALL_DIGITAL.present)
 SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 
 LOADS_FROM, COMPILES_FROM = 2e3, 6e4  # frames of servos in one process: about what it takes, in plain Python
@@ -51,9 +54,11 @@ class Rows(NamedTuple):
 
 def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration: float) -> Rows:
     """Run servos on one source from t = 0 to `duration` [s]."""
-    recipe = ALL_BUSES if any(not_plain(plan.numbers) for plan in plans) else PLAIN_BUSES
-    work = duration * sum(1.0 / plan.chip.frame_period for plan in plans)
-    way: _Compiled | _Plainly = (_Compiled if _worth_it(recipe, work) else _Plainly)(recipe, plans, states, source)
+    digital = {plan.digital for plan in plans}
+    recipe = recipe_of(any(digital), any(not_plain(plan.numbers) for plan in plans))
+    work = duration * sum(1.0 / (plan.firmware.T_c if plan.digital else plan.chip.frame_period) for plan in plans)
+    compiled = len(digital) == 1 and _worth_it(recipe, work)  # no kernel has servos with a program beside others
+    way: _Compiled | _Plainly = (_Compiled if compiled else _Plainly)(recipe, plans, states, source)
     written = tape_of(len(plans))
     found: list[list[Array]] = []
     count, status, when = 0, bus.PAUSED, 0.0
@@ -69,6 +74,13 @@ def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration
         found.append(part)
     motions, events, numbers = (np.concatenate(column) for column in zip(*found, strict=True))
     return Rows(motions, events, numbers, int(status), float(when))
+
+
+def recipe_of(digital: bool, rare: Any) -> Recipe:
+    """Return the kernels of servos on a bus: of programs, of servos with rare terms, or of plain ones."""
+    if digital:
+        return DIGITAL_BUSES
+    return ALL_BUSES if rare else PLAIN_BUSES
 
 
 def tape_of(servos: int) -> Tape:
@@ -99,11 +111,21 @@ def _worth_it(recipe: Recipe, frames: float) -> bool:
     return done == math.inf
 
 
+def begun(plan: Plan, state: State) -> Memory:
+    """Return what a servo remembers that is about to go on; its program knows its next tick."""
+    if not plan.digital:
+        return state.memory
+    memory = resumed(True, plan.inputs, state.memory, False)._replace(firm=(control.thawed(state.memory.firm[0]),))
+    controller.resume(plan.inputs, memory)
+    return memory
+
+
 class _Plainly:
     """Servos on one source that run in plain Python."""
 
     def __init__(self, recipe: Recipe, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
-        self._inputs, self._memories = [plan.inputs for plan in plans], [state.memory for state in states]
+        self._inputs = [plan.inputs for plan in plans]
+        self._memories = [begun(plan, state) for plan, state in zip(plans, states, strict=True)]
         self._joined, self._shared = [-1 for _ in plans], object_of(Shared)
         put_shared(self._shared, at_start(source))
         self._seats, self._mates = ([object_of(kind) for _ in range(n * len(plans))] for kind, n in (
@@ -124,7 +146,7 @@ class _Compiled:
     def __init__(self, recipe: Recipe, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
         count = len(plans)
         self._lanes, self._tables = _lanes_of(plans), _tables_of(plans)
-        self._bus = Buses(np.arange(count), np.array([0, count]), _records_of([state.memory for state in states]),
+        self._bus = Buses(np.arange(count), np.array([0, count]), _records_of(list(map(begun, plans, states))),
                           np.full(count, -1), shared_of([source]), np.zeros(count, np.int64), np.zeros(count))
         self._room = room_of(count)
         self._kernels: Any = kernels(recipe)
@@ -159,7 +181,15 @@ def _lanes_of(plans: Sequence[Plan]) -> Lanes:
                  np.zeros((7, len(plans))), np.array([plan.external_torque for plan in plans]),
                  np.array([_in_64_bits(plan.seed) for plan in plans]), np.concatenate(pieces), first, count,
                  np.concatenate(edges), edge_first, np.where(regular, -1, edge_count), plans[0].accuracy,
-                 programs_of(None, 1))
+                 _programs_of(plans))
+
+
+def _programs_of(plans: Sequence[Plan]) -> NDArray[Any]:
+    """Return the records of the programs of servos that all have one, or none."""
+    if not plans[0].digital:
+        return programs_of(None, 1)
+    columns: Any = (np.array(column) for column in zip(*(plan.firmware for plan in plans), strict=True))
+    return programs_of(Firmware(*columns), len(plans))
 
 
 def _in_64_bits(seed: int) -> int:
@@ -201,6 +231,6 @@ def _put(record: Any, values: Any) -> None:
         if hasattr(value, "_fields"):
             _put(record[name], value)
         elif name == "firm":  # one in a sequence
-            _put(record[name], value[0])
+            _put(record[name], value[0] if hasattr(value[0], "_fields") else control.frozen(value[0]))
         else:
             record[name] = value

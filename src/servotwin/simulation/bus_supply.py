@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
-from servotwin.models import Model, PulseServo, PulseServoInductive
+from servotwin.models import DigitalServo, Model, PulseServo, PulseServoInductive
 from servotwin.models.terms.elastic import Elastic, behind, present
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 Indices = NDArray[np.int64]
 OF_BUS = ("supply.open_circuit_voltage", "supply.internal_resistance", "supply.current_limit")
 """What a bus has in the place of the servo's own."""
-MODELS = (PulseServo, PulseServoInductive)
+MODELS = (PulseServo, PulseServoInductive, DigitalServo)
+MODEL_NAMES = "PulseServo, PulseServoInductive or DigitalServo"
 _OF_SERVO = ("bridge_drop_voltage", "bridge_drop_resistance")
 
 
@@ -112,7 +113,7 @@ def supplies_of(bus: Any, model: object, count: int) -> Supplies:
     if bus is None:
         return Supplies((), (), count)
     if not isinstance(model, MODELS):
-        raise InputError("model of servos on a bus", got=model, allowed="PulseServo or PulseServoInductive")
+        raise InputError("model of servos on a bus", got=model, allowed=MODEL_NAMES)
     given = [(bus, np.arange(count))] if isinstance(bus, Supply) else bus
     if not isinstance(given, Sequence) or not given or not all(
             isinstance(one, Sequence) and len(one) == 2 for one in given):

@@ -254,7 +254,7 @@ def _keep(record: Record, plan: Plan, before: Memory, trip: int, memory: Memory,
                 and not frame.accepted(plan.chip, pulse_width(plan.inputs, before))):
             record.events.append(Event(start, "pulse refused", angle))
     if plan.digital and memory.firm[0].trip != trip:
-        record.events.append(Event(start, _TRIPS[memory.firm[0].trip], angle))
+        record.events.append(Event(start, TRIPS[memory.firm[0].trip], angle))
     if now > start or not record.segments:
         drive = sign_of(memory.firm[0].duty) if plan.digital else memory.chip.drive
         record.segments.append(Segment(start, now, m, memory.chip.error, was.wiper, drive,
@@ -282,11 +282,10 @@ def told_by(plan: Plan, memory: Memory) -> tuple[float, float, float, int]:
     """Return what shows of a program: its duty, or `OPEN`, `BRAKED`; goal and reference [rad]; its trip."""
     if not plan.digital:
         return 0.0, 0.0, 0.0, 0
-    firm = memory.firm[0]
-    return firm.duty, firm.r if firm.goal == control.NOWHERE else firm.goal, firm.r, firm.trip
+    return control.told_by(memory.firm[0])
 
 
-_TRIPS = ("trip ends", "trips by overload", "trips by current", "trips by heat", "trips by undervoltage")
+TRIPS = ("trip ends", "trips by overload", "trips by current", "trips by heat", "trips by undervoltage")
 _DRIVES = {1: "drive forward", -1: "drive backward", 0: "drive ends"}
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import loops, tiles
+from servotwin.models.engine import loop_tiles, tiles
 from servotwin.models.engine.records import columns_of, numbers_in, record_of, room, tiles_with
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import NO_CHIP, Chip
@@ -180,7 +180,7 @@ def go_on(recipe: Recipe, *arguments: Any) -> None:
     """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads."""
     *shared, ended = arguments
     if recipe == PLAIN_DIGITAL:
-        kernels(BY_TICKS).go_on(*shared, loops.tile_room())
+        kernels(BY_TICKS).go_on(*shared, loop_tiles.tile_room())
     kernels(recipe).go_on(*shared, ended)
 
 

@@ -26,9 +26,9 @@ from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.packing import Asked, Chunk, Commands, groups
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import lane_remarks
-from servotwin.simulation.simulator import times_asked
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
+from servotwin.simulation.times import times_asked
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:

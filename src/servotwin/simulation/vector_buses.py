@@ -17,7 +17,7 @@ from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import APART
 from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation.bus_run import ALL_BUSES, PLAIN_BUSES, not_plain, room_of, shared_of
+from servotwin.simulation.bus_run import not_plain, recipe_of, room_of, shared_of
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD
@@ -38,9 +38,9 @@ def sets_of(numbers: LaneNumbers, threads: int, pool: Any) -> list[BusSet]:
     supplies = numbers.supplies
     rare = not_plain(columns_of(Numbers, numbers.columns.numbers, slice(numbers.count)))
     plain = [not np.any(np.broadcast_to(rare, numbers.count)[lanes]) for lanes in supplies.lanes]
-    parts = ((recipe, [k for k, own in enumerate(plain) if own == kind])
-             for recipe, kind in ((PLAIN_BUSES, True), (ALL_BUSES, False)))
-    return [BusSet(numbers, recipe, which, threads, pool) for recipe, which in parts if which]
+    ways = [recipe_of(numbers.digital, not own) for own in plain]
+    parts = ((recipe, [k for k, own in enumerate(ways) if own == recipe]) for recipe in dict.fromkeys(ways))
+    return [BusSet(numbers, recipe, which, threads, pool) for recipe, which in parts]
 
 
 class BusSet:

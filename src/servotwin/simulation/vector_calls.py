@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import loops
+from servotwin.models.engine import loop_tiles
 from servotwin.models.engine.observe import Observed
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import Recipe
@@ -145,5 +145,5 @@ class _Alone:
         calls = [call_of(recipe, "go_on", *shared, at),
                  call_of(TICKS, "note_failures", lanes, how, at, records, store.status, store.ended)]
         if recipe == lane_runs.PLAIN_DIGITAL:
-            calls.insert(0, call_of(lane_runs.BY_TICKS, "go_on", *shared, loops.tile_room()))
+            calls.insert(0, call_of(lane_runs.BY_TICKS, "go_on", *shared, loop_tiles.tile_room()))
         return calls

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine import crew, currents, shared_source, step, tape, together
+from servotwin.models.engine import controller, crew, currents, shared_source, step, tape, together
 from servotwin.models.engine.memory import (
     FRAMES,
     SAME,
@@ -29,6 +29,7 @@ from servotwin.models.engine.motion import LONG_STEP
 from servotwin.models.engine.seats import (
     chip_of,
     decided_of,
+    drive_of,
     mode_of,
     numbers_of,
     piece_of,
@@ -42,10 +43,11 @@ from servotwin.models.engine.seats import (
 from servotwin.models.engine.step import CHATTER, COMPLETED, CROWDED, MOST_IDLE, STEP_TOO_SMALL, TOO_FAST
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.together import APART, ENDED, TOGETHER
-from servotwin.models.terms import frame
+from servotwin.models.terms import control, duty, firmware, frame
 from servotwin.models.terms.bridge import terminal_voltage
+from servotwin.models.terms.control import NOTHING_SENSED, Sensed
 from servotwin.models.terms.motor import inductive
-from servotwin.models.terms.numbers import warm
+from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.sensor import sensed_voltage
 from servotwin.physics.pieces import piece_value
 
@@ -59,7 +61,9 @@ def through(inputs: list[Inputs], memories: list[Memory], ends: list[float], joi
     """Go on to the ends of all servos by their clocks [s]; return a status, and when since the start.
 
     The servos have their seats; memories, places among those that move together, and `shared` are kept up to date.
+    Programs know their next tick.
     """
+    programs = [memory.firm for memory in memories]
     for j in range(len(memories)):
         ends[j] = instant(True, inputs[j], memories[j], ends[j])
     status, when = COMPLETED, time_of(memories[0])
@@ -76,25 +80,26 @@ def through(inputs: list[Inputs], memories: list[Memory], ends: list[float], joi
         for j in range(len(memories)):
             end = ends[j] if last else memories[j].point.time + _SPAN
             crew.place(seats[j], memories[j], first, end, joined[j])
-        status, time = run(inputs, shared, seats, mates, written)
+        status, time = run(inputs, programs, shared, seats, mates, written)
         when = seats[0].origin + time
         for j in range(len(memories)):
-            memories[j], joined[j] = crew.memory_now(seats[j]), seats[j].joined
+            memories[j], joined[j] = crew.memory_now(seats[j], programs[j]), seats[j].joined
     return status, when
 
 
-def run(inputs: list[Inputs], shared: Any, seats: Any, mates: Any, written: Tape) -> tuple[int, float]:
+def run(inputs: list[Inputs], programs: list[Any], shared: Any, seats: Any, mates: Any,
+        written: Tape) -> tuple[int, float]:
     """Go on to the end of the run, or until the tape is full; return a status and when, by the clock of the bus [s]."""
     count, idle, status = len(inputs), 0, COMPLETED
     time, until = seats[0].clock, seats[0].end
     _take_up(count, shared, seats, mates)
     for j in range(count):
-        crew.plan_ahead(seats[j], crew.edge_of(seats[j], inputs[j]), until)
+        crew.plan_ahead(seats[j], crew.edge_of(seats[j], inputs[j], programs[j]), until)
     while time < until:
         if tape.is_full(written, count):
             status = PAUSED
             break
-        status = _act(inputs, shared, seats, mates, written, time, until)
+        status = _act(inputs, programs, shared, seats, mates, written, time, until)
         if status == COMPLETED:
             status = _go_on(count, shared, seats, mates, written, time, until)
         if status != COMPLETED:
@@ -162,8 +167,9 @@ def _come(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: 
 # --- what chips and loads do ------------------------------------------------------------------------------------------
 
 
-def _act(inputs: list[Inputs], shared: Any, seats: Any, mates: Any, written: Tape, time: float, until: float) -> int:
-    """Do what is due at a time of the bus [s]: first switch, then measure; return a status."""
+def _act(inputs: list[Inputs], programs: list[Any], shared: Any, seats: Any, mates: Any, written: Tape, time: float,
+         until: float) -> int:
+    """Do what is due at a time of the bus [s]: first switch, then measure, then put new duties on; return a status."""
     busy = False
     for j in range(len(inputs)):
         seat = seats[j]
@@ -173,21 +179,32 @@ def _act(inputs: list[Inputs], shared: Any, seats: Any, mates: Any, written: Tap
                 crew.bring(seat, j, shared, mates, time, written)
                 _switch(inputs[j], seat, j, written)
                 crew.plan_ahead(seat, seat.edge, until)
+            if firmware.present(inputs[j].firmware[0]) and seat.due <= time:
+                _apply(inputs[j], programs[j][0], j, shared, seats, mates, written, time)
     if busy:
         for j in range(len(inputs)):
             seat = seats[j]
             if seat.due <= time and seat.edge <= seat.clock:
+                if firmware.present(inputs[j].firmware[0]):
+                    _tick(inputs[j], programs[j][0], j, len(inputs), shared, seats, mates, time)
+                    continue
                 _measure(inputs[j], j, len(inputs), shared, seats, mates, written, time)
                 if seat.decided.number == frame.CROWDED:
                     return CROWDED
-                crew.plan_ahead(seat, crew.edge_of(seat, inputs[j]), until)
+                crew.plan_ahead(seat, crew.edge_of(seat, inputs[j], programs[j]), until)
+        for j in range(len(inputs)):
+            seat = seats[j]
+            if firmware.present(inputs[j].firmware[0]) and seat.due <= time and seat.edge <= seat.clock:
+                _apply(inputs[j], programs[j][0], j, shared, seats, mates, written, time)
+                crew.plan_ahead(seat, crew.edge_of(seat, inputs[j], programs[j]), until)
     return COMPLETED
 
 
 def _switch(inputs: Inputs, seat: Any, unit: int, written: Tape) -> None:
     """Let a servo's bridge and load do what they do now."""
     now = seat.clock
-    crew.hear(seat, unit, frame.switched(decided_of(seat.decided), now), written)
+    if not duty.present(seat.numbers.bridge):
+        crew.hear(seat, unit, frame.switched(decided_of(seat.decided), now), written)
     if seat.tau_end <= now:
         before = piece_of(seat.tau)
         tau, seat.tau_end = in_force(inputs.torque, seat.origin, now, inputs.constant_torque)
@@ -208,7 +225,7 @@ def _measure(inputs: Inputs, j: int, count: int, shared: Any, seats: Any, mates:
         tape.write_event(written, j, origin + now, tape.REFUSED, Mode(0, 0, 0, 0, 0), here.y[0])
     v_m, V_bus = 0.0, chip.V_oc
     if chip.beta != 0.0 or chip.c_s != 0.0:
-        v_m, V_bus = _voltages(j, count, shared, seats, mates, here.y, time)
+        _, v_m, V_bus = _currents(j, count, shared, seats, mates, here.y, time)
     v_o = sensed_voltage(numbers_of(seat.numbers).sensor, inputs.curve, here.wiper)
     after = frame.edge(chip, decided_of(seat.decided), now, t_in, v_o, v_m, V_bus, inputs.seed)
     if after.silent != seat.decided.silent and crew.heeds_silence(seat):
@@ -216,26 +233,62 @@ def _measure(inputs: Inputs, j: int, count: int, shared: Any, seats: Any, mates:
     crew.hear(seat, j, after, written)
 
 
-def _voltages(j: int, count: int, shared: Any, seats: Any, mates: Any, y: Vector, time: float) -> tuple[float, float]:
-    """Return the voltages at a servo's motor and of the bus [V]."""
-    own, drive, others, last = crew.numbers_now(seats[j]), seats[j].decided.drive, 0, -1
+def _apply(inputs: Inputs, firm: Any, j: int, shared: Any, seats: Any, mates: Any, written: Tape,
+           time: float) -> None:
+    """Put the duties of a servo's program on its bridge whose time has come."""
+    seat, program = seats[j], inputs.firmware[0]
+    crew.bring(seat, j, shared, mates, time, written)
+    controller.apply(program, firm, seat.frames, seat.clock + SAME * program.T_c)
+    crew.obey(seat, j, firm, written)
+
+
+def _tick(inputs: Inputs, firm: Any, j: int, count: int, shared: Any, seats: Any, mates: Any, time: float) -> None:
+    """Let a servo's program decide where a tick is due."""
+    seat, program = seats[j], inputs.firmware[0]
+    if not controller.is_due(program, firm, seat.frames, seat.clock + SAME * program.T_c):
+        return
+    sensed = NOTHING_SENSED
+    if control.senses(program):
+        sensed = _sensed(j, count, shared, seats, mates, vector_of(seat.point.y), time)
+    point = point_of(seat.point)
+    controller.work(inputs, numbers_of(seat.numbers).sensor, firm, point.y[0], point.wiper, sensed,
+                    seat.origin + seat.clock)
+
+
+def _sensed(j: int, count: int, shared: Any, seats: Any, mates: Any, y: Vector, time: float) -> Sensed:
+    """Return what a program measures besides its angle."""
+    now, seat = seats[j].shown.duty, seats[j]
+    i, _, V_bus = _currents(j, count, shared, seats, mates, y, time)
+    numbers = warm(numbers_of(seat.numbers), y)
+    return controller.sensed_of(numbers, i / duty.on_share_of(numbers.bridge, now), V_bus, y)
+
+
+def _currents(j: int, count: int, shared: Any, seats: Any, mates: Any, y: Vector,
+              time: float) -> tuple[float, float, float]:
+    """Return the current of a servo [A], and the voltages at its motor and of the bus [V]."""
+    seat = seats[j]
+    own, drive, others, last = crew.numbers_now(seat), drive_of(seat), 0, -1
     for k in range(count):
         if k != j and crew.is_connected(seats[k]):
             others, last = others + 1, k
     if others == 0:
-        return step.voltages(own, drive * own.source.V, y)
-    if others == 1 and not crew.is_connected(seats[j]):
-        seat = seats[last]
-        numbers = crew.numbers_now(seat)
-        there = crew.point_now(seat, shared, mates, time)
-        V_bus = step.voltages(numbers, seat.decided.drive * numbers.source.V, there.y)[1]
+        return _alone_on_bus(seat, own, y)
+    if others == 1 and not crew.is_connected(seat):
+        there = crew.point_now(seats[last], shared, mates, time)
+        V_bus = _alone_on_bus(seats[last], crew.numbers_now(seats[last]), there.y)[2]
     else:
         V_bus = bus_voltage(count, shared, seats, mates, time)
     stiff = warm(shared_source.on_stiff_source(own, False), y)
-    u = drive * V_bus
+    u = shared_source.part_on_bus(drive, own.bridge, seat.shown.duty, y) * V_bus if drive != 0.0 else 0.0
     zone = currents.zone_of(stiff, u, 0.0, y[0], y[6], y[2])
     i = y[2] if inductive(stiff.motor) else currents.current(stiff, zone, u, y[0], y[6])
-    return terminal_voltage(stiff.bridge, stiff.source, stiff.motor, u, y[6], i, V_bus), V_bus
+    return i, terminal_voltage(stiff.bridge, stiff.source, stiff.motor, u, y[6], i, V_bus), V_bus
+
+
+def _alone_on_bus(seat: Any, numbers: Numbers, y: Vector) -> tuple[float, float, float]:
+    """Return the same where no other motor is connected to the bus."""
+    i, v, V_bus = step.circuit(numbers, drive_of(seat) * numbers.source.V, y)
+    return i, v, V_bus / duty.share_of(numbers.bridge, seat.shown.duty) if duty.present(seat.numbers.bridge) else V_bus
 
 
 def bus_voltage(count: int, shared: Any, seats: Any, mates: Any, time: float) -> float:

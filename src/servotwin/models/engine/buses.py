@@ -5,22 +5,24 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import bus, crew, runs, step
+from servotwin.models.engine import bus, controller, crew, runs, step
 from servotwin.models.engine.memory import (
     Inputs,
     Memory,
     in_force,
-    memory_of,
     origin_of,
     put_memory,
     silent_now,
     since,
 )
-from servotwin.models.engine.observe import observed, on_bus
+from servotwin.models.engine.observe import observed, on_bus, told_by
+from servotwin.models.engine.runs import memory_at
+from servotwin.models.engine.seats import drive_of
 from servotwin.models.engine.sights import put
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import chip_of, numbers_of
+from servotwin.models.terms import duty, firmware
 from servotwin.models.terms.numbers import warm
 from servotwin.physics.pieces import Piece, piece_value
 
@@ -70,8 +72,14 @@ def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, dura
             continue
         inputs, joined = [inputs_of(lanes, tables, buses.which[j]) for j in places], [buses.joined[j] for j in places]
         memories = _seated(lanes, buses, places, inputs, seats)
+        if firmware.present(lanes.firmware[0]) and until == math.inf:
+            for n in range(len(places)):
+                controller.resume(inputs[n], memories[n])
         ends = [m.point.time + duration if until == math.inf else until - origin_of(m) for m in memories]
         status, when = bus.through(inputs, memories, ends, joined, buses.shared[k], seats, mates, written)
+        if firmware.present(lanes.firmware[0]) and until == math.inf:
+            for n in range(len(places)):
+                controller.pause(inputs[n], memories[n])
         for n in range(len(places)):
             j = places[n]
             put_memory(buses.records[j], memories[n])
@@ -86,7 +94,7 @@ def _seated(lanes: Lanes, buses: Buses, places: list[int], inputs: list[Inputs],
     for n in range(len(places)):
         lane = buses.which[places[n]]
         crew.sit(seats[n], numbers_of(lanes, lane), chip_of(lanes, lane), inputs[n])
-    return [memory_of(buses.records[j]) for j in places]
+    return [memory_at(lanes, buses.records, j) for j in places]
 
 
 def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
@@ -116,11 +124,17 @@ def _look(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int],
     for n in range(len(places)):
         memory, lane = memories[n], buses.which[places[n]]
         inputs, point, time, origin = told[n], memory.point, memory.point.time, origin_of(memory)
-        numbers = on_bus(crew.numbers_now(seats[n]), V)
-        u = memory.chip.drive * numbers.source.V
+        path, share = seats[n].numbers.bridge, 1.0
+        if duty.present(path):
+            share = duty.share_of(path, seats[n].shown.duty)
+        numbers = on_bus(crew.numbers_now(seats[n]), share * V)
+        u = drive_of(seats[n]) * numbers.source.V
         piece, _ = in_force(inputs.torque, origin, time, inputs.constant_torque)
         tau, mode = since(piece, origin), point.mode
         if point.anchor_time == math.inf or piece != memory.tau:
             mode = step.anchored(numbers, Piece(0.0, u, 0.0, 0.0, 0.0, 0.0, 0.0), tau, time, point).mode
-        put(seen, lane, observed(warm(numbers, point.y), inputs.curve, mode, u, piece_value(tau, time), point.y,
-                                 point.wiper, memory.chip.drive, memory.chip.error))
+        shown = observed(warm(numbers, point.y), inputs.curve, mode, u, piece_value(tau, time), point.y, point.wiper,
+                         memory.chip.drive, memory.chip.error)
+        if firmware.present(lanes.firmware[0]):
+            shown = told_by(numbers.bridge, memory.firm[0], shown)
+        put(seen, lane, shown)

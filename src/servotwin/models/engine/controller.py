@@ -18,7 +18,7 @@ from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE, WAITING, Sen
 from servotwin.models.terms.elastic import turning
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import Numbers, warm
-from servotwin.models.terms.sensor import sensed_voltage
+from servotwin.models.terms.sensor import Sensor, sensed_voltage
 from servotwin.physics.firmware import counted, resolved_pulse
 from servotwin.physics.motor import back_emf
 from servotwin.physics.pieces import piece_value
@@ -43,16 +43,19 @@ def serve(numbers: Numbers, inputs: Inputs, memory: Memory) -> None:
     apply(firmware, firm, memory.frames, latest)
     if not is_due(firmware, firm, memory.frames, latest):
         return
-    now = origin_of(memory) + point.time
+    sensed = sensed_by(numbers, firm, point.y) if control.senses(firmware) else NOTHING_SENSED
+    work(inputs, numbers.sensor, firm, point.y[0], point.wiper, sensed, origin_of(memory) + point.time)
+    apply(firmware, firm, memory.frames, latest)
+
+
+def work(inputs: Inputs, sensor: Sensor, firm: Any, q: float, wiper: float, sensed: Sensed, now: float) -> None:
+    """Do what a tick does: hear, measure where the shaft is [rad], decide; `now` counts since the start [s]."""
+    firmware, angle = inputs.firmware[0], q
     if has_news(firmware, firm, now):
         listen(inputs, firm, now)
-    angle = point.y[0]
     if firmware.per_volt != 0.0:
-        v = sensed_voltage(numbers.sensor, inputs.curve, point.wiper)
-        angle = angle_of(firmware, firm, v, numbers.sensor.b_o, inputs.seed)
-    sensed = sensed_by(numbers, firm, point.y) if control.senses(firmware) else NOTHING_SENSED
+        angle = angle_of(firmware, firm, sensed_voltage(sensor, inputs.curve, wiper), sensor.b_o, inputs.seed)
     decide(firmware, firm, angle, sensed, now)
-    apply(firmware, firm, memory.frames, latest)
 
 
 def is_due(firmware: Firmware, firm: Any, frames: int, latest: float) -> bool:
@@ -92,6 +95,11 @@ def sensed_by(numbers: Numbers, firm: Any, y: Vector) -> Sensed:
     """Return what the program measures besides, under the duty of now."""
     numbers = warm(numbers, y)
     V_bus, i = on_supply(duty.at_duty(numbers, firm.duty), firm.duty, y)
+    return sensed_of(numbers, i, V_bus, y)
+
+
+def sensed_of(numbers: Numbers, i: float, V_bus: float, y: Vector) -> Sensed:
+    """Return what a program measures at a current [A] and a voltage of the bus [V]."""
     cold = numbers.bridge.R_drive - numbers.source.R_b
     return Sensed(i, V_bus, back_emf(turning(numbers.elastic, y), numbers.motor.K_b), cold, y[4])
 

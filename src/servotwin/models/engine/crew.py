@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import motion, shared_source, step, tape, together
+from servotwin.models.engine import controller, motion, shared_source, step, tape, together
 from servotwin.models.engine.memory import Inputs, Memory, Point, since
 from servotwin.models.engine.modes import Mode
 from servotwin.models.engine.seats import (
     Track,
     decided_of,
+    drive_of,
     mode_of,
     numbers_of,
     piece_of,
@@ -30,9 +31,9 @@ from servotwin.models.engine.seats import (
     put_vector,
     vector_of,
 )
-from servotwin.models.terms import frame
+from servotwin.models.terms import duty, firmware, frame
 from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.control import ABSENT
+from servotwin.models.terms.control import told_by
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
@@ -55,6 +56,8 @@ def place(seat: Any, memory: Memory, first: float, end: float, joined: int) -> N
     """Put a servo where its memory says, for a run to `end` by its clock [s]; it is `first` by the bus's."""
     put_point(seat.point, memory.point)
     put_decided(seat.decided, memory.chip)
+    if duty.present(seat.numbers.bridge):
+        show(seat, memory.firm[0])
     put_piece(seat.tau, memory.tau)
     seat.tau_end, seat.frames, seat.beat = memory.tau_end, memory.frames, memory.beat
     seat.origin = memory.frames * memory.beat
@@ -62,12 +65,21 @@ def place(seat: Any, memory: Memory, first: float, end: float, joined: int) -> N
     seat.arrival, seat.joined = _UNKNOWN, joined
 
 
-def memory_now(seat: Any) -> Memory:
-    """Return what a servo remembers."""
-    decided = decided_of(seat.decided)
-    u = Piece(0.0, decided.drive * seat.numbers.source.V, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return Memory(seat.frames, seat.beat, point_of(seat.point), decided, u, math.inf, piece_of(seat.tau), seat.tau_end,
-                  ABSENT)
+def memory_now(seat: Any, firm: Any) -> Memory:
+    """Return what a servo remembers, its program `firm`."""
+    u = source(seat, numbers_now(seat))
+    return Memory(seat.frames, seat.beat, point_of(seat.point), decided_of(seat.decided), u, math.inf,
+                  piece_of(seat.tau), seat.tau_end, firm)
+
+
+def show(seat: Any, firm: Any) -> None:
+    """Take over what shows of a program."""
+    seat.shown.duty, seat.shown.goal, seat.shown.reference, seat.shown.trip = told_by(firm)
+
+
+def source(seat: Any, numbers: Numbers) -> Piece:
+    """Return the voltage behind the bridge of a servo that has these numbers now."""
+    return Piece(0.0, drive_of(seat) * numbers.source.V, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def is_known(arrival: float) -> bool:
@@ -78,20 +90,24 @@ def is_known(arrival: float) -> bool:
 def heeds_silence(seat: Any) -> bool:
     """Tell whether the bridge is off in another way while no pulses come."""
     path = seat.numbers.bridge
-    return bool(path.silence.coast != path.off.coast)
+    return bool(not duty.present(seat.numbers.bridge) and path.silence.coast != path.off.coast)
 
 
 def numbers_now(seat: Any) -> Numbers:
     """Return the numbers of a servo with its bridge as it is now."""
+    if duty.present(seat.numbers.bridge):
+        return duty.at_duty(numbers_of(seat.numbers), seat.shown.duty)
     return step.at_pulses(numbers_of(seat.numbers), seat.decided.silent if heeds_silence(seat) else 0)
 
 
 def is_connected(seat: Any) -> bool:
     """Tell whether a motor is connected to the bus, or may become so by itself."""
-    if seat.decided.drive != 0.0:
+    if drive_of(seat) != 0.0:
         return True
     path = seat.numbers.bridge
     coast = path.silence.coast if seat.decided.silent > 0 else path.off.coast
+    if duty.present(seat.numbers.bridge):
+        coast = numbers_now(seat).bridge.off.coast
     return bool(coast > 0.0 and (seat.point.y[2] != 0.0 or seat.point.y[6] != 0.0))
 
 
@@ -117,14 +133,18 @@ def by_bus(seat: Any, time: float, until: float) -> float:
 
 def plan_ahead(seat: Any, edge: float, until: float) -> None:
     """Find out when chip and load do something next, where the next frame begins at `edge`."""
-    switch = frame.next_switch(decided_of(seat.decided), heeds_silence(seat))
+    switch = math.inf
+    if not duty.present(seat.numbers.bridge):
+        switch = frame.next_switch(decided_of(seat.decided), heeds_silence(seat))
     seat.edge, seat.switch = edge, min(switch, seat.tau_end)
     seat.limit = min(seat.switch, edge)
     seat.due = by_bus(seat, seat.limit, until)
 
 
-def edge_of(seat: Any, inputs: Inputs) -> float:
-    """Return when the next frame begins, by the servo's clock [s]."""
+def edge_of(seat: Any, inputs: Inputs, programs: Any) -> float:
+    """Return when the next frame begins, or the next tick or duty comes, by the servo's clock [s]."""
+    if firmware.present(inputs.firmware[0]):
+        return controller.next_due(inputs.firmware[0], programs[0], seat.frames)
     if seat.period > 0.0:
         return frame.edge_time(seat.period, inputs.edges, seat.decided.number - seat.frames)
     edge: float = frame.edge_time(0.0, inputs.edges, seat.decided.number) - seat.origin
@@ -140,7 +160,7 @@ def forget(seat: Any) -> None:
 def alone(seat: Any, until: float) -> int:
     """Find out what a servo does next when no other motor is connected to the bus; return a status."""
     numbers, tau, point = numbers_now(seat), tau_by(seat, seat.origin), point_of(seat.point)
-    u = step.source(numbers, decided_of(seat.decided))
+    u = source(seat, numbers)
     if point.anchor_time == math.inf:
         point = step.anchored(numbers, u, tau, point.time, point)
         put_point(seat.point, point)
@@ -162,7 +182,7 @@ def point_now(seat: Any, shared: Any, mates: Any, time: float) -> Point:
         y = together.state_at(shared, mates[seat.joined], time - shared.begin)
     else:
         numbers = numbers_now(seat)
-        u = step.source(numbers, decided_of(seat.decided))
+        u = source(seat, numbers)
         m = motion.prepared(motion.begin(numbers, p.mode, u, tau_by(seat, seat.origin), p.anchor_time, p.anchor,
                                          p.step, seat.limit - p.anchor_time, seat.accuracy))
         y = motion.state(m, t - m.t0)
@@ -207,12 +227,25 @@ def hear(seat: Any, unit: int, now: Frame, written: Tape) -> None:
         forget(seat)
 
 
+def obey(seat: Any, unit: int, firm: Any, written: Tape) -> None:
+    """Take what a program has decided, from now on."""
+    duty_before, trip_before = seat.shown.duty, seat.shown.trip
+    show(seat, firm)
+    if seat.shown.trip != trip_before:
+        tape.write_event(written, unit, seat.origin + seat.clock, tape.TRIPS + seat.shown.trip, Mode(0, 0, 0, 0, 0),
+                         seat.point.y[0])
+    if seat.shown.duty != duty_before:
+        forget(seat)
+
+
 def take_part(seat: Any, unit: int, mate: Any, start: Any, y: Any) -> None:
     """Let a servo that is connected to the bus take part in a common motion from a start, where it stands at y."""
-    drive, returns, now = seat.decided.drive, seat.decided.drive == 0.0, vector_of(y)
-    put_numbers(mate.numbers, shared_source.on_stiff_source(numbers_now(seat), returns))
+    drive, now, numbers = drive_of(seat), vector_of(y), numbers_now(seat)
+    returns = drive == 0.0
+    put_numbers(mate.numbers, shared_source.on_stiff_source(numbers, returns))
     put_mode(mate.mode, mode_of(seat.point.mode))
     put_piece(mate.tau, tau_by(seat, seat.origin + seat.late))
-    mate.unit, mate.sign, mate.returns = unit, shared_source.sign_on_bus(drive, vector_of(start)), 1 if returns else 0
+    mate.unit, mate.returns = unit, 1 if returns else 0
+    mate.sign = shared_source.part_on_bus(drive, numbers.bridge, seat.shown.duty, vector_of(start))
     put_vector(mate.start, vector_of(start))
     put_vector(mate.y, now)

@@ -61,7 +61,7 @@ def longest_series(mates: Any, count: int) -> float:
 class Linear(NamedTuple):
     """The law of a linear mate: L di/dt = s V − K_b w − drop − R i, J dw/dt = K i − b w − torques."""
 
-    sign: float
+    sign: float  # or duty
     K: float
     K_b: float
     R: float
@@ -152,7 +152,7 @@ def _meeting(source: Source, state: int, laws: list[Linear]) -> tuple[float, flo
     """Return what V_bus = (given + per_volt h) / below is made of, where h are the currents that back-EMFs drive."""
     g = 0.0
     for k in range(len(laws)):
-        g += laws[k].conductance
+        g += laws[k].sign * laws[k].sign * laws[k].conductance
     if state == LIMITED:
         return g, 1.0, source.I_max
     if state == KEEPING:
@@ -185,12 +185,12 @@ def _series_voltage(source: Source, state: int, laws: list[Linear], mates: Any, 
         t, w, i = laws[k], mates[k].speed[n], mates[k].current[n]
         back = first * t.drop + t.K_b * w
         if t.L == 0.0:
-            g += t.conductance
+            g += t.sign * t.sign * t.conductance
             h += t.sign * back * t.conductance
         else:
             given += t.sign * i
             above += t.sign * t.conducts * (back + t.R * i) / t.L
-            below += t.conducts / t.L
+            below += t.sign * t.sign * t.conducts / t.L
     if state == FOLLOWING:
         return (first * source.V + source.R_b * (h - given)) / (1.0 + source.R_b * g)
     return (first * source.I_max + h - given) / g if g > 0.0 else above / below

@@ -5,11 +5,13 @@ For a compiler these are numpy's records, in plain Python objects of the same na
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine.memory import Point
 from servotwin.models.engine.modes import Mode, Vector
 from servotwin.models.engine.records import record_reader, record_writer
+from servotwin.models.terms import duty
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.frame import Frame
 from servotwin.models.terms.numbers import Numbers
@@ -38,6 +40,15 @@ class Track(NamedTuple):
     next_step: float
 
 
+class Shown(NamedTuple):
+    """What shows of a program."""
+
+    duty: float  # of the bridge, or `OPEN`, `BRAKED`
+    goal: float
+    reference: float
+    trip: int
+
+
 class Seat(NamedTuple):
     """A servo on a bus; times by its own clock [s] unless said."""
 
@@ -45,6 +56,7 @@ class Seat(NamedTuple):
     chip: Chip
     point: Point
     decided: Frame  # what its chip remembers
+    shown: Shown  # of a program, which remembers more elsewhere
     tau: Piece
     tau_end: float
     frames: int  # where its clock counts from, as in `Memory`
@@ -117,6 +129,14 @@ put_mode = record_writer("put_mode", Mode)
 put_track = record_writer("put_track", Track)
 put_shared = record_writer("put_shared", Shared)
 source_of = record_reader("source_of", Source)
+
+
+def drive_of(seat: Any) -> float:
+    """Return how the bridge drives: −1, 0 or +1."""
+    if duty.present(seat.numbers.bridge):
+        return math.copysign(1.0, seat.shown.duty) if duty.drives(seat.shown.duty) else 0.0
+    drive: float = seat.decided.drive
+    return drive
 
 
 def vector_of(values: Any) -> Vector:

@@ -2,7 +2,8 @@
 
 A servo takes part, as a mate of the others, while its bridge connects the motor to the bus: with the sign of the drive,
 or through the diodes of a coasting bridge against the sign of its current. Its numbers are then those of a stiff
-source, and u = s V_bus. The functions take the first `count` records of `seats.Mate`, each as it stands at its `y`.
+source, and u = s V_bus, where s is the sign, or the duty of a bridge under PWM: an ideal transformer, which takes s i.
+The functions take the first `count` records of `seats.Mate`, each as it stands at its `y`.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any
 from servotwin.models.engine import currents
 from servotwin.models.engine.modes import NO_CURRENT, Vector, sign_of
 from servotwin.models.engine.seats import numbers_of, vector_of
+from servotwin.models.terms import duty
 from servotwin.models.terms import source as source_term
 from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.numbers import Numbers, warm
@@ -46,6 +48,12 @@ def sign_on_bus(drive: float, y: Vector) -> float:
     return -math.copysign(1.0, y[2]) if y[2] != 0.0 else math.copysign(1.0, y[6])
 
 
+def part_on_bus(drive: float, path: Bridge, now: float, y: Vector) -> float:
+    """Return which part of the bus voltage is in a circuit, with its sign; `now` is the duty of a bridge under PWM."""
+    sign = sign_on_bus(drive, y)
+    return sign * duty.share_of(path, now) if duty.present(path) else sign
+
+
 def _loop(mate: Any) -> tuple[float, float, float]:
     """Return resistance [Ω], voltage drop [V] and K_b of the circuit of a mate."""
     if mate.numbers.heat.C_w > 0.0:
@@ -63,7 +71,7 @@ def _demand(mates: Any, count: int) -> tuple[float, float, float]:
             given += mate.sign * mate.y[2]
         elif mate.mode.zone != NO_CURRENT:
             R, D, K_b = _loop(mate)
-            g += motor.steady_armature_current(1.0, 0.0, R, K_b)
+            g += mate.sign * motor.steady_armature_current(mate.sign, 0.0, R, K_b)
             v = bridge.driving_voltage(0.0, sign_of(mate.mode.zone), D)
             h -= mate.sign * motor.steady_armature_current(v, mate.y[6], R, K_b)
     return g, h, given
@@ -88,7 +96,7 @@ def bus_voltage(source: Source, state: int, mates: Any, count: int) -> float:
             R, D, K_b = _loop(mate)
             v, L = bridge.driving_voltage(0.0, sign_of(mate.mode.zone), D), mate.numbers.motor.L
             above -= mate.sign * motor.armature_current_rate(v, mate.y[2], mate.y[6], R, L, K_b)
-            below += motor.armature_current_rate(1.0, 0.0, 0.0, R, L, K_b)
+            below += mate.sign * motor.armature_current_rate(mate.sign, 0.0, 0.0, R, L, K_b)
     return above / below
 
 

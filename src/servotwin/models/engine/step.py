@@ -179,18 +179,18 @@ def source(numbers: Numbers, now: Frame) -> Piece:
     return Piece(0.0, now.drive * numbers.source.V, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def voltages(numbers: Numbers, u: float, y: Vector) -> tuple[float, float]:
-    """Return the voltages at the motor's terminals and of the bus [V], for the voltage u behind the bridge."""
+def circuit(numbers: Numbers, u: float, y: Vector) -> tuple[float, float, float]:
+    """Return the current [A], the voltages at the motor's terminals and of the bus [V], for u [V] behind the bridge."""
     numbers = warm(numbers, y)
     w, i = turning(numbers.elastic, y), y[2]
     zone = currents.zone_of(numbers, u, 0.0, y[0], w, i)
     i = currents.flowing(numbers, zone, u, y[0], w, i)
     V_bus = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)
-    return bridge.terminal_voltage(numbers.bridge, numbers.source, numbers.motor, u, w, i, V_bus), V_bus
+    return i, bridge.terminal_voltage(numbers.bridge, numbers.source, numbers.motor, u, w, i, V_bus), V_bus
 
 
 def measured(numbers: Numbers, chip: Chip, inputs: Inputs, now: Frame, point: Point, t_in: float) -> Frame:
     """Return the frame state after the edge of a pulse of the width t_in that meets the servo at a point."""
-    v_m, V_bus = voltages(numbers, now.drive * numbers.source.V, point.y)
+    _, v_m, V_bus = circuit(numbers, now.drive * numbers.source.V, point.y)
     v_o = sensed_voltage(numbers.sensor, inputs.curve, point.wiper)
     return frame.edge(chip, now, point.time, t_in, v_o, v_m, V_bus, inputs.seed)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin.models.engine.modes import Mode
 from servotwin.models.engine.motion import LONG_STEP
 from servotwin.models.engine.seats import DENSE as _DENSE
-from servotwin.models.engine.seats import ROOM, mode_of, vector_of
+from servotwin.models.engine.seats import ROOM, drive_of, mode_of, vector_of
+from servotwin.models.terms import duty
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,9 +16,9 @@ if TYPE_CHECKING:
 
 # How a motion is written down: by its own law, or the numbers of a common one, a series or a step.
 ALONE, SERIES, DENSE = range(3)
-# Events besides those of guards: how the bridge drives after it, silence, and a pulse that is not taken.
-DRIVES, SILENCE, REFUSED = -10, -20, -30
-ROW, EVENT = 43, 6  # numbers of a row
+# Events besides those of guards: how the bridge drives after it, silence, a pulse that is not taken, a trip.
+DRIVES, SILENCE, REFUSED, TRIPS = -10, -20, -30, -50
+ROW, EVENT = 47, 6  # numbers of a row
 UNTIL, FIRST = 4, 25  # where a row of a motion has its end, and the place of its first number
 _MOST = 8  # rows of one servo between two looks at the room that is left
 
@@ -81,15 +82,17 @@ def write_together(tape: Tape, unit: int, seat: Any, until: float, shared: Any, 
 
 def _write(tape: Tape, unit: int, how: int, seat: Any, until: float, mode: Mode, kind: int, length: float,
            next_step: float, first: int, returns: int, end: Any, start: Any) -> None:
-    now, point, tau = seat.decided, seat.point, seat.tau
-    y, z = vector_of(end), vector_of(start)
-    values = (1.0 * unit, 1.0 * how, seat.origin, point.time, until, now.error, point.wiper, now.drive,
+    now, point, tau, shown, drive = seat.decided, seat.point, seat.tau, seat.shown, drive_of(seat)
+    y, z, path = vector_of(end), vector_of(start), seat.numbers.bridge
+    u = seat.numbers.source.V * drive * (duty.share_of(path, shown.duty) if duty.present(seat.numbers.bridge) else 1.0)
+    values = (1.0 * unit, 1.0 * how, seat.origin, point.time, until, now.error, point.wiper, drive,
               1.0 * now.silent,
               1.0 * mode.zone, 1.0 * mode.contact, 1.0 * mode.mesh, 1.0 * mode.motor, 1.0 * mode.share,
-              seat.numbers.source.V * now.drive,
+              u,
               tau.start - seat.origin, tau.value, tau.slope, tau.amplitude, tau.frequency, tau.phase, tau.sweep,
               1.0 * kind, length, next_step, 1.0 * first, 1.0 * returns, point.anchor_time, point.step,
-              y[0], y[1], y[2], y[3], y[4], y[5], y[6], z[0], z[1], z[2], z[3], z[4], z[5], z[6])
+              y[0], y[1], y[2], y[3], y[4], y[5], y[6], z[0], z[1], z[2], z[3], z[4], z[5], z[6],
+              shown.duty, shown.goal, shown.reference, 1.0 * shown.trip)
     n = tape.used[0]
     for k in range(ROW):
         tape.motions[n, k] = values[k]

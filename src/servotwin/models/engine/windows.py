@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import tiles
 from servotwin.models.engine.memory import SAME
-from servotwin.models.engine.step import voltages
+from servotwin.models.engine.step import circuit
 from servotwin.models.terms import frame
 from servotwin.models.terms.chip import Chip
 from servotwin.physics import bridge, motor, potentiometer, supply
@@ -97,7 +97,7 @@ def measure(size: int, form: int, tile: Any, plan: Any) -> None:
             numbers, w = tiles.numbers_at(tile.own, j), tile.servo.w[j]
             y = (0.0, w, tile.servo.i[j], tile.servo.T_w[j], tile.servo.T_h[j], 0.0,
                  tile.servo.w_m[j] if form == tiles.GAPS else w)
-            v_m, V_bus = voltages(numbers, tile.servo.drive[j] * numbers.source.V, y)
+            _, v_m, V_bus = circuit(numbers, tile.servo.drive[j] * numbers.source.V, y)
             plan.v_m[j] = v_m
             plan.V_bus[j] = V_bus
         return

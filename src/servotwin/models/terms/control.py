@@ -104,6 +104,11 @@ def frozen(firm: Any) -> Firm:
     return Firm(**vars(firm) | {"duties": tuple(firm.duties), "coming": tuple(firm.coming)})
 
 
+def told_by(firm: Any) -> tuple[float, float, float, int]:
+    """Return what shows of a program: its duty, or `OPEN`, `BRAKED`; goal and reference [rad]; its trip."""
+    return firm.duty, firm.r if firm.goal == NOWHERE else firm.goal, firm.r, firm.trip
+
+
 class Sensed(NamedTuple):
     """What the program measures at a tick, its own angle apart."""
 

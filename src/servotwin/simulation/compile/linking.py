@@ -2,7 +2,7 @@
 
 numba makes machine code of every function, and to that end optimises each with all that it calls. For functions called
 by others alone that is work for nothing: these take them in and are optimised as a whole. So they get no machine code,
-and large ones are left as they are, for whoever calls them.
+and are left as they are, for whoever calls them.
 
 Source: numba's developer manual, "Customizing the compiler".
 """
@@ -12,7 +12,6 @@ Source: numba's developer manual, "Customizing the compiler".
 
 from __future__ import annotations
 
-from itertools import islice
 from typing import Any
 
 from numba.core.codegen import JITCodeLibrary
@@ -20,7 +19,7 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, PassManager, register_pass
 from numba.core.typed_passes import NopythonTypeInference
 
-_MOST = 5000  # instructions, of a function and of all that it calls, that are still optimised by themselves
+_MOST = 150_000  # bytes of bitcode, of a function and of all that it calls, that are still optimised by themselves
 
 
 class _Nowhere:
@@ -44,9 +43,7 @@ class _Part(JITCodeLibrary):
         return 0
 
     def _optimize_final_module(self) -> None:
-        instructions = (one for function in self._final_module.functions for block in function.blocks
-                        for one in block.instructions)
-        if len(list(islice(instructions, _MOST + 1))) <= _MOST:
+        if len(self._final_module.as_bitcode()) <= _MOST:
             super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
