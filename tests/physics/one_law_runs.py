@@ -1,7 +1,7 @@
 """Servos that together use every law of the engine, plainly and as lanes of a batch whose kernels are not compiled.
 
-Run as a script in a process of its own: `one_law_runs.py out.npz` keeps all signals of both, and the names of the laws
-that were called.
+Run as a script in a process of its own: `one_law_runs.py out.npz` keeps all signals of both, and tells the names of the
+laws that each case has called; `one_law_runs.py out.npz tiles coasting` runs these cases alone.
 """
 
 import json
@@ -9,9 +9,11 @@ import sys
 import types
 import warnings
 from dataclasses import astuple
+from functools import partial
 
 import numpy as np
 
+ON_A_BUS = "on a bus"
 SECONDS = 0.11  # five frames: a drive, its end, plugging back
 PULSES = {"electronics.back_emf_injection": 0.01, "electronics.supply_coupling": 0.02, "potentiometer.noise": 1e-3,
           "electronics.stretcher_time_constant": 0.02, "electronics.minimum_drive_time": 2e-4,
@@ -69,25 +71,25 @@ def cases(st):
     }
 
 
-def signals_of(st, compiled=False):
-    """Return all signals and the energy of every case, "plain/…" and "batch/…"."""
-    if not compiled:
-        without_compiler()
+def signals_of(st, name, compiled=False):
+    """Return all signals and the energy of a case, "plain/…" and "batch/…"."""
     found = {}
-    for name, (model, command, load, batched) in cases(st).items():
-        plain = st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005, seed=0)
+    if name == ON_A_BUS:
+        return on_a_bus(st, *cases(st)["tiles that measure"][:3])
+    model, command, load, batched = cases(st)[name]
+    plain = st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005, seed=0)
+    for signal in model.available:
+        found[f"plain/{name}/{signal}"] = plain[signal]
+    found[f"plain/{name}/energy"] = np.array(astuple(plain.energy))
+    if batched and not (compiled and name == "sprung"):  # its kernels take minutes
+        R = model.value("motor.armature_resistance")
+        batch = st.simulate_many(model, command, duration=SECONDS, load=load, output_step=0.005,
+                                 outputs=model.available,
+                                 parameters={"motor.armature_resistance": [R, 1.01 * R, 1.02 * R]})
         for signal in model.available:
-            found[f"plain/{name}/{signal}"] = plain[signal]
-        found[f"plain/{name}/energy"] = np.array(astuple(plain.energy))
-        if batched and not (compiled and name == "sprung"):  # its kernels take minutes
-            R = model.value("motor.armature_resistance")
-            batch = st.simulate_many(model, command, duration=SECONDS, load=load, output_step=0.005,
-                                     outputs=model.available,
-                                     parameters={"motor.armature_resistance": [R, 1.01 * R, 1.02 * R]})
-            for signal in model.available:
-                found[f"batch/{name}/{signal}"] = batch[signal][0]
-            found |= ticks(st, name, model, load)
-    return found | on_a_bus(st, *cases(st)["tiles that measure"][:3])
+            found[f"batch/{name}/{signal}"] = batch[signal][0]
+        found |= ticks(st, name, model, load)
+    return found
 
 
 def ticks(st, name, model, load):
@@ -163,6 +165,15 @@ if __name__ == "__main__":
     warnings.simplefilter("ignore")  # np.float64 says when it divides by 0, which compiled code does not
     import servotwin
 
-    found, names = called_laws(lambda: signals_of(servotwin, compiled="compiled" in sys.argv))
-    np.savez(sys.argv[1], **found)
-    sys.stdout.write(json.dumps({"package": servotwin.__file__, "laws": sorted(names)}))
+    out, *wanted = sys.argv[1:]
+    compiled = wanted == ["compiled"]
+    if not compiled:
+        without_compiler()
+    found, laws = {}, {}
+    for name in [*cases(servotwin), ON_A_BUS]:
+        if compiled or not wanted or name in wanted:
+            signals, names = called_laws(partial(signals_of, servotwin, name, compiled))
+            found |= signals
+            laws[name] = sorted(names)
+    np.savez(out, **found)
+    sys.stdout.write(json.dumps({"package": servotwin.__file__, "laws": laws}))

@@ -8,7 +8,6 @@ import inspect
 import math
 import operator
 from collections.abc import Callable
-from copy import deepcopy
 from functools import cache, reduce
 from importlib import import_module
 from types import FunctionType, ModuleType
@@ -48,7 +47,7 @@ class Rewriting(ast.NodeTransformer):
             argument.annotation = None
         if ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
-        self._flags = _given_once(node)
+        self._flags = _given_once(_function(self._module, node.name))
         node.body = [self.visit(statement) for statement in node.body]
         self._by_place(node.args)
         node.args.defaults = [self.visit(default) for default in node.args.defaults]
@@ -129,7 +128,7 @@ class Rewriting(ast.NodeTransformer):
             called = self._space.get(_last(node.func))
         if not isinstance(called, FunctionType) or not called.__module__.startswith(_MODELS) or hasattr(called, "text"):
             return None
-        body = definition(called.__module__, called.__name__).body
+        body = _function(called.__module__, called.__name__).body
         line = body[-1]
         if len(body) > 2 or not isinstance(line, ast.Return) or line.value is None:
             return None
@@ -261,7 +260,7 @@ def _neutral(absent: tuple[str, ...]) -> dict[str, float]:
 
 
 def _given_once(node: ast.FunctionDef) -> dict[str, ast.expr]:
-    """Return the values of local variables that get one once and for all."""
+    """Return the values of local variables that get one once and for all; the tree is not to be changed."""
     found: dict[str, ast.expr] = {}
     stored = [n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
     for part in ast.walk(node):
@@ -270,7 +269,7 @@ def _given_once(node: ast.FunctionDef) -> dict[str, ast.expr]:
             pairs = (zip(names.elts, values.elts, strict=False)
                      if isinstance(names, ast.Tuple) and isinstance(values, ast.Tuple) else [(names, values)])
             found |= {name.id: value for name, value in pairs if isinstance(name, ast.Name)}
-    return {name: deepcopy(value) for name, value in found.items() if stored.count(name) == 1}
+    return {name: value for name, value in found.items() if stored.count(name) == 1}
 
 
 def _last(node: ast.expr) -> str:
@@ -299,14 +298,26 @@ def _tree(module: str) -> ast.Module:
     return ast.parse(inspect.getsource(import_module(module)))
 
 
+@cache
+def _functions(module: str) -> dict[str, ast.FunctionDef]:
+    return {node.name: node for node in _tree(module).body if isinstance(node, ast.FunctionDef)}
+
+
+def _function(module: str, name: str) -> ast.FunctionDef:
+    """Return a function of a module, in the tree of that; not to be changed."""
+    if name not in _functions(module):
+        raise NameError(f"{module} has no function {name}")
+    return _functions(module)[name]
+
+
 def definition(module: str, name: str) -> ast.FunctionDef:
     """Return a function of a module as a tree of its own."""
-    for node in _tree(module).body:
-        if isinstance(node, ast.FunctionDef) and node.name == name:
-            copy = ast.parse(ast.unparse(node)).body[0]
-            if isinstance(copy, ast.FunctionDef):
-                return copy
-    raise NameError(f"{module} has no function {name}")
+    return cast("ast.FunctionDef", ast.parse(_text(module, name)).body[0])
+
+
+@cache
+def _text(module: str, name: str) -> str:
+    return ast.unparse(_function(module, name))
 
 
 def local_names(node: ast.FunctionDef) -> set[str]:
