@@ -104,7 +104,7 @@ def not_plain(numbers: Numbers) -> Any:
 
 def _worth_it(recipe: Recipe, frames: float) -> bool:
     """Tell whether so many frames of servos, with those before, are worth compiled kernels."""
-    done = _frames_run.get(recipe.name, 0.0) + frames * (1 if recipe is PLAIN_BUSES else _INTEGRATED)
+    done = _frames_run.get(recipe.name, 0.0) + frames * (_INTEGRATED if recipe is ALL_BUSES else 1)
     if done >= COMPILES_FROM or (done >= LOADS_FROM and is_compiled(recipe)):
         done = math.inf
     _frames_run[recipe.name] = done
