@@ -31,8 +31,8 @@ def read_miuzei_logs(path: str | Path) -> list[Log]:
     """Return the runs in a file of the Miuzei data set, one log for each.
 
     The angle 0 is where the arm is horizontal, the 1500 µs position; gravity pulls towards negative angles. Before the
-    first sample the servo was at the command 0, which most runs leave at once. So a log begins with 0.1 s of it in which
-    nothing was measured; its time 0 is the first sample.
+    first sample the servo was at the command 0, which most runs leave at once. So a log begins with 0.1 s of it in
+    which nothing was measured; its time 0 is the first sample.
 
     Parameters
     ----------
