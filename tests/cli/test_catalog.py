@@ -7,6 +7,7 @@ from servotwin.models import MODELS
 
 SERVO = "hitec-hs-755hb"
 OF_PULSES = {"averaged", "averaged-inductive", "bounded", "pulse", "pulse-inductive"}
+ALONE = {"miuzei-25kg": {"digital"}}  # fitted to logs as one, without a sheet: no other model has numbers
 MISSING = {"analog": {"digital"}, "digital": set(), "bus": OF_PULSES}  # models that a kind of servo has no numbers for
 
 
@@ -48,7 +49,7 @@ def test_check_finds_the_catalog_ready_for_every_model_of_its_kind(cli, tmp_path
     ended = cli("catalog", "check", "copy.toml", "--json")
     assert ended.code == 0
     runs = {model for model, found in ended.data["models"].items() if found["runs"]}
-    assert runs == set(MODELS) - MISSING[st.load_servo(name).kind]
+    assert runs == ALONE.get(name, set(MODELS) - MISSING[st.load_servo(name).kind])
     assert ended.data["warnings"] == []
 
 

@@ -309,6 +309,30 @@ def test_the_start_of_a_log_is_what_was_measured():
     assert 0.5e-3 < f.cases[0].scatter < 5e-3
 
 
+@pytest.mark.parametrize("late", [0.0, 0.02, 0.05])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_shaft_that_sets_off_within_the_first_samples_begins_at_rest(late, sign):
+    """It speeds up evenly from rest, and swings to and fro later, which is no noise of its start."""
+    still = run(TRUTH, "step", time=np.arange(0.0, 1.0, 0.02))
+    gone = np.maximum(still.time - late, 0.0)
+    angle = 0.5 + sign * np.where(gone < 0.3, 20.0 * gone**2, 1.8 + np.sin(25.0 * (gone - 0.3)))
+    case, = forecast([replace(still, measured={"output_angle": np.round(angle / 1.5e-3) * 1.5e-3})]).cases
+    assert case.moving is False
+    assert case.start == pytest.approx((0.5, 0.0), abs=1.5e-3)
+    assert case.scatter < 0.02
+    case, = forecast([replace(still, measured={"output_angle": angle + 2.0 * sign * still.time})]).cases
+    assert case.moving is True
+
+
+def test_a_log_that_tells_what_was_before_is_not_held_at_its_first_command():
+    loose = TRUTH.replace({f"friction.coulomb_torque_{way}": 1e-6 for way in ("forward", "backward")})
+    log = run(TRUTH, "step", time=np.arange(0.0, 1.0, 0.02), kind="pulse_width")
+    angles = [np.full(50, 0.3), np.where(log.time < 0.1, np.nan, 0.3)]
+    f = forecast([replace(log, name=f"log {k}", measured={"output_angle": q}) for k, q in enumerate(angles)],
+                 servo=loose, nuisance=("delay", "frame_phase", "initial_state"))
+    assert [f.hunts(case) for case in f.cases] == [True, False]
+
+
 def test_a_log_that_begins_in_motion_is_believed_to_be_where_it_was_measured():
     """A servo that goes on at 3 rad/s until its command acts: at the truth, the belief about its start costs little."""
     servo, speed, late = TRUTH, 3.0, 0.05

@@ -54,7 +54,7 @@ def test_every_digital_and_bus_servo_of_the_catalog_makes_a_small_step(name):
     assert not result.remarks
     loop = st.datasheet.Loop(model)
     droop = loop.start_error + loop.count + model.value_or("gear.backlash", 0.0)
-    assert abs(result["output_angle"][-1] - goal) <= droop < math.radians(4.0)
+    assert abs(result["output_angle"][-1] - goal) <= droop + 1e-9 < math.radians(4.0)  # which some reach in the end
     assert result["duty"].max() > 0.0
     assert result["trip"].max() == 0.0
 

@@ -5,6 +5,7 @@ from importlib import resources
 
 import pytest
 
+import servotwin as st
 from servotwin.identification import motor_range, servo_file_text, servo_from_sheet, sheet_contradictions, sheet_of
 from servotwin.parameters import REGISTER_FAMILIES, catalog_names, load_servo, unit_of
 
@@ -12,6 +13,7 @@ BUS = ("dynamixel-ax-12a", "dynamixel-mx-106", "dynamixel-mx-28", "dynamixel-mx-
        "dynamixel-xl330-m288", "dynamixel-xl430-w250", "feetech-sts3215-12v", "feetech-sts3215-7v4", "feetech-sts3250")
 DIGITAL = ("dsservo-ds3218", "dsservo-rds3115", "emax-es08md", "feetech-ft-15m0", "feetech-ft-2806", "feetech-ft-7235",
            "hitec-hs-5485hb", "jx-pdi-6221mg", "towerpro-mg995", "towerpro-mg996r", "towerpro-sg92r")
+FITTED = ("miuzei-25kg",)  # to logs, without a sheet
 IMPOSSIBLE = ("dynamixel-xl330-m077",)
 MEASURED = {"feetech-sts3215-12v": ("gear.backlash",)}
 # kt [N m/A], R [ohm], armature [kg m2], friction_base [N m], friction_viscous [N m s/rad], load_friction_base, as
@@ -26,13 +28,18 @@ PLANTS = {
     "dynamixel-mx-106": (2.204165397088512, 2.653346939680077, 0.02484689556730746, 0.1133532996239035,
                          0.01194450384263248, 0.10824037267470683),
 }
+TOLD_BY_LOGS = {  # and nothing else: the rest of a file that was fitted is assumed, or said of the rig
+    "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
+    "friction.coulomb_torque_forward", "friction.coulomb_torque_backward", "friction.load_friction_external",
+    "potentiometer.feedback_gain", "firmware.proportional_gain", "firmware.derivative_gain", "firmware.off_state",
+    "firmware.signal_loss"}
 NEEDED = ("control_period", "compute_delay", "angle_quantum", "proportional_gain")
 
 
 def test_these_are_the_bus_and_the_digital_servos():
     kinds = {name: load_servo(name).kind for name in catalog_names()}
     assert {name for name, kind in kinds.items() if kind == "bus"} == set(BUS)
-    assert {name for name, kind in kinds.items() if kind == "digital"} == set(DIGITAL)
+    assert {name for name, kind in kinds.items() if kind == "digital"} == {*DIGITAL, *FITTED}
     for name, kind in kinds.items():
         assert (kind in load_servo(name).sheet["flags"]) is (kind != "analog"), name
         assert any(key.startswith("firmware.") for key in load_servo(name).names()) is (kind != "analog"), name
@@ -49,6 +56,28 @@ def test_the_firmware_is_complete_and_says_where_it_comes_from(name):
         without = isinstance(quantity.value, str) or quantity.value == 0.0 or key == "electronics.comparator_gain"
         if quantity.origin in ("assumed", "identified") and not without:
             assert quantity.spread, key
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_a_servo_that_was_fitted_says_to_what_and_how_sure_each_number_is(name):
+    servo = load_servo(name)
+    assert {key for key in servo.names() if servo.source(key).origin == "identified"} == TOLD_BY_LOGS
+    for key in servo.names():
+        quantity = servo.source(key)
+        assert quantity.source, key
+        if quantity.origin == "identified":
+            assert "github.com/" in quantity.source, key
+        if quantity.origin in ("assumed", "identified") and not isinstance(quantity.value, str):
+            assert quantity.lower <= quantity.value <= quantity.upper, key
+            assert quantity.lower < quantity.upper, key
+
+
+@pytest.mark.parametrize("name", FITTED)
+def test_a_servo_that_was_fitted_follows_what_it_is_told(name):
+    model = st.DigitalServo(load_servo(name))
+    result = st.simulate(model, st.signals.step(-25.0, 25.0, at=0.05, unit="deg"), duration=1.0)
+    result.raise_if_failed()
+    assert math.degrees(result["output_angle"][-1]) == pytest.approx(25.0, abs=4.0)
 
 
 @pytest.mark.parametrize("name", DIGITAL)

@@ -22,6 +22,7 @@ from servotwin.logs.log import Log
 from servotwin.units import is_finite
 
 PERIOD = 0.02  # s, nominal: there are no time stamps
+BEFORE = 5  # periods of the command 0 before the first sample: longer than any delay
 FRAME_PERIOD = 0.01  # s, pulses of the PCA9685
 INERTIA, GRAVITY_TORQUE, GRAVITY = 1.06e-2, 0.587, 9.80665  # of the arm about the shaft: kg m², N m; m/s²
 
@@ -30,7 +31,8 @@ def read_miuzei_logs(path: str | Path) -> list[Log]:
     """Return the runs in a file of the Miuzei data set, one log for each.
 
     The angle 0 is where the arm is horizontal, the 1500 µs position; gravity pulls towards negative angles. Before the
-    first sample the servo was at the command 0: a log does not hold that, so the state at its start has to be fitted.
+    first sample the servo was at the command 0, which most runs leave at once. So a log begins with 0.1 s of it in
+    which nothing was measured; its time 0 is the first sample.
 
     Parameters
     ----------
@@ -77,9 +79,9 @@ def _log(path: Path, k: int, run: object) -> Log:
     with in_file(path, name):
         return Log(
             name=name, source=str(path), motion=motion,
-            time=np.asarray(PERIOD * np.arange(action.size), dtype=np.float64), command=_pulse_width(action),
-            command_kind="pulse_width",
-            measured={"output_angle": math.pi * angle}, load=arm(),
+            time=np.asarray(PERIOD * np.arange(-BEFORE, action.size), dtype=np.float64),
+            command=_pulse_width(np.append(np.zeros(BEFORE), action)), command_kind="pulse_width",
+            measured={"output_angle": math.pi * np.append(np.full(BEFORE, math.nan), angle)}, load=arm(),
             parameters={"electronics.frame_period": FRAME_PERIOD},
             conditions={"amplitude_deg": round(180.0 * float(np.nanmax(np.abs(action), initial=0.0)), 6)})
 

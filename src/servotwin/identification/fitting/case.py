@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 _FRAME_PERIOD = "electronics.frame_period"
 _UNKNOWN = 0.1  # s, more than the delay of a servo and its bus
+_UNSURE = 3.0  # times what five samples scatter, which is known no better
+_FROM_REST = 0.5  # of its slope over five samples: what a shaft that begins from rest has over three
 
 
 @dataclass(frozen=True)
@@ -129,11 +131,31 @@ def _start(log: Log, model: Model) -> tuple[float, float, float, bool]:
     steps = np.abs(np.diff(values))
     resolution = float(steps[steps > 0.0].min(initial=math.inf)) if len(steps) else 0.0
     noise = float(np.median(np.abs(np.diff(values, n=2)))) if len(values) > 4 else 0.0
-    moving = abs(slope) * float(time[few - 1] - time[0]) > 6.0 * noise + 2e-3
-    scatter = max(noise, 0.5 * resolution if math.isfinite(resolution) else 0.0, 1e-6)
-    if moving:
+    quiet = min(noise, _UNSURE * _rough(time[:few], values[:few]))
+    scatter = max(quiet, 0.5 * resolution if math.isfinite(resolution) else 0.0, 1e-6)
+    moving = abs(slope) * float(time[few - 1] - time[0]) > 6.0 * quiet + 2e-3
+    if moving and not _begins(time, values, slope, scatter):
         return float(values[0] - slope * time[0]), slope, 3.0 * scatter, True
     return float(values[0]), 0.0, scatter, False
+
+
+def _rough(time: Array, values: Array) -> float:
+    """Return how far samples scatter about a motion of even acceleration; inf of three or less, which tell nothing."""
+    if len(values) < 4:
+        return math.inf
+    residual = values - np.polyval(np.polyfit(time - time[0], values, 2), time - time[0])
+    return math.sqrt(float(residual @ residual) / (len(values) - 3))
+
+
+def _begins(time: Array, values: Array, slope: float, scatter: float) -> bool:
+    """Tell whether a shaft that has a slope over five samples was at rest at the first of them.
+
+    One that speeds up evenly from rest has half of that slope over the first three; with a dead time it has less.
+    """
+    if len(values) < 3:
+        return False
+    way = float(time[2] - time[0]) * math.copysign(1.0, slope)
+    return float(np.polyfit(time[:3], values[:3], 1)[0]) * way <= _FROM_REST * slope * way + scatter
 
 
 def _period(log: Log, model: Model) -> float:

@@ -181,6 +181,8 @@ class Forecast:
         log, servo = case.log, self.model.servo
         if not self.phased or case.moving or log.load.recorded or not log.sent.all():
             return False
+        if case.times[0] >= _BEFORE * case.period:  # the log tells what was before
+            return False
         q = case.start[0]
         pull = log.load.torque + sum(s.stiffness * (q - s.rest_angle) for s in log.load.springs) + sum(
             p.mass * p.gravity * p.length * math.sin(q - p.hanging_angle) for p in log.load.pendulums)
