@@ -127,7 +127,7 @@ def without_compiler():
 
     numba, intrinsics, linking = (types.ModuleType(name) for name in (
         "numba", *(f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking"))))
-    linking.shared = lambda key, **_: lambda function: function
+    linking.Part = None
     numba.njit = lambda **_: lambda function: function
     for name in ("fma", "two_power", "binary_exponent", "nearest", "floor"):
         setattr(intrinsics, name, getattr(elementary, name))

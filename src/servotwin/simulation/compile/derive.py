@@ -10,7 +10,6 @@ form every float literal gets that type; in the vector form exponentials, logari
 from __future__ import annotations
 
 import ast
-import hashlib
 import math
 import sys
 from dataclasses import dataclass, field
@@ -71,18 +70,14 @@ def derive(recipe: Recipe) -> str:
     work = Derivation(recipe)
     names = [work.function(*entry.split(":")) for entry in recipe.entries]
     lines = ["# Derived from servotwin's kernels; do not edit.", "import math", "", "import numpy as np",
-             "from numba import njit", "", f"from {_LINKING} import shared", ""]
+             "from numba import njit", "", f"from {_LINKING} import Part", ""]
     lines += [f"from {module} import {name} as {alias}" for alias, (module, name) in sorted(work.imports.items())]
     lines += ["", f"_f = np.{'float32' if recipe.single else 'float64'}", ""]
     lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
-    keys: dict[str, str] = {}
     for flat in work.order:
-        text, entry = work.functions[flat], flat in names
-        options = _options(recipe, entry, text)
+        options = _options(recipe, flat in names, work.functions[flat])
         options += ', fastmath={"reassoc"}' if recipe.vector and flat in work.in_any_order else ""
-        keys[flat] = work.key(text, options, keys)
-        decorator = f"njit({options})" if entry else f'shared("{keys[flat]}", {options})'
-        lines += ["", "", f"@{decorator}", text]
+        lines += ["", "", f"@njit({options})", work.functions[flat]]
     lines += ["", *(f"{entry.split(':')[1]} = {flat}" for entry, flat in zip(recipe.entries, names, strict=True)), ""]
     return "\n".join(lines)
 
@@ -91,6 +86,7 @@ def _options(recipe: Recipe, entry: bool, text: str) -> str:
     options = 'nogil=True, error_model="numpy"'
     if entry:
         return options + ", cache=True"
+    options += ", no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=Part"
     loops = any(isinstance(node, (ast.For, ast.While)) for node in ast.walk(ast.parse(text)))
     return options + (", forceinline=True" if recipe.vector and not loops else "")
 
@@ -119,12 +115,6 @@ class Derivation:
             self.functions[flat] = ast.unparse(ast.fix_missing_locations(rewritten))
             self.order.append(flat)
         return flat
-
-    def key(self, text: str, options: str, keys: dict[str, str]) -> str:
-        """Return what tells a function from all others by its text, its options and all that it calls or reads."""
-        used = sorted({node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)})
-        known = (keys.get(name, self.constants.get(name, self.imports.get(name))) for name in used)
-        return hashlib.sha256(repr((text, options, self.recipe.single, list(known))).encode()).hexdigest()[:32]
 
     def value(self, module: str, name: str, value: object) -> str:
         """Return the name in the derived module of what `module` calls `name`."""

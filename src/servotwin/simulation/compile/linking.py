@@ -8,38 +8,18 @@ Source: numba's developer manual, "Customizing the compiler".
 """
 
 # numba's own types are not annotated
-# mypy: disable-error-code="no-untyped-call, misc, no-any-unimported, call-overload"
+# mypy: disable-error-code="no-untyped-call, misc, no-any-unimported"
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from types import FunctionType
 from typing import Any
 
-from numba import njit
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, PassManager, register_pass
 from numba.core.typed_passes import NopythonTypeInference
 
 _MOST = 150_000  # bytes of bitcode, of a function and of all that it calls, that are still optimised by themselves
-_known: dict[str, Any] = {}  # functions by their keys
-
-
-def shared(key: str, **options: Any) -> Callable[[Any], Any]:
-    """Return what makes a function one that others alone call: of several with one key, in several kernels, the first.
-
-    It is compiled once in a process, though many kernels have it. As one of this module, for what is kept of a kernel
-    names the modules of all that it calls, and the kernel that had it first need not be there when that is read again.
-    """
-    def take(function: Any) -> Any:
-        if key not in _known:
-            name, space = function.__name__, {**function.__globals__, "__name__": __name__}
-            own = FunctionType(function.__code__, space, name, function.__defaults__)
-            _known[key] = space[name] = njit(**options, no_cpython_wrapper=True, no_cfunc_wrapper=True,
-                                             pipeline_class=Part)(own)
-        return _known[key]
-    return take
 
 
 class _Nowhere:
