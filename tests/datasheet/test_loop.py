@@ -151,3 +151,10 @@ def test_bad_input_is_named(torque):
         Loop(st.DigitalServo(STS)).droop(torque)
     with pytest.raises(InputError, match="model of a loop: got 'PulseServo'"):
         Loop(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+
+
+@pytest.mark.parametrize("name", ["feetech-sts3215-12v", "miuzei-25kg"])
+def test_a_sheet_has_the_bandwidth_of_a_program_too(name):
+    """It is that of simulated sines; a transfer function it has none."""
+    found = st.curves(st.DigitalServo(st.load_servo(name))).voltages[0].bandwidth
+    assert any(0.5 < one.frequency < 20.0 for one in found)

@@ -348,5 +348,5 @@ def test_newton_metres_typed_for_kilogram_centimetres_are_asked_about(torque, ma
 def test_what_the_catalog_has_is_not_asked_about():
     for name in catalog_names():
         servo = st.load_servo(name)
-        if servo.sheet:
+        if "supply_voltage" in servo.sheet:
             assert torque_question(sheet_of(servo)) is None, name

@@ -52,7 +52,8 @@ def test_of_the_nominal_numbers_the_file_follows(kind):
     """Every servo of the catalog that the model knows is made of a sheet, and is the middle of its own fleet."""
     for name in st.catalog_names():
         servo = st.load_servo(name)
-        if servo.kind == "bus" or (kind is st.DigitalServo and servo.kind == "analog"):
+        measured = servo.kind == "bus" or "supply_voltage" not in servo.sheet
+        if measured or (kind is st.DigitalServo and servo.kind == "analog"):
             continue  # has no numbers for this model, or its plant is measured
         model = kind(servo)
         together = Together(model)

@@ -129,7 +129,7 @@ def frequency_response(model: Model, frequencies: ArrayLike, *, amplitude: Array
     >>> bool(seen.gain[1, 1] < seen.gain[0, 1])  # the supply ends
     True
     """
-    check_model(model, frame_period)
+    check_model(model, frame_period, linear=False)
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
         raise InputError("seed", got=seed, allowed="a whole number")
     if frame_period is not None:

@@ -116,11 +116,14 @@ def input_name(model: Model, name: str) -> str:
     return name
 
 
-def check_model(model: Model, frame_period: float | None) -> None:
-    """Raise InputError unless it is a model, and one with frames where a frame period is given."""
+def check_model(model: Model, frame_period: float | None, *, linear: bool = True) -> None:
+    """Raise InputError unless it is a model, and one with frames where a frame period is given.
+
+    Where it has to be `linear`, ticks and counts are refused too.
+    """
     if not isinstance(model, Model):
         raise InputError("model", got=model, allowed="a model of a servo, such as PulseServo(load_servo(...))")
-    if isinstance(model, DigitalServo):
+    if linear and isinstance(model, DigitalServo):
         raise InputError("model of a linear system", got=model,
                          allowed="a motor, a mean-voltage servo or a pulse servo: ticks and counts have no transfer "
                          "function")

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 
 _MANY_LOGS = 5  # as many logs for each number
 _HARDLY, _SURELY = 1.5, 3.0  # standard errors of a correlation of 0
+_NOTHING, _PART = 1e-11, 0.0025  # of the most that is known: nothing; the square of a part of a direction that counts
 _MOST_LEVER = 0.95
 
 
@@ -231,11 +232,18 @@ def uncertainty(rows: Sequence[Rows], prior: Prior, held: NDArray[np.bool_],
         whole, data = (np.diag(Q @ _sandwich(bread, Q.T @ m @ Q) @ Q.T) for m in (plain + beliefs, plain))
         freedoms = np.where(data > 0.0, freedoms * (whole / np.maximum(data, 1e-300))**2, math.inf)
     covariance, simple = spread(bread, beliefs), Q @ _sandwich(bread, Q.T @ (plain + beliefs) @ Q) @ Q.T
-    known = np.diag(simple) > 0.0
+    known = (np.diag(simple) > 0.0) & ~_open(information)
     ratio = np.sqrt(np.diag(covariance)[known] / np.diag(simple)[known])
     inflation = max(float(np.median(ratio)), 1.0) if known.any() else 1.0
     return Uncertainty(information, covariance, spread(bare, np.zeros_like(beliefs)), curvature, inflation, method,
                        freedom, memory.correlation if memory.excess > 0.0 else memory.excess, freedoms)
+
+
+def _open(information: Array) -> NDArray[np.bool_]:
+    """Tell which numbers have a part in a direction of which nothing is known: their variances there are rounding."""
+    values, vectors = np.linalg.eigh(information)
+    nothing = values < _NOTHING * max(float(values[-1]), 1e-300)
+    return np.asarray((vectors[:, nothing] ** 2).sum(axis=1) > _PART)
 
 
 def _varying(held: NDArray[np.bool_], vague: Array | None) -> Array:
