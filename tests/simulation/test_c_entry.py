@@ -10,6 +10,7 @@ import pytest
 
 import servotwin as st
 from conftest import EVERYTHING
+from models.digital_servos import COUNT, digital
 from servotwin.errors import InputError
 from servotwin.simulation.compile.layout import MESSAGES, SHOWN, TICK, VERSION
 from vector_cases import CASES, model_of
@@ -79,6 +80,25 @@ def test_it_is_python_bit_for_bit(servo, name, kind, dtype):
                 expected = python[signal] if signal in model.available else np.full(LANES, np.nan)
                 np.testing.assert_array_equal(values, expected, err_msg=f"{signal}, tick {k}")
         same(python, both)
+    assert np.ptp(python["output_angle"]) > 0.0
+
+
+def test_programs_are_python_bit_for_bit():
+    """Digital servos by the same ticks: their lanes go from tick to tick together, or in the middle of one alone."""
+    model = digital({"proportional_gain": 6.0, "derivative_gain": 0.02, "angle_quantum": COUNT, "overload_duty": 0.5,
+                     "overload_time": 0.02, "overload_output": 0.2})
+    several = {"firmware.proportional_gain": [3.0, 6.0, 9.0, 12.0],
+               "firmware.control_period": [1e-3, 1e-3, 1.5e-3, 2e-3]}
+    rng = np.random.default_rng(8)
+    python, c = (st.VectorSimulator(model, LANES, parameters=several, seed=3) for _ in range(2))
+    for sims in (python, c):
+        sims.reset(command_angle=0.1)
+    for k in range(30):
+        duration, (given, imposed) = rng.choice([1e-3, 7e-3, 0.0305]), random_tick(rng, ["command_angle"])
+        in_python(python, duration, given, imposed)
+        shown = in_c(c, duration, given, imposed)
+        np.testing.assert_array_equal(shown["output_angle"], python["output_angle"], err_msg=f"tick {k}")
+    same(python, c)
     assert np.ptp(python["output_angle"]) > 0.0
 
 

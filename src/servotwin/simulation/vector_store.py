@@ -239,6 +239,7 @@ class Store:
         """Let some lanes go on one by one; their memories are changed in place."""
         status, ended = np.zeros(len(which), np.int64), np.zeros(len(which))
         durations = np.full(len(which), duration) if isinstance(duration, float) else duration
+
         def go(part: slice) -> None:
             some = which[part]
             lane_runs.go_on(recipe, self.columns, *self.inputs, some, durations[part], _NONE,

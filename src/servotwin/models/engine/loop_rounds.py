@@ -48,28 +48,14 @@ def any_senses(tile: Any, size: int) -> bool:
     return found
 
 
-def going(tile: Any, size: int) -> int:
-    """Return how many lanes go on."""
-    going = 0
+def asked(tile: Any, size: int) -> tuple[int, int, int]:
+    """Return how many lanes go on, of how many a command may have come, and of how many the goal moves."""
+    going = news = following = 0
     for j in range(size):
         going += 1 if tile.clock.left[j] > 0.0 else 0
-    return going
-
-
-def with_news(tile: Any, size: int) -> int:
-    """Return of how many lanes a command may have come."""
-    news = 0
-    for j in range(size):
         news += 1 if tile.clock.tick[j] >= tile.clock.hears[j] else 0
-    return news
-
-
-def following(tile: Any, size: int) -> int:
-    """Return of how many lanes the goal moves."""
-    following = 0
-    for j in range(size):
         following += 1 if tile.clock.follows[j] > 0.0 else 0
-    return following
+    return going, news, following
 
 
 def with_outputs(tile: Any, size: int) -> int:

@@ -47,12 +47,13 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
 def _through(lanes: Lanes, curve: Floats, times: Floats, outputs: Floats, records: Any, tile: Any, size: int) -> None:
     """Let all lanes of a tile go on from tick to tick."""
     senses = rounds.any_senses(tile, size)
-    while rounds.going(tile, size) > 0:
-        if rounds.with_news(tile, size) > 0:
+    going, news, following = rounds.asked(tile, size)
+    while going > 0:
+        if news > 0:
             for j in range(size):
                 if tile.clock.left[j] > 0.0 and tile.clock.tick[j] >= tile.clock.hears[j]:
                     _hear(lanes, curve, records, tile, j)
-        if rounds.following(tile, size) > 0:
+        if following > 0:
             rounds.follow(tile, size)
         if senses:
             rounds.watch(tile, size)
@@ -72,6 +73,7 @@ def _through(lanes: Lanes, curve: Floats, times: Floats, outputs: Floats, record
                 if rounds.is_wanted(tile, j):
                     _write(times, outputs, records, tile, j)
         rounds.tick_over(tile, size)
+        going, news, following = rounds.asked(tile, size)
 
 
 def _hear(lanes: Lanes, curve: Floats, records: Any, tile: Any, j: int) -> None:
