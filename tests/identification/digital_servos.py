@@ -36,10 +36,10 @@ def off(servo, factors):
 
 
 def digital_log(servo, motion, *, seed=0, std=1e-3, duration=1.2, sample=0.02, name=None, gain=None, phase=0.0,
-                reach=0.8, load=DISC):
+                delay=0.0, reach=0.8, load=DISC):
     """Return a log of a digital servo with white noise; of another gain of its loop where one is given, which it says.
 
-    Its ticks begin at `phase` of their period.
+    Its ticks begin at `phase` of their period; what is measured is as old as the delay, before which the shaft rests.
     """
     time = np.arange(0.0, duration, sample)
     command = reach * shape(motion, time, seed)
@@ -49,5 +49,5 @@ def digital_log(servo, motion, *, seed=0, std=1e-3, duration=1.2, sample=0.02, n
     there = servo.replace({**own, "firmware.control_phase": phase * servo.firmware.control_period})
     result = st.simulate(st.DigitalServo(there), log.signal(servo.electronics.frame_period), load=load,
                          duration=float(time[-1]), initial={"output_angle": 0.0, "output_speed": 0.0})
-    angle = result.at("output_angle", time) + std * np.random.default_rng(seed).normal(size=len(time))
+    angle = result.at("output_angle", np.maximum(time - delay, 0.0)) + std * np.random.default_rng(seed).normal(size=len(time))
     return replace(log, measured={"output_angle": angle})

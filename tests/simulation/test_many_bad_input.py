@@ -177,3 +177,9 @@ def test_models_without_a_way_to_run_many():
     for model in (st.AveragedServo(SERVO), 3):
         with pytest.raises(InputError, match="PulseServo or PulseServoInductive or BoundedServo"):
             st.simulate_many(model, STEP, duration=0.1)
+
+
+def test_a_run_of_too_many_ticks_is_said_in_ticks():
+    model = st.DigitalServo(st.load_servo("feetech-sts3215-12v"))
+    with pytest.raises(InputError, match=r"duration / control period of lane 0: got '1e\+09 ticks'"):
+        st.simulate_many(model, signals.constant(0.5, unit="rad"), duration=1e6, output_times=[1.0])

@@ -10,6 +10,7 @@ import numpy as np
 
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.noise import SensorSeries, noise_of
+from servotwin.identification.fitting.giving_way import giving_way
 from servotwin.identification.fitting.phases import Scan, drifts, likely_periods, settled, with_period
 from servotwin.identification.fitting.point import PERIOD_SCALE, Point
 from servotwin.identification.fitting.scatter import by_sensor
@@ -25,6 +26,7 @@ _ROUNDS = 2  # of assignment and search
 _MOST_ROUNDS, _FALLS = 6, 0.95  # of pulses of another period, while the cost falls to less than that share
 _PERIOD_LOGS = 4  # that a far period is sought on
 _EXPLAINS = 0.75  # of the cost: a period that is nearly right leaves less
+_TICKS_PAY = 1.0  # of the cost
 _HELD_PAYS = 3.0  # of the cost: an odds ratio of 20
 _NEAR_PAYS = 4.0  # of the cost, for each independent residual: what one more number has to gain, a chance of 0.5 %
 _MORE = 2.0  # times the noise: what a period that is off by more than quartz clocks are leaves
@@ -64,7 +66,43 @@ def _with_phases(task: Task, start: Point, tell: Told, began: float) -> tuple[Po
         task.measure(point)
         if [task.forecast.frames_of(point, k) for k in task.fitted] == before:
             break
+    if task.forecast.ticked:
+        point = _with_ticks(task, point, tell, began)
     return point, math.fsum(math.log(value) for value in task.forecast.noise.values())
+
+
+def _with_ticks(task: Task, point: Point, tell: Told, began: float) -> Point:
+    """Return where a search ends that finds which commands ticks take, the better of two.
+
+    Ticks that take wrong commands bend all parameters, so that the right ones would not fit better with these. So they
+    are sought from where the search stands and, with parameters held near them, from where it began.
+    """
+    near = task.like(task.forecast, task.near_start())
+    again = near.ran(settled(near.scan(_from_start(task, point)), task.fitted), tell, began).point
+    ends = [_ticking(task, point, tell, began),
+            _ticking(task, task.ran(_ticking(near, again, tell, began), tell, began).point, tell, began)]
+    best = min(ends, key=task.cost)
+    task.measure(best)
+    return best
+
+
+def _ticking(task: Task, point: Point, tell: Told, began: float) -> Point:
+    """Return where a search ends in which ticks take other commands, as long as that pays.
+
+    What counts is where all parameters would go with these.
+    """
+    cost = task.cost(point)
+    for _ in range(_MOST_ROUNDS):
+        tell(began, "ticks")
+        better = giving_way(task.scan(point), task.prior, task.held, task.fitted)
+        found = task.ran_all(better, tell, began)
+        best = min(found, key=lambda outcome: outcome.cost, default=None)
+        if best is None or not best.cost < cost - _TICKS_PAY:
+            break
+        point = best.point
+        task.measure(point)
+        cost = task.cost(point)
+    return point
 
 
 def _held(task: Task, point: Point, tell: Told, began: float) -> Point:

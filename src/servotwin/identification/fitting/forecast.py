@@ -96,6 +96,7 @@ class Forecast:
         self.work = 0.0  # seconds of one lane that were simulated
         self.phased = "frame_phase" in nuisance and _PERIOD not in space.names and all(c.period for c in self.cases)
         self.extra = tuple(name for name in SHARED if name in nuisance and (name != "frame_period" or self.phased))
+        self.ticked = self.phased and "control_phase" in nuisance  # whether ticks find which commands they take
         self.own_phases = "delay" not in self.extra  # whether each log's pulses come when they want
         self.held = False  # whether servos had held their first command for long when their log began
         self.frames = tuple(widest(case.log, case.period) for case in self.cases) if self.phased else ()
@@ -119,9 +120,9 @@ class Forecast:
         names = []
         if "initial_state" in self.nuisance:
             names += ["output_angle", "output_speed"] if case.moving else ["output_angle"]
+        if self.phased:  # which holds a delay of the log's own too; the phase of its ticks beside is no more than
+            return (*names, "frame_phase")  # which commands they take
         names += ["control_phase"] if "control_phase" in self.nuisance else []
-        if self.phased:  # which holds a delay of the log's own too
-            return (*names, "frame_phase")
         return (*names, "log_delay") if "log_delay" in self.nuisance else tuple(names)
 
     def own_start(self, case: Case) -> Array:
@@ -162,10 +163,10 @@ class Forecast:
         case = self.cases[k]
         if not self.phased:
             return case.signal
-        first = float(point.own[k][self.names_of_own(case).index("frame_phase")]) * DELAY_SCALE
+        first = self.first_pulse(point, k)
         frames = self.frames_of(point, k)
         period = self.nuisance_of(point.shared, "frame_period") or frames.period
-        sent = (k, frames, first, period, self.lead(case))
+        sent = (k, frames, first, period, self.lead_at(point, k))
         if sent not in self._commands:
             if len(self._commands) >= _KEPT:
                 self._commands.clear()
@@ -175,6 +176,20 @@ class Forecast:
     def lead(self, case: Case) -> float:
         """Return how long before the first sample the simulation of a log begins [s]."""
         return _BEFORE * case.period if self.held and self.hunts(case) else 0.0
+
+    def first_pulse(self, point: Point, k: int) -> float:
+        """Return when the pulse comes at a point that stands for the phase of a log's frames [s]."""
+        return float(point.own[k][self.names_of_own(self.cases[k]).index("frame_phase")]) * DELAY_SCALE
+
+    def lead_at(self, point: Point, k: int) -> float:
+        """Return how long before the first sample the simulation of a log begins at a point [s]: no pulse is left out.
+
+        Pulses that come before the first sample carry its command where clocks of logger and generator differ, and where
+        ticks are later instead.
+        """
+        frames = self.frames_of(point, k)
+        earliest = self.first_pulse(point, k) + math.ceil(-frames.phase / frames.period) * frames.period
+        return max(self.lead(self.cases[k]), -earliest)
 
     def hunts(self, case: Case) -> bool:
         """Tell whether the servo could not rest at the start of a log without drives, but begins there at rest."""

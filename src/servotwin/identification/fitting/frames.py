@@ -75,7 +75,12 @@ def gaps(log: Log, period: float) -> tuple[Gap, ...]:
     >>> [(round(gap.low, 4), round(gap.high, 4)) for gap in gaps(log, 0.02)]
     [(0.0, 0.005), (0.005, 0.02)]
     """
-    residues = np.sort(np.mod(changes(log), period))
+    return between(changes(log), period)
+
+
+def between(times: Array, period: float) -> tuple[Gap, ...]:
+    """Return the phases of a beat at which none of some times lies, in the order of their low ends."""
+    residues = np.sort(np.mod(times, period))
     residues[residues > period * (1.0 - _EDGE)] = 0.0
     residues = np.unique(residues)
     if not len(residues):

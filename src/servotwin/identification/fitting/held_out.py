@@ -43,7 +43,7 @@ def trace_of(forecast: Forecast, point: Point, k: int, part: LogPart, *, held_ou
         judged=np.asarray(times >= 0.5 * case.log.duration) if late else np.ones(len(times), np.bool_),
         command=forecast.command_at(point, k),
         delay=forecast.nuisance_of(point.shared, "delay") + float(own.get("log_delay", 0.0)) * DELAY_SCALE
-        - forecast.lead(case))
+        - forecast.lead_at(point, k))
 
 
 def with_pulses_of(forecast: Forecast, loss: Loss, point: Point, held_out: Sequence[int],

@@ -65,6 +65,7 @@ class LogLanes:
                 column, scale = columns[name]
                 column[first + p + i] += self.steps[side, p + i] * scale
         self.signals = [self.case.signal] * self.count
+        self.begins = 0.0  # from when on ticks are counted, where they go with the pulses [s]
         if forecast.phased:
             self._send_pulses(k, point, own["frame_phase"] * DELAY_SCALE, numbers)
         delayed = sides > 0 and ("delay" in forecast.extra or any(name in names for name in _DELAYS))
@@ -76,8 +77,9 @@ class LogLanes:
     def _send_pulses(self, k: int, point: Point, first: float, numbers: int) -> None:
         """Give every lane its pulses; those of one whose period is varied come a little later one by one."""
         forecast, log = self.forecast, self.case.log
-        frames, lead = forecast.frames_of(point, k), forecast.lead(self.case)
+        frames, lead = forecast.frames_of(point, k), forecast.lead_at(point, k)
         self.delay -= lead
+        self.begins = first + lead + frames.tick
         period = forecast.nuisance_of(point.shared, "frame_period") or frames.period
         self.signals = [forecast.command_at(point, k)] * self.count
         for side in range(self.sides if self.shaped else 0):
@@ -100,13 +102,27 @@ class LogLanes:
         if _NOISE in forecast.model.optional and forecast.model.servo.get(_NOISE):
             own[_NOISE] = np.zeros(self.count)
         columns = {**forecast.space.columns(self.x), **own}
-        if "control_phase" in self.names:
-            columns[_PHASE] = np.clip(self.tick, 0.0, 1.0) * columns.get(_TICK, forecast.model.value(_TICK))
+        if _PHASE in forecast.model.optional:
+            columns |= self._ticks(columns)
         asked = np.maximum(np.concatenate([self.times, self.times + self.later]) if self.later else self.times, 0.0)
         starts = "initial_state" in forecast.nuisance
         return Bundle(times=asked, duration=max(float(asked.max()), log.duration), load=log.load, signals=self.signals,
                       columns=columns,
                       initial={"output_angle": self.angle, "output_speed": self.speed} if starts else {})
+
+    def _ticks(self, columns: Mapping[str, Array]) -> dict[str, Array]:
+        """Return when the first tick of each lane is [s]: pulses that come later move it as much, or nothing would move.
+
+        A command acts from the first tick on that follows its pulse.
+        """
+        model, tick = self.forecast.model, columns.get(_TICK, self.forecast.model.value_or(_TICK, 0.0))
+        if "control_phase" in self.names:
+            phase = np.clip(self.tick, 0.0, 1.0) * tick
+        elif self.forecast.phased:
+            phase = np.full(self.count, columns.get(_PHASE, model.value_or(_PHASE, 0.0)))
+        else:
+            return {}
+        return {_PHASE: np.mod(phase + self.begins, tick)}
 
     def _fail(self) -> None:
         """Make a part that is nan."""

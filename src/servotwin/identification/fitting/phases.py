@@ -17,6 +17,7 @@ from servotwin.identification.fitting.arrow import Loss
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.frames import Gap, gap_of, gaps, latency
 from servotwin.identification.fitting.point import DELAY_SCALE, Frames, LogPart, Point
+from servotwin.identification.fitting.ticks import ticks_of
 
 Array = NDArray[np.float64]
 Mask = Callable[[int], NDArray[np.bool_]]
@@ -71,6 +72,7 @@ class Scan:
                  mask: Mask | None = None) -> None:
         self.forecast, self.loss, self.point = forecast, loss, point
         self.widening, self.mask = widening, mask
+        self.ticks = {k: ticks_of(forecast, point, k) for k in range(len(point.own))} if forecast.ticked else {}
 
     def place(self, k: int) -> int:
         """Return where a log's own numbers hold the time of its first pulse."""
@@ -83,7 +85,7 @@ class Scan:
     def like(self, k: int, gap: Gap, period: float | None = None) -> PulseChoice:
         """Return a trial of other phases whose commands wait as long in the mean as they do now."""
         now, log = self.now(k), self.forecast.cases[k].log
-        frames = Frames(gap.middle, now.frames.period if period is None else period)
+        frames = now.frames._replace(phase=gap.middle, period=now.frames.period if period is None else period)
         waits = now.first * DELAY_SCALE - now.frames.phase + latency(log, now.frames)
         return PulseChoice(frames, (frames.phase + waits - latency(log, frames)) / DELAY_SCALE)
 
@@ -92,6 +94,20 @@ class Scan:
         now = self.now(k)
         step = now.frames.period / steps / DELAY_SCALE
         return [now, *(PulseChoice(now.frames, now.first + i * step) for i in range(-steps, steps + 1) if i)]
+
+    def ticking(self, k: int) -> list[PulseChoice]:
+        """Return trials of other ticks, which take their commands as long after the pulses in the mean as they do now.
+
+        There are none unless ticks are sought.
+        """
+        now, ticks = self.now(k), self.ticks.get(k)
+        if ticks is None:
+            return []
+        waits = ticks.wait(now.frames.tick)
+        return [PulseChoice(now.frames._replace(tick=gap.middle),
+                            now.first + (waits - ticks.wait(gap.middle)) / DELAY_SCALE)
+                for gap in _spread(ticks.gaps)
+                if abs(_wrapped(now.frames.tick - gap.middle, ticks.period)) >= 0.5 * gap.width]
 
     def moved(self, choices: Mapping[int, PulseChoice]) -> Point:
         """Return the point with other pulses of some logs."""
@@ -139,6 +155,8 @@ class Scan:
         cost, moved = min((self.loss.cost(r + g * s), s) for s in (0.0, step))
         width = max(gap_of(self.forecast.cases[k].log, choice.frames).width, 1e-12)
         cost -= self.widening * math.log(width / choice.frames.period)
+        if ticks := self.ticks.get(k):
+            cost -= self.widening * math.log(ticks.gap_of(choice.frames.tick).width / ticks.period)
         return PulseTrial(cost, PulseChoice(choice.frames, choice.first + moved))
 
 
@@ -153,6 +171,11 @@ def settled(scan: Scan, cases: Sequence[int]) -> Point:
         there = Scan(scan.forecast, scan.loss, scan.moved(found), scan.widening, scan.mask)
         near = there.best({k: [found[k], *(there.like(k, gap) for gap in _near(there, k, several[k]))] for k in many})
         found |= {k: trials[0].choice for k, trials in near.items()}
+    there = Scan(scan.forecast, scan.loss, scan.moved(found), scan.widening, scan.mask)
+    several_ticks = {k: trials for k in cases if (trials := there.ticking(k))}
+    if several_ticks:
+        ticking = there.best({k: [found[k], *trials] for k, trials in several_ticks.items()})
+        found |= {k: trials[0].choice for k, trials in ticking.items()}
     return scan.moved(found)
 
 
@@ -166,6 +189,9 @@ def credible(scan: Scan, cases: Sequence[int]) -> dict[int, list[PulseChoice]]:
     several = {k: gaps(log, scan.now(k).frames.period) for k, log in zip(cases, logs, strict=True)}
     fixed = scan.tried({k: scan.later(k, _FINE_TIMES) for k in cases}, moves=False)
     others = {k: [scan.like(k, gap) for gap in _near(scan, k, some)] for k, some in several.items() if len(some) > 1}
+    for k in cases:
+        if trials := scan.ticking(k):
+            others.setdefault(k, []).extend(trials)
     moved = scan.tried(others) if others else {}
     found = {}
     for k in cases:

@@ -22,13 +22,16 @@ LATER = 1e-5  # s, for the time derivative of signals that are no angles
 
 
 class Frames(NamedTuple):
-    """Which command each pulse of a log carries: pulse k that of `phase` + k · `period`, from the first sample [s].
+    """Which command each pulse of a log carries, and each tick of a program takes.
 
-    When the pulses themselves come is another matter, and continuous; here every command changes at a jump.
+    Pulse k carries that of `phase` + k · `period`, from the first sample; ticks come by `tick` later after the first
+    pulse than the servo says [s]. When pulses and ticks themselves come is another matter, and continuous; here every
+    command changes at a jump.
     """
 
     phase: float
     period: float
+    tick: float = 0.0
 
 
 class Point(NamedTuple):
@@ -39,8 +42,8 @@ class Point(NamedTuple):
     shared : ndarray, shape (p,)
         The searched numbers of `Space`, then those of `SHARED` that are nuisances (scaled).
     own : tuple of ndarray
-        Of each log: angle and speed at its start, its own delay, when its first pulse comes (scaled), and when its
-        servo's program looks at the shaft first (in ticks), as far as they are nuisances.
+        Of each log: angle and speed at its start, its own delay, when its first pulse comes (scaled), and when a
+        program without pulses looks at the shaft first (in ticks), as far as they are nuisances.
     frames : tuple of Frames
         Of each log, where pulses have a phase; those that a forecast begins with unless given.
     """

@@ -1,0 +1,150 @@
+"""Other commands for the ticks of all logs at once, judged by where all numbers would go with them.
+
+Ticks that take wrong commands bend what all logs share, so that the right ones would not fit better with that, and where
+those of several logs are wrong, one log alone cannot be right either. So each log says to first order what each of its
+choices costs as the shared numbers move, a parabola, and the cheapest choices of all logs are sought together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.identification.fitting.arrow import Prior
+from servotwin.identification.fitting.phases import PulseChoice, Scan
+from servotwin.identification.fitting.point import LogPart, Point
+
+Array = NDArray[np.float64]
+
+_RANDOM, _ALIKE = 24, 8  # choices that descents begin with: random ones, and ticks alike in all logs
+_TRIED = 3  # ends that are looked at closely
+_GAINS = 0.5  # of the cost: less is not worth a look
+
+
+class Parabolas(NamedTuple):
+    """What choices cost as the shared numbers move, each log's own gone to where they fit best; one along the first axis.
+
+    Parameters
+    ----------
+    level : ndarray, shape (n,)
+    slope : ndarray, shape (n, p)
+    curvature : ndarray, shape (n, p, p)
+    """
+
+    level: Array
+    slope: Array
+    curvature: Array
+
+    def least(self) -> Array:
+        """Return the least cost of each [shape (n,)]."""
+        p = self.slope.shape[1]
+        hair = 1e-10 * np.trace(self.curvature, axis1=1, axis2=2)[:, None, None] * np.eye(p)
+        steps = np.linalg.solve(self.curvature + hair, self.slope[..., None])[..., 0]
+        return np.asarray(self.level - 0.5 * np.sum(self.slope * steps, axis=1))
+
+    def plus(self, other: Parabolas) -> Parabolas:
+        """Return the sums."""
+        return Parabolas(*(a + b for a, b in zip(self, other, strict=True)))
+
+    def at(self, k: int) -> Parabolas:
+        """Return one of them alone."""
+        return Parabolas(*(a[k:k + 1] for a in self))
+
+
+def giving_way(scan: Scan, prior: Prior, held: NDArray[np.bool_], cases: Sequence[int]) -> list[Point]:
+    """Return points with other ticks that would fit better, to first order, the best first.
+
+    Parameters
+    ----------
+    scan : Scan
+        Where a search stands.
+    prior : Prior
+        About the shared numbers.
+    held : ndarray of bool, shape (p,)
+        Shared numbers that stay.
+    cases : sequence of int
+        Logs that count.
+    """
+    choices = {k: [scan.now(k), *scan.ticking(k)] for k in cases}
+    if all(len(some) == 1 for some in choices.values()):
+        return []
+    parabolas = _parabolas(scan, choices, ~held)
+    off = ((scan.point.shared - prior.mean) * prior.weight**2)[~held]
+    about = Parabolas(np.zeros(1), off[None], np.diag(prior.weight[~held]**2)[None])
+    now = dict.fromkeys(cases, 0)
+    stands = _cost(parabolas, about, now)
+    ends = {tuple(end.values()): cost for end, cost in (
+        _descent(parabolas, about, start) for start in [now, *_starts(scan, choices)])}
+    best = sorted((cost, end) for end, cost in ends.items() if cost < stands - _GAINS)[:_TRIED]
+    return [scan.moved({k: choices[k][which] for k, which in zip(cases, end, strict=True)}) for _, end in best]
+
+
+def _parabolas(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]], moves: NDArray[np.bool_]) -> dict[int, Parabolas]:
+    """Return what each choice of each log costs; residuals count as much as they do where the search stands."""
+    most = max(map(len, choices.values()))
+    points = [scan.moved({k: some[min(i, len(some) - 1)] for k, some in choices.items()}) for i in range(most)]
+    parts = scan.forecast.at_all(points, derivatives=True, cases=list(choices))
+    found = {}
+    for j, (k, some) in enumerate(choices.items()):
+        own = Prior(*scan.forecast.own_belief(scan.forecast.cases[k]))
+        weight = scan.loss.weight(parts[0][j].residual)
+        each = [_parabola(parts[i][j], weight, own, points[i].own[k], moves) for i in range(len(some))]
+        found[k] = Parabolas(*map(np.stack, zip(*each, strict=True)))
+    return found
+
+
+def _parabola(part: LogPart, weight: Array, own: Prior, at: Array, moves: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
+    """Return level, slope and curvature of the cost of one choice."""
+    shared, alone = part.shared[:, moves], part.own
+    p = shared.shape[1]
+    if not (np.isfinite(part.residual).all() and np.isfinite(shared).all() and np.isfinite(alone).all()):
+        return np.array(1e12), np.zeros(p), np.eye(p)
+    weighed, off = weight * part.residual, own.weight * (at - own.mean)
+    inner = alone.T @ (weight[:, None] * alone) + np.diag(own.weight**2) + 1e-12 * np.eye(len(at))
+    across = shared.T @ (weight[:, None] * alone)
+    pull = alone.T @ weighed + own.weight * off
+    follow = np.linalg.solve(inner, np.column_stack([across.T, pull]))
+    level = 0.5 * (weighed @ part.residual + off @ off - pull @ follow[:, -1])
+    return (np.asarray(level), shared.T @ weighed - across @ follow[:, -1],
+            shared.T @ (weight[:, None] * shared) - across @ follow[:, :-1])
+
+
+def _starts(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]]) -> list[dict[int, int]]:
+    """Return where descents begin."""
+    rng = np.random.default_rng(0)
+    random = [{k: int(rng.integers(len(some))) for k, some in choices.items()} for _ in range(_RANDOM)]
+    alike = []
+    for share in (np.arange(_ALIKE) + 0.5) / _ALIKE:
+        alike.append({k: int(np.argmin([abs(np.mod(one.frames.tick / scan.ticks[k].period - share + 0.5, 1.0) - 0.5)
+                                        for one in some])) for k, some in choices.items()})
+    return [*random, *alike]
+
+
+def _cost(parabolas: Mapping[int, Parabolas], about: Parabolas, chosen: Mapping[int, int]) -> float:
+    return float(_sum(parabolas, about, chosen).least()[0])
+
+
+def _sum(parabolas: Mapping[int, Parabolas], about: Parabolas, chosen: Mapping[int, int]) -> Parabolas:
+    total = about
+    for k, which in chosen.items():
+        total = total.plus(parabolas[k].at(which))
+    return total
+
+
+def _descent(parabolas: Mapping[int, Parabolas], about: Parabolas,
+             start: Mapping[int, int]) -> tuple[dict[int, int], float]:
+    """Return the choices to which changes of one log at a time lead, and what they cost."""
+    chosen, cost = dict(start), _cost(parabolas, about, start)
+    while True:
+        before = cost
+        for k, mine in parabolas.items():
+            others = _sum(parabolas, about, {j: which for j, which in chosen.items() if j != k})
+            costs = mine.plus(others).least()
+            best = int(np.argmin(costs))
+            if costs[best] < cost:
+                chosen[k], cost = best, float(costs[best])
+        if not cost < before - 1e-9 * abs(before):
+            return chosen, cost
