@@ -137,7 +137,7 @@ def test_the_angle_behind_the_shaft_waits_for_a_model_that_has_it(logs):
     ({"free": ["electronics.bridge_gain"]}, "does not read"), ({"free": ["output_inertia", "motor.rotor_inertia"]},
                                                                "both set"),
     ({"nuisance": ("dleay",)}, "nuisance"), ({"nuisance": "delay"}, "nuisance.*a list"),
-    ({"nuisance": ("delay", "delay")}, "nuisance"), ({"nuisance": None}, "nuisance"),
+    ({"nuisance": ("delay", "delay")}, "nuisance"), ({"nuisance": 5}, "nuisance"),
     ({"sensors": ("bus_current",)}, "sensors"), ({"sensors": ("supply_current",)}, "sensors"),
     ({"sensors": ()}, "output_angle or feedback_voltage"), ({"sensors": "output_angle"}, "sensors.*a list"),
     ({"priors": "sevro"}, "priors"), ({"priors": {"output_inertia": (-1.0, 1.0)}}, "prior of output_inertia"),

@@ -63,7 +63,8 @@ def fit(
         "--no-priors", help="Ignore the spreads in the servo file.", rich_help_panel=_SEARCH)] = False,
     nuisance: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Effects of the rig to fit: delay, log_delay, frame_phase, frame_period, control_phase, "
-        "angle_offset, angle_sag, initial_state, or none (default: delay, frame_phase, angle_offset, initial_state).",
+        "angle_offset, angle_sag, initial_state, or none (default: delay, frame_phase, angle_offset, initial_state, "
+        "and control_phase where pulses command a program).",
         rich_help_panel=_SEARCH)] = None,
     starts: Annotated[int, typer.Option(
         metavar="NUMBER", help="Number of searches; all but the first start at random.", rich_help_panel=_SEARCH)] = 3,
@@ -204,12 +205,10 @@ def _search(servo: str, model: str | None, change: list[str], free: list[str] | 
 def _options(given: dict[str, Any]) -> dict[str, Any]:
     """Return the options of `identify` that words say."""
     from servotwin.cli import fit_words
-    from servotwin.identification.fitting.identify import NUISANCE
-
     return {
         "holdout": fit_words.held_out(given["holdout"]), "mend": fit_words.kinds(given["mend"]),
         "sensors": fit_words.names(given["sensors"]),
-        "nuisance": fit_words.some_or_none("--nuisance", given["nuisance"], NUISANCE),
+        "nuisance": fit_words.some_or_none("--nuisance", given["nuisance"], None),
         "level": fit_words.share("--level", given["level"]), "starts": given["starts"], "loss": given["loss"],
         "intervals": given["intervals"], "seed": given["seed"], "accuracy": given["accuracy"],
         "diagnose": given["diagnose"], "compare_with": ("slew", "M1") if given["compare"] else ()}

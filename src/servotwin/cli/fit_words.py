@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from servotwin.errors import InputError, ServotwinError, UnknownNameError
 from servotwin.identification.fitting.free import Space, nominal
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from servotwin.identification import Log
     from servotwin.models import Model
     from servotwin.parameters import Servo
+
+Usual = TypeVar("Usual")
 
 MODEL_NAMES = ("pulse", "pulse-inductive", "bounded", "digital")
 
@@ -46,7 +48,7 @@ def kinds(words: Sequence[str] | None) -> tuple[str, ...]:
     return tuple(name.replace("-", " ") for name in names(words) or ())
 
 
-def some_or_none(option: str, words: Sequence[str] | None, usual: tuple[str, ...]) -> tuple[str, ...]:
+def some_or_none(option: str, words: Sequence[str] | None, usual: Usual) -> tuple[str, ...] | Usual:
     """Return names, no name at all for the word "none", and the usual ones where the option was not given.
 
     Examples

@@ -47,7 +47,8 @@ def delay_range(scan: Scan, credible: Mapping[int, Sequence[PulseChoice]],
         ends = []
         for choice in choices:
             gap, takes_effect = gap_of(log, choice.frames), delay + choice.first * DELAY_SCALE
-            ends.append((takes_effect - gap.high, takes_effect - gap.low))
+            sooner, later = _of_ticks(scan, k, choice)
+            ends.append((takes_effect - sooner - gap.high, takes_effect + later - gap.low))
         unsure = error + _scatter(log)
         lows.append(min(low for low, _ in ends) - unsure)
         highs.append(max(high for _, high in ends) + unsure)
@@ -67,6 +68,15 @@ def unsure_commands(scan: Scan, credible: Mapping[int, Sequence[PulseChoice]]) -
             lines.append(f"log {log.name!r}: the commands at {shown} s change near the edge of a pulse; which pulse "
                          "carries them is not sure")
     return tuple(lines)
+
+
+def _of_ticks(scan: Scan, k: int, choice: PulseChoice) -> tuple[float, float]:
+    """Return by how much sooner and later pulses could come if ticks were as much later and sooner after them [s]."""
+    ticks = scan.ticks.get(k)
+    if ticks is None:
+        return 0.0, 0.0
+    gap = ticks.gap_of(choice.frames.tick)
+    return gap.high - choice.frames.tick, choice.frames.tick - gap.low
 
 
 def _scatter(log: Log) -> float:

@@ -137,6 +137,8 @@ class Fit:
         Ranges (SI) of what is told by pulses: the delay.
     phased : bool
         Whether the pulses of each log came when the log wanted.
+    ticked : bool
+        Whether each log's ticks took the commands that the log wanted.
     yielded : tuple of Yielded
         Priors that were dropped because the logs contradict them, in the order in which they went.
     prior_share : mapping of str to float
@@ -176,6 +178,7 @@ class Fit:
     verdict: Verdict | None = None
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     phased: bool = False
+    ticked: bool = False
     yielded: tuple[Yielded, ...] = ()
     prior_share: Mapping[str, float] = field(default_factory=dict)
     allowed: Allowed | None = field(default=None, repr=False)

@@ -182,14 +182,17 @@ class Forecast:
         return float(point.own[k][self.names_of_own(self.cases[k]).index("frame_phase")]) * DELAY_SCALE
 
     def lead_at(self, point: Point, k: int) -> float:
-        """Return how long before the first sample the simulation of a log begins at a point [s]: no pulse is left out.
+        """Return how long before the first sample the simulation of a log begins at a point [s].
 
-        Pulses that come before the first sample carry its command where clocks of logger and generator differ, and where
-        ticks are later instead.
+        That is with its first pulse, before or after the sample, so that all that follows moves with it; earlier where
+        the servo had held its command.
         """
+        lead = self.lead(self.cases[k])
+        if not self.phased:
+            return lead
         frames = self.frames_of(point, k)
-        earliest = self.first_pulse(point, k) + math.ceil(-frames.phase / frames.period) * frames.period
-        return max(self.lead(self.cases[k]), -earliest)
+        begins = -self.first_pulse(point, k) - math.ceil(-frames.phase / frames.period) * frames.period
+        return max(lead, begins) if lead > 0.0 else begins
 
     def hunts(self, case: Case) -> bool:
         """Tell whether the servo could not rest at the start of a log without drives, but begins there at rest."""

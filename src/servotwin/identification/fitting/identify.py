@@ -23,6 +23,7 @@ from servotwin.identification.fitting.doubts import Doubts, allowed, prior_share
 from servotwin.identification.fitting.findings import explained, first_looks
 from servotwin.identification.fitting.fit import Fit, Start, Trace
 from servotwin.identification.fitting.forecast import Forecast
+from servotwin.identification.fitting.frames import has_pulses
 from servotwin.identification.fitting.free import Bounds, Priors, Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import split
@@ -37,7 +38,7 @@ from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows
 from servotwin.identification.fitting.words import explain, simplest, vague_directions
 from servotwin.identification.fitting.yielding import Dropped, Yielded, settle, yielded
 from servotwin.logs.log import Log
-from servotwin.models import Model
+from servotwin.models import DigitalServo, Model
 from servotwin.parameters import Servo
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.workers import Crew
@@ -49,9 +50,15 @@ Progress = bool | Callable[[float, str], object]
 NUISANCE = ("delay", "frame_phase", "angle_offset", "initial_state")
 
 
+def usual_nuisance(model: Model) -> tuple[str, ...]:
+    """Return the nuisances of a fit that names none: when ticks come is one of a program that pulses command."""
+    ticks = isinstance(model, DigitalServo) and has_pulses(model)
+    return (*NUISANCE, "control_phase") if ticks else NUISANCE
+
+
 def identify(
     logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] | None = None,
-    free: Sequence[str] | None = None, nuisance: Sequence[str] = NUISANCE, priors: Priors | str | None = "servo",
+    free: Sequence[str] | None = None, nuisance: Sequence[str] | None = None, priors: Priors | str | None = "servo",
     *, mend: Sequence[str] = (), bounds: Bounds | None = None, holdout: float | Sequence[str] | None = None,
     sensors: Sequence[str] | None = None,
     starts: int = 3, loss: str = "huber", noise: Mapping[str, float] | None = None, level: float = 0.95,
@@ -75,12 +82,13 @@ def identify(
     free : sequence of str, optional
         What is searched: dotted names of servo and load, and the lumped names `output_torque_constant` (motor and
         back-EMF constant times the gear reduction), `output_inertia`, `output_coulomb_torque`.
-    nuisance : sequence of str
+    nuisance : sequence of str, optional
         Of "delay" (the command acts so much later), "log_delay" (what each log adds to it), "frame_phase" (when the
         pulses of each log come; of models with pulses), "frame_period" (how far apart they are in all logs; added
         where pulses drift), "angle_offset" (measured less true angle), "angle_sag" (the measured angle moves with the
         bus voltage), "control_phase" (when each log's servo ticks; of a `DigitalServo`) and "initial_state" (each
-        log's start; else the servo stands where its first command says).
+        log's start; else the servo stands where its first command says). Unless given: delay, frame_phase,
+        angle_offset and initial_state, and control_phase where pulses command a program.
     priors : "servo", mapping or None
         Normal beliefs, mean and standard deviation by name (SI); "servo" takes the spread that the servo file states.
     mend : sequence of str
@@ -154,8 +162,9 @@ def identify(
     space = Space(plain, names, bounds=bounds, priors=priors, load=checks.shared_load(given, names))
     fitted, held_out = split(given, holdout, seed)
     running = Running(Crew(executor), accuracy_of(accuracy))
-    forecast = Forecast(given, plain, space, checks.checked_words("nuisance", nuisance, NUISANCES), seen, running)
-    checks.check_fitted(given, fitted, seen, len(names) + len(nuisance))
+    rig = usual_nuisance(plain) if nuisance is None else checks.checked_words("nuisance", nuisance, NUISANCES)
+    forecast = Forecast(given, plain, space, rig, seen, running)
+    checks.check_fitted(given, fitted, seen, len(names) + len(rig))
     trials = checks.checked_flag("diagnose", diagnose)
     task = Task(forecast, Loss(checks.checked_loss(loss, HUBER)), fitted, seed,
                 checks.checked_count("starts", starts, least=1), checks.checked_noise(noise, seen))
@@ -197,7 +206,7 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
         interrupted, tables = True, compare(task, held_out, traces, final, ())
     fit = _fit(task, found, doubts, dropped, final, traces, tables, ended)
     middles = {name: 0.5 * (low + high) for name, (low, high) in doubts.spans.items()}
-    fit = replace(fit, level=level, interrupted=interrupted, phased=forecast.phased,
+    fit = replace(fit, level=level, interrupted=interrupted, phased=forecast.phased, ticked=forecast.ticked,
                   estimates={**fit.estimates, **middles})
     return fit if interrupted else with_verdict(task, found.point, fit, show, trials=trials)
 

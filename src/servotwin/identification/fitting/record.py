@@ -181,6 +181,8 @@ def with_record(fit: Fit, logs: Sequence[Log], fitted: Sequence[int], mend: Sequ
     }
     if fit.phased:
         record["frame_phase"] = "of each log"
+    if fit.ticked:
+        record["control_phase"] = "of each log"
     if fit.verdict is not None:
         record["verdict"] = {"sentence": fit.verdict.sentence, "holds": fit.verdict.holds, "ratio": fit.verdict.ratio,
                              "causes": [cause.name for cause in fit.verdict.causes]}

@@ -50,6 +50,7 @@ _DELAYS = (_DELAY, 0.0, 0.04, 0.06, 0.09)
 _STARTS = 0.6  # of the way: rough searches from several starts
 _MOST = {"rough": 12, "all": 25}  # steps
 _ABOUT = 0.3  # of a searched number: how far off a servo file may be, while clocks are sought
+_NOTHING = 0.15  # of what a search began with
 _PAYS = 10.0  # of the cost, for each independent residual: what another clock has to gain
 
 Told = Callable[[float, str], None]
@@ -158,6 +159,7 @@ class Task:
             self._set_noise(self.forecast.at(nominal, derivatives=False, cases=self.fitted), self.fitted)
         if self.forecast.phased:
             nominal = with_clocks(self, [nominal, *self._elsewhere(ended)], tell, began)
+        nominal = self._out_of_nothing(nominal, tell, began)
         best = self._refined(nominal, self.fitted, rounds=6, tell=tell, began=began)
         return best, ended or [best]
 
@@ -173,6 +175,23 @@ class Task:
         far = [one.point for one in ended[1:] if _ALIKE < one.cost / best.cost < _NEARLY
                and (np.abs(one.point.shared - best.point.shared)[:size][factors] > _APART).any()]
         return far[:1]
+
+    def _out_of_nothing(self, point: Point, tell: Told, began: float) -> Point:
+        """Return the point, or a better one with more of what went to nothing: friction, deadband, and their like.
+
+        A shaft without friction is a valley of its own, beside a low ridge. So once more with as much as at the start
+        until all else has followed.
+        """
+        space, x = self.forecast.space, point.shared
+        gone = np.zeros(len(x), np.bool_)
+        gone[:len(space)] = [not p.logarithmic and p.lower == 0.0 and x[k] < _NOTHING * space.start[k]
+                             for k, p in enumerate(space.parameters)]
+        if not gone.any():
+            return point
+        there = np.where(gone, self.nominal().shared, x)
+        begun = self._search(self.fitted, gone).run(point._replace(shared=there), most=_MOST["all"])
+        here, other = self.ran_all([point, begun.point], tell, began)
+        return other.point if other.cost < here.cost else here.point
 
     def ran(self, start: Point, tell: Told, began: float) -> Outcome:
         """Search from a point on all logs that are fitted, as closely as is needed to choose between points."""
@@ -244,8 +263,9 @@ class Task:
         self._best = ended[0]
         return ended
 
-    def _search(self, cases: Sequence[int]) -> Search:
-        return Search(self.forecast, self.loss, self.prior, self.lower, self.upper, cases, self.held)
+    def _search(self, cases: Sequence[int], also_held: NDArray[np.bool_] | None = None) -> Search:
+        held = self.held if also_held is None else self.held | also_held
+        return Search(self.forecast, self.loss, self.prior, self.lower, self.upper, cases, held)
 
     def _refined(self, start: Point, cases: Sequence[int], *, rounds: int, tell: Told, began: float) -> Outcome:
         """Search, estimate the noise anew, and search on until it stays."""

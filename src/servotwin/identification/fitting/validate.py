@@ -134,7 +134,7 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
         if name not in NUISANCES:
             raise InputError("nuisance", got=name, allowed=", ".join(NUISANCES))
     known = recorded_nuisance(servo)
-    always = ("initial_state", "frame_phase") if "frame_phase" in servo.fit else ("initial_state",)
+    always = ("initial_state", *(name for name in ("frame_phase", "control_phase") if name in servo.fit))
     used = [name for name in NUISANCES if name in known or name in nuisance or name in always]
     forecast = Forecast(given, plain, _space(plain, given), used, seen, Running(accuracy=ACCURACY))
     with explained(noticed), checks.shown(progress) as show:

@@ -144,7 +144,7 @@ def like_digital(bench: TrialBench) -> Sequence[Setting]:
     read = (*model.requires, *model.optional, *LUMPED)
     lost = tuple(name for name in names if name not in read and not name.startswith("load."))
     nuisance = tuple(dict.fromkeys(name for name in (*bench.old.nuisance, "delay", "log_delay")
-                                   if name not in ("frame_phase", "frame_period", "angle_sag")))
+                                   if name not in ("frame_phase", "frame_period", "control_phase", "angle_sag")))
     return [Setting(bench.setting.logs, model, {"electronics.bridge_gain": factor * mean}, lost, nuisance)
             for factor in (0.3, 1.0, 3.0)]
 
