@@ -79,18 +79,20 @@ def _with_ticks(task: Task, point: Point, tell: Told, began: float) -> Point:
     """
     near = task.like(task.forecast, task.near_start())
     again = near.ran(settled(near.scan(_from_start(task, point)), task.fitted), tell, began).point
-    ends = [_ticking(task, point, tell, began),
-            _ticking(task, task.ran(_ticking(near, again, tell, began), tell, began).point, tell, began)]
+    ends = [ticking(task, point, tell, began),
+            ticking(task, task.ran(ticking(near, again, tell, began), tell, began).point, tell, began)]
     best = min(ends, key=task.cost)
     task.measure(best)
     return best
 
 
-def _ticking(task: Task, point: Point, tell: Told, began: float) -> Point:
+def ticking(task: Task, point: Point, tell: Told, began: float) -> Point:
     """Return where a search ends in which ticks take other commands, as long as that pays.
 
     What counts is where all parameters would go with these.
     """
+    if not task.forecast.ticked:
+        return point
     cost = task.cost(point)
     for _ in range(_MOST_ROUNDS):
         tell(began, "ticks")

@@ -41,6 +41,8 @@ class Doubts:
     allowed : Allowed, optional
     spans : mapping of str to tuple of float
         Ranges (SI) of what pulses tell.
+    deeper : Outcome, optional
+        The best that was seen on the way, if that is clearly better than where the search ended.
     """
 
     doubt: Uncertainty | None = None
@@ -49,6 +51,7 @@ class Doubts:
     prior_share: Mapping[str, float] = field(default_factory=dict)
     allowed: Allowed | None = None
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    deeper: Outcome | None = None
 
 
 def prior_share(names: Sequence[str], doubt: Uncertainty, reaching: Mapping[int, Ends], flags: NDArray[np.bool_],

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search
 from servotwin.identification.fitting.batches import FIT_ACCURACY, Running
+from servotwin.identification.fitting.clocks import ticking
 from servotwin.identification.fitting.common_cause import common_cause
 from servotwin.identification.fitting.comparison import BESIDE, compare
 from servotwin.identification.fitting.counts import counts_of
@@ -44,6 +45,7 @@ from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.workers import Crew
 
 Array = NDArray[np.float64]
+_VALLEYS = 3  # that a fit goes on to, at most
 _VOLTAGE = "supply.open_circuit_voltage"
 Progress = bool | Callable[[float, str], object]
 
@@ -190,7 +192,7 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
             found, left = settle(task, found, lambda share, text: show(0.7 + 0.06 * share, text))
         if intervals and not interrupted:
             show(0.76, "intervals")
-            doubts = _doubts(task, found, level, show)
+            found, doubts = _with_doubts(task, found, level, show)
     except KeyboardInterrupt:
         interrupted = True
     dropped = yielded(task, found, left, doubts)
@@ -209,6 +211,18 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     fit = replace(fit, level=level, interrupted=interrupted, phased=forecast.phased, ticked=forecast.ticked,
                   estimates={**fit.estimates, **middles})
     return fit if interrupted else with_verdict(task, found.point, fit, show, trials=trials)
+
+
+def _with_doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str], None]) -> tuple[Outcome, Doubts]:
+    """Return where the search ended and its doubts; where these saw a deeper valley, it goes on from there."""
+    doubts = _doubts(task, found, level, show)
+    for _ in range(_VALLEYS):
+        if doubts.deeper is None:
+            break
+        show(0.76, "a deeper valley")
+        found = task.again(ticking(task, doubts.deeper.point, show, 0.76), lambda share, text: show(0.76, text))
+        doubts = _doubts(task, found, level, show)
+    return found, doubts
 
 
 def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str], None]) -> Doubts:
@@ -234,12 +248,14 @@ def _doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str
     which = [k for k in range(len(names)) if not flags[k] and not stuck[k]]
     search = Search(forecast, task.loss, task.prior, task.lower, task.upper, task.fitted, held=stuck)
     count = max(len(which), 1)
-    reaching = ends(search, found, doubt, which, level, rows=rows,
+    seen: list[Outcome] = []
+    reaching = ends(search, found, doubt, which, level, rows=rows, deeper=seen.append,
                     tell=lambda done: show(0.76 + 0.18 * done / count, "intervals"))
     return Doubts(doubt, reaching, with_remedies(forecast, found.point, vague, names),
                   prior_share(names, doubt, reaching, flags, directions, task.prior.weight),
                   allowed(task, found, rows, directions, information, flags, doubt, reaching, level),
-                  _spans(task, found, parts, rows, doubt, level))
+                  _spans(task, found, parts, rows, doubt, level),
+                  min(seen, key=lambda there: there.cost, default=None))
 
 
 def _spans(task: Task, found: Outcome, parts: Sequence[LogPart], rows: Sequence[Rows], doubt: Uncertainty,
@@ -251,7 +267,7 @@ def _spans(task: Task, found: Outcome, parts: Sequence[LogPart], rows: Sequence[
     errors = phase_errors(task.forecast, task.fitted, parts, rows, task.loss, doubt)
     scan = task.scan(found.point)
     pulses = credible(scan, task.fitted)
-    task.remarks.extend(unsure_commands(scan, pulses))
+    task.unsure = unsure_commands(scan, pulses)
     return {"delay": delay_range(scan, pulses, [
         reach * error + task.stamps_off.get(k, 0.0) for k, error in zip(task.fitted, errors, strict=True)])}
 
@@ -311,6 +327,6 @@ def _fit(task: Task, found: Outcome, doubts: Doubts, dropped: tuple[Yielded, ...
         holdout=tables.holdout, training=tables.training, traces=traces,
         starts=tuple(Start(outcome.cost, outcome.converged) for outcome in ended), noise=dict(forecast.noise),
         cost=found.cost, space=space, best=x,
-        warnings=(*task.remarks, *checks.warnings_of(dropped, tables), *_explained(task, dropped)),
+        warnings=(*task.remarks, *task.unsure, *checks.warnings_of(dropped, tables), *_explained(task, dropped)),
         doubt=doubt, ends=dict(reaching), scales={n: scales[n] for n in forecast.extra}, yielded=dropped,
         prior_share=doubts.prior_share, allowed=doubts.allowed, spans=doubts.spans)

@@ -23,6 +23,7 @@ _FAITHFUL = (0.7, 1.4)  # of the expected rise of the cost: standard errors righ
 _FAR = (2.0, 4.0)  # times as far as the ends: between them the cost of a number alone rises too,
 _RISES, _HIGH = 1.5, 50.0  # by more than this factor, or it is flat behind a cliff; unless it is so much above the ends
 _STAYS = 0.01  # of the root of the rise: farther out the cost is the same
+_DEEPER = 2.0  # of the cost: less than that is what a search leaves
 _ROUNDS = 9  # of the search for an end
 
 
@@ -47,7 +48,8 @@ class Ends:
 
 
 def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int], level: float, *,
-         rows: Sequence[Rows] = (), tell: Callable[[int], None] = lambda done: None) -> dict[int, Ends]:
+         rows: Sequence[Rows] = (), tell: Callable[[int], None] = lambda done: None,
+         deeper: Callable[[Outcome], None] = lambda there: None) -> dict[int, Ends]:
     """Return the ends of the intervals of some shared numbers.
 
     Parameters
@@ -64,6 +66,8 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
         Of the fitted logs: how their own numbers follow.
     tell : callable, optional
         Is told how many are done, after each step.
+    deeper : callable, optional
+        Is told of points that cost clearly less than the end of the search: it lies in another valley.
     """
     reaches = {k: doubt.quantile(level, k) for k in which}
     both = [(k, side) for k in which for side in (-1.0, 1.0)]
@@ -85,7 +89,7 @@ def ends(search: Search, best: Outcome, doubt: Uncertainty, which: Sequence[int]
             tell(len(found))
         else:
             bent.append(k)
-    profiles = [_end(search, best, doubt, k, side, reaches[k], rows, tell=lambda: tell(len(found)))
+    profiles = [_end(search, best, doubt, k, side, reaches[k], rows, lambda: tell(len(found)), deeper)
                 for k in bent for side in (-1.0, 1.0)]
     reached = together(search.forecast, search.cases, profiles)
     for k, (low, of_low), (high, of_high) in zip(bent, reached[::2], reached[1::2], strict=True):
@@ -126,7 +130,7 @@ def _expected(doubt: Uncertainty, k: int, reach: float) -> float:
 
 
 def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float, reach: float,
-         rows: Sequence[Rows], tell: Callable[[], None]) -> Generator[Ask, list[LogPart], tuple[float, float]]:
+         rows: Sequence[Rows], tell: Callable[[], None], deeper: Callable[[Outcome], None]) -> Generator[Ask, list[LogPart], tuple[float, float]]:
     """Return how far a profile of the cost reaches on one side [standard errors], and the share of the priors in that.
 
     A bound ends it.
@@ -147,6 +151,8 @@ def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float,
                 costs.append(inner.cost_of(start, (yield Ask(start, False))))
         there = yield from inner.steps(starts[int(np.argmin(costs))], most=3, tell=lambda *_: tell())
         rise = there.cost - best.cost
+        if rise < -_DEEPER:
+            deeper(there)
         of_priors = search.prior.cost(there.point.shared) - search.prior.cost(best.point.shared)
         share = of_priors / max(rise, wanted)
         root = math.sqrt(max(rise, 0.0) / wanted)  # grows in proportion where the cost is a parabola

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError
 from servotwin.identification.fitting.arrow import Loss, Outcome, Prior, Search, together
 from servotwin.identification.fitting.case import Case
-from servotwin.identification.fitting.clocks import with_clocks
+from servotwin.identification.fitting.clocks import ticking, with_clocks
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.phases import Scan, widening
 from servotwin.identification.fitting.point import (
@@ -50,7 +50,7 @@ _DELAYS = (_DELAY, 0.0, 0.04, 0.06, 0.09)
 _STARTS = 0.6  # of the way: rough searches from several starts
 _MOST = {"rough": 12, "all": 25}  # steps
 _ABOUT = 0.3  # of a searched number: how far off a servo file may be, while clocks are sought
-_NOTHING = 0.15  # of what a search began with
+_NOTHING = 0.35  # of what a search began with
 _PAYS = 10.0  # of the cost, for each independent residual: what another clock has to gain
 
 Told = Callable[[float, str], None]
@@ -79,6 +79,7 @@ class Task:
         self.prior = Prior(np.array([b[0] if b else 0.0 for b in beliefs]),
                            np.array([1.0 / b[1] if b else 0.0 for b in beliefs]))
         self.remarks: list[str] = []  # on what the search found out about clocks
+        self.unsure: tuple[str, ...] = ()  # of which commands it is not sure which pulse carries them
         self.stamps_off: dict[int, float] = {}  # by how much the beat that replaced a log's stamps may lie off [s]
         self._best: Outcome | None = None  # of the search that goes on
         self._ended: list[Outcome] = []  # where rough searches ended, each in its own noise
@@ -191,7 +192,7 @@ class Task:
         there = np.where(gone, self.nominal().shared, x)
         begun = self._search(self.fitted, gone).run(point._replace(shared=there), most=_MOST["all"])
         here, other = self.ran_all([point, begun.point], tell, began)
-        return other.point if other.cost < here.cost else here.point
+        return ticking(self, other.point, tell, began) if other.cost < here.cost else here.point
 
     def ran(self, start: Point, tell: Told, began: float) -> Outcome:
         """Search from a point on all logs that are fitted, as closely as is needed to choose between points."""
