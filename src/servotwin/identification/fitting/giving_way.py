@@ -83,15 +83,17 @@ def giving_way(scan: Scan, prior: Prior, held: NDArray[np.bool_], cases: Sequenc
 
 
 def _parabolas(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]], moves: NDArray[np.bool_]) -> dict[int, Parabolas]:
-    """Return what each choice of each log costs; residuals count as much as they do where the search stands."""
+    """Return what each choice of each log costs, with slopes and weights of residuals as where the search stands."""
     most = max(map(len, choices.values()))
     points = [scan.moved({k: some[min(i, len(some) - 1)] for k, some in choices.items()}) for i in range(most)]
-    parts = scan.forecast.at_all(points, derivatives=True, cases=list(choices))
+    now = scan.forecast.at(points[0], cases=list(choices))
+    parts = scan.forecast.at_all(points, cases=list(choices))
     found = {}
     for j, (k, some) in enumerate(choices.items()):
         own = Prior(*scan.forecast.own_belief(scan.forecast.cases[k]))
-        weight = scan.loss.weight(parts[0][j].residual)
-        each = [_parabola(parts[i][j], weight, own, points[i].own[k], moves) for i in range(len(some))]
+        weight = scan.loss.weight(now[j].residual)
+        each = [_parabola(now[j]._replace(residual=parts[i][j].residual), weight, own, points[i].own[k], moves)
+                for i in range(len(some))]
         found[k] = Parabolas(*map(np.stack, zip(*each, strict=True)))
     return found
 
