@@ -49,5 +49,6 @@ def digital_log(servo, motion, *, seed=0, std=1e-3, duration=1.2, sample=0.02, n
     there = servo.replace({**own, "firmware.control_phase": phase * servo.firmware.control_period})
     result = st.simulate(st.DigitalServo(there), log.signal(servo.electronics.frame_period), load=load,
                          duration=float(time[-1]), initial={"output_angle": 0.0, "output_speed": 0.0})
-    angle = result.at("output_angle", np.maximum(time - delay, 0.0)) + std * np.random.default_rng(seed).normal(size=len(time))
-    return replace(log, measured={"output_angle": angle})
+    angle = result.at("output_angle", np.maximum(time - delay, 0.0))
+    noise = std * np.random.default_rng(seed).normal(size=len(time))
+    return replace(log, measured={"output_angle": angle + noise})

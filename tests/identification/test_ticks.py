@@ -64,7 +64,8 @@ def test_between_the_ends_of_pulses_ticks_cannot_be_told_from_pulses():
     assert np.mean(waits) == pytest.approx(0.5 * TICK, rel=0.01)
 
 
-@pytest.mark.parametrize(("tick", "phases"), [(1e-3, (0.634, 0.631, 0.722, 0.414)), (TICK, (0.262, 0.323, 0.011, 0.398))],
+@pytest.mark.parametrize(("tick", "phases"), [
+    (1e-3, (0.634, 0.631, 0.722, 0.414)), (TICK, (0.262, 0.323, 0.011, 0.398))],
                          ids=["1 ms, all between the ends of pulses", "5 ms, two between them"])
 def test_ticks_are_found_for_all_logs_at_once(tick, phases):
     """Taken one by one, the logs kept wrong commands that parameters, 5 % off, made up for: none alone could go."""

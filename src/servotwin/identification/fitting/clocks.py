@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.identification.fitting.forecast import Forecast
-from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.giving_way import giving_way
+from servotwin.identification.fitting.noise import SensorSeries, noise_of
 from servotwin.identification.fitting.phases import Scan, drifts, likely_periods, settled, with_period
 from servotwin.identification.fitting.point import PERIOD_SCALE, Point
 from servotwin.identification.fitting.scatter import by_sensor

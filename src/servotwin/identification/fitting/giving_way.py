@@ -1,8 +1,8 @@
 """Other commands for the ticks of all logs at once, judged by where all numbers would go with them.
 
-Ticks that take wrong commands bend what all logs share, so that the right ones would not fit better with that, and where
-those of several logs are wrong, one log alone cannot be right either. So each log says to first order what each of its
-choices costs as the shared numbers move, a parabola, and the cheapest choices of all logs are sought together.
+Ticks that take wrong commands bend what all logs share, so that the right ones would not fit better with that, and
+where those of several logs are wrong, one log alone cannot be right either. So each log says to first order what each
+of its choices costs as the shared numbers move, a parabola, and the cheapest choices of all logs are sought together.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _GAINS = 0.5  # of the cost: less is not worth a look
 
 
 class Parabolas(NamedTuple):
-    """What choices cost as the shared numbers move, each log's own gone to where they fit best; one along the first axis.
+    """What choices, along the first axis, cost as the shared numbers move; a log's own go to where they fit best.
 
     Parameters
     ----------
@@ -82,7 +82,8 @@ def giving_way(scan: Scan, prior: Prior, held: NDArray[np.bool_], cases: Sequenc
     return [scan.moved({k: choices[k][which] for k, which in zip(cases, end, strict=True)}) for _, end in best]
 
 
-def _parabolas(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]], moves: NDArray[np.bool_]) -> dict[int, Parabolas]:
+def _parabolas(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]],
+               moves: NDArray[np.bool_]) -> dict[int, Parabolas]:
     """Return what each choice of each log costs, with slopes and weights of residuals as where the search stands."""
     most = max(map(len, choices.values()))
     points = [scan.moved({k: some[min(i, len(some) - 1)] for k, some in choices.items()}) for i in range(most)]
@@ -98,20 +99,20 @@ def _parabolas(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]], moves: 
     return found
 
 
-def _parabola(part: LogPart, weight: Array, own: Prior, at: Array, moves: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
-    """Return level, slope and curvature of the cost of one choice."""
+def _parabola(part: LogPart, weight: Array, own: Prior, at: Array, moves: NDArray[np.bool_]) -> Parabolas:
+    """Return what one choice costs."""
     shared, alone = part.shared[:, moves], part.own
     p = shared.shape[1]
     if not (np.isfinite(part.residual).all() and np.isfinite(shared).all() and np.isfinite(alone).all()):
-        return np.array(1e12), np.zeros(p), np.eye(p)
+        return Parabolas(np.array(1e12), np.zeros(p), np.eye(p))
     weighed, off = weight * part.residual, own.weight * (at - own.mean)
     inner = alone.T @ (weight[:, None] * alone) + np.diag(own.weight**2) + 1e-12 * np.eye(len(at))
     across = shared.T @ (weight[:, None] * alone)
     pull = alone.T @ weighed + own.weight * off
     follow = np.linalg.solve(inner, np.column_stack([across.T, pull]))
     level = 0.5 * (weighed @ part.residual + off @ off - pull @ follow[:, -1])
-    return (np.asarray(level), shared.T @ weighed - across @ follow[:, -1],
-            shared.T @ (weight[:, None] * shared) - across @ follow[:, :-1])
+    return Parabolas(np.asarray(level), shared.T @ weighed - across @ follow[:, -1],
+                     shared.T @ (weight[:, None] * shared) - across @ follow[:, :-1])
 
 
 def _starts(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]]) -> list[dict[int, int]]:

@@ -213,7 +213,8 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
     return fit if interrupted else with_verdict(task, found.point, fit, show, trials=trials)
 
 
-def _with_doubts(task: Task, found: Outcome, level: float, show: Callable[[float, str], None]) -> tuple[Outcome, Doubts]:
+def _with_doubts(task: Task, found: Outcome, level: float,
+                 show: Callable[[float, str], None]) -> tuple[Outcome, Doubts]:
     """Return where the search ended and its doubts; where these saw a deeper valley, it goes on from there."""
     doubts = _doubts(task, found, level, show)
     for _ in range(_VALLEYS):

@@ -130,7 +130,8 @@ def _expected(doubt: Uncertainty, k: int, reach: float) -> float:
 
 
 def _end(search: Search, best: Outcome, doubt: Uncertainty, k: int, side: float, reach: float,
-         rows: Sequence[Rows], tell: Callable[[], None], deeper: Callable[[Outcome], None]) -> Generator[Ask, list[LogPart], tuple[float, float]]:
+         rows: Sequence[Rows], tell: Callable[[], None],
+         deeper: Callable[[Outcome], None]) -> Generator[Ask, list[LogPart], tuple[float, float]]:
     """Return how far a profile of the cost reaches on one side [standard errors], and the share of the priors in that.
 
     A bound ends it.

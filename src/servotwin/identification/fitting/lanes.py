@@ -111,7 +111,7 @@ class LogLanes:
                       initial={"output_angle": self.angle, "output_speed": self.speed} if starts else {})
 
     def _ticks(self, columns: Mapping[str, Array]) -> dict[str, Array]:
-        """Return when the first tick of each lane is [s]: pulses that come later move it as much, or nothing would move.
+        """Return when the first tick of each lane is [s]; pulses that come later move it by as much.
 
         A command acts from the first tick on that follows its pulse.
         """

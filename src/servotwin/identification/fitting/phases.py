@@ -33,6 +33,7 @@ _MOST_PHASES = 8  # for each period
 _REACH = 0.06  # of a period, either way: more than a PCA9685's clock is off by its data sheet
 _FINE = (1e-5, 3e-5, 1e-4, 2e-4, 4e-4, 8e-4)  # of a period: quartz clocks
 _WINDOWS = 6  # of a log, that are compared
+_NARROWEST = 1e-10  # share of a beat
 _UNLIKELY = 100.0  # times the weight of the best: pulses that count no more
 _DRIFTS = 1e-2  # how often pulses that do not drift would look as if
 
@@ -47,7 +48,8 @@ class PulseChoice(NamedTuple):
 class PulseTrial(NamedTuple):
     """What a trial found: its cost, and the time of the first pulse at which that was.
 
-    The cost counts how narrow the gap is in which the phase has to lie: less the logarithm of its share of a frame.
+    The cost counts how narrow the gaps are in which phases have to lie: less the logarithm of their share of a frame,
+    and of a tick.
     """
 
     cost: float
@@ -153,10 +155,10 @@ class Scan:
                 break
             step = min(max(-float(w @ (g * r)) / power, -most), most)
         cost, moved = min((self.loss.cost(r + g * s), s) for s in (0.0, step))
-        width = max(gap_of(self.forecast.cases[k].log, choice.frames).width, 1e-12)
-        cost -= self.widening * math.log(width / choice.frames.period)
+        shares = [gap_of(self.forecast.cases[k].log, choice.frames).width / choice.frames.period]
         if ticks := self.ticks.get(k):
-            cost -= self.widening * math.log(ticks.gap_of(choice.frames.tick).width / ticks.period)
+            shares.append(ticks.gap_of(choice.frames.tick).width / ticks.period)
+        cost -= self.widening * sum(math.log(max(share, _NARROWEST)) for share in shares)
         return PulseTrial(cost, PulseChoice(choice.frames, choice.first + moved))
 
 
@@ -172,10 +174,9 @@ def settled(scan: Scan, cases: Sequence[int]) -> Point:
         near = there.best({k: [found[k], *(there.like(k, gap) for gap in _near(there, k, several[k]))] for k in many})
         found |= {k: trials[0].choice for k, trials in near.items()}
     there = Scan(scan.forecast, scan.loss, scan.moved(found), scan.widening, scan.mask)
-    several_ticks = {k: trials for k in cases if (trials := there.ticking(k))}
-    if several_ticks:
-        ticking = there.best({k: [found[k], *trials] for k, trials in several_ticks.items()})
-        found |= {k: trials[0].choice for k, trials in ticking.items()}
+    others = {k: [found[k], *more] for k in cases if (more := there.ticking(k))}
+    if others:
+        found |= {k: trials[0].choice for k, trials in there.best(others).items()}
     return scan.moved(found)
 
 
@@ -190,8 +191,8 @@ def credible(scan: Scan, cases: Sequence[int]) -> dict[int, list[PulseChoice]]:
     fixed = scan.tried({k: scan.later(k, _FINE_TIMES) for k in cases}, moves=False)
     others = {k: [scan.like(k, gap) for gap in _near(scan, k, some)] for k, some in several.items() if len(some) > 1}
     for k in cases:
-        if trials := scan.ticking(k):
-            others.setdefault(k, []).extend(trials)
+        if more := scan.ticking(k):
+            others.setdefault(k, []).extend(more)
     moved = scan.tried(others) if others else {}
     found = {}
     for k in cases:

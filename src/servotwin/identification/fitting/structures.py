@@ -178,8 +178,9 @@ def _fitted(logs: Sequence[Log], servo: Servo, structure: Structure, analog: typ
     read = (*plain.requires, *plain.optional, *LUMPED, *LOAD_NAMES)
     names = checks.usual_free(plain, logs) if free is None else [name for name in free if name in read]
     some = (*names, *RUNGS[_BASE])
-    own = {key: {name: value for name, value in options[key].items() if name in some}
-           for key in ("bounds", "priors") if isinstance(options.get(key), Mapping)}
+    own: dict[str, Any] = {
+        key: {name: value for name, value in options[key].items() if name in some}
+        for key in ("bounds", "priors") if isinstance(options.get(key), Mapping)}
     if structure.kind == "analog" and options.get("nuisance") is not None:
         own["nuisance"] = [name for name in options["nuisance"] if name != "control_phase"]
     return friction_ladder(logs, servo, kind, names, rungs=(_BASE,), progress=tell, **{**options, **own}).fit

@@ -6,7 +6,7 @@ that to a log: between two ends of pulses, later ticks cannot be told from earli
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,8 @@ class Ticks(NamedTuple):
 def ticks_of(forecast: Forecast, point: Point, k: int) -> Ticks:
     """Return which ticks take which commands of a log, as its pulses come at a point."""
     case, model = forecast.cases[k], forecast.model
-    values = {**forecast.space.columns(point.shared[None, :len(forecast.space)]), **case.log.parameters}
+    values: dict[str, Any] = {**forecast.space.columns(point.shared[None, :len(forecast.space)]),
+                              **case.log.parameters}
     period, phase = (float(np.ravel(values.get(name, model.value_or(name, 0.0)))[0]) for name in (_TICK, _PHASE))
     first = forecast.first_pulse(point, k)
     command = forecast.command_at(point, k)
