@@ -5,6 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from bam import PUBLISHED
+from bam_rule import STEP, error
+
 import servotwin as st
 from servotwin.identification import LogError, read_bam_log
 
@@ -23,20 +26,24 @@ def logs(folder: Path) -> list[st.Log]:
 
 
 def told(label: str, errors: tuple[LogError, ...]) -> None:
-    """Print the rms error by gain [mrad]: over all samples, and as the mean of the runs' own."""
+    """Print the rms error by gain [mrad]: over all samples, and of each run, by motion."""
     cells = []
     for gain in GAINS:
         some = [e for e in errors if e.conditions["gain"] == gain]
         if some:
             pooled = np.sqrt(sum(e.rms**2 * e.samples for e in some) / sum(e.samples for e in some))
-            cells.append(f"{gain:g}: {1e3 * pooled:5.1f} ({1e3 * np.mean([e.rms for e in some]):5.1f})")
+            own = " ".join(f"{1e3 * e.rms:3.0f}" for e in sorted(some, key=lambda e: e.motion))
+            cells.append(f"{gain:g}: {1e3 * pooled:5.1f} ({own})")
     print(f"  {label:20} {'   '.join(cells)}", flush=True)
 
 
 def main(folder: Path) -> None:
     runs = logs(folder)
     servo = st.load_servo("dynamixel-xl330-m288").replace({"supply.open_circuit_voltage": 7.4})
-    print(f"XL330 as a bus servo: {len(runs)} runs; rms error by register P [mrad], over all samples (mean of runs)")
+    print(f"XL330 as a bus servo: {len(runs)} runs; rms error by register P [mrad], over all samples "
+          f"({', '.join(sorted({log.motion for log in runs}))})")
+    for name, published in PUBLISHED.items():
+        told(f"BAM's {name.upper()}, {1e3 * STEP:g} ms", tuple(error(log, published) for log in runs))
     for gain in GAINS:
         began = time.perf_counter()
         fit = st.identify(runs, servo, free=FREE, priors=None, starts=1, intervals=False, diagnose=False, noise=NOISE,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine import contacts, creep, dormand_prince, first_order, rodas, second_order
+from servotwin.models.engine import contacts, creep, dormand_prince, first_order, pairs, rodas, second_order
 from servotwin.models.engine.coefficients import (
     apart_coefficients,
     current_of,
@@ -48,7 +48,8 @@ from servotwin.models.terms.play import with_motor
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
-REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, CREEP, APART, IMPOSSIBLE = range(11)
+(REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, CREEP, APART, PAIR,
+ IMPOSSIBLE) = range(12)
 
 _TURN = 2.0 * math.pi
 # Error of one implicit step, relative to 1 + |state|, and of an explicit one: parts of the accuracy asked for
@@ -79,7 +80,7 @@ class Motion(NamedTuple):
     has_dense: bool
     stages: tuple[Triple, ...]
     dense: tuple[Triple, Triple, Triple]
-    long_dense: tuple[Vector, ...]
+    long_dense: tuple[Vector, ...]  # PAIR: the law
 
 
 def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
@@ -89,8 +90,8 @@ def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
 
 
 def is_step(motion: Motion) -> bool:
-    """Tell whether a motion is one step of an integrator, or a creep, which ends as one does."""
-    return motion.kind == STEP or motion.kind == LONG_STEP or motion.kind == CREEP
+    """Tell whether a motion is one step of an integrator, or a creep or a series, which end as one does."""
+    return motion.kind == STEP or motion.kind == LONG_STEP or motion.kind == CREEP or motion.kind == PAIR
 
 
 def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
@@ -105,6 +106,8 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
         output_rate, output_pull, motor_rate, motor_pull = apart_coefficients(numbers, mode, u.value, tau.value)
         laws = (output_rate, output_pull, motor_rate, motor_pull, 0.0, 0.0, 0.0, 0.0, 0.0)
         return _closed(APART, numbers, mode, u, tau, t0, y, laws, (0.0, 0.0), step)
+    if pairs.linear(numbers, on, u, tau):
+        return _pair(numbers, mode, u, tau, t0, y, step, limit)
     if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & (ON_Q | BY_SHARE)))):
         return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
     if on & FADING:
@@ -222,6 +225,15 @@ def _creep(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vec
                   _moved(none, q, w, 0.0), step, ends_by, True, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
 
 
+def _pair(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
+          limit: float) -> Motion:
+    """Return the series of two bodies, as long as it holds."""
+    law = pairs.law(numbers, mode, u.value, tau.value)
+    h = min(limit, pairs.longest(law), elastic.longest_step(numbers.elastic, numbers.shaft))
+    return Motion(PAIR, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, (0.0, 0.0), pairs.propagate(law, y, h), step,
+                  -1, True, _NO_STAGES, _NO_DENSE, law)
+
+
 def prepared(motion: Motion) -> Motion:
     """Return the motion ready to be evaluated between the ends of a step."""
     if motion.has_dense or not is_step(motion):
@@ -271,6 +283,8 @@ def state(motion: Motion, s: float) -> Vector:
         return motion.end
     if s == 0.0:
         return start
+    if elastic.present(motion.numbers.elastic) and kind == PAIR:
+        return pairs.propagate(motion.long_dense, start, s)
     if kind == CREEP:
         q, w = creep.at_time(motion.numbers, motion.mode, motion.u.value, motion.tau.value, start, motion.end,
                              motion.length, s)
