@@ -4,7 +4,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-
 from bam import PUBLISHED
 from bam_rule import STEP, error
 
