@@ -31,6 +31,7 @@ BALANCE = {"armature_current_rate", "bridge_loss", "brush_loss", "circuit_curren
            "driving_voltage", "kinetic_energy", "magnetic_energy", "needed_voltage",
            "shaft_acceleration", "source_voltage", "spring_energy", "steady_armature_current",
            "stretch_beyond_play", "supply_current", "twist_torque"}
+MOST = 5  # cases that run with a law changed
 EDGES = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -2.0)
 
 
@@ -53,8 +54,8 @@ class Runs:
             return dict(found), told["laws"]
 
     def scaled(self, names, *words):
-        """Return the signals of all cases that call one of some laws, where these return 1.01 times as much."""
-        changed, words = {}, words or [case for case, called in self.called.items() if {*names} & {*called}]
+        """Return the signals of cases that call one of some laws, where these return 1.01 times as much."""
+        changed, words = {}, words or self._callers(names)
         for name in names:
             file = self.folder / "servotwin" / "physics" / Path(inspect.getfile(LAWS[name])).name
             text = file.read_text(encoding="utf-8")
@@ -67,6 +68,12 @@ class Runs:
             for file, text in changed.items():
                 file.write_text(text, encoding="utf-8")
             self._forget()
+
+    def _callers(self, names):
+        """Return which cases call one of some laws: of many some, others for each law, so that all have their turn."""
+        callers = [case for case, called in self.called.items() if {*names} & {*called}]
+        first, most = SCALED.index(names[0]), min(MOST, len(callers))
+        return [callers[(first + k * len(callers) // most) % len(callers)] for k in range(most)]
 
     def _forget(self):
         shutil.rmtree(self.folder / "servotwin" / "physics" / "__pycache__", ignore_errors=True)
