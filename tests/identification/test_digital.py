@@ -14,10 +14,12 @@ from servotwin.identification import Log, Structure, as_structure, compare_struc
 from servotwin.identification.fitting.checks import usual_free
 from servotwin.identification.fitting.free import nominal
 from servotwin.identification.fitting.loop_gain import GAIN, with_loop_gain
+from servotwin.identification.fitting.structures import as_arm
 
 QUICK = {"priors": None, "starts": 1, "compare_with": (), "holdout": 0, "diagnose": False}
 MOTIONS = ("step", "prbs", "triangle")
 STILL = ("initial_state",)
+INERT = st.loads.Inertia(4e-3)
 FREE = usual_free(st.DigitalServo(PULSED))[:-1]  # angles that are commanded tell nothing of the scale of pulses
 
 
@@ -167,6 +169,30 @@ def test_structures_are_told_apart_and_the_simplest_is_chosen():
         assert ladder[other].holdout > 2.0 * ladder[ladder.chosen].holdout, other
 
 
+def test_a_gear_that_gives_way_is_told_from_a_stiff_one():
+    """Of a log of one angle an elastic arm says the same, but for where the motor's friction acts."""
+    servo = PULSED.replace({"gear.stiffness": 12.0, "gear.damping": 0.01})
+    logs = [digital_log(servo, ("step", "prbs")[k % 2], seed=k, duration=0.8, sample=5e-3, std=2e-4, load=INERT)
+            for k in range(4)]
+    ladder = compare_structures(logs, PULSED, free=FREE[:4], kinds=("digital",), bridges=("brake",),
+                                springs=("gear", "arm"), rungs=("M1",), nuisance=STILL, priors=None, starts=1, intervals=False,
+                                holdout=[log.name for log in logs[:2]])
+    names = ["digital, brake, M1", "digital, brake, elastic gear, M1", "digital, brake, elastic arm, M1"]
+    assert [rung.name for rung in ladder.rungs] == names
+    assert ladder.chosen == names[1]
+    assert ladder[names[0]].holdout > 5.0 * ladder[names[1]].holdout
+    assert ladder.fit.servo.gear.stiffness == pytest.approx(12.0, rel=0.05)
+
+
+def test_an_arm_that_gives_way_takes_what_turned_with_the_shaft():
+    load = as_arm(st.loads.Pendulum(mass=0.3, length=0.2, hanging_angle=0.4) + st.loads.Inertia(1e-3)
+                  + st.loads.Constant(0.1))
+    body = load.flexible
+    assert (load.inertia, load.pendulums, load.torque) == (0.0, (), 0.1)
+    assert body.moment_of_inertia == pytest.approx(1e-3 + 0.3 * 0.04)
+    assert (body.mass, body.length, body.hanging_angle) == (0.3, 0.2, 0.4)
+
+
 def test_chip_and_firmware_follow_from_each_other():
     analog = as_structure(PULSED, Structure("analog", "brake"))
     back = as_structure(analog.replace({name: None for name in analog.names() if name.startswith("firmware.")}),
@@ -179,8 +205,8 @@ def test_chip_and_firmware_follow_from_each_other():
 @pytest.mark.parametrize(("servo", "more", "words"), [
     (ON_BUS, {"kinds": ("analog",)}, "on a bus"), (PULSED, {"kinds": ("smart",)}, "analog"),
     (PULSED, {"bridges": ("short",)}, "brake"), (PULSED, {"select": "luck"}, "criterion"),
-    (PULSED, {"kinds": ("analog",), "bridges": ("diode",)}, "diode"),
-], ids=["no pulses", "kind", "bridge", "select", "nothing left"])
+    (PULSED, {"kinds": ("analog",), "bridges": ("diode",)}, "diode"), (PULSED, {"springs": ("belt",)}, "gear, arm"),
+], ids=["no pulses", "kind", "bridge", "select", "nothing left", "spring"])
 def test_structures_that_make_no_sense_are_refused(servo, more, words):
     with pytest.raises(ServotwinError, match=words):
         compare_structures([digital_log(PULSED, "step")], servo, **more)

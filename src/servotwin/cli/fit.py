@@ -88,6 +88,9 @@ def fit(
     structures: Annotated[bool, typer.Option(
         "--structures", help="Fit analog and digital loops, braking and open bridges, and friction laws M1 to M6, and "
         "choose the simplest that predicts the held-out logs no worse.", rich_help_panel=_SEARCH)] = False,
+    spring: Annotated[list[str] | None, typer.Option(
+        metavar="gear|arm", help="With --structures: try an elastic gear or arm too, which takes longer; repeatable.",
+        rich_help_panel=_SEARCH)] = None,
     advise: Annotated[bool, typer.Option(
         "--advise", help="Say which experiment to do next; without logs, which one to start with.",
         rich_help_panel=_SEARCH)] = False,
@@ -114,13 +117,13 @@ def fit(
     if not logs:
         _show_advice(_first_advice(search), as_json=as_json)
         return
-    _check_ladder(search.model, ladder=ladder, structures=structures)
+    _check_ladder(search.model, ladder=ladder, structures=structures, springs=spring)
     options = {"holdout": holdout, "mend": mend, "nuisance": nuisance, "sensors": sensors, "starts": starts,
                "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
                "diagnose": diagnose, "accuracy": accuracy}
     chosen = _options(options)
     given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json)
-    climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures)
+    climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures, springs=spring)
     found = _run(search, given, chosen, scheduler, climbs)
     files = _write(found, targets, force=force)
     if advise and not found.fit.interrupted and found.fit.doubt is not None:
@@ -166,12 +169,14 @@ def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None,
                          "from-sheet makes one from a data sheet")
 
 
-def _check_ladder(model: Model, *, ladder: bool, structures: bool) -> None:
+def _check_ladder(model: Model, *, ladder: bool, structures: bool, springs: list[str] | None) -> None:
     from servotwin.errors import InputError
     from servotwin.models import BoundedServo
 
     if ladder and structures:
         raise InputError("--ladder", got="also --structures", allowed="one of them: structures climb the ladder too")
+    if springs and not structures:
+        raise InputError("--spring", got="no --structures", allowed="both: a spring is one of the structures")
     if ladder and isinstance(model, BoundedServo):
         raise InputError("--ladder", got="a bounded servo",
                          allowed="pulse, pulse-inductive or digital, which know friction that grows with the load")
@@ -214,15 +219,18 @@ def _options(given: dict[str, Any]) -> dict[str, Any]:
         "diagnose": given["diagnose"], "compare_with": ("slew", "M1") if given["compare"] else ()}
 
 
-def _climber(search: _Search, *, asked: bool, ladder: bool, structures: bool) -> Callable[..., Ladder] | None:
+def _climber(search: _Search, *, asked: bool, ladder: bool, structures: bool,
+             springs: list[str] | None) -> Callable[..., Ladder] | None:
     """Return what fits several laws or structures; None where one fit is asked for."""
     from functools import partial
 
+    from servotwin.cli import fit_words
     from servotwin.identification import compare_structures, friction_ladder
 
     servo, kind = search.model.servo, type(search.model)
     if structures:
-        return partial(compare_structures, servo=servo, model=kind, free=search.free if asked else None)
+        return partial(compare_structures, servo=servo, model=kind, free=search.free if asked else None,
+                       springs=fit_words.names(springs) or ())
     return partial(friction_ladder, servo=servo, model=kind, free=search.free) if ladder else None
 
 

@@ -1,13 +1,15 @@
-"""Structures of a servo one after the other on the same logs: analog or digital, what its bridge does, its friction.
+"""Structures of a servo one after the other on the same logs: analog or digital, its bridge, its spring, its friction.
 
-The kind of loop and the bridge are compared first, with Coulomb and viscous friction; the friction laws M2 to M6 follow
-on what these leave. A structure with fewer parts is simpler, and the simplest that predicts no worse is chosen.
+The kind of loop and the bridge are compared first, with Coulomb and viscous friction; an elastic gear or arm where they
+are asked for, and the friction laws M2 to M6, follow on what these leave. A structure with fewer parts is simpler, and
+the simplest that predicts no worse is chosen.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from servotwin.errors import InputError
@@ -15,6 +17,7 @@ from servotwin.identification.fitting import checks
 from servotwin.identification.fitting.fit import Fit
 from servotwin.identification.fitting.free import LUMPED
 from servotwin.identification.fitting.ladder import RUNGS, Ladder, Rung, friction_ladder, ladder_of, rung_of
+from servotwin.loads import Flexible, Load
 from servotwin.logs.log import Log
 from servotwin.models import DigitalServo, Model, PulseServo, PulseServoInductive
 from servotwin.parameters import Servo
@@ -24,33 +27,42 @@ KINDS = ("analog", "digital")
 BRIDGES: dict[str, tuple[str, ...]] = {"analog": ("brake", "coast"), "digital": ("brake", "diode")}
 """What a bridge may do while it does not drive, by the kind of servo; the simplest first."""
 
+SPRINGS: dict[str, tuple[str, ...]] = {
+    "gear": ("gear.stiffness", "gear.damping"), "arm": ("load.flexible.stiffness", "load.flexible.damping")}
+"""What may give way, and what is searched of it beside all else."""
+
 _BASE = "M1"
+_STIFFNESS, _DAMPING = 100.0, 0.05  # N m/rad, N m s/rad, where a search begins: guesses for small gears
 _TICK, _FRAME = 1e-3, 0.02  # s, where nothing is known: a guess, and the usual transmitter
 _STEPS = ("electronics.one_shot_slope", "potentiometer.feedback_gain")
 
 
 class Structure(NamedTuple):
-    """A kind of loop, and what its bridge does while it does not drive.
+    """A kind of loop, what its bridge does while it does not drive, and what gives way.
 
     Parameters
     ----------
     kind : {"analog", "digital"}
     bridge : str
         Of `BRIDGES`.
+    spring : str
+        Of `SPRINGS`; nothing gives way unless given.
     """
 
     kind: str
     bridge: str
+    spring: str = ""
 
     def named(self, law: str) -> str:
         """Return how a table calls it with a friction law."""
-        return f"{self.kind}, {self.bridge}, {law}"
+        return ", ".join((self.kind, self.bridge, *([f"elastic {self.spring}"] if self.spring else []), law))
 
 
 def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | None = None,
                        free: Sequence[str] | None = None, *, kinds: Sequence[str] = KINDS,
-                       bridges: Sequence[str] | None = None, rungs: Sequence[str] = tuple(RUNGS),
-                       select: str = "holdout", progress: Any = False, **options: Any) -> Ladder:
+                       bridges: Sequence[str] | None = None, springs: Sequence[str] = (),
+                       rungs: Sequence[str] = tuple(RUNGS), select: str = "holdout", progress: Any = False,
+                       **options: Any) -> Ladder:
     """Fit structures of a servo to the same logs, and choose the simplest that predicts no worse.
 
     Parameters
@@ -68,8 +80,11 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
         Of "analog" and "digital"; a servo on a bus takes no pulses and is digital alone.
     bridges : sequence of str, optional
         Of "brake", "coast" (analog) and "diode" (digital); all unless given.
+    springs : sequence of str
+        Of "gear" (elastic, with inertia behind it) and "arm" (all inertia of the load, and its pendulum, behind a
+        spring), tried on the chosen loop and bridge. They take far longer than rigid ones.
     rungs : sequence of str
-        Friction laws of the chosen loop and bridge, "M1" among them or not: of `RUNGS`.
+        Friction laws of the chosen loop, bridge and spring, "M1" among them or not: of `RUNGS`.
     select : {"holdout", "criterion"}
         As of `friction_ladder`.
     progress : bool or callable
@@ -86,40 +101,51 @@ def compare_structures(logs: Sequence[Log], servo: Servo, model: type[Model] | N
     Raises
     ------
     InputError
-        If a kind, bridge, law or way to select is unknown, nothing is left to compare, or as `identify` does.
+        If a kind, bridge, spring, law or way to select is unknown, nothing is left to compare, a load has no inertia
+        for a spring, or as `identify` does.
     """
     laws = checks.checked_words("rungs", rungs, tuple(RUNGS))
     checks.checked_words("select", [select], ("holdout", "criterion"))
     given = checks.checked_logs(logs)
     some = _structures(servo, kinds, bridges)
+    elastic = checks.checked_words("springs", springs, tuple(SPRINGS))
+    logs_of = {spring: [replace(log, load=as_arm(log.load)) for log in given] if spring == "arm" else given
+               for spring in ("", *elastic)}
     options = {"compare_with": (), **options, "diagnose": False}  # the comparison is the trial
     found: dict[Structure, Rung] = {}
     with checks.shown(progress) as show:
         further = [law for law in laws if law != _BASE]
-        count = len(some) + len(further)
-        for k, one in enumerate(some):
-            fit = _fitted(given, as_structure(servo, one), one, model, free, options,
-                          _part(show, k, count, one.named(_BASE)))
-            if math.isfinite(fit.cost):
-                found[one] = rung_of(one.named(_BASE), fit)
-            if fit.interrupted:
-                break
+        before, count = len(some) + len(elastic), len(some) + len(elastic) + len(further)
+
+        def all_fitted(first: int, structures: Sequence[Structure], start: Servo) -> bool:
+            """Fit structures, and tell whether that came to its end."""
+            for k, one in enumerate(structures, first):
+                fit = _fitted(logs_of[one.spring], as_structure(start, one), one, model, free, options,
+                              _part(show, k, count, one.named(_BASE)))
+                if math.isfinite(fit.cost):
+                    found[one] = rung_of(one.named(_BASE), fit)
+                if fit.interrupted:
+                    return False
+            return True
+
+        ended = all_fitted(0, some, servo)
         if not found:
             raise InputError("structures", got="none that could be simulated to the end of the logs",
                              allowed="a servo whose parameters can follow the logs; see its values and bounds")
-        if fit.interrupted:
+        if ended and elastic:
+            rigid = _best(found, select)
+            ended = all_fitted(len(some), [rigid._replace(spring=spring) for spring in elastic], found[rigid].fit.servo)
+        if not ended or not further:
             return ladder_of(tuple(found.values()), select)
         best = _best(found, select)
-        if not further:
-            return ladder_of(tuple(found.values()), select)
-        climbed = _climbed(given, found[best].fit, further, options,
-                           lambda share, text: show((len(some) + share * len(further)) / count, text))
+        climbed = _climbed(logs_of[best.spring], found[best].fit, further, options,
+                           lambda share, text: show((before + share * len(further)) / count, text))
     laws_of_best = [rung_of(best.named(rung.name), rung.fit) for rung in climbed.rungs]
     return ladder_of((*found.values(), *laws_of_best), select)
 
 
 def as_structure(servo: Servo, structure: Structure) -> Servo:
-    """Return a servo with chip or firmware of a structure, where it has none made of the other, and its bridge.
+    """Return a servo with chip or firmware of a structure, where it has none made of the other, bridge and spring.
 
     Parameters
     ----------
@@ -153,7 +179,31 @@ def as_structure(servo: Servo, structure: Structure) -> Servo:
             made["firmware.proportional_gain"] = _required(servo, "electronics.stretcher_gain") * per_angle / period
         if servo.get("firmware.control_period") is None:
             made["firmware.control_period"] = _TICK
+    if structure.spring == "gear" and servo.get("gear.stiffness") is None:
+        made |= {"gear.stiffness": _STIFFNESS, "gear.damping": _DAMPING}
     return servo.replace(made, source=f"a trial of a structure: {structure.kind}, {structure.bridge}")
+
+
+def as_arm(load: Load) -> Load:
+    """Return a load all inertia of which, with its pendulum, is behind a spring.
+
+    Raises
+    ------
+    InputError
+        If the load has no inertia, several pendulums, or something behind a spring already.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> as_arm(st.loads.Inertia(0.01) + st.loads.Constant(0.2)).flexible.moment_of_inertia
+    0.01
+    """
+    if load.flexibles or len(load.pendulums) > 1 or not load.total_inertia > 0.0:
+        raise InputError("structures: arm", got=f"a load of {load!r}", allowed="inertia, or one pendulum, on the shaft")
+    weight = {key: getattr(load.pendulums[0], key) for key in ("mass", "length", "hanging_angle", "gravity")
+              } if load.pendulums else {}
+    body = Flexible(stiffness=_STIFFNESS, damping=_DAMPING, inertia=load.total_inertia, **weight)
+    return replace(load, inertia=0.0, pendulums=(), flexibles=(body,))
 
 
 def _structures(servo: Servo, kinds: Sequence[str], bridges: Sequence[str] | None) -> list[Structure]:
@@ -176,7 +226,8 @@ def _fitted(logs: Sequence[Log], servo: Servo, structure: Structure, analog: typ
     kind = DigitalServo if structure.kind == "digital" else _analog_class(analog)
     plain = checks.checked_servo(servo, kind)
     read = (*plain.requires, *plain.optional, *LUMPED, *LOAD_NAMES)
-    names = checks.usual_free(plain, logs) if free is None else [name for name in free if name in read]
+    names = [*(checks.usual_free(plain, logs) if free is None else [name for name in free if name in read]),
+             *SPRINGS.get(structure.spring, ())]
     some = (*names, *RUNGS[_BASE])
     own: dict[str, Any] = {
         key: {name: value for name, value in options[key].items() if name in some}
