@@ -175,8 +175,8 @@ def test_a_gear_that_gives_way_is_told_from_a_stiff_one():
     logs = [digital_log(servo, ("step", "prbs")[k % 2], seed=k, duration=0.8, sample=5e-3, std=2e-4, load=INERT)
             for k in range(4)]
     ladder = compare_structures(logs, PULSED, free=FREE[:4], kinds=("digital",), bridges=("brake",),
-                                springs=("gear", "arm"), rungs=("M1",), nuisance=STILL, priors=None, starts=1, intervals=False,
-                                holdout=[log.name for log in logs[:2]])
+                                springs=("gear", "arm"), rungs=("M1",), nuisance=STILL, priors=None, starts=1,
+                                intervals=False, holdout=[log.name for log in logs[:2]])
     names = ["digital, brake, M1", "digital, brake, elastic gear, M1", "digital, brake, elastic arm, M1"]
     assert [rung.name for rung in ladder.rungs] == names
     assert ladder.chosen == names[1]
