@@ -45,6 +45,11 @@ def test_pulses_that_come_later_move_the_motion_by_as_much(first, tick):
     np.testing.assert_allclose(there.residual - here.residual, expected, atol=2e-3 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("first", [1.3, -1.3])
+def test_a_trial_whose_pulses_come_after_the_log_can_be_run(first):
+    assert np.isfinite(part(forecast_of(digital_log(PULSED, "prbs", delay=0.06)), first).residual).all()
+
+
 def test_between_the_ends_of_pulses_ticks_cannot_be_told_from_pulses():
     forecast = forecast_of(digital_log(PULSED, "step", std=0.0, duration=1.6, delay=0.06, load=DISC))
     shared = np.append(forecast.space.start, 0.06 / DELAY_SCALE)

@@ -25,6 +25,9 @@ class Toy:
     def own_belief(self, case: int) -> tuple[Array, Array]:
         return np.full(self.own, self.belief[0]), np.full(self.own, self.belief[1])
 
+    def own_reach(self, case: int) -> Array:
+        return np.full(self.own, np.inf)
+
     def at(self, point: Point, *, derivatives: bool = True, cases: Sequence[int] | None = None, **_: Any,
            ) -> list[LogPart]:
         self.calls += 1

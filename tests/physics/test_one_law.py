@@ -135,6 +135,7 @@ def test_a_law_that_changes_changes_all_paths_alike(runs, name):
 
 
 @pytest.mark.slow
+@pytest.mark.compiles  # for minutes, and so first
 def test_all_laws_changed_and_compiled(runs):
     found = runs.scaled([name for name in SCALED if name != "play"], "compiled")
     assert _differs(found, runs.before)

@@ -194,6 +194,7 @@ class Search:
         self.cases = tuple(range(len(forecast.cases)) if cases is None else cases)
         beliefs = [forecast.own_belief(forecast.cases[k]) for k in self.cases]
         self.own = [Prior(mean, weight) for mean, weight in beliefs]
+        self.own_reach = [forecast.own_reach(forecast.cases[k]) for k in self.cases]
         self.held = np.zeros(forecast.size, np.bool_) if held is None else held
 
     def cost_of(self, point: Point, parts: Sequence[LogPart]) -> float:
@@ -296,9 +297,10 @@ class Search:
             stays = stays | over
         own = list(point.own)
         largest = float(np.abs(change).max(initial=0.0))
-        for k, b in zip(self.cases, damped.blocks, strict=True):
+        for k, b, belief, reach in zip(self.cases, damped.blocks, self.own, self.own_reach, strict=True):
             if b.g_o.size:
                 step = -np.linalg.solve(_safe(b.H_oo), b.g_o + b.H_so.T @ change)
+                step = np.clip(point.own[k] + step, belief.mean - reach, belief.mean + reach) - point.own[k]
                 own[k] = point.own[k] + step
                 largest = max(largest, float(np.abs(step).max()))
         return point._replace(shared=x + change, own=tuple(own)), largest

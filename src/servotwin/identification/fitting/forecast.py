@@ -22,6 +22,7 @@ from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.lanes import LogLanes
 from servotwin.identification.fitting.point import (
     DELAY_SCALE,
+    MOST_DELAY,
     NUISANCES,
     OFFSET_SCALE,
     SHARED,
@@ -147,6 +148,11 @@ class Forecast:
                   "log_delay": 0.5 * float(np.median(np.diff(case.log.time))) / DELAY_SCALE,
                   "frame_phase": math.inf if self.own_phases else _HELD, "control_phase": _ANY_TICK[1]}
         return self.own_start(case), np.array([1.0 / spread[name] for name in self.names_of_own(case)])
+
+    def own_reach(self, case: Case) -> Array:
+        """Return how far a log's own numbers may go from where they begin (scaled): pulses as far as delays."""
+        reach = {"frame_phase": MOST_DELAY / DELAY_SCALE}
+        return np.array([reach.get(name, math.inf) for name in self.names_of_own(case)])
 
     def frames_of(self, point: Point, k: int) -> Frames:
         """Return which commands the pulses of a log carry at a point; the period is that of the point where it has one.

@@ -128,11 +128,12 @@ def near_edges(log: Log, one: Frames, other: Frames) -> Array:
 def signal(log: Log, frames: Frames, first: float, period: float, lead: float = 0.0) -> Signal:
     """Return the command of a log as pulses: the edges at first + k · period, k from −∞ on, carry those of `frames`.
 
-    Its t = 0 is the first sample, or by `lead` earlier [s], from when on it is the first command. A command that is
+    Its t = 0 is the first sample, or by `lead` earlier [s], later where that is negative, from when on it is the first
+    command. A command that is
     linear between samples is read at the edges themselves.
     """
     least = math.ceil(-(first + lead) / period - _EDGE)
-    k = np.arange(least, least + math.ceil((log.duration + lead) / period) + 2)
+    k = np.arange(least, least + max(math.ceil((log.duration + lead) / period), 0) + 2)
     edges = np.maximum(first + lead + k * period, 0.0)
     time = log.time - log.time[0]
     asked = frames.phase + k * frames.period

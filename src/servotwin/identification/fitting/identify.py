@@ -215,14 +215,21 @@ def _run(task: Task, held_out: Sequence[int], beside: tuple[str, ...], level: fl
 
 def _with_doubts(task: Task, found: Outcome, level: float,
                  show: Callable[[float, str], None]) -> tuple[Outcome, Doubts]:
-    """Return where the search ended and its doubts; where these saw a deeper valley, it goes on from there."""
+    """Return where the search ended and its doubts; where these saw a deeper valley, it goes on from there.
+
+    One at whose bottom more numbers stand at a bound is none of a servo: logs that no servo can follow have such.
+    """
     doubts = _doubts(task, found, level, show)
     for _ in range(_VALLEYS):
         if doubts.deeper is None:
             break
         show(0.76, "a deeper valley")
-        found = task.again(ticking(task, doubts.deeper.point, show, 0.76), lambda share, text: show(0.76, text))
-        doubts = _doubts(task, found, level, show)
+        noise, bounds = task.forecast.noise, task.at_bound(found)
+        other = task.again(ticking(task, doubts.deeper.point, show, 0.76), lambda share, text: show(0.76, text))
+        if np.count_nonzero(task.at_bound(other)) > np.count_nonzero(bounds):
+            task.forecast.noise = noise
+            break
+        found, doubts = other, _doubts(task, other, level, show)
     return found, doubts
 
 
