@@ -29,7 +29,8 @@ def validate(
     logs: Annotated[list[Path], typer.Argument(
         metavar="LOGS", help=log_reading.HELP)],
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="pulse, pulse-inductive or bounded (default: the model of the file's fit, else pulse).")]
+        metavar="MODEL", help="pulse, pulse-inductive, bounded or digital (default: the model of the file's fit, else "
+        "that of the servo's kind).")]
     = None,
     file_format: log_reading.FormatOption = "auto",
     columns: log_reading.ColumnsOption = None,
@@ -39,9 +40,8 @@ def validate(
         "in SI units.")] = None,
     nuisance: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Effects of the rig to fit to these logs: delay, log_delay, frame_phase, "
-        "frame_period, angle_offset, angle_sag, initial_state; repeatable or with commas (default: none; the others "
-        "are as recorded by the fit in "
-        "the servo file).")] = None,
+        "frame_period, control_phase, angle_offset, angle_sag, initial_state; repeatable or with commas (default: "
+        "none; the others are as recorded by the fit in the servo file).")] = None,
     sensors: Annotated[list[str] | None, typer.Option(
         metavar="NAME", help="Measured signals to compare; repeatable or with commas.")] = None,
     leave_out: Annotated[list[str] | None, typer.Option(
