@@ -210,6 +210,7 @@ def _search(servo: str, model: str | None, change: list[str], free: list[str] | 
 def _options(given: dict[str, Any]) -> dict[str, Any]:
     """Return the options of `identify` that words say."""
     from servotwin.cli import fit_words
+
     return {
         "holdout": fit_words.held_out(given["holdout"]), "mend": fit_words.kinds(given["mend"]),
         "sensors": fit_words.names(given["sensors"]),

@@ -16,6 +16,7 @@ from servotwin.models.terms.friction import straight
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.physics.laws import array_form
 from servotwin.simulation.compile import Recipe, kernels
+from servotwin.simulation.first_ticks import to_first_ticks
 from servotwin.simulation.lane_memory import RECORD, flat, records_of
 from servotwin.simulation.lanes import ALL_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
 
@@ -180,29 +181,9 @@ def go_on(recipe: Recipe, *arguments: Any) -> None:
     """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads."""
     *shared, ended = arguments
     if recipe == PLAIN_DIGITAL:
-        _to_first_ticks(recipe, *shared)
+        to_first_ticks(kernels(recipe), *shared)
         kernels(BY_TICKS).go_on(*shared, loop_tiles.tile_room())
     kernels(recipe).go_on(*shared, ended)
-
-
-def _to_first_ticks(recipe: Recipe, lanes: Lanes, curve: Floats, torques: Floats, first: Indices, count: Indices,
-                    which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats,
-                    records: NDArray[Any], status: Indices) -> None:
-    """Let lanes that begin before their first tick go on to it; who cannot stays where it is."""
-    phases = lanes.firmware["t_phi"][which]
-    some = np.flatnonzero((phases > 0.0) & (phases < durations) & (records["point"]["time"] == 0.0)
-                          & (records["frames"] == 0) & (first_output == 0))
-    if not len(some):
-        return
-    early = times[times < phases[some].max()]
-    own, there = records[some], np.zeros((len(some), outputs.shape[1], len(early)))
-    states, ended = np.zeros(len(some), np.int64), np.zeros(len(some))
-    kernels(recipe).go_on(lanes, curve, torques, first, count, which[some], phases[some], early,
-                          np.zeros(len(some), np.int64), there, own, states, ended)
-    for k in np.flatnonzero(states == 0):
-        lane, seen = some[k], int(np.searchsorted(early, phases[some[k]]))
-        records[lane], outputs[lane, :, :seen], first_output[lane] = own[k], there[k, :, :seen], seen
-        durations[lane] -= phases[lane]
 
 
 class SideBySide(NamedTuple):

@@ -83,13 +83,13 @@ class NormalEquations(NamedTuple):
         g, H = self.g.copy(), self.H.copy()
         for b in self.blocks:
             if b.g_o.size:
-                part = np.linalg.solve(_safe(b.H_oo), np.column_stack([b.H_so.T, b.g_o]))
+                part = np.linalg.solve(safe(b.H_oo), np.column_stack([b.H_so.T, b.g_o]))
                 H -= b.H_so @ part[:, :-1]
                 g -= b.H_so @ part[:, -1]
         return g, H
 
 
-def _safe(H: Array) -> Array:
+def safe(H: Array) -> Array:
     """Return a matrix with a hair on its diagonal: a number that a log says nothing about stays where it is."""
     return np.asarray(H + np.diag(np.maximum(1e-12 * np.diag(H), 1e-12)))
 
@@ -109,6 +109,7 @@ def block(part: LogPart, loss: Loss, own: Prior | None = None, at: Array | None 
     if own is not None and at is not None:
         g_o, H_oo = g_o + (at - own.mean) * own.weight**2, H_oo + np.diag(own.weight**2)
     return Block(shared.T @ part.residual, g_o, shared.T @ part.shared, shared.T @ part.own, H_oo)
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -273,7 +274,7 @@ class Search:
         gain = 0.5 * float(g[moves] @ np.linalg.lstsq(H[np.ix_(moves, moves)], g[moves], rcond=1e-14)[0])
         for b in normal.blocks:
             if b.g_o.size:
-                gain += 0.5 * float(b.g_o @ np.linalg.solve(_safe(b.H_oo), b.g_o))
+                gain += 0.5 * float(b.g_o @ np.linalg.solve(safe(b.H_oo), b.g_o))
         return gain
 
     def _step(self, point: Point, normal: NormalEquations, damping: float, scale: Array) -> tuple[Point, float]:
@@ -299,7 +300,7 @@ class Search:
         largest = float(np.abs(change).max(initial=0.0))
         for k, b, belief, reach in zip(self.cases, damped.blocks, self.own, self.own_reach, strict=True):
             if b.g_o.size:
-                step = -np.linalg.solve(_safe(b.H_oo), b.g_o + b.H_so.T @ change)
+                step = -np.linalg.solve(safe(b.H_oo), b.g_o + b.H_so.T @ change)
                 step = np.clip(point.own[k] + step, belief.mean - reach, belief.mean + reach) - point.own[k]
                 own[k] = point.own[k] + step
                 largest = max(largest, float(np.abs(step).max()))

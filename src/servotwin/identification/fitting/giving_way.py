@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.identification.fitting.arrow import Prior
+from servotwin.identification.fitting.arrow import Loss, NormalEquations, Prior, block, safe
 from servotwin.identification.fitting.phases import PulseChoice, Scan
 from servotwin.identification.fitting.point import LogPart, Point
 
@@ -101,18 +101,17 @@ def _parabolas(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]],
 
 def _parabola(part: LogPart, weight: Array, own: Prior, at: Array, moves: NDArray[np.bool_]) -> Parabolas:
     """Return what one choice costs."""
-    shared, alone = part.shared[:, moves], part.own
-    p = shared.shape[1]
-    if not (np.isfinite(part.residual).all() and np.isfinite(shared).all() and np.isfinite(alone).all()):
-        return Parabolas(np.array(1e12), np.zeros(p), np.eye(p))
-    weighed, off = weight * part.residual, own.weight * (at - own.mean)
-    inner = alone.T @ (weight[:, None] * alone) + np.diag(own.weight**2) + 1e-12 * np.eye(len(at))
-    across = shared.T @ (weight[:, None] * alone)
-    pull = alone.T @ weighed + own.weight * off
-    follow = np.linalg.solve(inner, np.column_stack([across.T, pull]))
-    level = 0.5 * (weighed @ part.residual + off @ off - pull @ follow[:, -1])
-    return Parabolas(np.asarray(level), shared.T @ weighed - across @ follow[:, -1],
-                     shared.T @ (weight[:, None] * shared) - across @ follow[:, :-1])
+    shared = part.shared[:, moves]
+    if not (np.isfinite(part.residual).all() and np.isfinite(shared).all() and np.isfinite(part.own).all()):
+        return Parabolas(np.array(1e12), np.zeros(shared.shape[1]), np.eye(shared.shape[1]))
+    root = np.sqrt(weight)
+    weighed = LogPart(part.residual * root, shared * root[:, None], part.own * root[:, None])
+    b = block(weighed, Loss(), own, at)
+    g, H = NormalEquations((b,), b.g_s, b.H_ss).reduced()
+    level = Loss().cost(weighed.residual) + own.cost(at)
+    if b.g_o.size:
+        level -= 0.5 * float(b.g_o @ np.linalg.solve(safe(b.H_oo), b.g_o))
+    return Parabolas(np.asarray(level), g, H)
 
 
 def _starts(scan: Scan, choices: Mapping[int, Sequence[PulseChoice]]) -> list[dict[int, int]]:
