@@ -10,7 +10,7 @@ from servotwin.identification import Space, identify
 from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.identify import NUISANCE, usual_nuisance
 from servotwin.identification.fitting.point import DELAY_SCALE, Frames, Point
-from servotwin.identification.fitting.ticks import ticks_of
+from servotwin.identification.fitting.ticks import Ticks, ticks_of
 
 DISC = st.loads.Inertia(4e-3)  # rests until the first tick
 TICK = PULSED.firmware.control_period
@@ -65,6 +65,7 @@ def test_between_the_ends_of_pulses_ticks_cannot_be_told_from_pulses():
         np.testing.assert_allclose(last, first, atol=1e-11)
         after = part(forecast, 0.005 - gap.high - 1e-5, gap.high + 1e-5).residual
         assert np.abs(after - first).max() > 1e-3
+    assert Ticks(TICK, np.array([1e-3]), ()).wait(1.5e-3) == pytest.approx(0.5e-3)
     waits = [ticks.wait(tick) for tick in np.arange(0.0, TICK, 1e-5)]
     assert np.mean(waits) == pytest.approx(0.5 * TICK, rel=0.01)
 
