@@ -120,6 +120,20 @@ def test_a_curved_cost_has_the_ends_of_its_profile(k):
     assert abs(skew - 1.0) > 0.05  # or the normal one would have done
 
 
+def test_a_deeper_valley_on_the_way_is_told():
+    """A parabola in the square has two bottoms; the search ends in that at -1, and what else counts favours 1."""
+    toy = Toy([lambda x, o: np.array([4.0 * (x[0]**2 - 1.0), 1.5 * (x[0] - 1.0)])], 1, 0)
+    search, best, doubt = ended(toy, 1, 0, 1, lower=[-3.0], upper=[3.0], begin=[-0.9])
+    assert best.point.shared[0] < -0.5
+    seen = []
+    ends(search, best, doubt, [0], 1.0 - 1e-9, deeper=seen.append)
+    assert min(there.cost for there in seen) < best.cost - 2.0
+    seen.clear()
+    search, best, doubt = ended(toy, 1, 0, 1, lower=[-3.0], upper=[3.0], begin=[0.9])
+    ends(search, best, doubt, [0], 1.0 - 1e-9, deeper=seen.append)
+    assert seen == []
+
+
 def test_a_hardly_curved_cost_needs_no_profile():
     toy, _ = saturating(1e-3)
     search, best, doubt = ended(toy, 2, 0, 1, begin=[1.0, 1.0])

@@ -11,6 +11,7 @@ from servotwin.identification.fitting.forecast import Forecast
 from servotwin.identification.fitting.identify import NUISANCE, usual_nuisance
 from servotwin.identification.fitting.point import DELAY_SCALE, Frames, Point
 from servotwin.identification.fitting.ticks import Ticks, ticks_of
+from validation.test_digital_coverage import MOTIONS, OFF, bench
 
 DISC = st.loads.Inertia(4e-3)  # rests until the first tick
 TICK = PULSED.firmware.control_period
@@ -88,6 +89,19 @@ def test_ticks_are_found_for_all_logs_at_once(tick, phases):
     low, high, method = fit.intervals()["delay"]
     assert method == "by pulses"
     assert low < 0.05 < high < low + 0.01 + tick + 1e-3
+
+
+def test_friction_that_went_to_nothing_comes_back():
+    """The search of these logs ended with a quarter of their friction, beside a ridge: 2.1 mrad were left of them."""
+    servo, truth, rng = bench(7)
+    begin = servo.replace({name: factor * servo.get(name) for name, factor in OFF.items()})
+    phases = rng.uniform(size=(3, len(MOTIONS)))[2]
+    logs = [digital_log(servo, motion, seed=720 + k, duration=1.6, phase=phase, delay=truth["delay"])
+            for k, (motion, phase) in enumerate(zip(MOTIONS, phases, strict=True))]
+    fit = identify(logs, begin, free=FREE, priors=None, starts=1, compare_with=(), holdout=0, diagnose=False,
+                   intervals=False)
+    assert fit.noise["output_angle"] == pytest.approx(1e-3, rel=0.3)
+    assert fit.estimates["output_coulomb_torque"] == pytest.approx(truth["output_coulomb_torque"], rel=0.1)
 
 
 def test_ticks_have_a_phase_unless_one_says_where_pulses_command_a_program():

@@ -63,6 +63,19 @@ def test_a_lane_is_the_servo_alone(name):
     assert np.abs(lanes["output_angle"][1] - one["output_angle"]).max() > 1e-6
 
 
+def test_a_call_that_begins_before_the_first_tick_lasts_as_long_as_it_says():
+    model = digital({"proportional_gain": 6.0, "control_phase": 3e-4})
+    sims, one = st.VectorSimulator(model, lanes=2), st.Simulator(model)
+    sims.reset(command_angle=0.5)
+    state = one.initial(st.signals.constant(0.5, unit="rad"))
+    sims.advance(6.9e-3, command_angle=0.9)
+    command = st.signals.constant(0.9, unit="rad")
+    state = one.advance(state, 6.9e-3, command)
+    assert one.observe(state, "output_speed", command) > 0.1
+    for signal in ("output_angle", "output_speed"):
+        np.testing.assert_allclose(sims[signal], one.observe(state, signal, command), rtol=0.0, atol=1e-11)
+
+
 def test_lanes_cut_at_random_ticks_are_simulators():
     model = digital({
         "proportional_gain": 6.0, "derivative_gain": 0.02, "compute_delay": 2.3e-3, "bus_latency": 4.2e-3,
