@@ -404,3 +404,30 @@ def test_a_header_that_cannot_be_written(servo, tmp_path):
     assert entry.write_header(tmp_path).read_text() == entry.header
     with pytest.raises(InputError, match=r"write_header\(folder\)"):
         entry.write_header(tmp_path / "missing")
+
+
+@pytest.mark.parametrize("kind", [st.PulseServo, st.DigitalServo])
+def test_buses_are_those_of_python(servo, kind):
+    """Two lanes on one supply, one on another and one alone: in Python alone, and in Python and C by turns."""
+    battery = st.Supply(open_circuit_voltage=6.0, internal_resistance=0.4)
+    model = kind(servo if kind is st.PulseServo else st.load_servo("feetech-sts3215-12v"))
+    rng, command = np.random.default_rng(3), "pulse_width" if kind is st.PulseServo else "command_angle"
+    low, high = (1.2e-3, 1.8e-3) if kind is st.PulseServo else (0.5, 1.0)
+    python, both = (st.VectorSimulator(model, LANES, load=st.loads.Inertia(1e-3), threads=1, bus=[
+        (battery, [0, 2]), (battery, [1])]) for _ in range(2))
+    lowest = np.inf
+    for k in range(60):
+        given = {command: rng.uniform(low, high, LANES), "external_torque": rng.uniform(-0.05, 0.05, LANES)}
+        imposed = {"output_speed": rng.uniform(-1.0, 1.0, LANES), "load_inertia": rng.uniform(5e-4, 4e-3, LANES)}
+        imposed = imposed if k % 7 == 0 else {}
+        in_python(python, 3e-3, given, imposed)
+        if k % 4 == 3:
+            in_python(both, 3e-3, given, imposed)
+        else:
+            shown = in_c(both, 3e-3, given, imposed)
+            np.testing.assert_array_equal(shown.pop("status"), python.status)
+            for signal, values in shown.items():
+                np.testing.assert_array_equal(values, python[signal], err_msg=f"{signal} at tick {k}")
+        same(python, both)
+        lowest = min(lowest, python["bus_voltage"][0])
+    assert lowest < 5.9

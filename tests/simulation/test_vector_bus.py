@@ -218,8 +218,9 @@ def test_what_a_bus_refuses(servo):
         st.VectorSimulator(st.BoundedServo(st.load_servo("hitec-hs-755hb")), 2, bus=BATTERY)
     sims = st.VectorSimulator(st.PulseServo(servo), 3, bus=[(BATTERY, [1, 2])], threads=1)
     sims.set(bus_voltage=5.0, lanes=[0])
-    with pytest.raises(InputError, match="c_entry of lanes on a bus"):
-        sims.c_entry()
+    entry = sims.c_entry()
+    with pytest.raises(InputError, match="one that lanes share"):
+        entry.advance(entry.tick(1e-3, set_bus_voltage=np.full(3, 5.0)))
     with pytest.raises(InputError, match="bus_voltage of lane 1"):
         sims.set(bus_voltage=5.0)
     with pytest.raises(InputError, match=r"supply\.internal_resistance of lane 2"):

@@ -15,6 +15,7 @@ from servotwin.errors import InputError
 from servotwin.simulation.compile.calls import program, tick_address
 from servotwin.simulation.compile.layout import GIVEN, HANDLE, MESSAGES, STAGES, TICK, VERSION
 from servotwin.simulation.vector_calls import Room, programs_of
+from servotwin.simulation.vector_memory import Piece, piece_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from servotwin.simulation.vector_store import Store
 
 Array = NDArray[np.float64]
+_INSIDE = 1e-9  # of a range whose ends are not possible themselves
 _WORDS: dict[str, Any] = {  # the rest are addresses
     "version": ctypes.c_int64, "lanes": ctypes.c_int64, "duration": ctypes.c_double}
 
@@ -150,6 +152,50 @@ class CEntry:
         code = self._function(ctypes.addressof(tick))
         if code != 0:
             raise InputError(f"servotwin_advance returned {code}: {MESSAGES[code]}")
+
+    @property
+    def seen(self) -> Array:
+        """What shows of the lanes where a signal is asked for, shape (lanes, signals of `models.engine.observe`)."""
+        return self._parts().room.seen
+
+    def memory(self) -> tuple[Piece, ...]:
+        """Return where all that the lanes remember stands, for who keeps and restores it between ticks.
+
+        It stays there for as long as nothing but ticks, `set` of angles and speeds, `reset` and `restore` happens.
+        """
+        parts = self._parts()
+        arrays = (parts.store.status, parts.store.ended, parts.store.total, parts.torque)
+        return (*map(piece_of, arrays), *(piece for some in parts.store.sets for piece in some.pieces()))
+
+    def commands(self, name: str) -> tuple[Array, Array]:
+        """Return the lowest and highest command of each lane, of the kind `name`.
+
+        Raises
+        ------
+        InputError
+            If a servo takes none of this kind.
+        """
+        kind = GIVEN.index(name)
+        gain, offset, low, high, least, most = self._parts().translate.table()[kind].T
+        if np.isnan(gain).any():
+            raise InputError(f"{name} of lane {np.isnan(gain).argmax()}", allowed="no command of this kind")
+        ends = np.sort([(least - offset) / gain, (most - offset) / gain], axis=0)
+        inside = _INSIDE * (ends[1] - ends[0])
+        inside[~np.isfinite(inside)] = 0.0
+        return np.maximum(low, ends[0] + inside), np.minimum(high, ends[1] - inside)
+
+    def travel(self) -> tuple[Array, Array]:
+        """Return the stops of each lane [rad]; infinite where there are none."""
+        stops = self._parts().numbers.now("stops")
+        return np.array(stops.lower), np.array(stops.upper)
+
+    def own_inertia(self) -> Array:
+        """Return of each lane what turns with the output without its load, the motor included unless it has play."""
+        numbers = self._parts().numbers
+        shaft, apart = numbers.now("shaft"), (numbers.now("play").half > 0.0) | (numbers.now("elastic").k > 0.0)
+        known = numbers.imposed.load_inertia
+        load = np.where(np.isnan(known), numbers.load_total, known)
+        return np.asarray(np.where(apart, shaft.J_out, shaft.J) - load)
 
     # --- what C works on ----------------------------------------------------------------------------------------------
 

@@ -33,7 +33,7 @@ enum {
     SERVOTWIN_BAD_COMMAND = 6,    /* a command is not possible, or more than one is given */
     SERVOTWIN_BAD_ANGLE = 7,      /* an angle is beyond a stop */
     SERVOTWIN_BAD_INERTIA = 8,    /* an inertia is negative */
-    SERVOTWIN_BAD_VOLTAGE = 9,    /* a bus voltage is not positive */
+    SERVOTWIN_BAD_VOLTAGE = 9,    /* a bus voltage is not positive, or is one that lanes share */
     SERVOTWIN_BEYOND_RECORD = 10, /* a recorded torque ends before */
     SERVOTWIN_NOT_RENEWED = 11    /* lanes that run in another way now could not be prepared: inertias and bus voltages
                                      are imposed, but no time has gone by */

@@ -40,8 +40,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _BYTES = 4000  # of a lane, and of what is made of it now and then
 _COLUMNS = {name: k for k, name in enumerate(Observed._fields)}
-_AT_MOTOR = {"motor_angle": physics.motor_from_output, "motor_speed": physics.motor_from_output,
+AT_MOTOR = {"motor_angle": physics.motor_from_output, "motor_speed": physics.motor_from_output,
              "motor_torque": lambda torque, reduction: torque / reduction}
+"""From what is seen at the output shaft, with the reduction of the gear."""
 
 
 class VectorSimulator:
@@ -211,7 +212,7 @@ class VectorSimulator:
             self._store.look(self._command, self._room.seen)
             self._fresh[0] = 1
         values = self._room.seen[:, _COLUMNS[name]]
-        return np.asarray(_AT_MOTOR[name](values, numbers.reduction)) if name in _AT_MOTOR else values.copy()
+        return np.asarray(AT_MOTOR[name](values, numbers.reduction)) if name in AT_MOTOR else values.copy()
 
     @property
     def impulse_work(self) -> Array:
@@ -310,11 +311,6 @@ class VectorSimulator:
         """Return what a program in C needs to go on with this simulator: an address, a struct and its header.
 
         All that its lanes may need is compiled now, once on a machine.
-
-        Raises
-        ------
-        InputError
-            If lanes share supplies.
         """
         if self._entry is None:
             from servotwin.simulation.c_entry import CEntry

@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import InputError
-from servotwin.models.engine import tape
 from servotwin.models.engine.buses import Buses, Tables
 from servotwin.models.engine.records import columns_of
 from servotwin.models.engine.step import COMPLETED
-from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import APART
 from servotwin.models.terms.numbers import Numbers
@@ -21,14 +18,14 @@ from servotwin.simulation.bus_run import not_plain, recipe_of, room_of, shared_o
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD
-from servotwin.simulation.vector_calls import TICKS
+from servotwin.simulation.vector_memory import Piece, piece_of
+from servotwin.simulation.vector_calls import NO_TAPE, TICKS, calls_on_buses
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_numbers import LaneNumbers
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-_NO_TAPE = Tape(np.zeros((0, tape.ROW)), np.zeros((0, tape.EVENT)), np.zeros(0), np.zeros(0, np.int64))
 _PLACES = 4  # among what is imposed
 _WORTH = 4  # buses for a thread: fewer cost more in waking it
 
@@ -52,36 +49,38 @@ class BusSet:
         The lanes.
     rows : ndarray
         What each remembers, a record of `models.engine.memory.Memory`.
+    buses : Buses
+        What those on a bus remember together; `recipe`, `tables` and `rooms` are what its kernels need besides.
     """
 
     def __init__(self, numbers: LaneNumbers, recipe: Any, buses: list[int], threads: int, pool: Any) -> None:
         supplies: Supplies = numbers.supplies
         lanes = [supplies.lanes[k] for k in buses]
-        self.numbers_of_buses, self._recipe, self._pool = np.array(buses), recipe, pool
+        self.numbers_of_buses, self.recipe, self._pool = np.array(buses), recipe, pool
         self.which = np.concatenate(lanes)
         sizes = np.array([len(some) for some in lanes])
         count = len(self.which)
         self.rows = np.zeros(count, RECORD)
         self._bus_at = np.repeat(np.arange(len(buses)), sizes)
-        self._buses = Buses(self.which, np.concatenate([[0], np.cumsum(sizes)]), self.rows, np.full(count, -1),
+        self.buses = Buses(self.which, np.concatenate([[0], np.cumsum(sizes)]), self.rows, np.full(count, -1),
                             shared_of([source_of(supplies.supplies[k]) for k in buses]), np.zeros(count, np.int64),
                             np.zeros(count))
         none = np.zeros(numbers.count, np.int64)
         curve = numbers.curve
-        self._tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, curve, none,
+        self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, curve, none,
                               none + curve.shape[1])
-        self._rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(buses) // _WORTH)))]
+        self.rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(buses) // _WORTH)))]
 
     def advance(self, columns: Lanes, duration: float, status: NDArray[np.int8], ended: Array) -> None:
         """Let all buses go on for a duration [s]; `status` and `ended` of all lanes are kept up to date."""
-        buses = self._buses
+        buses = self.buses
         buses.status[:] = status[self.which]
         before = buses.status.copy()
-        go_on, count, workers = kernels(self._recipe).go_on, len(self.numbers_of_buses), len(self._rooms)
+        go_on, count, workers = kernels(self.recipe).go_on, len(self.numbers_of_buses), len(self.rooms)
 
         def go(k: int) -> None:
-            go_on(columns, self._tables, buses, count * k // workers, count * (k + 1) // workers, duration, math.inf,
-                  *self._rooms[k], _NO_TAPE)
+            go_on(columns, self.tables, buses, count * k // workers, count * (k + 1) // workers, duration, math.inf,
+                  *self.rooms[k], NO_TAPE)
 
         if workers == 1:
             go(0)
@@ -96,11 +95,11 @@ class BusSet:
     def _break_up(self, places: Indices) -> None:
         """Let nobody on the buses of these lanes move together, until time goes on."""
         touched = np.unique(self._bus_at[places])
-        mates = np.flatnonzero(np.isin(self._bus_at, touched) & (self._buses.joined >= 0))
+        mates = np.flatnonzero(np.isin(self._bus_at, touched) & (self.buses.joined >= 0))
         self.rows["point"]["anchor_time"][mates] = math.inf
-        self._buses.joined[mates] = -1
-        self._buses.shared["phase"][touched] = APART
-        self._buses.shared["jumped"][touched] = 1
+        self.buses.joined[mates] = -1
+        self.buses.shared["phase"][touched] = APART
+        self.buses.shared["jumped"][touched] = 1
 
     def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
         """Put what lanes remember into their places."""
@@ -118,28 +117,31 @@ class BusSet:
         kernels(TICKS).impose_on_records(*imposed, self.rows)
 
     def calls(self, store: Any, room: Any, command: Array) -> dict[str, list[Any]]:
-        """Refuse the entry for C: lanes on buses are run from Python alone."""
-        raise InputError("c_entry of lanes on a bus", got=f"{len(self.which)} lanes on buses",
-                         allowed="lanes with supplies of their own")
+        """Return what compiled code calls at each stage of a tick."""
+        return calls_on_buses(self, store, room)
 
     def records(self) -> NDArray[Any]:
         """Return what the lanes remember."""
         return self.rows.copy()
 
+    def pieces(self) -> list[Piece]:
+        """Return where the lanes stand, and what those on a bus remember together."""
+        return [piece_of(array) for array in (self.rows, self.buses.joined, self.buses.shared)]
+
     def common(self, joined: Indices, shared: dict[int, Any]) -> None:
         """Put into `joined` (lanes,) and `shared` what the lanes of each bus remember together."""
-        joined[self.which] = self._buses.joined
-        shared |= {int(k): self._buses.shared[n].copy() for n, k in enumerate(self.numbers_of_buses)}
+        joined[self.which] = self.buses.joined
+        shared |= {int(k): self.buses.shared[n].copy() for n, k in enumerate(self.numbers_of_buses)}
 
     def set_common(self, joined: Indices, shared: dict[int, Any], anchors: Array) -> None:
         """Let those lanes move together again whose buses are in `shared`, from motions that began at `anchors` [s]."""
         for n, k in enumerate(self.numbers_of_buses.tolist()):
             if k in shared:
                 places = np.flatnonzero(self._bus_at == n)
-                source = self._buses.shared[n]["source"].copy()
-                self._buses.shared[n] = shared[k]
-                self._buses.shared["source"][n] = source
-                self._buses.joined[places] = joined[self.which[places]]
+                source = self.buses.shared[n]["source"].copy()
+                self.buses.shared[n] = shared[k]
+                self.buses.shared["source"][n] = source
+                self.buses.joined[places] = joined[self.which[places]]
                 self.rows["point"]["anchor_time"][places] = anchors[self.which[places]]
 
     def shaft(self, name: str) -> Array:
@@ -153,5 +155,5 @@ class BusSet:
 
     def look(self, columns: Lanes, inputs: Any, status: NDArray[np.int8], seen: Array) -> None:
         """Put what shows of the lanes into their rows of `seen`."""
-        self._buses.status[:] = status[self.which]
-        kernels(self._recipe).look(columns, self._tables, self._buses, *self._rooms[0], seen)
+        self.buses.status[:] = status[self.which]
+        kernels(self.recipe).look(columns, self.tables, self.buses, *self.rooms[0], seen)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import loop_tiles
+from servotwin.models.engine import loop_tiles, tape
 from servotwin.models.engine.observe import Observed
+from servotwin.models.engine.tape import Tape
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
@@ -29,7 +31,10 @@ TICKS = Recipe("ticks", (
     *(f"servotwin.models.engine.ticks:{name}" for name in ("accept", "change", "follow")),
     *(f"servotwin.models.engine.lane_ticks:{name}" for name in (
         "gather_lost", "put_lost", "gather", "put", "note_failures", "forget_motions", "impose_on_tiles",
-        "impose_on_records", "show_tiles", "show_records", "read_clocks"))))
+        "impose_on_records", "show_tiles", "show_records", "read_clocks", "take_status", "note_lost_buses",
+        "break_up"))))
+NO_TAPE = Tape(np.zeros((0, tape.ROW)), np.zeros((0, tape.EVENT)), np.zeros(0), np.zeros(0, np.int64))
+"""Of buses whose motions nobody keeps."""
 _NONE = np.zeros(0)
 
 
@@ -64,7 +69,7 @@ def programs_of(numbers: LaneNumbers, store: Store, room: Room, scales: Array, c
     """Return the programs of all stages; `scales` are those of `Translator.table`."""
     columns = store.columns
     accept = call_of(TICKS, "accept", store.now, room.has, room.given, scales, columns.numbers, room.clock,
-                     numbers.record_ends(), room.wanted, returns=True)
+                     numbers.record_ends(), numbers.supplies.bus_of, room.wanted, returns=True)
     every = np.arange(numbers.count)
     change = call_of(TICKS, "change", room.has, room.given, every, numbers.given, numbers.load_total, numbers.V_oc,
                      numbers.pulsed, *numbers.imposed, columns.numbers, returns=True)
@@ -109,9 +114,31 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
         "advance": advance, "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
         "look": [call_of(lane_runs.looking(some.recipe), "one_by_one", store.columns, *store.inputs, which, rows,
                          room.seen)]}
-    if store.numbers.torque.count[which].any():
-        found["clock"] = [call_of(TICKS, "read_clocks", which, store.status, store.ended, rows, room.clock)]
-    return found
+    return found | _clock(some, store, room)
+
+
+def calls_on_buses(some: Any, store: Store, room: Room) -> dict[str, list[Call]]:
+    """Return what is called for lanes on buses at each stage."""
+    recipe, rows, which, buses, own = some.recipe, some.rows, some.which, some.buses, (store.columns, some.tables)
+    apart = call_of(TICKS, "break_up", buses.joined, buses.shared, rows)
+    alive = call_of(TICKS, "take_status", which, store.status, buses.status)
+    found = {
+        "refit": [apart],
+        "impose": [apart, call_of(TICKS, "impose_on_records", room.has, room.given, store.columns.numbers, which,
+                                  np.arange(len(which)), store.work, rows)],
+        "advance": [alive, call_of(recipe, "go_on", *own, buses, 0, len(buses.shared), Now(store.now, 0), math.inf,
+                                   *some.rooms[0], NO_TAPE),
+                    call_of(TICKS, "note_lost_buses", which, buses.status, rows, store.status, store.ended)],
+        "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
+        "look": [alive, call_of(recipe, "look", *own, buses, *some.rooms[0], room.seen)]}
+    return found | _clock(some, store, room)
+
+
+def _clock(some: Any, store: Store, room: Room) -> dict[str, list[Call]]:
+    """Return what reads the times of lanes, if a record of torque could end for one of them."""
+    if not store.numbers.torque.count[some.which].any():
+        return {}
+    return {"clock": [call_of(TICKS, "read_clocks", some.which, store.status, store.ended, some.rows, room.clock)]}
 
 
 class _Gathered(NamedTuple):

@@ -56,3 +56,17 @@ class VectorMemory:
     work: Array
     numbers: NDArray[Any]
     common: Common | None = None
+
+
+class Piece(NamedTuple):
+    """Rows of bytes in memory, each so many bytes behind the one before."""
+
+    address: int
+    rows: int
+    stride: int
+    bytes: int
+
+
+def piece_of(array: NDArray[Any]) -> Piece:
+    """Return an array as one row."""
+    return Piece(array.ctypes.data, 1, array.nbytes, array.nbytes)

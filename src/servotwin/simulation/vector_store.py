@@ -23,7 +23,7 @@ from servotwin.simulation.lane_runs import OneByOne, SideBySide, some_of
 from servotwin.simulation.lanes import ALL_FIELDS
 from servotwin.simulation.vector_buses import BusSet, sets_of
 from servotwin.simulation.vector_calls import TICKS, asked, calls_in_records, calls_in_tiles
-from servotwin.simulation.vector_memory import Common
+from servotwin.simulation.vector_memory import Common, Piece, piece_of
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_memory import VectorMemory
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 SHAFT = {"output_angle": ("q", 0), "output_speed": ("w", 1)}  # where tiles and records have them
+_WORD = 8  # bytes
 _WORTH = 64  # tiles for a thread: fewer cost more in waking it
 
 
@@ -315,6 +316,15 @@ class _Tiles:
     def records(self) -> NDArray[Any]:
         return records_of(self.rows, np.arange(len(self.which)))
 
+    def pieces(self) -> list[Piece]:
+        """Return where the lanes of each tile stand: numbers of one kind side by side."""
+        wide = self.rows.dtype.itemsize // TILE // _WORD  # a tile of float32 is kept whole
+        first, step = self.rows.ctypes.data, self.rows.itemsize
+        if self.rows.dtype != tiles.tile_type("float64", self.form[0]):
+            return [piece_of(self.rows)]
+        return [Piece(first + step * k, wide, _WORD * TILE, _WORD * min(len(self.which) - TILE * k, TILE))
+                for k in range(len(self.rows))]
+
     def shaft(self, name: str) -> Array:
         return np.asarray(self.rows["servo"][SHAFT[name][0]].reshape(-1)[:len(self.which)], dtype=np.float64)
 
@@ -351,6 +361,10 @@ class _Records:
 
     def records(self) -> NDArray[Any]:
         return self.rows.copy()
+
+    def pieces(self) -> list[Piece]:
+        """Return where the lanes stand."""
+        return [piece_of(self.rows)]
 
     def shaft(self, name: str) -> Array:
         return np.asarray(self.rows["point"]["y"][:, SHAFT[name][1]])

@@ -25,6 +25,7 @@ from servotwin.models.engine.modes import INSIDE
 from servotwin.models.engine.records import TILE
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.ticks import ANGLE, SPEED, shaft_at, stops_at
+from servotwin.models.engine.together import APART
 
 if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats, Indices
@@ -153,3 +154,26 @@ def read_clocks(which: Indices, status: Any, ended: Floats, rows: Any, clock: Fl
     for k in range(which.size):
         lane = which[k]
         clock[lane] = time_of(memory_of(rows[k])) if status[lane] == COMPLETED else ended[lane]
+
+
+def take_status(which: Indices, status: Any, own: Indices) -> None:
+    """Tell lanes on buses which of them have failed."""
+    for k in range(which.size):
+        own[k] = status[which[k]]
+
+
+def note_lost_buses(which: Indices, own: Indices, rows: Any, status: Any, ended: Floats) -> None:
+    """Note which lanes on buses have failed, and when; they are nan from there on."""
+    for k in range(which.size):
+        if own[k] != COMPLETED and status[which[k]] == COMPLETED:
+            status[which[k]], ended[which[k]] = own[k], time_of(memory_of(rows[k]))
+            for i in range(7):
+                rows[k].point.y[i] = math.nan
+
+
+def break_up(joined: Indices, shared: Any, rows: Any) -> None:
+    """Let nobody on any bus move together until time goes on, and all motions begin anew."""
+    for k in range(joined.size):
+        joined[k], rows[k].point.anchor_time = -1, math.inf
+    for k in range(len(shared)):
+        shared[k].phase, shared[k].jumped = APART, 1

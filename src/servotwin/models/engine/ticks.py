@@ -38,11 +38,12 @@ put_off = writer("put_off", Off)
 
 
 def accept(now: Floats, has: Indices, given: Floats, scales: Floats, numbers: Any, clock: Floats, ends: Floats,
-           wanted: Floats) -> int:
+           bus_of: Indices, wanted: Floats) -> int:
     """Return `ACCEPTED`, or what is wrong with what is given; put commands into `wanted` as the engine follows them.
 
     `now` has the duration [s]; `scales`, for each kind of command and lane, gain, offset and the bounds of
-    `possible`. `clock` and `ends` are the time of each lane, and when its recorded torque is over [s].
+    `possible`. `clock` and `ends` are the time of each lane, and when its recorded torque is over [s];
+    `bus_of` is negative where a lane shares no supply, whose voltage would not be anyone's to give.
     """
     duration = now[0]
     if not 0.0 <= duration <= LONGEST:
@@ -64,7 +65,7 @@ def accept(now: Floats, has: Indices, given: Floats, scales: Floats, numbers: An
     for k in range(lanes):
         if has[INERTIA] != 0 and given[INERTIA, k] < 0.0:
             return BAD_INERTIA
-        if has[VOLTAGE] != 0 and given[VOLTAGE, k] <= 0.0:
+        if has[VOLTAGE] != 0 and (given[VOLTAGE, k] <= 0.0 or bus_of[k] >= 0):
             return BAD_VOLTAGE
         if has[ANGLE] != 0:
             stops = stops_at(numbers[k // TILE].stops, k % TILE)

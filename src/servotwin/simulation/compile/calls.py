@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -148,15 +149,36 @@ def _compiled(recipe: Recipe, rest: tuple[str, tuple[str, ...], tuple[str, ...],
 @cache
 def tick_address() -> int:
     """Return the address of the C function `int servotwin_advance(servotwin_tick *tick)`."""
-    text, *others = (Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
-                     for name in ("tick", "layout", "intrinsics"))
-    path, _ = stored(f"servotwin_tick_{key_of(source_key(), text, *others)}", lambda: text + _TICK)
-    return int(loaded(path).entry.address)
+    return int(_module("tick", "layout", _TICK).entry.address)
+
+
+@cache
+def joint_addresses() -> tuple[int, int]:
+    """Return the addresses of two C functions of `joints`.
+
+    They are `void control(const mjModel *m, mjData *d)` and
+    `long long step(long long *drive, const mjModel *m, mjData *d, long long steps)`.
+    """
+    module = _module("joints", "joints_layout", _JOINTS)
+    return int(module.at_callback.address), int(module.stepping.address)
+
+
+def _module(name: str, layout: str, entries: str) -> ModuleType:
+    """Return a file of this folder as a compiled module, with its entries for C."""
+    text, *others = (Path(__file__).with_name(f"{file}.py").read_text(encoding="utf-8")
+                     for file in (name, layout, "intrinsics"))
+    path, _ = stored(f"servotwin_{name}_{key_of(source_key(), text, entries, *others)}", lambda: text + entries)
+    return loaded(path)
 
 
 _TICK = """
 
 entry = cfunc(types.int32(types.int64), cache=True, error_model="numpy")(advance)
+"""
+_JOINTS = """
+
+at_callback = cfunc(types.void(types.int64, types.int64), cache=True, error_model="numpy")(control)
+stepping = cfunc(types.int64(*[types.int64] * 4), cache=True, error_model="numpy")(step)
 """
 
 

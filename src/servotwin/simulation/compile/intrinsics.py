@@ -134,3 +134,47 @@ def called(_typing, function, words):
         return builder.call(builder.inttoptr(function, kind.as_pointer()), [words])
 
     return number(number, number), generate
+
+
+@intrinsic
+def told(_typing, function, arguments):
+    """Call the function at an address with some words, and return its word, which counts where it has one."""
+    word = types.int64
+
+    def generate(_context, builder, signature, given):
+        function, words = given
+        some = [builder.extract_value(words, k) for k in range(len(arguments))]
+        kind = ir.FunctionType(ir.IntType(64), [value.type for value in some])
+        return builder.call(builder.inttoptr(function, kind.as_pointer()), some)
+
+    return word(word, arguments), generate
+
+
+_ACTIVE = "servotwin_active"  # the one word that a compiled function keeps between its calls
+
+
+def _kept_word(builder):
+    module, kind = builder.module, ir.IntType(64)
+    if _ACTIVE not in module.globals:
+        word = ir.GlobalVariable(module, kind, _ACTIVE)
+        word.linkage, word.initializer = "internal", ir.Constant(kind, 0)
+    return module.globals[_ACTIVE]
+
+
+@intrinsic
+def activate(_typing, value):
+    """Keep a word in the function that is compiled, for `active` in the same one."""
+    def generate(_context, builder, signature, given):
+        builder.store(given[0], _kept_word(builder))
+        return _context.get_dummy_value()
+
+    return types.none(types.int64), generate
+
+
+@intrinsic
+def active(_typing):
+    """Return the word that was kept."""
+    def generate(_context, builder, signature, given):
+        return builder.load(_kept_word(builder))
+
+    return types.int64(), generate

@@ -31,7 +31,7 @@ MESSAGES = {
     ticks.BAD_COMMAND: "a command is not possible, or more than one is given",
     ticks.BAD_ANGLE: "an angle is beyond a stop",
     ticks.BAD_INERTIA: "an inertia is negative",
-    ticks.BAD_VOLTAGE: "a bus voltage is not positive",
+    ticks.BAD_VOLTAGE: "a bus voltage is not positive, or is one that lanes share",
     ticks.BEYOND_RECORD: "a recorded torque ends before",
     NOT_RENEWED: "lanes that run in another way now could not be prepared",
 }

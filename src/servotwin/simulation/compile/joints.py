@@ -1,0 +1,428 @@
+"""Servos at the joints of a rigid-body engine: what happens at its control callback, and its step with them.
+
+Kept and compiled as a derived module, and not imported from here. Words are those of `joints_layout`.
+
+A servo sees the inertia 1/(M⁻¹)ᵢᵢ and the acceleration aᵢ that its joint would have without it. It goes on for a tick
+and ends at another speed; the joint gets the mean torque (Δω/Δt − aᵢ)/(M⁻¹)ᵢᵢ. Of the other servos, which aᵢ needs too,
+those that move have the torques of the last tick; those at rest hold against whatever comes, and theirs are found so
+that none of them moves.
+"""
+
+# numba's own types are not annotated
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped, call-arg, unreachable"
+
+from __future__ import annotations
+
+import math
+
+from numba import cfunc, njit, types  # noqa: F401 - the last lines of the derived module need them
+
+from servotwin.models.engine.observe import Observed
+from servotwin.simulation.compile.intrinsics import activate, active, array_maker, called, told
+from servotwin.simulation.compile.joints_layout import (
+    ASK_NEW,
+    ASK_RESET,
+    ASK_ROOM,
+    BLOCK,
+    DRIVE,
+    FAILED,
+    FOREIGN,
+    GROUP,
+    INSTANCE,
+    KEPT,
+    NOT_FINITE,
+    OF_EACH,
+    PIECE,
+    RECORD,
+    RESTARTED,
+    ROOM,
+    TOO_LONG,
+    WELL,
+)
+
+_words, _numbers = array_maker("<i8", 1, True), array_maker("<f8", 1, True)
+_rows, _bytes, _halves = array_maker("<f8", 2, True), array_maker("|i1", 1, True), array_maker("<i4", 1, True)
+
+_SIGNALS, _OWN_SIGNALS = len(Observed._fields), len(KEPT)
+_SWEEPS = 4  # over servos at rest, which begin with the torques of the tick before
+_RK4 = 1  # MuJoCo's number of it
+_SAME = 1e-6  # of a tick: within it one instant is another
+_HEAD, _EACH = len(BLOCK), len(OF_EACH)
+(_SERVOS, _DOFS, _COORDINATES, _WIDE, _BODIES, _TIMESTEP, _INTEGRATOR, _TIME, _QPOS, _QVEL, _CTRL, _APPLIED, _XFRC,
+ _USERDATA, _XIPOS, _PASSIVE, _BIAS, _ACTUATOR, _CONSTRAINT, _SOLVE, _ACTUATE, _ACCELERATE, _CONSTRAIN, _PUSH, _STEP,
+ _SLOT, _OWN, _OTHERS, _ANGLE_AT, _SPEED_AT, _COMMAND_AT, _GAIN, _ZERO, _ARMATURE, _LOWER, _UPPER, _LOW, _HIGH,
+ _LONGEST, _KEPT_AT, _MEMORY, _INSTANCES, _ASK) = range(len(DRIVE))
+_DATA, _KEPT, _ROOM, _COMMAND, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIAL_NOW = range(len(INSTANCE))
+(_ADVANCE, _TICK, _DURATION, _LOOK, _LANES, _WHICH, _G_ANGLE, _G_SPEED, _G_GOAL, _G_LOAD, _G_INERTIA, _G_REACHED,
+ _G_AFTER, _G_STATUS, _G_SEEN, _PIECES, _PIECE_COUNT) = range(len(GROUP))
+_ROW, _CAPACITY, _USED, _KEPT_ROWS = range(len(RECORD))
+_START, _END, _CALLS, _FRESH, _SERIAL, _RESTORED, _HALF = range(len(BLOCK))
+_R_ANGLE, _R_SPEED, _R_GOAL, _R_LOAD, _R_INERTIA, _R_AFTER, _R_FREE, _R_PASSIVE, _R_PUSHED = range(len(ROOM))
+
+
+@njit(error_model="numpy")
+def _word(base, offset):
+    """Return the word that stands so many bytes behind an address."""
+    return _words(base + offset, (1,))[0]
+
+
+@njit(error_model="numpy")
+def _number(base, offset):
+    """Return the number that stands so many bytes behind an address."""
+    return _numbers(base + offset, (1,))[0]
+
+
+# --- memory -----------------------------------------------------------------------------------------------------------
+
+
+@njit(error_model="numpy")
+def _moved(own, kept, size, back):
+    """Copy so many bytes from one address to another, or `back`; return how many they take there."""
+    whole = size // 8
+    a, b = _words(own, (whole,)), _words(kept, (whole,))
+    for k in range(whole):
+        if back:
+            a[k] = b[k]
+        else:
+            b[k] = a[k]
+    rest = size - 8 * whole
+    c, d = _bytes(own + 8 * whole, (rest,)), _bytes(kept + 8 * whole, (rest,))
+    for k in range(rest):
+        if back:
+            c[k] = d[k]
+        else:
+            d[k] = c[k]
+    return 8 * ((size + 7) // 8)
+
+
+@njit(error_model="numpy")
+def _memories(instance, kept, back):
+    """Copy what all servos remember to an address, or `back`."""
+    groups = _words(instance[_GROUPS], (instance[_COUNT],))
+    for k in range(instance[_COUNT]):
+        group = _words(groups[k], (len(GROUP),))
+        pieces = _words(group[_PIECES], (len(PIECE) * group[_PIECE_COUNT],))
+        for n in range(group[_PIECE_COUNT]):
+            address, rows, stride, size = pieces[4 * n], pieces[4 * n + 1], pieces[4 * n + 2], pieces[4 * n + 3]
+            for row in range(rows):
+                kept += _moved(address + row * stride, kept, size, back)
+
+
+# --- the load ---------------------------------------------------------------------------------------------------------
+
+
+@njit(error_model="numpy")
+def _forces(m, d, drive, constraint, total):
+    """Put the forces at all degrees of freedom into `total`, without those of servos and inertia."""
+    dofs = drive[_DOFS]
+    passive, bias = _numbers(_word(d, drive[_PASSIVE]), (dofs,)), _numbers(_word(d, drive[_BIAS]), (dofs,))
+    applied = _numbers(_word(d, drive[_APPLIED]), (dofs,))
+    for k in range(dofs):
+        total[k] = passive[k] - bias[k] + applied[k] + constraint[k]
+    if drive[_OTHERS] != 0:
+        told(drive[_ACTUATE], (m, d))
+        actuator = _numbers(_word(d, drive[_ACTUATOR]), (dofs,))
+        for k in range(dofs):
+            total[k] += actuator[k]
+    at = _word(d, drive[_XFRC])
+    pushes = _numbers(at, (6 * drive[_BODIES],))
+    for body in range(1, drive[_BODIES]):
+        pushed = 0.0
+        for k in range(6):
+            pushed += abs(pushes[6 * body + k])
+        if pushed != 0.0:
+            told(drive[_PUSH], (m, d, at + 48 * body, at + 48 * body + 24, _word(d, drive[_XIPOS]) + 24 * body, body,
+                                total.ctypes.data))
+
+
+@njit(error_model="numpy")
+def _hold(speed_at, inverse, free, torque, resting):
+    """Find the torques of servos at rest that leave none of them moving, the others' given."""
+    for _ in range(_SWEEPS):
+        for i in range(len(speed_at)):
+            if resting[i] != 0.0:
+                a = free[i]
+                for j in range(len(speed_at)):
+                    if j != i:
+                        a += inverse[i, speed_at[j]] * torque[j]
+                torque[i] = -a / inverse[i, speed_at[i]]
+
+
+@njit(error_model="numpy")
+def _supported(m, d, drive, speed_at, torque):
+    """Let MuJoCo find the forces of contacts and limits under these torques, where no step has found them."""
+    passive = _numbers(_word(d, drive[_PASSIVE]), (drive[_DOFS],))
+    for i in range(len(speed_at)):
+        passive[speed_at[i]] += torque[i]
+    told(drive[_ACTUATE], (m, d))
+    told(drive[_ACCELERATE], (m, d))
+    told(drive[_CONSTRAIN], (m, d))
+    for i in range(len(speed_at)):
+        passive[speed_at[i]] -= torque[i]
+
+
+@njit(error_model="numpy")
+def _stand(d, drive, instance, room):
+    """Put angles, speeds and commands, as the servos see them, into their room; return who has none, or −1."""
+    n = drive[_SERVOS]
+    angle_at, speed_at = _words(drive[_ANGLE_AT], (n,)), _words(drive[_SPEED_AT], (n,))
+    command_at, command = _words(drive[_COMMAND_AT], (n,)), _numbers(instance[_COMMAND], (n,))
+    gain, zero = _numbers(drive[_GAIN], (n,)), _numbers(drive[_ZERO], (n,))
+    lower, upper = _numbers(drive[_LOWER], (n,)), _numbers(drive[_UPPER], (n,))
+    low, high = _numbers(drive[_LOW], (n,)), _numbers(drive[_HIGH], (n,))
+    qpos, qvel, ctrl = _word(d, drive[_QPOS]), _word(d, drive[_QVEL]), _word(d, drive[_CTRL])
+    for i in range(n):
+        q, w = _number(qpos, 8 * angle_at[i]), _number(qvel, 8 * speed_at[i])
+        goal = _number(ctrl, 8 * command_at[i]) if command_at[i] >= 0 else command[i]
+        if not (math.isfinite(q) and math.isfinite(w) and math.isfinite(goal)):
+            return i
+        room[0, i] = min(max((q - zero[i]) / gain[i], lower[i]), upper[i])
+        room[1, i] = w / gain[i]
+        room[2, i] = min(max((goal - zero[i]) / gain[i], low[i]), high[i])
+    return -1
+
+
+# --- the servos -------------------------------------------------------------------------------------------------------
+
+
+@njit(error_model="numpy")
+def _go_on(instance, room, dt, watched):
+    """Let all servos go on for a tick; return who cannot, or −1."""
+    groups = _words(instance[_GROUPS], (instance[_COUNT],))
+    lost = -1
+    for k in range(instance[_COUNT]):
+        group = _words(groups[k], (len(GROUP),))
+        lanes = group[_LANES]
+        which, ends = _words(group[_WHICH], (lanes,)), _numbers(group[_G_AFTER], (lanes,))
+        for row in range(5):
+            values = _numbers(group[_G_ANGLE + row], (lanes,))
+            for n in range(lanes):
+                values[n] = room[row, which[n]]
+        _numbers(group[_DURATION], (1,))[0] = dt
+        _words(group[_LOOK], (1,))[0] = group[_G_LOAD] if watched else 0
+        if called(group[_ADVANCE], group[_TICK]) != 0:
+            return which[0]
+        status = _bytes(group[_G_STATUS], (lanes,))
+        for n in range(lanes):
+            room[5, which[n]] = ends[n]
+            if status[n] != 0:
+                lost = which[n]
+    return lost
+
+
+@njit(error_model="numpy")
+def _keep(drive, instance, room, torque, time, again):
+    """Write what shows of all servos into a row of the record; `again` over the last one."""
+    record = _words(instance[_RECORD], (len(RECORD),))
+    if again and record[_USED] > 0:
+        record[_USED] -= 1
+    if record[_USED] == record[_CAPACITY] and told(drive[_ASK], (ASK_ROOM, instance[_DATA], 0)) == 0:
+        return
+    row = _numbers(record[_KEPT_ROWS] + 8 * record[_ROW] * record[_USED], (record[_ROW],))
+    record[_USED] += 1
+    row[0] = time
+    groups = _words(instance[_GROUPS], (instance[_COUNT],))
+    for k in range(instance[_COUNT]):
+        group = _words(groups[k], (len(GROUP),))
+        lanes = group[_LANES]
+        which, seen = _words(group[_WHICH], (lanes,)), _rows(group[_G_SEEN], (lanes, _SIGNALS))
+        reached = _numbers(group[_G_REACHED], (lanes,))
+        for n in range(lanes):
+            i = which[n]
+            at = 1 + (_OWN_SIGNALS + _SIGNALS) * i
+            row[at], row[at + 1], row[at + 2], row[at + 3] = reached[n], room[_R_AFTER, i], room[_R_GOAL, i], torque[i]
+            for s in range(_SIGNALS):
+                row[at + _OWN_SIGNALS + s] = seen[n, s]
+
+
+@njit(error_model="numpy")
+def _complain(instance, code, culprit):
+    """Keep what went wrong first."""
+    if instance[_CODE] == WELL:
+        instance[_CODE], instance[_CULPRIT] = code, culprit
+
+
+@njit(error_model="numpy")
+def _find_loads(m, d, drive, block, inverse, room, known, again):
+    """Put load and inertia that each servo meets in this tick into its room, and its free acceleration."""
+    n, dofs = drive[_SERVOS], drive[_DOFS]
+    first = _HEAD + _EACH * n
+    torque, resting, constraint = block[_HEAD:_HEAD + n], block[_HEAD + n:_HEAD + 2 * n], block[first:first + dofs]
+    speed_at, found = _words(drive[_SPEED_AT], (n,)), _numbers(_word(d, drive[_CONSTRAINT]), (dofs,))
+    total = inverse[n]
+    if not again:
+        for k in range(dofs):
+            constraint[k] = found[k] if known else 0.0
+    for turn in range(1 if known or again else 2):
+        _forces(m, d, drive, constraint, total)
+        for i in range(n):
+            free = 0.0
+            for k in range(dofs):
+                free += inverse[i, k] * total[k]
+            room[_R_FREE, i] = free
+        _hold(speed_at, inverse, room[_R_FREE], torque, resting)
+        if turn == 0 and not (known or again):
+            _supported(m, d, drive, speed_at, torque)
+            for k in range(dofs):
+                constraint[k] = found[k]
+    gain, armature = _numbers(drive[_GAIN], (n,)), _numbers(drive[_ARMATURE], (n,))
+    for i in range(n):
+        a, J = room[_R_FREE, i], 1.0 / inverse[i, speed_at[i]]
+        for j in range(n):
+            if j != i:
+                a += inverse[i, speed_at[j]] * torque[j]
+        room[_R_FREE, i] = a
+        room[_R_LOAD, i] = -a * J * gain[i]
+        room[_R_INERTIA, i] = max(J - armature[i], 0.0) * gain[i] * gain[i]
+
+
+@njit(error_model="numpy")
+def _tick(m, d, drive, instance, block, room, dt, again):
+    """Let the servos go on from the beginning of the tick, and find the torques that the joints get meanwhile."""
+    n, dofs = drive[_SERVOS], drive[_DOFS]
+    at = instance[_ROOM]
+    torque, resting = block[_HEAD:_HEAD + n], block[_HEAD + n:_HEAD + 2 * n]
+    known = block[_FRESH] == 0.0 and (block[_RESTORED] != 0.0 or block[_SERIAL] == instance[_SERIAL_NOW])
+    block[_RESTORED] = 0.0
+    inverse = _rows(at + 8 * n * dofs, (n + 1, dofs))  # and a row for the forces
+    told(drive[_SOLVE], (m, d, at + 8 * n * dofs, at, n))
+    _find_loads(m, d, drive, block, inverse, room, known, again)
+    record = _words(instance[_RECORD], (len(RECORD),))
+    culprit = _go_on(instance, room, dt, record[_ROW] > 0)
+    if culprit >= 0:
+        torque[:] = 0.0
+        _complain(instance, FAILED, culprit)
+        return
+    speed_at, gain = _words(drive[_SPEED_AT], (n,)), _numbers(drive[_GAIN], (n,))
+    for i in range(n):
+        change = (room[_R_AFTER, i] - room[_R_SPEED, i]) * gain[i]
+        torque[i] = (change / dt - room[_R_FREE, i]) / inverse[i, speed_at[i]]
+        resting[i] = 1.0 if room[_R_AFTER, i] == 0.0 else 0.0
+    if record[_ROW] > 0:
+        _keep(drive, instance, room, torque, block[_END], again)
+
+
+@njit(error_model="numpy")
+def _is_stage(block, t, dt):
+    """Tell whether this call is one of those of RK4 after the first in a step."""
+    calls = int(block[_CALLS])
+    if calls < 1 or calls > 3:
+        return False
+    return abs(t - block[_START] - (0.5 * dt if calls < 3 else dt)) <= _SAME * dt
+
+
+@njit(error_model="numpy")
+def _begin(d, drive, instance, block, halves, t, dt):
+    """Find out where in time this call stands, and let the servos stand there; return whether this tick was met before.
+
+    Time that goes on by a tick goes on from what the servos remember at its end; the same instant once more begins the
+    tick anew; any other instant is a new beginning for the servos too, at rest.
+    """
+    n, size = drive[_SERVOS], drive[_MEMORY]
+    met = block[_CALLS] > 0.0
+    again = met and block[_FRESH] == 0.0 and abs(t - block[_START]) <= _SAME * dt
+    onward = met and not again and abs(t - block[_END]) <= _SAME * dt
+    if onward:
+        block[_HALF], block[_FRESH] = 1.0 - block[_HALF], 0.0
+    half = halves + 8 * size * int(block[_HALF])
+    if again or (onward and block[_SERIAL] != instance[_SERIAL_NOW]):
+        _memories(instance, half, True)
+    now, before = block[_HEAD:_HEAD + 2 * n], block[_HEAD + 2 * n:_HEAD + 4 * n]
+    if again:
+        now[:] = before
+    else:
+        if not onward:
+            told(drive[_ASK], (ASK_RESET, instance[_DATA], 0))
+            block[_FRESH] = 1.0
+            _memories(instance, half, False)
+            speed_at, qvel = _words(drive[_SPEED_AT], (n,)), _word(d, drive[_QVEL])
+            for i in range(n):
+                now[i], now[n + i] = 0.0, 1.0 if _number(qvel, 8 * speed_at[i]) == 0.0 else 0.0
+        before[:] = now
+    block[_START], block[_END], block[_CALLS] = t, t + dt, 1.0
+    return again
+
+
+@njit(error_model="numpy")
+def _instance_at(m, d, drive):
+    """Return the address of the servos in this data, which Python makes where it is new; 0: it could not."""
+    count = _words(drive[_INSTANCES], (1,))[0]
+    known = _words(drive[_INSTANCES] + 8, (2 * count,))
+    for k in range(count):
+        if known[2 * k] == d:
+            return known[2 * k + 1]
+    return told(drive[_ASK], (ASK_NEW, m, d))
+
+
+@njit(error_model="numpy")
+def _is_own(m, drive):
+    """Tell whether a model is one of those that the servos are for, by its numbers of coordinates."""
+    if drive[_WIDE] != 0:
+        return _word(m, 0) == drive[_COORDINATES] and _word(m, 8) == drive[_DOFS]
+    sizes = _halves(m, (2,))
+    return sizes[0] == drive[_COORDINATES] and sizes[1] == drive[_DOFS]
+
+
+@njit(error_model="numpy")
+def _control(m, d, drive_at):
+    """Give the servos' torques to the joints, at the control callback of the engine's step."""
+    drive = _words(drive_at, (len(DRIVE),))
+    n, dofs, size = drive[_SERVOS], drive[_DOFS], drive[_MEMORY]
+    at = _instance_at(m, d, drive) if _is_own(m, drive) else 0
+    if at == 0:
+        return
+    instance = _words(at, (len(INSTANCE),))
+    kept = instance[_KEPT] if drive[_KEPT_AT] < 0 else _word(d, drive[_USERDATA]) + 8 * drive[_KEPT_AT]
+    head = _HEAD + _EACH * n + dofs
+    block, halves = _numbers(kept, (head,)), kept + 8 * head
+    room = _rows(instance[_ROOM] + 8 * dofs * (2 * n + 1), (len(ROOM), n))
+    passive, speed_at = _numbers(_word(d, drive[_PASSIVE]), (dofs,)), _words(drive[_SPEED_AT], (n,))
+    for i in range(n):
+        if passive[speed_at[i]] == room[_R_PUSHED, i]:  # not worked out anew since the last call
+            passive[speed_at[i]] = room[_R_PASSIVE, i]
+        room[_R_PASSIVE, i] = passive[speed_at[i]]
+    t, dt = _number(d, drive[_TIME]), _number(m, drive[_TIMESTEP])
+    if _halves(m + drive[_INTEGRATOR], (1,))[0] == _RK4 and _is_stage(block, t, dt):
+        block[_CALLS] += 1.0
+    else:
+        culprit = _stand(d, drive, instance, room)
+        if culprit >= 0 or dt > _number(drive_at, 8 * _LONGEST) * (1.0 + _SAME):
+            _complain(instance, NOT_FINITE if culprit >= 0 else TOO_LONG, max(culprit, 0))
+            return
+        again = _begin(d, drive, instance, block, halves, t, dt)
+        _tick(m, d, drive, instance, block, room, dt, again)
+        instance[_SERIAL_NOW] += 1
+        block[_SERIAL] = instance[_SERIAL_NOW]
+        _memories(instance, halves + 8 * size * (1 - int(block[_HALF])), False)
+    for i in range(n):
+        passive[speed_at[i]] += block[_HEAD + i]
+        room[_R_PUSHED, i] = passive[speed_at[i]]
+
+
+def control(m, d):
+    """Be MuJoCo's control callback; without a model `d` is the address of the drive whose servos are meant."""
+    if m == 0:
+        activate(d)
+        return
+    drive = active()
+    if drive != 0:
+        _control(m, d, drive)
+
+
+def step(drive_at, m, d, steps):
+    """Let the engine go on with the servos, under this callback alone; return `WELL` or what is wrong."""
+    drive = _words(drive_at, (len(DRIVE),))
+    slot = _words(drive[_SLOT], (1,))
+    before = slot[0]
+    if before != 0 and before != drive[_OWN]:
+        return FOREIGN
+    slot[0] = drive[_OWN]
+    code = WELL
+    for _ in range(steps):
+        t = _number(d, drive[_TIME])
+        told(drive[_STEP], (m, d))
+        if not _number(d, drive[_TIME]) > t:
+            code = RESTARTED
+            break
+    slot[0] = before
+    return code

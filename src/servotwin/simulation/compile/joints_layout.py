@@ -1,0 +1,51 @@
+"""The words of servos at the joints of a rigid-body engine, as compiled code reads them; each has eight bytes."""
+
+from __future__ import annotations
+
+PLACES = ("time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "userdata", "xipos", "qfrc_passive",
+          "qfrc_bias", "qfrc_actuator", "qfrc_constraint")
+"""Of the engine's data: how many bytes behind its beginning the time stands, and the addresses of arrays."""
+FUNCTIONS = ("mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration", "mj_fwdConstraint", "mj_applyFT", "mj_step")
+"""Addresses of functions of the engine."""
+ARRAYS = ("angle_at", "speed_at", "command_at", "gain", "zero", "armature", "lower", "upper", "low", "high")
+"""Of each servo: places in qpos, qvel and ctrl (or −1); what a turn of the servo is at the joint, and where it begins;
+its own inertia there; ends of its travel, and of its commands."""
+DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integrator", *PLACES, *FUNCTIONS, "slot", "own",
+         "others", *ARRAYS, "longest", "kept_at", "memory", "instances", "ask")
+"""All that servos share, wherever they are simulated."""
+INSTANCE = ("data", "block", "room", "command", "record", "groups", "count", "code", "culprit", "serial")
+"""Servos in one of the engine's data; `room` is for numbers that are worked out anew at each tick."""
+ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "acceleration", "passive", "pushed")
+"""Numbers of each servo there, behind the unit rows of their degrees of freedom, those of M⁻¹, and all forces. The last
+two are the passive force of its joint without its torque, and with it."""
+GROUP = ("advance", "tick", "duration", "look", "lanes", "which", "angle", "speed", "goal", "load", "inertia", "reached",
+         "after", "status", "seen", "pieces", "count")
+"""Servos of one model there, `which` of all: the function that lets them go on, its struct, where in this the duration
+and the address of a signal stand, and arrays."""
+PIECE = ("address", "rows", "stride", "bytes")
+"""A part of their memory."""
+RECORD = ("row", "capacity", "used", "rows")
+"""What is kept of a run: numbers in a row, rows that there is room for, that there are, and where."""
+KEPT = ("output_angle", "output_speed", "command_angle", "joint_torque")
+"""Of each servo in a row of the record, before what `models.engine.observe` sees; the time of the row stands first."""
+BLOCK = ("start", "end", "calls", "fresh", "serial", "restored", "half")
+"""What servos remember of a tick: its times, the calls of the engine's step in it, whether it is the first, who worked
+it out last, whether it was restored with its constraint forces, and which half of the memories is that of its beginning.
+Behind it stand the numbers of `OF_EACH`, the
+constraint forces that it took, and both halves."""
+OF_EACH = ("torque", "resting", "torque before", "resting before")
+"""Numbers of each servo in a block: mean torque over the tick, and whether it rests at the end."""
+
+ASK_NEW, ASK_RESET, ASK_ROOM = range(3)
+"""What compiled code asks Python for."""
+
+WELL, NOT_FINITE, TOO_LONG, FAILED, REFUSED, FOREIGN, RESTARTED = range(7)
+MESSAGES = {
+    NOT_FINITE: "its angle, speed or command in MuJoCo is not a number",
+    TOO_LONG: "MuJoCo's step is longer than a frame of the servo",
+    FAILED: "the servo cannot go on",
+    REFUSED: "the servos could not be set up",
+    FOREIGN: "another control callback is installed",
+    RESTARTED: "MuJoCo has met a number that is not finite, or too large, and has started anew",
+}
+"""What can be wrong."""
