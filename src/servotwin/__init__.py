@@ -27,7 +27,7 @@ _LAZY = {
                      "validate"), "identification"),
 }
 _MODULES = ("bench", "datasheet", "errors", "identification", "linear", "loads", "logs", "models", "parameters",
-            "physics", "plotting", "signals", "simulation", "studies", "units")
+            "physics", "plotting", "robots", "signals", "simulation", "studies", "units")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 

@@ -1,0 +1,207 @@
+"""Which servos of a robot run together, and their simulators in one of MuJoCo's data."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.models import Model
+from servotwin.parameters.groups import Supply
+from servotwin.robots.mount import Joint
+from servotwin.simulation import VectorSimulator
+from servotwin.simulation.c_entry import CEntry
+from servotwin.simulation.compile.joints_layout import GROUP, INSTANCE, PIECE, RECORD, ROOM
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+OF_SHAFT = ("output_angle", "output_speed")
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Servos of one model, or of one kind on shared supplies.
+
+    Parameters
+    ----------
+    model : Model
+        Of the first of them.
+    which : ndarray of int64
+        Their numbers among all.
+    parameters : mapping
+        What differs among them.
+    bus : list of tuple (Supply, lanes)
+    """
+
+    model: Model
+    which: Indices
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    bus: Sequence[tuple[Supply, list[int]]] = ()
+
+    def simulator(self) -> VectorSimulator:
+        """Return a simulator of them."""
+        return VectorSimulator(self.model, len(self.which), parameters=self.parameters, bus=list(self.bus) or None,
+                               threads=1)
+
+
+def crews_of(joints: Sequence[Joint], bus: Any) -> list[Crew]:
+    """Return all servos as crews.
+
+    Raises
+    ------
+    InputError
+        If `bus` is no supply, names a joint without a servo or one twice, or has servos of several kinds.
+    """
+    buses = _buses(joints, bus)
+    shared = [k for _, own in buses for k in own]
+    crews = [_sharing(joints, buses)] if buses else []
+    alone = [k for k in range(len(joints)) if k not in shared]
+    while alone:
+        first = joints[alone[0]].mount.model
+        own = [k for k in alone if _alike(joints[k].mount.model, first)]
+        crews.append(Crew(first, np.array(own)))
+        alone = [k for k in alone if k not in own]
+    return crews
+
+
+def _alike(a: Model, b: Model) -> bool:
+    return a is b or (type(a) is type(b) and a.servo == b.servo)
+
+
+def _buses(joints: Sequence[Joint], bus: Any) -> list[tuple[Supply, list[int]]]:
+    """Return supplies with the numbers of the servos on each."""
+    if bus is None:
+        return []
+    names = [joint.name for joint in joints]
+    given = [(bus, names)] if isinstance(bus, Supply) else bus
+    if not isinstance(given, Sequence) or not all(isinstance(one, Sequence) and len(one) == 2 for one in given):
+        raise InputError("bus", got=bus, allowed="a Supply that all servos share, or a list of (Supply, joints)")
+    found, seen = list[tuple[Supply, list[int]]](), set[str]()
+    for supply, some in given:
+        for name in some:
+            if name not in names:
+                raise UnknownNameError("joint with a servo", name, names)
+            if name in seen:
+                raise InputError(f"bus of joint {name}", got="two", allowed="one supply at most")
+            seen.add(name)
+        found.append((supply, [names.index(name) for name in some]))
+    return found
+
+
+def _sharing(joints: Sequence[Joint], buses: list[tuple[Supply, list[int]]]) -> Crew:
+    """Return the servos on buses, which have to be of one kind, with what differs among them."""
+    which = [k for _, own in buses for k in own]
+    models = [joints[k].mount.model for k in which]
+    first = models[0]
+    for k, model in zip(which, models, strict=True):
+        if type(model) is not type(first):
+            raise InputError(f"servo of joint {joints[k].name} on a bus", got=type(model).__name__,
+                             allowed=f"{type(first).__name__}, as joint {joints[which[0]].name}: servos on shared "
+                             "supplies are of one kind")
+    parameters: dict[str, Any] = {}
+    for name in (*first.requires, *first.optional):
+        values = [model.servo.get(name) for model in models]
+        if all(value == values[0] for value in values) or name.startswith("supply."):
+            continue
+        if any(value is None or not isinstance(value, int | float | str) for value in values):
+            absent = next(joints[k].name for k, value in zip(which, values, strict=True)
+                          if value is None or not isinstance(value, int | float | str))
+            raise InputError(f"{name} of servos on a bus", got=f"none at joint {absent}",
+                             allowed="a number of each servo, or of none: give it in its file")
+        parameters[name] = values
+    places = {k: n for n, k in enumerate(which)}
+    return Crew(first, np.array(which), parameters, [(supply, [places[k] for k in own]) for supply, own in buses])
+
+
+class Berth:
+    """A crew in one of MuJoCo's data: its simulator, and the words by which compiled code lets it go on."""
+
+    def __init__(self, crew: Crew) -> None:
+        self.crew, self.sims = crew, crew.simulator()
+        count = len(crew.which)
+        self.entry: CEntry = self.sims.c_entry()
+        self._arrays = {name: np.zeros(count) for name in ("angle", "speed", "goal", "load", "inertia", "reached", "after")}
+        self._status, own = np.zeros(count, np.int8), self._arrays
+        self.tick = self.entry.tick(
+            0.0, command_angle=own["goal"], external_torque=own["load"], set_output_angle=own["angle"],
+            set_output_speed=own["speed"], set_load_inertia=own["inertia"], output_angle=own["reached"],
+            output_speed=own["after"], armature_current=np.zeros(count), status=self._status)
+        self._look = type(self.tick).armature_current.offset
+        self.pieces = self.entry.memory()
+        self._pieces = np.array(self.pieces, np.int64)
+        self.words = np.zeros(len(GROUP), np.int64)
+        at = ctypes.addressof(self.tick)
+        values = {"advance": self.entry.address, "tick": at, "duration": at + type(self.tick).duration.offset,
+                  "look": at + self._look, "lanes": count, "which": crew.which.ctypes.data,
+                  **{name: array.ctypes.data for name, array in own.items()}, "status": self._status.ctypes.data,
+                  "seen": self.entry.seen.ctypes.data, "pieces": self._pieces.ctypes.data, "count": len(self.pieces)}
+        self.words[:] = [values[name] for name in GROUP]
+
+    @property
+    def size(self) -> int:
+        """Words that the memories of the crew take."""
+        return sum(piece.rows * (-(-piece.bytes // 8)) for piece in self.pieces)
+
+    def reset(self, angle: Array, goal: Array) -> None:
+        """Let the servos begin anew, at rest at these angles [rad] under these commands."""
+        self.sims.reset(command_angle=goal[self.crew.which], output_angle=angle[self.crew.which])
+
+
+class Instance:
+    """All servos of a robot in one of MuJoCo's data.
+
+    Parameters
+    ----------
+    address : int
+        Of the data.
+    crews : sequence of Crew
+    joints : sequence of Joint
+    dofs : int
+        Of the model.
+    head : int
+        Words of a block before the memories.
+    """
+
+    def __init__(self, address: int, crews: Sequence[Crew], joints: Sequence[Joint], dofs: int, head: int,
+                 serial: int) -> None:
+        count = len(joints)
+        self.address = address
+        self.berths = [Berth(crew) for crew in crews]
+        self.size = sum(berth.size for berth in self.berths)
+        self.block = np.zeros(head + 2 * self.size)
+        self.command = np.zeros(count)
+        self.record_words = np.zeros(len(RECORD), np.int64)
+        self.rows = np.zeros((0, 0))
+        self._room = np.zeros((2 * count + 1) * dofs + len(ROOM) * count)
+        for i, joint in enumerate(joints):
+            self._room[i * dofs + joint.speed_at] = 1.0
+        self.room = self._room[(2 * count + 1) * dofs:].reshape(len(ROOM), count)
+        self.room[-1] = np.nan
+        self._groups = np.array([berth.words.ctypes.data for berth in self.berths], np.int64)
+        self.words = np.zeros(len(INSTANCE), np.int64)
+        values = {"data": address, "block": self.block.ctypes.data, "room": self._room.ctypes.data,
+                  "command": self.command.ctypes.data, "record": self.record_words.ctypes.data,
+                  "groups": self._groups.ctypes.data, "count": len(self.berths), "serial": serial}
+        self.words[:] = [values.get(name, 0) for name in INSTANCE]
+
+    def reset(self) -> None:
+        """Let all servos begin anew where compiled code has seen them."""
+        angle, goal = self.room[ROOM.index("angle")], self.room[ROOM.index("goal")]
+        for berth in self.berths:
+            berth.reset(angle, goal)
+        self.record_words[RECORD.index("used")] = 0
+
+    def keep(self, row: int, capacity: int) -> None:
+        """Keep rows of so many numbers of what shows, as many as there were and up to `capacity`; 0: none."""
+        rows = np.zeros((capacity, max(row, 1)))
+        used = int(self.record_words[RECORD.index("used")]) if row else 0
+        rows[:used] = self.rows[:used] if used else 0.0
+        self.rows = rows
+        self.record_words[:] = [row, capacity, used, rows.ctypes.data]
+
+

@@ -1,0 +1,157 @@
+"""How a servo sits at a joint of a robot: where its zero is, which way it turns, and through what ratio."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.models import BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
+from servotwin.robots.places import load_mujoco
+from servotwin.units import is_finite
+
+SERVOS = (BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
+_PASSIVE = {"dof_damping": "damping", "dof_frictionloss": "friction loss"}
+
+
+@dataclass(frozen=True)
+class Mount:
+    """A servo at a joint: angle of the joint = `zero` + `direction` · `ratio` · angle of the servo.
+
+    Parameters
+    ----------
+    model : BoundedServo, PulseServo, PulseServoInductive or DigitalServo
+    zero : float
+        Of the joint where the servo's angle is 0: angle of a hinge [rad], place of a slide [m].
+    direction : int
+        1, or −1 where the joint turns the other way.
+    ratio : float
+        Of a hinge: turns of the joint per turn of the servo; of a slide: radius of the pinion [m/rad].
+
+    Raises
+    ------
+    InputError
+        If the model is none of these, or a number is not possible.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> servo = st.PulseServo(st.load_servo("hitec-hs-755hb"))
+    >>> Mount(servo, zero=-1.57, direction=-1).direction
+    -1
+    """
+
+    model: Model
+    zero: float = 0.0
+    direction: int = 1
+    ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check."""
+        if not isinstance(self.model, SERVOS):
+            raise InputError("servo of a joint", got=self.model, allowed=" or ".join(kind.__name__ for kind in SERVOS))
+        if not is_finite(self.zero):
+            raise InputError("zero of a servo", got=self.zero, allowed="a finite number of rad (hinge) or m (slide)")
+        if self.direction not in (1, -1):
+            raise InputError("direction of a servo", got=self.direction, allowed="1 or -1")
+        if not is_finite(self.ratio) or not self.ratio > 0.0:
+            raise InputError("ratio of a servo", got=self.ratio,
+                             allowed="a positive number: turns of a hinge per turn, or m/rad of a slide")
+
+    @property
+    def gain(self) -> float:
+        """Of the joint per angle of the servo, with its sign."""
+        return self.direction * self.ratio
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint that a servo moves.
+
+    Parameters
+    ----------
+    name : str
+    number : int
+        Of the joint in its model.
+    angle_at, speed_at : int
+        Its places in qpos and qvel.
+    actuator : int
+        Number of the actuator whose `ctrl` commands it, −1 where there is none.
+    """
+
+    name: str
+    mount: Mount
+    number: int
+    angle_at: int
+    speed_at: int
+    actuator: int
+    command_at: int
+
+
+def joints_of(model: Any, servos: dict[str, Any], friction: str) -> list[Joint]:
+    """Return the joints of an MjModel that servos move, checked.
+
+    Raises
+    ------
+    InputError
+        If a joint is not there, is neither hinge nor slide, or has friction of its own that `friction` does not say
+        what to do with; or several actuators move it.
+    """
+    mujoco = load_mujoco()
+    known = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, k) or "" for k in range(model.njnt)]
+    found = []
+    for name, given in servos.items():
+        mount = given if isinstance(given, Mount) else Mount(given)
+        if name not in known:
+            _refuse(mujoco, model, name, known)
+        number = known.index(name)
+        kind = mujoco.mjtJoint(model.jnt_type[number])
+        if kind not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
+            raise InputError(f"joint {name}", got=f"a {kind.name.removeprefix('mjJNT_').lower()} joint",
+                             allowed="a hinge or a slide: one servo moves one degree of freedom")
+        dof = int(model.jnt_dofadr[number])
+        actuator, command_at = _actuator(mujoco, model, name, number)
+        found.append(Joint(name, mount, number, int(model.jnt_qposadr[number]), dof, actuator, command_at))
+    _treat_friction(model, found, friction)
+    return found
+
+
+def _refuse(mujoco: Any, model: Any, name: str, known: list[str]) -> None:
+    """Raise InputError for what is not a joint, and say what it is instead."""
+    tendon = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name)
+    if tendon >= 0:
+        raise InputError(f"joint {name}", got="a tendon", allowed="a hinge or a slide: a servo sits at a joint")
+    raise UnknownNameError("joint", name, [one for one in known if one])
+
+
+def _actuator(mujoco: Any, model: Any, name: str, joint: int) -> tuple[int, int]:
+    """Return the one actuator at a joint, and the place of its control; −1 where there is none."""
+    at_joint = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    own = [k for k in range(model.nu) if model.actuator_trntype[k] in at_joint and model.actuator_trnid[k, 0] == joint]
+    if len(own) > 1:
+        names = ", ".join(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or str(k) for k in own)
+        raise InputError(f"actuators of joint {name}", got=names, allowed="one, whose control commands the servo")
+    return (own[0], own[0]) if own else (-1, -1)
+
+
+def _treat_friction(model: Any, joints: list[Joint], friction: str) -> None:
+    """Refuse, clear or keep what the joints have of friction themselves."""
+    if friction not in ("refuse", "clear", "keep"):
+        raise InputError("joint_friction", got=friction, allowed="'refuse', 'clear' or 'keep'")
+    dofs = [joint.speed_at for joint in joints]
+    if friction == "clear":
+        for field in _PASSIVE:
+            getattr(model, field)[dofs] = 0.0
+    if friction != "refuse":
+        return
+    for field, word in _PASSIVE.items():
+        own = [f"{joint.name} {getattr(model, field)[joint.speed_at]:g}" for joint in joints
+               if np_any(getattr(model, field)[joint.speed_at])]
+        if own:
+            raise InputError(f"{word} of joints with servos", got=", ".join(own), allowed="0, for friction is the "
+                             "servo's: joint_friction='clear' sets it so, 'keep' leaves it as the bearing's")
+
+
+def np_any(value: Any) -> bool:
+    """Tell whether a number of MuJoCo's, which may be a row of them, is not zero."""
+    return bool((value != 0.0).any())

@@ -1,0 +1,169 @@
+"""What the servos of a robot have done: their signals at the end of each tick, as `simulate` names them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import MissingExtraError, UnknownNameError
+from servotwin.models.engine.observe import Observed
+from servotwin.models.outputs import SIGNALS
+from servotwin.robots.mount import Mount
+from servotwin.simulation import files
+from servotwin.simulation.compile.joints_layout import KEPT
+from servotwin.simulation.remarks import TRIPS, Remark
+from servotwin.simulation.vector import AT_MOTOR
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+Array = NDArray[np.float64]
+_COLUMNS = (*KEPT, *Observed._fields)
+_OF_JOINT = {"joint_angle": ("rad", "m"), "joint_command": ("rad", "m"), "joint_torque": ("N m", "N")}
+
+
+@dataclass(frozen=True, eq=False)
+class ServoRecord(Mapping[str, Array]):
+    """What one servo has done: signals (SI) by name, shape (n,), as those of a `Result`.
+
+    Beside those of its model there are `joint_angle` and `joint_command`, the angle [rad] or place [m] of the joint and
+    what was asked of it, and `joint_torque`, the mean torque [N m] or force [N] that the joint has got in the tick.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Ends of the ticks [s].
+    mount : Mount
+    columns : ndarray, shape (n, signals)
+    """
+
+    time: Array
+    mount: Mount
+    columns: Array
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all signals, `time` first."""
+        available = self.mount.model.available
+        return ("time", *(name for name in _COLUMNS if name in available), *_OF_JOINT)
+
+    def unit(self, name: str, *, slides: bool = False) -> str:
+        """Return the SI unit of a signal."""
+        if name in _OF_JOINT:
+            return _OF_JOINT[name][slides]
+        return "s" if name == "time" else SIGNALS[name].unit
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a signal; KeyError with the names that there are, if it is none of them."""
+        if name not in self.names:
+            raise UnknownNameError(f"signal of {type(self.mount.model).__name__} at a joint", name, self.names)
+        if name == "time":
+            return self.time
+        mount = self.mount
+        if name in ("joint_angle", "joint_command"):
+            own = "output_angle" if name == "joint_angle" else "command_angle"
+            return np.asarray(mount.zero + mount.gain * self.columns[:, _COLUMNS.index(own)])
+        values = self.columns[:, _COLUMNS.index(name)]
+        if name in AT_MOTOR:
+            return np.asarray(AT_MOTOR[name](values, mount.model.value("gear.gear_reduction")))
+        return values
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def peak(self, name: str) -> float:
+        """Return the largest magnitude of a signal among the ends of the ticks; nan where there is none."""
+        return float(np.abs(self[name]).max()) if len(self.time) else math.nan
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """First trip by each protection, (kind, time [s])."""
+        if "trip" not in self.names:
+            return ()
+        trips = self["trip"]
+        found = [(float(self.time[np.argmax(trips == k)]), kind) for k, kind in enumerate(TRIPS, 1) if (trips == k).any()]
+        return tuple(Remark(f"tripped by {kind}", time) for time, kind in sorted(found))
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return all signals (SI) as a pandas DataFrame, indexed by time [s]."""
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingExtraError("pandas", "data") from None
+        return pd.DataFrame({name: self[name] for name in self.names[1:]}, index=pd.Index(self.time, name="time"))
+
+
+class Record(Mapping[str, ServoRecord]):
+    """What all servos of a robot have done, by the names of their joints.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Ends of the ticks [s].
+
+    Examples
+    --------
+    >>> import mujoco
+    >>> import servotwin as st
+    >>> arm = '''<mujoco><worldbody><body><joint name="elbow" axis="0 1 0"/>
+    ...   <geom type="capsule" fromto="0 0 0 0.1 0 0" size=".01" mass=".05"/></body></worldbody></mujoco>'''
+    >>> drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(arm),
+    ...                              {"elbow": st.PulseServo(st.load_servo("hitec-hs-755hb"))})
+    >>> data = mujoco.MjData(drive.model)
+    >>> drive.record(data)
+    >>> drive.command(data, {"elbow": 0.5})
+    >>> drive.step(data, 100)
+    >>> result = drive.result(data)
+    >>> result["elbow"]["armature_current"].shape, bool(result["elbow"].peak("supply_current") > 0.5)
+    ((100,), True)
+    """
+
+    def __init__(self, joints: tuple[str, ...], mounts: Mapping[str, Mount], rows: Array) -> None:
+        self.time = rows[:, 0].copy()
+        width = len(_COLUMNS)
+        self._servos = {name: ServoRecord(self.time, mounts[name], rows[:, 1 + width * k:1 + width * (k + 1)])
+                        for k, name in enumerate(joints)}
+
+    @staticmethod
+    def width(servos: int) -> int:
+        """Return how many numbers a row has."""
+        return 1 + len(_COLUMNS) * servos
+
+    def __getitem__(self, name: str) -> ServoRecord:
+        """Return what one servo has done."""
+        if name not in self._servos:
+            raise UnknownNameError("joint with a servo", name, tuple(self._servos))
+        return self._servos[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._servos)
+
+    def __len__(self) -> int:
+        """Return the number of servos."""
+        return len(self._servos)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write all signals of all joints to a CSV file, `joint.signal` with its unit in each column's name.
+
+        Raises
+        ------
+        OutputExistsError, OutputError
+            If the file exists and `overwrite` is false, or it cannot be written.
+        """
+        signals, units = {"time": self.time}, {"time": "s"}
+        for joint, servo in self._servos.items():
+            for name in servo.names[1:]:
+                if name in SIGNALS:
+                    signals[f"{joint}.{name}"], units[f"{joint}.{name}"] = servo[name], SIGNALS[name].unit
+        files.save_csv(path, signals, units, overwrite=overwrite)
