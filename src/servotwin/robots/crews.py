@@ -177,10 +177,11 @@ class Instance:
         self.command = np.zeros(count)
         self.record_words = np.zeros(len(RECORD), np.int64)
         self.rows = np.zeros((0, 0))
-        self._room = np.zeros((2 * count + 1) * dofs + len(ROOM) * count)
+        behind = (2 * count + 1) * dofs + count * count
+        self._room = np.zeros(behind + len(ROOM) * count)
         for i, joint in enumerate(joints):
             self._room[i * dofs + joint.speed_at] = 1.0
-        self.room = self._room[(2 * count + 1) * dofs:].reshape(len(ROOM), count)
+        self.room = self._room[behind:].reshape(len(ROOM), count)
         self.room[-1] = np.nan
         self._groups = np.array([berth.words.ctypes.data for berth in self.berths], np.int64)
         self.words = np.zeros(len(INSTANCE), np.int64)

@@ -3,9 +3,12 @@
 Kept and compiled as a derived module, and not imported from here. Words are those of `joints_layout`.
 
 A servo sees the inertia 1/(M⁻¹)ᵢᵢ and the acceleration aᵢ that its joint would have without it. It goes on for a tick
-and ends at another speed; the joint gets the mean torque (Δω/Δt − aᵢ)/(M⁻¹)ᵢᵢ. Of the other servos, which aᵢ needs too,
-those that move have the torques of the last tick; those at rest hold against whatever comes, and theirs are found so
-that none of them moves.
+and ends at another speed; the joint gets the mean torque τᵢ = (Δω/Δt − aᵢ)/(M⁻¹)ᵢᵢ. The torques of the other servos,
+which aᵢ needs too, are predicted: each is what it was, less its share of what another aᵢ asks of it; one at rest takes up
+all. Where that was wrong by more than a speed that does not count, all go through the tick again.
+
+The servo keeps the angle that it has reached, plus what the engine's differs from the one that its way of integrating
+leads to with these speeds: else a shaft that comes to rest on a tooth within a tick would float before it for ever.
 """
 
 # numba's own types are not annotated
@@ -44,7 +47,11 @@ _words, _numbers = array_maker("<i8", 1, True), array_maker("<f8", 1, True)
 _rows, _bytes, _halves = array_maker("<f8", 2, True), array_maker("|i1", 1, True), array_maker("<i4", 1, True)
 
 _SIGNALS, _OWN_SIGNALS = len(Observed._fields), len(KEPT)
-_SWEEPS = 4  # over servos at rest, which begin with the torques of the tick before
+_PASSES = 6  # through a tick, at most
+_MISSED = 1e-3  # rad/s of a servo: what a prediction may be off by
+_LEAK = 0.01  # of the way that a servo goes: how fast its angle returns to the engine's
+_APART = 1e-4  # rad: how far it may be from where it should be beside it
+_SLIGHT = 1e-9  # rad/s: what tells nothing of a share
 _RK4 = 1  # MuJoCo's number of it
 _SAME = 1e-6  # of a tick: within it one instant is another
 _HEAD, _EACH = len(BLOCK), len(OF_EACH)
@@ -57,7 +64,8 @@ _DATA, _KEPT, _ROOM, _COMMAND, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIA
  _G_AFTER, _G_STATUS, _G_SEEN, _PIECES, _PIECE_COUNT) = range(len(GROUP))
 _ROW, _CAPACITY, _USED, _KEPT_ROWS = range(len(RECORD))
 _START, _END, _CALLS, _FRESH, _SERIAL, _RESTORED, _HALF = range(len(BLOCK))
-_R_ANGLE, _R_SPEED, _R_GOAL, _R_LOAD, _R_INERTIA, _R_AFTER, _R_FREE, _R_PASSIVE, _R_PUSHED = range(len(ROOM))
+(_R_ANGLE, _R_SPEED, _R_GOAL, _R_LOAD, _R_INERTIA, _R_AFTER, _R_FREE, _R_ACCELERATION, _R_PREDICTED, _R_FOUND,
+ _R_PASSIVE, _R_PUSHED) = range(len(ROOM))
 
 
 @njit(error_model="numpy")
@@ -136,16 +144,73 @@ def _forces(m, d, drive, constraint, total):
 
 
 @njit(error_model="numpy")
-def _hold(speed_at, inverse, free, torque, resting):
-    """Find the torques of servos at rest that leave none of them moving, the others' given."""
-    for _ in range(_SWEEPS):
-        for i in range(len(speed_at)):
-            if resting[i] != 0.0:
-                a = free[i]
-                for j in range(len(speed_at)):
-                    if j != i:
-                        a += inverse[i, speed_at[j]] * torque[j]
-                torque[i] = -a / inverse[i, speed_at[i]]
+def _predict(speed_at, inverse, known, room, square):
+    """Predict all torques, and the acceleration of each joint without its servo.
+
+    `known` has torque, acceleration and share of each servo: τ = τ₀ − share/(M⁻¹)ᵢᵢ · (a − a₀). With the torques of the
+    others in a, those with a share are the solution of linear equations, which are symmetric and positive.
+    """
+    n = len(speed_at)
+    free, a, torque = room[_R_FREE], room[_R_ACCELERATION], room[_R_PREDICTED]
+    for i in range(n):
+        share, own = known[2 * n + i], inverse[i, speed_at[i]]
+        if share > 0.0:
+            for j in range(i):
+                square[i, j] = inverse[i, speed_at[j]] if known[2 * n + j] > 0.0 else 0.0
+            square[i, i] = own / share
+            torque[i] = known[i] * own / share + known[n + i] - free[i]
+            for j in range(n):
+                if known[2 * n + j] == 0.0:
+                    torque[i] -= inverse[i, speed_at[j]] * known[j]
+        else:
+            for j in range(i):
+                square[i, j] = 0.0
+            square[i, i], torque[i] = 1.0, known[i]
+    _solve(square, torque)
+    for i in range(n):
+        a[i] = free[i]
+        for j in range(n):
+            if j != i:
+                a[i] += inverse[i, speed_at[j]] * torque[j]
+
+
+@njit(error_model="numpy")
+def _solve(square, x):
+    """Solve equations with a symmetric positive matrix, whose lower half is given, in place (Cholesky)."""
+    n = len(x)
+    for i in range(n):
+        for j in range(i + 1):
+            total = square[i, j]
+            for k in range(j):
+                total -= square[i, k] * square[j, k]
+            square[i, j] = math.sqrt(total) if i == j else total / square[j, j]
+    for i in range(n):
+        for k in range(i):
+            x[i] -= square[i, k] * x[k]
+        x[i] /= square[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            x[i] -= square[k, i] * x[k]
+        x[i] /= square[i, i]
+
+
+@njit(error_model="numpy")
+def _learn(speed_at, inverse, known, room, dt, turn):
+    """Take torques that were found as what the next prediction starts from; return the largest speed missed."""
+    n = len(speed_at)
+    a, predicted, found = room[_R_ACCELERATION], room[_R_PREDICTED], room[_R_FOUND]
+    missed = 0.0
+    for i in range(n):
+        off = 0.0
+        for j in range(n):
+            if j != i:
+                off += inverse[i, speed_at[j]] * (found[j] - predicted[j])
+        missed = max(missed, abs(off) * dt)
+        other = a[i] - known[n + i]
+        if turn > 0 and abs(other) * dt > _SLIGHT:
+            known[2 * n + i] = min(max((known[i] - found[i]) / other * inverse[i, speed_at[i]], 0.0), 1.0)
+        known[i], known[n + i] = found[i], a[i]
+    return missed
 
 
 @njit(error_model="numpy")
@@ -168,7 +233,6 @@ def _stand(d, drive, instance, room):
     angle_at, speed_at = _words(drive[_ANGLE_AT], (n,)), _words(drive[_SPEED_AT], (n,))
     command_at, command = _words(drive[_COMMAND_AT], (n,)), _numbers(instance[_COMMAND], (n,))
     gain, zero = _numbers(drive[_GAIN], (n,)), _numbers(drive[_ZERO], (n,))
-    lower, upper = _numbers(drive[_LOWER], (n,)), _numbers(drive[_UPPER], (n,))
     low, high = _numbers(drive[_LOW], (n,)), _numbers(drive[_HIGH], (n,))
     qpos, qvel, ctrl = _word(d, drive[_QPOS]), _word(d, drive[_QVEL]), _word(d, drive[_CTRL])
     for i in range(n):
@@ -176,10 +240,43 @@ def _stand(d, drive, instance, room):
         goal = _number(ctrl, 8 * command_at[i]) if command_at[i] >= 0 else command[i]
         if not (math.isfinite(q) and math.isfinite(w) and math.isfinite(goal)):
             return i
-        room[0, i] = min(max((q - zero[i]) / gain[i], lower[i]), upper[i])
-        room[1, i] = w / gain[i]
-        room[2, i] = min(max((goal - zero[i]) / gain[i], low[i]), high[i])
+        room[_R_ANGLE, i] = (q - zero[i]) / gain[i]
+        room[_R_SPEED, i] = w / gain[i]
+        room[_R_GOAL, i] = min(max((goal - zero[i]) / gain[i], low[i]), high[i])
     return -1
+
+
+@njit(error_model="numpy")
+def _place(drive, block, room, dt, rk4):
+    """Let the servos be where they have come to, as far as the engine has done what was expected of it."""
+    n = drive[_SERVOS]
+    reached, expected = block[_HEAD + 4 * n:_HEAD + 5 * n], block[_HEAD + 5 * n:_HEAD + 6 * n]
+    lower, upper = _numbers(drive[_LOWER], (n,)), _numbers(drive[_UPPER], (n,))
+    for i in range(n):
+        q, way = room[_R_ANGLE, i], abs(room[_R_SPEED, i]) * dt
+        if block[_FRESH] == 0.0:
+            usual = 0.0 if rk4 else -0.5 * dt * room[_R_SPEED, i]  # semi-implicit steps take the speed at their end
+            apart = reached[i] - expected[i] - usual
+            apart -= min(max(apart, -_LEAK * way), _LEAK * way)
+            room[_R_ANGLE, i] = q + usual + min(max(apart, -_APART), _APART)
+        room[_R_ANGLE, i] = min(max(room[_R_ANGLE, i], lower[i]), upper[i])
+        expected[i] = q
+
+
+@njit(error_model="numpy")
+def _expect(drive, instance, block, room, dt, rk4):
+    """Note the angles that servos have reached, and those that the engine's way of integrating leads to."""
+    n = drive[_SERVOS]
+    reached, expected = block[_HEAD + 4 * n:_HEAD + 5 * n], block[_HEAD + 5 * n:_HEAD + 6 * n]
+    groups = _words(instance[_GROUPS], (instance[_COUNT],))
+    for k in range(instance[_COUNT]):
+        group = _words(groups[k], (len(GROUP),))
+        which, angle = _words(group[_WHICH], (group[_LANES],)), _numbers(group[_G_REACHED], (group[_LANES],))
+        for lane in range(group[_LANES]):
+            reached[which[lane]] = angle[lane]
+    for i in range(n):
+        w, after = room[_R_SPEED, i], room[_R_AFTER, i]
+        expected[i] += dt * (0.5 * (w + after) if rk4 else after)
 
 
 # --- the servos -------------------------------------------------------------------------------------------------------
@@ -243,61 +340,67 @@ def _complain(instance, code, culprit):
 
 
 @njit(error_model="numpy")
-def _find_loads(m, d, drive, block, inverse, room, known, again):
-    """Put load and inertia that each servo meets in this tick into its room, and its free acceleration."""
+def _free(m, d, drive, block, inverse, room, square, known, again):
+    """Find the accelerations that the joints have without any servo; `known` is whether constraint forces are."""
     n, dofs = drive[_SERVOS], drive[_DOFS]
     first = _HEAD + _EACH * n
-    torque, resting, constraint = block[_HEAD:_HEAD + n], block[_HEAD + n:_HEAD + 2 * n], block[first:first + dofs]
-    speed_at, found = _words(drive[_SPEED_AT], (n,)), _numbers(_word(d, drive[_CONSTRAINT]), (dofs,))
-    total = inverse[n]
+    constraint, speed_at = block[first:first + dofs], _words(drive[_SPEED_AT], (n,))
+    found, total = _numbers(_word(d, drive[_CONSTRAINT]), (dofs,)), inverse[n]
     if not again:
         for k in range(dofs):
             constraint[k] = found[k] if known else 0.0
     for turn in range(1 if known or again else 2):
+        if turn > 0:  # contacts and limits answer what the servos do
+            _predict(speed_at, inverse, block[_HEAD + n:_HEAD + 4 * n], room, square)
+            _supported(m, d, drive, speed_at, room[_R_PREDICTED])
+            for k in range(dofs):
+                constraint[k] = found[k]
         _forces(m, d, drive, constraint, total)
         for i in range(n):
             free = 0.0
             for k in range(dofs):
                 free += inverse[i, k] * total[k]
             room[_R_FREE, i] = free
-        _hold(speed_at, inverse, room[_R_FREE], torque, resting)
-        if turn == 0 and not (known or again):
-            _supported(m, d, drive, speed_at, torque)
-            for k in range(dofs):
-                constraint[k] = found[k]
-    gain, armature = _numbers(drive[_GAIN], (n,)), _numbers(drive[_ARMATURE], (n,))
-    for i in range(n):
-        a, J = room[_R_FREE, i], 1.0 / inverse[i, speed_at[i]]
-        for j in range(n):
-            if j != i:
-                a += inverse[i, speed_at[j]] * torque[j]
-        room[_R_FREE, i] = a
-        room[_R_LOAD, i] = -a * J * gain[i]
-        room[_R_INERTIA, i] = max(J - armature[i], 0.0) * gain[i] * gain[i]
 
 
 @njit(error_model="numpy")
-def _tick(m, d, drive, instance, block, room, dt, again):
+def _tick(m, d, drive, instance, block, room, before, dt, rk4, again):
     """Let the servos go on from the beginning of the tick, and find the torques that the joints get meanwhile."""
     n, dofs = drive[_SERVOS], drive[_DOFS]
     at = instance[_ROOM]
-    torque, resting = block[_HEAD:_HEAD + n], block[_HEAD + n:_HEAD + 2 * n]
-    known = block[_FRESH] == 0.0 and (block[_RESTORED] != 0.0 or block[_SERIAL] == instance[_SERIAL_NOW])
+    torque, known = block[_HEAD:_HEAD + n], block[_HEAD + n:_HEAD + 4 * n]
+    settled = block[_FRESH] == 0.0 and (block[_RESTORED] != 0.0 or block[_SERIAL] == instance[_SERIAL_NOW])
     block[_RESTORED] = 0.0
     inverse = _rows(at + 8 * n * dofs, (n + 1, dofs))  # and a row for the forces
+    square = _rows(at + 8 * dofs * (2 * n + 1), (n, n))
+    _place(drive, block, room, dt, rk4)
     told(drive[_SOLVE], (m, d, at + 8 * n * dofs, at, n))
-    _find_loads(m, d, drive, block, inverse, room, known, again)
-    record = _words(instance[_RECORD], (len(RECORD),))
-    culprit = _go_on(instance, room, dt, record[_ROW] > 0)
-    if culprit >= 0:
-        torque[:] = 0.0
-        _complain(instance, FAILED, culprit)
-        return
-    speed_at, gain = _words(drive[_SPEED_AT], (n,)), _numbers(drive[_GAIN], (n,))
+    _free(m, d, drive, block, inverse, room, square, settled, again)
+    record, speed_at = _words(instance[_RECORD], (len(RECORD),)), _words(drive[_SPEED_AT], (n,))
+    gain, armature = _numbers(drive[_GAIN], (n,)), _numbers(drive[_ARMATURE], (n,))
+    for turn in range(_PASSES):
+        if turn > 0:
+            _memories(instance, before, True)
+        _predict(speed_at, inverse, known, room, square)
+        for i in range(n):
+            J = 1.0 / inverse[i, speed_at[i]]
+            room[_R_LOAD, i] = -room[_R_ACCELERATION, i] * J * gain[i]
+            room[_R_INERTIA, i] = max(J - armature[i], 0.0) * gain[i] * gain[i]
+        culprit = _go_on(instance, room, dt, record[_ROW] > 0)
+        if culprit >= 0:
+            torque[:] = 0.0
+            _complain(instance, FAILED, culprit)
+            return
+        for i in range(n):
+            change = (room[_R_AFTER, i] - room[_R_SPEED, i]) * gain[i]
+            room[_R_FOUND, i] = (change / dt - room[_R_ACCELERATION, i]) / inverse[i, speed_at[i]]
+        if _learn(speed_at, inverse, known, room, dt, turn) <= _MISSED:
+            break
     for i in range(n):
-        change = (room[_R_AFTER, i] - room[_R_SPEED, i]) * gain[i]
-        torque[i] = (change / dt - room[_R_FREE, i]) / inverse[i, speed_at[i]]
-        resting[i] = 1.0 if room[_R_AFTER, i] == 0.0 else 0.0
+        torque[i] = room[_R_FOUND, i]
+        if room[_R_AFTER, i] == 0.0:  # at rest: it will hold against anything
+            known[i], known[n + i], known[2 * n + i] = 0.0, 0.0, 1.0
+    _expect(drive, instance, block, room, dt, rk4)
     if record[_ROW] > 0:
         _keep(drive, instance, room, torque, block[_END], again)
 
@@ -327,7 +430,7 @@ def _begin(d, drive, instance, block, halves, t, dt):
     half = halves + 8 * size * int(block[_HALF])
     if again or (onward and block[_SERIAL] != instance[_SERIAL_NOW]):
         _memories(instance, half, True)
-    now, before = block[_HEAD:_HEAD + 2 * n], block[_HEAD + 2 * n:_HEAD + 4 * n]
+    now, before = block[_HEAD + n:_HEAD + 6 * n], block[_HEAD + 6 * n:_HEAD + 11 * n]
     if again:
         now[:] = before
     else:
@@ -337,7 +440,8 @@ def _begin(d, drive, instance, block, halves, t, dt):
             _memories(instance, half, False)
             speed_at, qvel = _words(drive[_SPEED_AT], (n,)), _word(d, drive[_QVEL])
             for i in range(n):
-                now[i], now[n + i] = 0.0, 1.0 if _number(qvel, 8 * speed_at[i]) == 0.0 else 0.0
+                now[i], now[n + i] = 0.0, 0.0
+                now[2 * n + i] = 1.0 if _number(qvel, 8 * speed_at[i]) == 0.0 else 0.0
         before[:] = now
     block[_START], block[_END], block[_CALLS] = t, t + dt, 1.0
     return again
@@ -375,14 +479,15 @@ def _control(m, d, drive_at):
     kept = instance[_KEPT] if drive[_KEPT_AT] < 0 else _word(d, drive[_USERDATA]) + 8 * drive[_KEPT_AT]
     head = _HEAD + _EACH * n + dofs
     block, halves = _numbers(kept, (head,)), kept + 8 * head
-    room = _rows(instance[_ROOM] + 8 * dofs * (2 * n + 1), (len(ROOM), n))
+    room = _rows(instance[_ROOM] + 8 * (dofs * (2 * n + 1) + n * n), (len(ROOM), n))
     passive, speed_at = _numbers(_word(d, drive[_PASSIVE]), (dofs,)), _words(drive[_SPEED_AT], (n,))
     for i in range(n):
         if passive[speed_at[i]] == room[_R_PUSHED, i]:  # not worked out anew since the last call
             passive[speed_at[i]] = room[_R_PASSIVE, i]
         room[_R_PASSIVE, i] = passive[speed_at[i]]
     t, dt = _number(d, drive[_TIME]), _number(m, drive[_TIMESTEP])
-    if _halves(m + drive[_INTEGRATOR], (1,))[0] == _RK4 and _is_stage(block, t, dt):
+    rk4 = _halves(m + drive[_INTEGRATOR], (1,))[0] == _RK4
+    if rk4 and _is_stage(block, t, dt):
         block[_CALLS] += 1.0
     else:
         culprit = _stand(d, drive, instance, room)
@@ -390,7 +495,7 @@ def _control(m, d, drive_at):
             _complain(instance, NOT_FINITE if culprit >= 0 else TOO_LONG, max(culprit, 0))
             return
         again = _begin(d, drive, instance, block, halves, t, dt)
-        _tick(m, d, drive, instance, block, room, dt, again)
+        _tick(m, d, drive, instance, block, room, halves + 8 * size * int(block[_HALF]), dt, rk4, again)
         instance[_SERIAL_NOW] += 1
         block[_SERIAL] = instance[_SERIAL_NOW]
         _memories(instance, halves + 8 * size * (1 - int(block[_HALF])), False)

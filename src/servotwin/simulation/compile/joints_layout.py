@@ -15,9 +15,10 @@ DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integra
 """All that servos share, wherever they are simulated."""
 INSTANCE = ("data", "block", "room", "command", "record", "groups", "count", "code", "culprit", "serial")
 """Servos in one of the engine's data; `room` is for numbers that are worked out anew at each tick."""
-ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "acceleration", "passive", "pushed")
-"""Numbers of each servo there, behind the unit rows of their degrees of freedom, those of M⁻¹, and all forces. The last
-two are the passive force of its joint without its torque, and with it."""
+ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "free", "acceleration", "predicted", "found", "passive",
+        "pushed")
+"""Numbers of each servo there, behind the unit rows of their degrees of freedom, those of M⁻¹, all forces, and a square
+for equations. The last two are the passive force of its joint without its torque, and with it."""
 GROUP = ("advance", "tick", "duration", "look", "lanes", "which", "angle", "speed", "goal", "load", "inertia", "reached",
          "after", "status", "seen", "pieces", "count")
 """Servos of one model there, `which` of all: the function that lets them go on, its struct, where in this the duration
@@ -33,8 +34,11 @@ BLOCK = ("start", "end", "calls", "fresh", "serial", "restored", "half")
 it out last, whether it was restored with its constraint forces, and which half of the memories is that of its beginning.
 Behind it stand the numbers of `OF_EACH`, the
 constraint forces that it took, and both halves."""
-OF_EACH = ("torque", "resting", "torque before", "resting before")
-"""Numbers of each servo in a block: mean torque over the tick, and whether it rests at the end."""
+_CARRIED = ("known torque", "known acceleration", "share", "reached", "expected")
+OF_EACH = ("torque", *_CARRIED, *(f"{name} before" for name in _CARRIED))
+"""Numbers of each servo in a block: its mean torque over the tick; from where on the next torque is predicted, and how
+much of another acceleration of its joint the servo takes up, from 0 (nothing) to 1 (it holds); the angle that it has
+reached at the end of the tick, and the one that the engine should have reached."""
 
 ASK_NEW, ASK_RESET, ASK_ROOM = range(3)
 """What compiled code asks Python for."""
