@@ -16,7 +16,7 @@ from servotwin.parameters.groups import Supply
 from servotwin.robots.mount import Joint
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.c_entry import CEntry
-from servotwin.simulation.compile.joints_layout import GROUP, INSTANCE, PIECE, RECORD, ROOM
+from servotwin.simulation.compile.joints_layout import GROUP, INSTANCE, RECORD, ROOM
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

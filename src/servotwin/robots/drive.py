@@ -212,7 +212,7 @@ class ServoDrive:
                     words = dict(zip(RECORD, instance.record_words.tolist(), strict=True))
                     instance.keep(words["row"], 2 * max(words["capacity"], _FIRST_ROWS // 2))
                 return 1
-        except Exception as error:  # noqa: BLE001 - nothing can be raised through compiled code
+        except Exception as error:
             self._error = error
             return 0
 

@@ -64,6 +64,7 @@ _BY_GAPS = _side("by_gaps", ("GAPS",), _NOT_IN_GAPS, ("CORE",))
 _NOT_PLAIN = ("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE")
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep", *_APART), never=_NOT_PLAIN)
+CALM = Recipe("calm", ("servotwin.models.engine.calm:go",), absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never)
 PENDULUM_RUNS = Recipe(
     "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep", *_APART),
     never=("SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"))

@@ -18,8 +18,8 @@ from servotwin.simulation.bus_run import not_plain, recipe_of, room_of, shared_o
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_memory import RECORD
-from servotwin.simulation.vector_memory import Piece, piece_of
 from servotwin.simulation.vector_calls import NO_TAPE, TICKS, calls_on_buses
+from servotwin.simulation.vector_memory import Piece, piece_of
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_numbers import LaneNumbers

@@ -20,7 +20,7 @@ from servotwin.models.engine.crossing import (
     side_of,
 )
 from servotwin.models.engine.imposing import carried, impulse_work, placed
-from servotwin.models.engine.memory import Memory, memory_of, put_memory, time_of
+from servotwin.models.engine.memory import memory_of, point_of, put_memory, put_point, time_of
 from servotwin.models.engine.modes import INSIDE
 from servotwin.models.engine.records import TILE
 from servotwin.models.engine.step import COMPLETED
@@ -58,12 +58,12 @@ def put_lost(places: Indices, lanes: Indices, records: Any, periods: Floats, til
         put_counted(tile.count, j, side.counted)
 
 
-def gather(which: Indices, status: Any, now: Floats, rows: Any, count: Indices, places: Indices, lanes: Indices,
-           durations: Floats, records: Any) -> int:
-    """Put together the lanes of records that have not failed; return how many there are."""
+def gather(which: Indices, status: Any, now: Floats, done: Indices, rows: Any, count: Indices, places: Indices,
+           lanes: Indices, durations: Floats, records: Any) -> int:
+    """Put together the lanes of records that have neither failed nor are `done` (1); return how many there are."""
     n = 0
     for k in range(which.size):
-        if status[which[k]] == COMPLETED:
+        if status[which[k]] == COMPLETED and done[k] == 0:
             places[n], lanes[n], durations[n] = k, which[k], now[0]
             records[n] = rows[k]
             n += 1
@@ -116,18 +116,16 @@ def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices,
                       rows: Any) -> None:
     """Set angles and speeds of lanes at these places of records, and book the work of the impulses [J]."""
     for k in range(which.size):
-        lane, memory = which[k], memory_of(rows[places[k]])
+        lane, point = which[k], point_of(rows[places[k]].point)
         own, i = numbers[lane // TILE], lane % TILE
         half, angle, sprung = own.play.half[i], 0.0, own.elastic.k[i] > 0.0
         if has[SPEED] != 0:
             alone = half > 0.0 or (sprung and own.elastic.J[i] == 0.0)
-            work[lane] += impulse_work(shaft_at(own.shaft, i), alone, memory.point.y[1], given[SPEED, lane])
+            work[lane] += impulse_work(shaft_at(own.shaft, i), alone, point.y[1], given[SPEED, lane])
         if has[ANGLE] != 0:
             angle = within_stops(own, i, given[ANGLE, lane])
-        point = placed(memory.point, angle, given[SPEED, lane], has[ANGLE] != 0, has[SPEED] != 0, half,
-                       own.sensor.half_slack[i], sprung)
-        put_memory(rows[places[k]], Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end,
-                                           memory.tau, memory.tau_end, memory.firm))
+        put_point(rows[places[k]].point, placed(point, angle, given[SPEED, lane], has[ANGLE] != 0, has[SPEED] != 0, half,
+                                                own.sensor.half_slack[i], sprung))
 
 
 def within_stops(numbers: Any, i: int, angle: float) -> float:

@@ -76,6 +76,8 @@ NOTHING = Piece()
 memory_of = record_reader("memory_of", Memory)
 put_memory = record_writer("put_memory", Memory)
 put_firm = record_writer("put_firm", Firm)
+point_of = record_reader("point_of", Point)
+put_point = record_writer("put_point", Point)
 
 
 def started(y: Vector, mesh: int) -> Memory:

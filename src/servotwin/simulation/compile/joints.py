@@ -4,8 +4,8 @@ Kept and compiled as a derived module, and not imported from here. Words are tho
 
 A servo sees the inertia 1/(M⁻¹)ᵢᵢ and the acceleration aᵢ that its joint would have without it. It goes on for a tick
 and ends at another speed; the joint gets the mean torque τᵢ = (Δω/Δt − aᵢ)/(M⁻¹)ᵢᵢ. The torques of the other servos,
-which aᵢ needs too, are predicted: each is what it was, less its share of what another aᵢ asks of it; one at rest takes up
-all. Where that was wrong by more than a speed that does not count, all go through the tick again.
+which aᵢ needs too, are predicted: each is what it was, less its share of what another aᵢ asks of it; one at rest takes
+up all. Where that was wrong by more than a speed that does not count, all go through the tick again.
 
 The servo keeps the angle that it has reached, plus what the engine's differs from the one that its way of integrating
 leads to with these speeds: else a shaft that comes to rest on a tooth within a tick would float before it for ever.
@@ -51,6 +51,7 @@ _PASSES = 6  # through a tick, at most
 _MISSED = 1e-3  # rad/s of a servo: what a prediction may be off by
 _LEAK = 0.01  # of the way that a servo goes: how fast its angle returns to the engine's
 _APART = 1e-4  # rad: how far it may be from where it should be beside it
+_RESTS = 1e-9  # rad/s: what a shaft at rest may turn with in the engine, by rounding
 _SLIGHT = 1e-9  # rad/s: what tells nothing of a share
 _RK4 = 1  # MuJoCo's number of it
 _SAME = 1e-6  # of a tick: within it one instant is another
@@ -65,7 +66,7 @@ _DATA, _KEPT, _ROOM, _COMMAND, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIA
 _ROW, _CAPACITY, _USED, _KEPT_ROWS = range(len(RECORD))
 _START, _END, _CALLS, _FRESH, _SERIAL, _RESTORED, _HALF = range(len(BLOCK))
 (_R_ANGLE, _R_SPEED, _R_GOAL, _R_LOAD, _R_INERTIA, _R_AFTER, _R_FREE, _R_ACCELERATION, _R_PREDICTED, _R_FOUND,
- _R_PASSIVE, _R_PUSHED) = range(len(ROOM))
+ _R_ACTUAL, _R_FINAL, _R_FINAL_ACCELERATION, _R_FINAL_SHARE, _R_PASSIVE, _R_PUSHED) = range(len(ROOM))
 
 
 @njit(error_model="numpy")
@@ -241,7 +242,8 @@ def _stand(d, drive, instance, room):
         if not (math.isfinite(q) and math.isfinite(w) and math.isfinite(goal)):
             return i
         room[_R_ANGLE, i] = (q - zero[i]) / gain[i]
-        room[_R_SPEED, i] = w / gain[i]
+        room[_R_ACTUAL, i] = w / gain[i]
+        room[_R_SPEED, i] = room[_R_ACTUAL, i] if abs(room[_R_ACTUAL, i]) > _RESTS else 0.0
         room[_R_GOAL, i] = min(max((goal - zero[i]) / gain[i], low[i]), high[i])
     return -1
 
@@ -392,14 +394,20 @@ def _tick(m, d, drive, instance, block, room, before, dt, rk4, again):
             _complain(instance, FAILED, culprit)
             return
         for i in range(n):
-            change = (room[_R_AFTER, i] - room[_R_SPEED, i]) * gain[i]
+            change = (room[_R_AFTER, i] - room[_R_ACTUAL, i]) * gain[i]
             room[_R_FOUND, i] = (change / dt - room[_R_ACCELERATION, i]) / inverse[i, speed_at[i]]
         if _learn(speed_at, inverse, known, room, dt, turn) <= _MISSED:
             break
+    final = _numbers(at + 8 * (dofs * (2 * n + 1) + n * n + _R_FINAL * n), (3 * n,))
     for i in range(n):
-        torque[i] = room[_R_FOUND, i]
-        if room[_R_AFTER, i] == 0.0:  # at rest: it will hold against anything
+        rests = room[_R_AFTER, i] == 0.0
+        final[i], final[n + i], final[2 * n + i] = room[_R_FOUND, i], 0.0, 0.0
+        if rests:  # it holds against whatever the others have turned out to do, now and in the next tick
+            final[i] = -room[_R_ACTUAL, i] * gain[i] / (dt * inverse[i, speed_at[i]])
+            final[2 * n + i] = 1.0
             known[i], known[n + i], known[2 * n + i] = 0.0, 0.0, 1.0
+    _predict(speed_at, inverse, final, room, square)
+    torque[:] = room[_R_PREDICTED]
     _expect(drive, instance, block, room, dt, rk4)
     if record[_ROW] > 0:
         _keep(drive, instance, room, torque, block[_END], again)

@@ -10,17 +10,17 @@ FUNCTIONS = ("mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration", "mj_fwdConstr
 ARRAYS = ("angle_at", "speed_at", "command_at", "gain", "zero", "armature", "lower", "upper", "low", "high")
 """Of each servo: places in qpos, qvel and ctrl (or −1); what a turn of the servo is at the joint, and where it begins;
 its own inertia there; ends of its travel, and of its commands."""
-DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integrator", *PLACES, *FUNCTIONS, "slot", "own",
-         "others", *ARRAYS, "longest", "kept_at", "memory", "instances", "ask")
+DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integrator", *PLACES, *FUNCTIONS, "slot",
+         "own", "others", *ARRAYS, "longest", "kept_at", "memory", "instances", "ask")
 """All that servos share, wherever they are simulated."""
 INSTANCE = ("data", "block", "room", "command", "record", "groups", "count", "code", "culprit", "serial")
 """Servos in one of the engine's data; `room` is for numbers that are worked out anew at each tick."""
-ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "free", "acceleration", "predicted", "found", "passive",
-        "pushed")
+ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "free", "acceleration", "predicted", "found", "engine's speed",
+        "final torque", "final acceleration", "final share", "passive", "pushed")
 """Numbers of each servo there, behind the unit rows of their degrees of freedom, those of M⁻¹, all forces, and a square
 for equations. The last two are the passive force of its joint without its torque, and with it."""
-GROUP = ("advance", "tick", "duration", "look", "lanes", "which", "angle", "speed", "goal", "load", "inertia", "reached",
-         "after", "status", "seen", "pieces", "count")
+GROUP = ("advance", "tick", "duration", "look", "lanes", "which", "angle", "speed", "goal", "load", "inertia",
+         "reached", "after", "status", "seen", "pieces", "count")
 """Servos of one model there, `which` of all: the function that lets them go on, its struct, where in this the duration
 and the address of a signal stand, and arrays."""
 PIECE = ("address", "rows", "stride", "bytes")
@@ -31,9 +31,8 @@ KEPT = ("output_angle", "output_speed", "command_angle", "joint_torque")
 """Of each servo in a row of the record, before what `models.engine.observe` sees; the time of the row stands first."""
 BLOCK = ("start", "end", "calls", "fresh", "serial", "restored", "half")
 """What servos remember of a tick: its times, the calls of the engine's step in it, whether it is the first, who worked
-it out last, whether it was restored with its constraint forces, and which half of the memories is that of its beginning.
-Behind it stand the numbers of `OF_EACH`, the
-constraint forces that it took, and both halves."""
+it out last, whether it was restored with its constraint forces, and which half of the memories is of its beginning.
+Behind it stand the numbers of `OF_EACH`, the constraint forces that it took, and both halves."""
 _CARRIED = ("known torque", "known acceleration", "share", "reached", "expected")
 OF_EACH = ("torque", *_CARRIED, *(f"{name} before" for name in _CARRIED))
 """Numbers of each servo in a block: its mean torque over the tick; from where on the next torque is predicted, and how

@@ -1,0 +1,237 @@
+"""`ServoActuated`: servos in the place of the actuators of a Gymnasium environment."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from servotwin.errors import InputError, MissingExtraError, ServotwinError, SimulationError
+from servotwin.models import Model
+from servotwin.robots.command_map import CommandMap, Seat, maps, seats
+from servotwin.robots.drive import ServoDrive
+from servotwin.robots.mount import Mount
+from servotwin.robots.places import load_mujoco
+from servotwin.robots.record import Record
+
+try:
+    import gymnasium
+except ImportError:
+    raise MissingExtraError("gymnasium", "robots") from None
+
+_T = TypeVar("_T")
+_LOST = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")  # after each of these MuJoCo starts anew
+
+
+class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
+    """A Gymnasium environment on MuJoCo whose joints real servos move, in the place of its actuators.
+
+    What the environment writes into `data.ctrl` stays there, for its rewards, and is the command of the servo by a map
+    that `maps` shows. The control of a position actuator means the angle that it meant. Of a motor, and of anything
+    else, the control range goes linearly onto where the joint can go that the servo can be told to go to as well.
+    Action space, observations and rewards are those of the environment. A policy for torques has to be trained anew:
+    the action now says where to go.
+
+    The servos begin anew at `reset`. In `qfrc_actuator` and `actuator_force` there is nothing of them: MuJoCo has their
+    torques [N m], or forces [N], among the passive ones, and `info["servo_torque"]` has them after each step.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        Its `unwrapped` has an MjModel as `model` and an MjData as `data`, and lets `mujoco.mj_step` go on with them.
+        The model is changed.
+    servos : mapping of str to Model or Mount
+        By the name of the actuator, or of its joint.
+    command : mapping or str, optional
+        Other maps of actuators: (lowest, highest) angle of the joint [rad] or place [m] for the control range, a
+        `CommandMap`, or "identity" where the control is the angle; "identity" alone: of all.
+    bus : Supply or sequence of tuple (Supply, names), optional
+        Supplies that servos share.
+    joint_friction : str
+        What to do with damping and friction loss of these joints: "clear" (they stand for the actuator's, and a servo
+        has its own), "keep", where they are those of a bearing, or "refuse".
+
+    Attributes
+    ----------
+    drive : ServoDrive
+    maps : dict of str to CommandMap
+        By the names in `servos`.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds, on bad input; also while stepping, if another control callback of MuJoCo is active.
+    SimulationError
+        While stepping, if a servo or MuJoCo cannot go on.
+    MissingExtraError
+        If MuJoCo or Gymnasium is not installed.
+
+    Examples
+    --------
+    >>> import gymnasium
+    >>> import servotwin as st
+    >>> servo = st.DigitalServo(st.load_servo("feetech-sts3215-12v"))
+    >>> env = ServoActuated(gymnasium.make("Reacher-v5"), {"joint0": servo, "joint1": servo})
+    >>> print(env.maps["joint1"])
+    joint1: control -1 to 1 is -3 to 3 rad
+    >>> observation, info = env.reset(seed=1)
+    >>> observation, reward, terminated, truncated, info = env.step([0.1, -0.1])
+    >>> info["servo_torque"].shape
+    (2,)
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], servos: Mapping[str, Model | Mount], *, command: Any = None,
+                 bus: Any = None, joint_friction: str = "clear") -> None:
+        _check(env, servos)
+        kept = {"servos": dict(servos), "command": command, "bus": bus, "joint_friction": joint_friction}
+        gymnasium.utils.RecordConstructorArgs.__init__(self, **kept)
+        gymnasium.Wrapper.__init__(self, env)
+        self._kept, model = kept, self._bare.model
+        places = seats(model, servos)
+        mounts = {key: given if isinstance(given, Mount) else Mount(given) for key, given in servos.items()}
+        self.maps: dict[str, CommandMap] = maps(model, places, mounts, command)
+        joints = {name: seat.joint for seat in places for name in (seat.joint, seat.key)}
+        self.drive = _drive(model, places, list(self.maps.values()), {joints[key]: one for key, one in mounts.items()},
+                            _by_joint(bus, joints), joint_friction)
+        self._at = np.array([seat.actuator for seat in places])
+        self._scale, self._offset = np.array([[one.scale, one.offset] for one in self.maps.values()]).T
+        self._direct = all(one.is_identity for one in self.maps.values())
+        self._new = self.drive.save(self.data).servos
+
+    @property
+    def data(self) -> Any:
+        """MuJoCo's data of the environment."""
+        return self._bare.data
+
+    @property
+    def _bare(self) -> Any:
+        return self.unwrapped
+
+    # --- what an environment does -------------------------------------------------------------------------------------
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Let the environment go on with its servos."""
+        observation, reward, terminated, truncated, info = self._with_servos(lambda: self.env.step(action))
+        lost = [name for name in _LOST if self.data.warning[getattr(load_mujoco().mjtWarning, name)].number]
+        if lost:
+            raise SimulationError("MUJOCO", float(self.data.time), "MuJoCo has met a number that is not finite, or too "
+                                  f"large, and has started anew ({', '.join(lost)})")
+        return observation, reward, terminated, truncated, {**info, "servo_torque": self.drive.torque(self.data)}
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Let the environment begin anew, and the servos with it, at rest."""
+        with contextlib.suppress(ServotwinError):
+            self.drive.check(self.data)  # what went wrong in the episode before
+        self.drive.restore(self.data, replace(self.drive.save(self.data), servos=self._new))
+        return self._with_servos(lambda: self.env.reset(seed=seed, options=options))
+
+    def _with_servos(self, call: Callable[[], _T]) -> _T:
+        """Return what a call returns, with the servos in MuJoCo's control callback meanwhile."""
+        mujoco = load_mujoco()
+        if self._bare.model is not self.drive.model:
+            raise InputError("model of the environment", got="another one than when it was wrapped",
+                             allowed="the same: wrap an environment that changes its model anew")
+        before, servos = mujoco.get_mjcb_control(), self.drive.callback()
+        if before is not None and not _is_same(before, servos):
+            raise InputError("MuJoCo's control callback", got="one that is not this drive's", allowed="none while an "
+                             "environment with servos steps; mujoco.set_mjcb_control(None) ends it")
+        mujoco.set_mjcb_control(servos if self._direct else self._mapped(servos))
+        try:
+            result = call()
+        finally:
+            mujoco.set_mjcb_control(before)
+        self.drive.check(self.data)
+        return result
+
+    def _mapped(self, servos: Any) -> Callable[[Any, Any], None]:
+        """Return a control callback by which the servos see angles where the environment has put its controls."""
+        own, at, scale, offset = self.drive.model, self._at, self._scale, self._offset
+        sizes = own.nq, own.nv, own.nu
+
+        def control(model: Any, data: Any) -> None:
+            if (model.nq, model.nv, model.nu) != sizes:
+                return
+            controls = data.ctrl
+            kept = controls[at]
+            controls[at] = offset + scale * kept
+            servos(model._address, data._address)
+            controls[at] = kept
+
+        return control
+
+    # --- what shows ---------------------------------------------------------------------------------------------------
+
+    def record(self) -> None:
+        """Keep from now on what shows of all servos at the end of each tick, of the last episode."""
+        self.drive.record(self.data)
+
+    def result(self) -> Record:
+        """Return what was kept, by joint.
+
+        Raises
+        ------
+        InputError
+            If nothing is kept.
+        """
+        return self.drive.result(self.data)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle and copy by the constructor's arguments, as Gymnasium's environments on MuJoCo do."""
+        return _again, (type(self), self.env, {**self._kept, "command": self.maps})
+
+
+def _again(kind: type[ServoActuated], env: Any, arguments: dict[str, Any]) -> ServoActuated:
+    return kind(env, **arguments)
+
+
+def _check(env: Any, servos: Any) -> None:
+    """Raise InputError if an environment cannot have servos."""
+    mujoco = load_mujoco()
+    if not isinstance(env, gymnasium.Env):
+        raise InputError("env", got=type(env).__name__, allowed="a gymnasium.Env, one of a vector at a time")
+    below = env
+    while isinstance(below, gymnasium.Wrapper):
+        if isinstance(below, ServoActuated):
+            raise InputError("env", got="one that has servos", allowed="one without: give all servos at once")
+        below = below.env
+    bare = env.unwrapped
+    found = getattr(bare, "model", None), getattr(bare, "data", None)
+    if not isinstance(found[0], mujoco.MjModel) or not isinstance(found[1], mujoco.MjData):
+        raise InputError(f"model and data of {type(bare).__name__}", got=", ".join(type(one).__name__ for one in found),
+                         allowed="an MjModel and an MjData")
+    if not isinstance(servos, Mapping) or not servos:
+        raise InputError("servos of an environment", got=servos, allowed="a mapping of actuators to models or Mounts")
+
+
+def _drive(model: Any, places: list[Seat], commands: list[CommandMap], servos: dict[str, Mount], bus: Any,
+           joint_friction: str) -> ServoDrive:
+    """Return the servos, to which the ends of their controls are shown as angles."""
+    at = [seat.actuator for seat in places]
+    ends, limited = model.actuator_ctrlrange[at], model.actuator_ctrllimited[at]
+    try:
+        for k, one in zip(at, commands, strict=True):
+            angles = sorted((one.angle_low, one.angle_high))
+            model.actuator_ctrllimited[k] = np.isfinite(angles).all()
+            if model.actuator_ctrllimited[k]:
+                model.actuator_ctrlrange[k] = angles
+        return ServoDrive(model, servos, bus=bus, joint_friction=joint_friction)
+    finally:
+        model.actuator_ctrlrange[at], model.actuator_ctrllimited[at] = ends, limited
+
+
+def _by_joint(bus: Any, joints: Mapping[str, str]) -> Any:
+    """Return supplies with names of joints for those of actuators; anything else as it is, for the drive to refuse."""
+    try:
+        return [(supply, [joints.get(name, name) for name in names]) for supply, names in bus]
+    except (TypeError, ValueError):
+        return bus
+
+
+def _is_same(callback: Any, own: Any) -> bool:
+    """Tell whether a control callback is the same function of C as another one."""
+    return isinstance(callback, type(own)) and (
+        ctypes.cast(callback, ctypes.c_void_p).value == ctypes.cast(own, ctypes.c_void_p).value)

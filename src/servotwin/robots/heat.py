@@ -1,0 +1,145 @@
+"""How warm the servos of a robot get, in a motion and where it goes on for ever."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.datasheet.conditions import at_temperatures, changed
+from servotwin.datasheet.full_drive import FullDrive
+from servotwin.datasheet.warming import WIRE_LIMIT, Masses, thermal_masses
+from servotwin.errors import InputError
+from servotwin.physics import Temperatures, winding_resistance
+from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE, copper_loss
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.robots.record import ServoRecord
+
+Array = NDArray[np.float64]
+_NUMBERS = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient", "ambient",
+            "magnet_coefficient")
+_LONGEST = 3600.0  # s; what is not too hot by then never gets so
+_STEPS = 720
+
+
+@dataclass(frozen=True, kw_only=True)
+class Heating:
+    """How warm a servo gets whose motion is repeated without a pause.
+
+    Parameters
+    ----------
+    heat : float
+        Mean of i² R over the motion [W].
+    winding : float
+        Temperature to which the winding comes in the end; inf where it has none [K].
+    limit_time : float
+        When it passes 130 °C, beginning cool; nan where it does not within an hour [s].
+    masses : Masses
+    """
+
+    heat: float
+    winding: float
+    limit_time: float
+    masses: Masses
+
+
+def with_heat(model: Model) -> Model:
+    """Return a model whose winding and housing get warm, with thermal masses assumed by its mass if it has none.
+
+    A servo of which the mass is not known either stays as it is, and so does a model without temperatures.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> "winding_temperature" in with_heat(st.PulseServo(st.load_servo("hitec-hs-755hb"))).available
+    True
+    """
+    masses = thermal_masses(model.servo)
+    if masses is None or not masses.assumed or "thermal.winding_capacity" not in model.optional:
+        return model
+    return changed(model, {f"thermal.{name}": getattr(masses, name) for name in _NUMBERS})
+
+
+def mean_heat(record: ServoRecord, masses: Masses, since: float, until: float) -> float:
+    """Return the mean heat of a winding between two times [W]: what both masses have kept and given to the air.
+
+    Samples of a current that flows in short pulses would not tell. A model without temperatures has no such pulses.
+    """
+    inside = (record.time >= since) & (record.time <= until)
+    time = record.time[inside]
+    if time.size < 2:
+        return math.nan
+    if "winding_temperature" not in record:
+        R = record.mount.model.value("motor.armature_resistance")
+        return float(np.mean(copper_loss(record["armature_current"][inside], R)))
+    winding, housing = record["winding_temperature"][inside], record["housing_temperature"][inside]
+    lost = float(np.trapezoid(housing - masses.ambient, time)) / masses.housing_to_ambient
+    kept = masses.winding_capacity * (winding[-1] - winding[0]) + masses.housing_capacity * (housing[-1] - housing[0])
+    return max((float(kept) + lost) / float(time[-1] - time[0]), 0.0)
+
+
+def heating(heat: float, mean_winding: float, masses: Masses) -> Heating:
+    """Return how warm a servo gets that goes on making a heat [W], which grows with the resistance of its copper.
+
+    Parameters
+    ----------
+    heat : float
+        While the winding was at `mean_winding` [W]
+    mean_winding : float
+        [K]
+    masses : Masses
+
+    Examples
+    --------
+    >>> from servotwin.datasheet.warming import masses_by_mass
+    >>> cool, hot = (heating(heat, 298.15, masses_by_mass(0.055)) for heat in (0.5, 3.0))
+    >>> round(cool.winding), cool.limit_time, hot.winding > 403.15, round(hot.limit_time)
+    (315, nan, True, 553)
+    """
+    per_watt = masses.winding_to_housing + masses.housing_to_ambient
+    cold = heat / float(winding_resistance(mean_winding, 1.0))  # at the reference temperature
+    slope = COPPER_COEFFICIENT * cold * per_watt
+    end = math.inf if slope >= 1.0 else (
+        masses.ambient + cold * per_watt * (1.0 + COPPER_COEFFICIENT * (masses.ambient - REFERENCE_TEMPERATURE))
+        / (1.0 - slope))
+    return Heating(heat=heat, winding=end, limit_time=_passing(cold, masses) if end > WIRE_LIMIT else math.nan,
+                   masses=masses)
+
+
+def _passing(cold: float, masses: Masses) -> float:
+    """Return when a winding passes its limit [s], of a heat [W] that it makes at the reference temperature."""
+    now, step = Temperatures(masses.ambient, masses.ambient), _LONGEST / _STEPS
+    for k in range(_STEPS):
+        heat = cold * float(winding_resistance(now.winding, 1.0))
+        after = masses.after(step, heat, now)
+        if after.winding > WIRE_LIMIT:
+            share = (WIRE_LIMIT - now.winding) / (after.winding - now.winding)
+            return step * (k + float(share))
+        now = Temperatures(float(after.winding), float(after.housing))
+    return math.nan
+
+
+def lasting_torque(model: Model, masses: Masses) -> float:
+    """Return the torque that a servo can lift slowly without end: its winding comes to 130 °C [N m].
+
+    Where it holds still instead, friction helps it. 0 where that current does not move the shaft, nan of a model that
+    knows no limit of current.
+    """
+    if "supply.current_limit" not in model.optional:
+        return math.nan
+    hot = masses.with_winding(WIRE_LIMIT)
+    warm = at_temperatures(model, hot, masses.magnet_coefficient)
+    allowed = (WIRE_LIMIT - masses.ambient) / (masses.winding_to_housing + masses.housing_to_ambient)
+    limit = math.sqrt(allowed / warm.value("motor.armature_resistance"))
+    own = model.servo.get("supply.current_limit")
+    if isinstance(own, float):
+        limit = min(limit, own)
+    try:
+        return FullDrive(changed(warm, {"supply.current_limit": limit})).stall_torque
+    except InputError:  # the shaft does not turn by it
+        return 0.0

@@ -1,0 +1,180 @@
+"""The same robot with ideal actuators: its joints follow their motion exactly, and what that takes.
+
+A motion is straight lines between samples, which no joint follows: its speed jumps at each sample. An ideal joint moves
+on the mean of the motion over a short window, which makes parabolas of the corners and leaves straight lines as they are
+(Craig, Introduction to Robotics, 3rd ed. 2005, section 7.3, linear function with parabolic blends):
+
+    q(t) = (Q(t + w/2) − Q(t − w/2))/w,    with Q' = the motion
+
+The torque is that of inverse dynamics, rotors and gears of the servos included. Joints without a servo, and things that
+lie about, move as they are pushed: there the joints with servos are given an inertia beside which nothing counts, and
+with it the acceleration that they have to have.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, SimulationError
+from servotwin.robots.motion import Motion
+from servotwin.robots.places import load_mujoco
+from servotwin.units import is_finite
+
+Array = NDArray[np.float64]
+WINDOWS = (0.02, 0.1)  # s, shortest and longest window of a motion: a frame of a servo, and what nobody sees
+_HEAVY = 1e8  # times what a joint carries
+_LIGHTEST = 1e-9  # kg m², of a joint that carries nothing
+
+
+class Course(NamedTuple):
+    """How a joint moves: angle [rad], speed [rad/s] and acceleration [rad/s²]; of a slide in m."""
+
+    angle: Array
+    speed: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdealRun:
+    """A robot whose joints follow their motion exactly.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        [s]
+    window : float
+        Over which the motion is blended [s]
+    courses : mapping of str to Course
+        Of each joint with a servo.
+    torque : mapping of str to ndarray, shape (n,)
+        That each of them takes, to move its own rotor and gear included [N m], of a slide [N]
+    poses : ndarray, shape (n, nq)
+        Of the whole robot, MuJoCo's `qpos`.
+    """
+
+    time: Array
+    window: float
+    courses: Mapping[str, Course]
+    torque: Mapping[str, Array]
+    poses: Array
+
+
+def blend_window(motion: Motion) -> float:
+    """Return the window of a motion [s]: two of its samples, but no less than 0.02 and no more than 0.1 s.
+
+    Examples
+    --------
+    >>> blend_window(Motion(time=[0.0, 1.0], angles={"elbow": [0.0, 1.0]}, source="two points"))
+    0.1
+    """
+    return float(np.clip(2.0 * np.median(np.diff(motion.time)), *WINDOWS))
+
+
+def course(motion: Motion, joint: str, time: Array, window: float) -> Course:
+    """Return how a joint follows a motion whose corners are blended.
+
+    Parameters
+    ----------
+    motion : Motion
+    joint : str
+    time : ndarray, shape (n,)
+        [s]
+    window : float
+        w, over which the motion is averaged [s]
+
+    Examples
+    --------
+    >>> ramp = Motion(time=[0.0, 1.0], angles={"elbow": [0.0, 2.0]}, source="ramp")
+    >>> found = course(ramp, "elbow", np.array([-0.05, 0.0, 0.5]), 0.1)
+    >>> found.angle.round(4).tolist(), found.speed.tolist(), found.acceleration.tolist()
+    ([0.0, 0.025, 1.0], [0.0, 1.0, 2.0], [20.0, 20.0, 0.0])
+    """
+    times, values = motion.time, motion.angles[joint]
+    slopes = np.concatenate([[0.0], np.diff(values) / np.diff(times), [0.0]])
+    areas = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(times) * (values[1:] + values[:-1]))])
+
+    def at(t: Array) -> Course:
+        k = np.searchsorted(times, t, side="right")  # slopes[k] holds from sample k − 1 on
+        first = np.maximum(k - 1, 0)
+        since = t - times[first]
+        return Course(areas[first] + since * (values[first] + 0.5 * since * slopes[k]),
+                      values[first] + since * slopes[k], slopes[k])
+
+    after, before = at(time + 0.5 * window), at(time - 0.5 * window)
+    return Course(*((late - early) / window for late, early in zip(after, before, strict=True)))
+
+
+def ideal_run(model: Any, joints: Sequence[str], motion: Motion, time: Array, *, window: float | None = None,
+              progress: Callable[[int], object] | None = None) -> IdealRun:
+    """Return what the robot does whose joints follow a motion exactly, and the torques that this takes.
+
+    Parameters
+    ----------
+    model : MjModel
+        Of a `ServoDrive`, whose joints carry rotors and gears of their servos.
+    joints : sequence of str
+        With servos; those of which the motion says nothing stay where the model has them.
+    motion : Motion
+    time : ndarray, shape (n,)
+        Evenly spaced, by the timestep of the model [s]
+    window : float, optional
+        Over which the motion is blended; `blend_window` of it unless given [s]
+    progress : callable, optional
+        Is told how many times are done.
+
+    Raises
+    ------
+    InputError
+        If the window is not positive.
+    SimulationError
+        If MuJoCo meets a number that is not finite.
+    """
+    mujoco = load_mujoco()
+    window = blend_window(motion) if window is None else window
+    if not (is_finite(window) and window > 0.0):
+        raise InputError("window of a blended motion", got=window, allowed="a positive number of seconds")
+    exact, heavy = copy.copy(model), copy.copy(model)
+    numbers = [model.joint(name).id for name in joints]
+    angles_at, dofs = model.jnt_qposadr[numbers], model.jnt_dofadr[numbers]
+    for each in (exact, heavy):
+        each.jnt_limited[numbers] = 0
+        each.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    weights = _HEAVY * np.maximum(model.dof_M0[dofs], _LIGHTEST)
+    heavy.dof_armature[dofs] += weights
+    data, inverse = mujoco.MjData(heavy), mujoco.MjData(exact)
+    others_move = model.nv > len(numbers) or model.nu > 0
+    courses = {name: course(motion, name, time, window) if name in motion.angles else
+               _standing(float(data.qpos[at]), len(time)) for name, at in zip(joints, angles_at, strict=True)}
+    table = np.array([courses[name] for name in joints])  # joints, (angle, speed, acceleration), times
+    torque, poses = np.zeros((len(joints), len(time))), np.zeros((len(time), model.nq))
+    for k in range(len(time)):
+        data.qpos[angles_at], data.qvel[dofs] = table[:, 0, k], table[:, 1, k]
+        data.qacc[dofs] = table[:, 2, k]
+        data.time = time[k]
+        if others_move:
+            data.qfrc_applied[dofs] = weights * table[:, 2, k]
+            mujoco.mj_forward(heavy, data)
+        inverse.qpos[:], inverse.qvel[:], inverse.qacc[:] = data.qpos, data.qvel, data.qacc
+        mujoco.mj_inverse(exact, inverse)
+        torque[:, k] = inverse.qfrc_inverse[dofs] - data.qfrc_actuator[dofs]
+        poses[k] = data.qpos
+        if others_move:
+            mujoco.mj_step(heavy, data)
+        if progress is not None:
+            progress(k + 1)
+    if not (np.isfinite(torque).all() and np.isfinite(poses).all()):
+        bad = int(np.argmax(~np.isfinite(poses).all(axis=1) | ~np.isfinite(torque).all(axis=0)))
+        raise SimulationError("MUJOCO", float(time[bad]), "MuJoCo has met a number that is not finite with ideal "
+                              "actuators")
+    return IdealRun(time=time, window=window, courses=courses, torque=dict(zip(joints, torque, strict=True)),
+                    poses=poses)
+
+
+def _standing(angle: float, count: int) -> Course:
+    return Course(np.full(count, angle), np.zeros(count), np.zeros(count))

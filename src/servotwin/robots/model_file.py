@@ -1,0 +1,90 @@
+"""Models of robots: MJCF files, and those that come with the package."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.robots.places import load_mujoco
+from servotwin.robots.so101 import so101
+
+BUILT_IN: Mapping[str, Callable[[], str]] = MappingProxyType({"so101": so101})
+"""MJCF of robots that come with the package, by name."""
+_SKY = {"rgb1": (0.66, 0.75, 0.86), "rgb2": (0.93, 0.95, 0.97), "width": 64, "height": 384}
+
+
+def robot_model(source: Any) -> Any:
+    """Return an MjModel of its own, which may be changed.
+
+    Parameters
+    ----------
+    source : MjModel, MjSpec, str or Path
+        A path is of an MJCF or URDF file; a string may be the name of a robot that comes with the package. What is
+        read from a file gets a sky where it has none: pictures would be black.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or MuJoCo cannot read it: one line.
+    MissingExtraError
+        If MuJoCo is not installed.
+
+    Examples
+    --------
+    >>> robot_model("so101").njnt
+    6
+    """
+    mujoco = load_mujoco()
+    if isinstance(source, mujoco.MjModel):
+        return copy.copy(source)
+    if isinstance(source, mujoco.MjSpec):
+        return source.copy().compile()
+    if not isinstance(source, str | Path) or not str(source):
+        raise InputError("model of a robot", got=source, allowed="an MjModel, an MjSpec or the path of an MJCF file")
+    if str(source) in BUILT_IN:
+        return mujoco.MjModel.from_xml_string(BUILT_IN[str(source)]())
+    return _read(mujoco, Path(source))
+
+
+def _read(mujoco: Any, path: Path) -> Any:
+    try:
+        is_file = path.is_file()
+    except (OSError, ValueError):  # a name that no file can have
+        is_file = False
+    if not is_file:
+        if path.suffix or len(path.parts) > 1:
+            raise InputError(f"{path} is no file", allowed=f"the path of an MJCF file (.xml), or {', '.join(BUILT_IN)}")
+        raise UnknownNameError("robot", str(path), BUILT_IN,
+                               allowed=f"the path of an MJCF file (.xml), or {', '.join(BUILT_IN)}")
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        if not any(texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for texture in spec.textures):
+            spec.add_texture(name="servotwin sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+                             builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, **_SKY)
+        return spec.compile()
+    except Exception as error:  # MuJoCo raises ValueError, its own FatalError and what its plugins raise
+        raise InputError(f"{path} is no model that MuJoCo reads ({' '.join(str(error).split())})") from None
+
+
+def joint_names(model: Any) -> dict[str, str]:
+    """Return "angle" of each hinge and "length" of each slide that has a name, in the order of the model.
+
+    Examples
+    --------
+    >>> list(joint_names(robot_model("so101")))[:2]
+    ['shoulder_pan', 'shoulder_lift']
+    """
+    mujoco = load_mujoco()
+    kinds = {mujoco.mjtJoint.mjJNT_HINGE: "angle", mujoco.mjtJoint.mjJNT_SLIDE: "length"}
+    found = {model.joint(k).name: mujoco.mjtJoint(model.jnt_type[k]) for k in range(model.njnt)}
+    return {name: kinds[kind] for name, kind in found.items() if name and kind in kinds}
+
+
+def joint_ranges(model: Any) -> dict[str, tuple[float, float]]:
+    """Return the limits of all joints that have a name and limits [rad or m]."""
+    return {name: (float(model.joint(name).range[0]), float(model.joint(name).range[1]))
+            for name in joint_names(model) if model.jnt_limited[model.joint(name).id]}

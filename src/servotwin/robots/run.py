@@ -1,0 +1,251 @@
+"""`run_motion`: a robot whose servos follow a motion, and how well they do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.models import Model
+from servotwin.parameters.groups import Supply
+from servotwin.robots.drive import ServoDrive
+from servotwin.robots.heat import with_heat
+from servotwin.robots.ideal import IdealRun, blend_window, ideal_run
+from servotwin.robots.model_file import joint_names, robot_model
+from servotwin.robots.motion import Motion
+from servotwin.robots.mount import Mount
+from servotwin.robots.places import load_mujoco
+from servotwin.robots.record import Record
+from servotwin.robots.tracking import Tracking, tracking_of
+from servotwin.simulation.progress import Progress, shown
+from servotwin.units import is_finite
+
+Array = NDArray[np.float64]
+SETTLE = 0.5  # s, before the motion and after it
+_HOLDS = ("linear", "previous")
+_MOST_TICKS = 2_000_000
+_SAME = 1e-9  # s
+_TELL = 50  # ticks between two words on the progress
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RobotRun:
+    """A robot whose servos have followed a motion; its times count from the beginning of the motion.
+
+    Parameters
+    ----------
+    model : MjModel
+        With rotors and gears of the servos.
+    motion : Motion
+    mounts : mapping of str to Mount
+        Of the joints with servos.
+    bus : Supply or sequence of tuple (Supply, joints), optional
+        That they share.
+    record : Record
+        What the servos have done, from the settling before the motion to the rest after it.
+    poses : ndarray, shape (n, nq)
+        Of the robot at the times of the record, MuJoCo's `qpos`.
+    ideal : IdealRun
+        The same with ideal actuators, at the same times.
+    tracking : mapping of str to Tracking
+        How well each joint has followed.
+    """
+
+    model: Any
+    motion: Motion
+    mounts: Mapping[str, Mount]
+    bus: Any
+    record: Record
+    poses: Array
+    ideal: IdealRun
+    tracking: Mapping[str, Tracking]
+
+    @property
+    def time(self) -> Array:
+        """Times of record and poses [s]."""
+        return self.record.time
+
+    def goal(self, joint: str) -> Array:
+        """Return where a joint is to be at these times: angle of a hinge [rad], place of a slide [m]."""
+        return goal_of(self.motion, joint, self.time, self.ideal)
+
+    def slides(self, joint: str) -> bool:
+        """Tell whether a joint is a slide."""
+        return joint_names(self.model)[joint] == "length"
+
+    def supply_of(self, joint: str) -> Supply | None:
+        """Return the supply that a servo shares with others, None where it has its own."""
+        return supply_of(self.bus, joint)
+
+
+def goal_of(motion: Motion, joint: str, time: Array, ideal: IdealRun) -> Array:
+    """Return where a joint is to be: on its motion, or where it stands if there is none."""
+    return np.asarray(motion.at(joint, time) if joint in motion.angles else ideal.courses[joint].angle)
+
+
+def supply_of(bus: Any, joint: str) -> Supply | None:
+    """Return the supply among those of `bus` that a joint is on."""
+    if bus is None or isinstance(bus, Supply):
+        return bus
+    return next((supply for supply, joints in bus if joint in joints), None)
+
+
+def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, *, bus: Any = None,
+               joint_friction: str = "refuse", timestep: float | None = None, settle: float = SETTLE,
+               hold: str = "linear", window: float | None = None, assume_heat: bool = True,
+               progress: Progress = False) -> RobotRun:
+    """Let the servos of a robot follow a motion, and the same robot with ideal actuators beside.
+
+    The robot begins at the first goals, at rest. A servo without an error gives no torque, so it sinks at first: it is
+    given the time `settle` before the motion begins, and the same time after it to come to rest.
+
+    Parameters
+    ----------
+    model : MjModel, MjSpec, str or Path
+        Of the robot: a copy is changed. A path is of an MJCF file; "so101" is an arm that comes with the package.
+    servos : mapping of str to Model or Mount
+        By the name of the joint.
+    motion : Motion
+        Of these joints; those of which it says nothing hold still.
+    bus, joint_friction
+        As of `ServoDrive`.
+    timestep : float, optional
+        Of MuJoCo; the model's own unless given [s]
+    settle : float
+        [s]
+    hold : str
+        What a servo is told between samples of the motion: "linear", or "previous", as LeRobot sends goals.
+    window : float, optional
+        Over which the motion of the ideal actuators is blended; `blend_window` of it unless given [s]
+    assume_heat : bool
+        Whether servos whose files have no thermal numbers get warm by ones that their mass lets assume.
+    progress : bool or callable
+        Whether to show how far it is; a callable is told the steps done, and all.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds: if a joint of the motion has no servo, a goal is beyond where its servo can start, or
+        what `ServoDrive` refuses.
+    SimulationError
+        If a servo or MuJoCo cannot go on.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.robots import Motion, run_motion
+    >>> nod = Motion(time=[0.0, 0.2, 0.4], angles={"wrist_flex": [0.0, 0.2, 0.0]}, source="a nod")
+    >>> run = run_motion("so101", {"wrist_flex": st.DigitalServo(st.load_servo("feetech-sts3215-12v"))}, nod)
+    >>> 0.01 < run.tracking["wrist_flex"].rms < 0.1
+    True
+    """
+    mujoco = load_mujoco()
+    _check(motion, settle, hold, timestep)
+    own = robot_model(model)
+    if timestep is not None:
+        own.opt.timestep = timestep
+    mounts = _mounts(servos, assume_heat=assume_heat, shared=bus is not None)
+    joints = joint_names(own)
+    for joint in motion.joints:
+        if joint in joints and joint not in mounts:
+            raise InputError(f"joint {joint} of {motion.source}", got="no servo at it",
+                             allowed=f"joints with servos, {', '.join(mounts)}")
+        if joint not in joints:
+            raise UnknownNameError(f"joint of {motion.source}", joint, joints)
+    drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction)
+    time = _times(own.opt.timestep, motion.duration, settle)
+    with shown(progress, 2 * len(time), "following the motion") as tell:
+        data = mujoco.MjData(drive.model)
+        poses = np.zeros((len(time), own.nq))
+        _start(drive, data, motion, mounts, -settle)
+        for k, goals in enumerate(_goals(motion, time - own.opt.timestep, hold)):
+            if goals:
+                drive.command(data, goals)
+            drive.step(data)
+            poses[k] = data.qpos
+            if k % _TELL == 0:
+                tell(k)
+        record = drive.result(data)
+        ideal = ideal_run(drive.model, drive.joints, motion, record.time, progress=lambda k: tell(len(time) + k),
+                          window=blend_window(motion) if window is None else window)
+    return RobotRun(model=drive.model, motion=motion, mounts=mounts, bus=bus, record=record, poses=poses, ideal=ideal,
+                    tracking={joint: tracking_of(record[joint], goal_of(motion, joint, record.time, ideal),
+                                                 motion.duration) for joint in drive.joints})
+
+
+def _check(motion: Motion, settle: float, hold: str, timestep: float | None) -> None:
+    if not isinstance(motion, Motion):
+        raise InputError("motion", got=motion, allowed="a Motion, such as read_motion(...)")
+    if not (is_finite(settle) and settle >= 0.0):
+        raise InputError("settle", got=settle, allowed="a number of seconds that is not negative")
+    if hold not in _HOLDS:
+        raise InputError("hold", got=hold, allowed=" or ".join(map(repr, _HOLDS)))
+    if timestep is not None and not (is_finite(timestep) and timestep > 0.0):
+        raise InputError("timestep", got=timestep, allowed="a positive number of seconds")
+
+
+def _mounts(servos: Mapping[str, Model | Mount], *, assume_heat: bool, shared: bool) -> dict[str, Mount]:
+    if not isinstance(servos, Mapping) or not servos:
+        raise InputError("servos of a robot", got=servos, allowed="a mapping of joints to models")
+    found = {name: given if isinstance(given, Mount) else Mount(given) for name, given in servos.items()}
+    if not assume_heat:
+        return found
+    warm: dict[int, Model] = {id(mount.model): with_heat(mount.model) for mount in found.values()}
+    known = [model.servo.thermal.winding_capacity is not None for model in warm.values()]
+    if shared and not all(known):  # servos on a shared supply all have thermal masses, or none
+        return found
+    return {name: replace(mount, model=warm[id(mount.model)]) for name, mount in found.items()}
+
+
+def _times(timestep: float, duration: float, settle: float) -> Array:
+    """Return the ends of all ticks [s]."""
+    ticks = math.ceil((duration + 2.0 * settle) / timestep - _SAME)
+    if ticks > _MOST_TICKS:
+        raise InputError("motion", got=f"{ticks} steps of {timestep:g} s", allowed=f"up to {_MOST_TICKS}")
+    return -settle + timestep * np.arange(1.0, ticks + 1.0)
+
+
+def _start(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mount], time: float) -> None:
+    """Put the robot at the first goals, and let the servos begin there."""
+    model, goals = drive.model, {}
+    for joint, mount in mounts.items():
+        at = int(model.jnt_qposadr[model.joint(joint).id])
+        if joint in motion.angles:
+            data.qpos[at] = motion.at(joint, 0.0)
+        goals[joint] = float(data.qpos[at])
+        _check_travel(joint, mount, goals[joint])
+    data.time = time
+    load_mujoco().mj_forward(model, data)
+    drive.record(data)
+    drive.command(data, goals)
+
+
+def _check_travel(joint: str, mount: Mount, start: float) -> None:
+    """Raise InputError where a servo would have to begin beyond its stops."""
+    stops = mount.model.servo.stops
+    low = -math.inf if stops.lower_angle is None else stops.lower_angle
+    high = math.inf if stops.upper_angle is None else stops.upper_angle
+    angle = (start - mount.zero) / mount.gain
+    if not low <= angle <= high:
+        raise InputError(
+            f"first goal of joint {joint}", got=f"{math.degrees(angle):.4g} deg at the servo",
+            allowed=f"{math.degrees(low):.4g} to {math.degrees(high):.4g} deg, the travel of {mount.model.servo.name}: "
+            "mount it with another zero or direction")
+
+
+def _goals(motion: Motion, time: Array, hold: str) -> Iterator[dict[str, float]]:
+    """Give what the servos are told at each time [s]; nothing where that has not changed."""
+    if hold == "previous":
+        samples = np.clip(np.searchsorted(motion.time, time + _SAME, side="right") - 1, 0, None)
+        table = np.array([values[samples] for values in motion.angles.values()])
+    else:
+        table = np.array([motion.at(joint, time) for joint in motion.joints])
+    before = table[:, 0] + math.nan
+    for goals in table.T:
+        yield {} if (goals == before).all() else dict(zip(motion.joints, goals.tolist(), strict=True))
+        before = goals
