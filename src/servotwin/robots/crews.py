@@ -189,11 +189,56 @@ class Instance:
                   "command": self.command.ctypes.data, "record": self.record_words.ctypes.data,
                   "groups": self._groups.ctypes.data, "count": len(self.berths), "serial": serial}
         self.words[:] = [values.get(name, 0) for name in INSTANCE]
+        self._begin = [berth.sims.save() for berth in self.berths]
+        self._start = self._fresh()
+        if self._start is not None:
+            fresh, angles = self._start
+            for name, value in (("fresh", fresh.ctypes.data), ("angles", angles.ctypes.data), ("angle_count", len(angles))):
+                self.words[INSTANCE.index(name)] = value
+
+    def _fresh(self) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
+        """Return what servos at rest remember, and which of these words are angles of which servo.
+
+        None where that is not all: where the command counts too, or what is remembered is more than the angle.
+        """
+        count = len(self.command)
+        first, other = 1e-3 * (1.0 + np.arange(count)), 2e-3 * (1.0 + np.arange(count))
+        first, other = (self._within(angle) for angle in (first, other))
+        words = [self._rested(*given) for given in ((first, first), (first, other), (other, first))]
+        differ = np.flatnonzero(words[0] != words[2])
+        numbers = [some.view(np.float64)[differ] for some in (words[0], words[2])]
+        servo = np.array([int(np.argmin(np.abs(first - value))) for value in numbers[0]], np.int64)
+        told = np.array_equal(numbers[0], first[servo]) and np.array_equal(numbers[1], other[servo])
+        if not np.array_equal(words[0], words[1]) or not told or len(np.unique(first)) < count:
+            return None
+        return words[0], np.ascontiguousarray(np.stack([differ, servo], axis=1))
+
+    def _within(self, angle: Array) -> Array:
+        """Return angles moved into the servos' travel and commands."""
+        low, high = np.full(len(angle), -np.inf), np.full(len(angle), np.inf)
+        for berth in self.berths:
+            for ends in (berth.entry.travel(), berth.entry.commands("command_angle")):
+                which = berth.crew.which
+                low[which], high[which] = np.maximum(low[which], ends[0]), np.minimum(high[which], ends[1])
+        inside = np.where(np.isfinite(low), low, 0.0) + angle
+        return np.asarray(np.minimum(inside, high))
+
+    def _rested(self, angle: Array, goal: Array) -> NDArray[np.int64]:
+        """Return the words of what servos remember that rest at these angles [rad] under these commands."""
+        self.room[ROOM.index("angle")], self.room[ROOM.index("goal")] = angle, goal
+        self.reset()
+        found = []
+        for piece in (piece for berth in self.berths for piece in berth.pieces):
+            for row in range(piece.rows):
+                given = ctypes.string_at(piece.address + row * piece.stride, piece.bytes)
+                found.append(np.frombuffer(given.ljust(8 * (-(-piece.bytes // 8)), b"\0"), np.int64))
+        return np.concatenate(found)
 
     def reset(self) -> None:
         """Let all servos begin anew where compiled code has seen them."""
         angle, goal = self.room[ROOM.index("angle")], self.room[ROOM.index("goal")]
-        for berth in self.berths:
+        for berth, begin in zip(self.berths, self._begin, strict=True):
+            berth.sims.restore(begin)  # noise begins anew too
             berth.reset(angle, goal)
         self.record_words[RECORD.index("used")] = 0
 

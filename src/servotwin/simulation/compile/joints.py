@@ -60,7 +60,8 @@ _HEAD, _EACH = len(BLOCK), len(OF_EACH)
  _USERDATA, _XIPOS, _PASSIVE, _BIAS, _ACTUATOR, _CONSTRAINT, _SOLVE, _ACTUATE, _ACCELERATE, _CONSTRAIN, _PUSH, _STEP,
  _SLOT, _OWN, _OTHERS, _ANGLE_AT, _SPEED_AT, _COMMAND_AT, _GAIN, _ZERO, _ARMATURE, _LOWER, _UPPER, _LOW, _HIGH,
  _LONGEST, _KEPT_AT, _MEMORY, _INSTANCES, _ASK) = range(len(DRIVE))
-_DATA, _KEPT, _ROOM, _COMMAND, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIAL_NOW = range(len(INSTANCE))
+(_DATA, _KEPT, _ROOM, _COMMAND, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIAL_NOW, _NEW, _ANGLES,
+ _ANGLE_COUNT) = range(len(INSTANCE))
 (_ADVANCE, _TICK, _DURATION, _LOOK, _LANES, _WHICH, _G_ANGLE, _G_SPEED, _G_GOAL, _G_LOAD, _G_INERTIA, _G_REACHED,
  _G_AFTER, _G_STATUS, _G_SEEN, _PIECES, _PIECE_COUNT) = range(len(GROUP))
 _ROW, _CAPACITY, _USED, _KEPT_ROWS = range(len(RECORD))
@@ -423,7 +424,22 @@ def _is_stage(block, t, dt):
 
 
 @njit(error_model="numpy")
-def _begin(d, drive, instance, block, halves, t, dt):
+def _start_anew(drive, instance, room, half):
+    """Put the servos at rest where their joints are, and what they remember then into a half of a block."""
+    _words(instance[_RECORD], (len(RECORD),))[_USED] = 0
+    if instance[_NEW] == 0:
+        told(drive[_ASK], (ASK_RESET, instance[_DATA], 0))
+        _memories(instance, half, False)
+        return
+    _moved(instance[_NEW], half, 8 * drive[_MEMORY], False)
+    angles, found = _words(instance[_ANGLES], (2 * instance[_ANGLE_COUNT],)), _numbers(half, (drive[_MEMORY],))
+    for k in range(instance[_ANGLE_COUNT]):
+        found[angles[2 * k]] = room[_R_ANGLE, angles[2 * k + 1]]
+    _memories(instance, half, True)
+
+
+@njit(error_model="numpy")
+def _begin(d, drive, instance, block, room, halves, t, dt):
     """Find out where in time this call stands, and let the servos stand there; return whether this tick was met before.
 
     Time that goes on by a tick goes on from what the servos remember at its end; the same instant once more begins the
@@ -443,9 +459,8 @@ def _begin(d, drive, instance, block, halves, t, dt):
         now[:] = before
     else:
         if not onward:
-            told(drive[_ASK], (ASK_RESET, instance[_DATA], 0))
+            _start_anew(drive, instance, room, half)
             block[_FRESH] = 1.0
-            _memories(instance, half, False)
             speed_at, qvel = _words(drive[_SPEED_AT], (n,)), _word(d, drive[_QVEL])
             for i in range(n):
                 now[i], now[n + i] = 0.0, 0.0
@@ -502,7 +517,7 @@ def _control(m, d, drive_at):
         if culprit >= 0 or dt > _number(drive_at, 8 * _LONGEST) * (1.0 + _SAME):
             _complain(instance, NOT_FINITE if culprit >= 0 else TOO_LONG, max(culprit, 0))
             return
-        again = _begin(d, drive, instance, block, halves, t, dt)
+        again = _begin(d, drive, instance, block, room, halves, t, dt)
         _tick(m, d, drive, instance, block, room, halves + 8 * size * int(block[_HALF]), dt, rk4, again)
         instance[_SERIAL_NOW] += 1
         block[_SERIAL] = instance[_SERIAL_NOW]

@@ -13,8 +13,10 @@ its own inertia there; ends of its travel, and of its commands."""
 DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integrator", *PLACES, *FUNCTIONS, "slot",
          "own", "others", *ARRAYS, "longest", "kept_at", "memory", "instances", "ask")
 """All that servos share, wherever they are simulated."""
-INSTANCE = ("data", "block", "room", "command", "record", "groups", "count", "code", "culprit", "serial")
-"""Servos in one of the engine's data; `room` is for numbers that are worked out anew at each tick."""
+INSTANCE = ("data", "block", "room", "command", "record", "groups", "count", "code", "culprit", "serial", "fresh",
+            "angles", "angle_count")
+"""Servos in one of the engine's data; `room` is for numbers that are worked out anew at each tick. `fresh` is what they
+remember at rest (0: ask Python), in which the words of `angles`, pairs of place and servo, are the angle of a servo."""
 ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "free", "acceleration", "predicted", "found", "engine's speed",
         "final torque", "final acceleration", "final share", "passive", "pushed")
 """Numbers of each servo there, behind the unit rows of their degrees of freedom, those of M⁻¹, all forces, and a square
