@@ -226,3 +226,18 @@ def test_what_a_bus_refuses(servo):
     with pytest.raises(InputError, match=r"supply\.internal_resistance of lane 2"):
         sims.set(parameters={"supply.internal_resistance": 0.2}, lanes=[2])
     assert math.isclose(float(sims["bus_voltage"][0]), 5.0)
+
+
+def test_ticks_of_a_program_come_once_when_times_count_anew():
+    """Calls as long as its ticks, over the instant from which times count anew: as without a shared supply."""
+    model = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace({"gear.backlash": None}))
+    supply = st.Supply(open_circuit_voltage=12.0)
+    own = st.DigitalServo(model.servo.replace({"supply.open_circuit_voltage": 12.0, "supply.internal_resistance": 0.0}))
+    both = (st.VectorSimulator(own, 1, load=st.loads.Inertia(1e-3)),
+            st.VectorSimulator(model, 1, load=st.loads.Inertia(1e-3), bus=supply, threads=1))
+    for sims in both:
+        sims.reset(command_angle=0.5)
+    for _ in range(400):
+        for sims in both:
+            sims.advance(1e-3, command_angle=1.2)
+    assert both[0]["output_angle"][0] == pytest.approx(both[1]["output_angle"][0], abs=1e-12)

@@ -150,8 +150,8 @@ class ServoDrive:
             arrays["low"][which], arrays["high"][which] = berth.entry.commands("command_angle")
             arrays["armature"][which] = berth.entry.own_inertia() / arrays["gain"][which] ** 2
         for k, joint in enumerate(joints):
-            if joint.actuator >= 0 and self.model.actuator_ctrllimited[joint.actuator]:
-                ends = np.sort((self.model.actuator_ctrlrange[joint.actuator] - joint.mount.zero) / joint.mount.gain)
+            if joint.actuator >= 0 and self.model.actuator_ctrllimited[joint.command_at]:
+                ends = np.sort((self.model.actuator_ctrlrange[joint.command_at] - joint.mount.zero) / joint.mount.gain)
                 arrays["low"][k] = min(max(arrays["low"][k], ends[0]), arrays["high"][k])
                 arrays["high"][k] = max(min(arrays["high"][k], ends[1]), arrays["low"][k])
         return arrays

@@ -75,8 +75,8 @@ class Joint:
         Of the joint in its model.
     angle_at, speed_at : int
         Its places in qpos and qvel.
-    actuator : int
-        Number of the actuator whose `ctrl` commands it, −1 where there is none.
+    actuator, command_at : int
+        Number of the actuator that gives its control as the command, and where in `ctrl`; −1 where there is none.
     """
 
     name: str
@@ -126,12 +126,15 @@ def _refuse(mujoco: Any, model: Any, name: str, known: list[str]) -> None:
 
 def _actuator(mujoco: Any, model: Any, name: str, joint: int) -> tuple[int, int]:
     """Return the one actuator at a joint, and the place of its control; −1 where there is none."""
-    at_joint = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    own = [k for k in range(model.nu) if model.actuator_trntype[k] in at_joint and model.actuator_trnid[k, 0] == joint]
+    at_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    own = [k for k in range(len(model.actuator_trntype))
+           if int(model.actuator_trntype[k]) in at_joint and model.actuator_trnid[k, 0] == joint]
     if len(own) > 1:
         names = ", ".join(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or str(k) for k in own)
         raise InputError(f"actuators of joint {name}", got=names, allowed="one, whose control commands the servo")
-    return (own[0], own[0]) if own else (-1, -1)
+    if not own:
+        return -1, -1
+    return own[0], int(model.actuator_ctrladr[own[0]]) if hasattr(model, "actuator_ctrladr") else own[0]
 
 
 def _treat_friction(model: Any, joints: list[Joint], friction: str) -> None:

@@ -72,7 +72,8 @@ def through(inputs: list[Inputs], memories: list[Memory], ends: list[float], joi
             memories[j] = resumed(True, inputs[j], memories[j], False)
             while due(memories[j]):
                 shift = FRAMES * memories[j].beat
-                memories[j], ends[j] = counted_anew(memories[j]), ends[j] - shift
+                memories[j] = counted_anew(memories[j])
+                ends[j] = instant(True, inputs[j], memories[j], ends[j] - shift)  # or a tick next to it comes twice
                 if j == 0:
                     shared.begin, shared.end = shared.begin - shift, shared.end - shift
         first = memories[0].point.time
