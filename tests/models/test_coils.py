@@ -47,7 +47,7 @@ def test_a_leg_is_the_matrix_exponential(L, time):
     q, w, i, left, _, way = coils.leg(numbers, circuit, TORQUE, 6.0, CURRENT_FORWARD, 1.0, 1.0, 2.0, 0.9, time)
     assert (left, way) == (0.0, 1.0)
     expected = reference(L, 6.0 - 0.3, 3.1, 0.12, (1.0, 2.0, 0.9), time)
-    np.testing.assert_allclose((q, w, i), expected, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose((q, w, i), expected, rtol=1e-11, atol=1e-13)  # as far as SciPy's expm agrees on all CPUs
 
 
 @pytest.mark.parametrize("L", [5e-4, equal_inductance(), 0.05])

@@ -1,4 +1,4 @@
-"""Results are what they were: 500 random servos, one by one, in lanes, and on a bus, to 1e-12.
+"""Results are what they were: 500 random servos, one by one, in lanes, and on a bus, to 1e-11.
 
 That is of the largest number of a signal in a case, or of 1 where that is larger; `frozen_search.py` says which cases
 are allowed more, those that rounding alone moves. `frozen_servos.py` says what is frozen, and when it may be written
@@ -26,7 +26,7 @@ from models.frozen_servos import (
 
 SINGLE = 1e-5  # rad, of angles in float32
 KEPT = ("signals", "last", "events", "status", "allowed", "last_allowed")
-STRICT, SCATTER = 1.0000001e-12, 10.0  # what rounding alone moves, it moves by so much more another time
+SCATTER = 10.0  # what rounding moves, it moves by so much more another time, or on another make of CPU
 BY_STRIDES, STEPPED = ("heat", "spring", "pendulum"), 1e-10  # lanes that take steps of their own, and by how much
 SHOWN = 10  # cases of a failure
 GROUPS = 8  # tests of each kind
@@ -45,8 +45,8 @@ def group(k):
 
 
 def scattered(allowed):
-    """Return the allowances, larger where they are for cases that rounding alone moves."""
-    return np.where(allowed > STRICT, SCATTER * allowed, allowed)
+    """Return the allowances, with room for how another machine rounds."""
+    return SCATTER * allowed
 
 
 def compared(name, time, before, after, allowed):

@@ -1,8 +1,27 @@
 """Servos in robots: at the joints of MuJoCo models, in environments, and the motions that they follow."""
 
+from typing import Any
+
+from servotwin.robots.command_map import CommandMap
 from servotwin.robots.drive import ServoDrive
+from servotwin.robots.model_file import joint_names, joint_ranges, robot_model
+from servotwin.robots.motion import Motion, read_motion
 from servotwin.robots.mount import Mount
 from servotwin.robots.record import Record, ServoRecord
+from servotwin.robots.run import RobotRun, run_motion
+from servotwin.robots.sizing import Sizing, sizing_of
 from servotwin.robots.state import DriveState
 
-__all__ = ["DriveState", "Mount", "Record", "ServoDrive", "ServoRecord"]
+__all__ = [
+    "CommandMap", "DriveState", "Motion", "Mount", "Record", "RobotRun", "ServoActuated", "ServoDrive", "ServoRecord",
+    "Sizing", "joint_names",
+    "joint_ranges", "read_motion", "robot_model", "run_motion", "sizing_of",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "ServoActuated":  # Gymnasium is slow to load, and an extra
+        from servotwin.robots.gym import ServoActuated
+
+        return ServoActuated
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

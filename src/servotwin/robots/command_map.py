@@ -92,7 +92,8 @@ class Seat:
     ----------
     key : str
         By which somebody asked for it.
-    actuator : int
+    actuator, control : int
+        Its number, and where in `ctrl` it is told what to do.
     joint : str
     number : int
         Of the joint.
@@ -100,6 +101,7 @@ class Seat:
 
     key: str
     actuator: int
+    control: int
     joint: str
     number: int
 
@@ -112,7 +114,7 @@ def seats(model: Any, keys: Mapping[str, object]) -> list[Seat]:
     UnknownNameError
         If there is no such actuator and no such joint with an actuator.
     InputError
-        If an actuator is not at a joint, its joint has no name, or two names mean one of them.
+        If an actuator is not at a hinge or a slide or has not one control, or two names mean one of them.
     """
     found: list[Seat] = []
     for key in keys:
@@ -127,7 +129,7 @@ def seats(model: Any, keys: Mapping[str, object]) -> list[Seat]:
 def _seat(model: Any, key: str) -> Seat:
     mujoco = load_mujoco()
     kinds = [mujoco.mjtTrn(int(kind)).name.removeprefix("mjTRN_") for kind in model.actuator_trntype]
-    named = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or "" for k in range(model.nu)]
+    named = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or "" for k in range(len(kinds))]
     moved = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, model.actuator_trnid[k, 0]) or ""
              if kind in _AT_JOINT else "" for k, kind in enumerate(kinds)]
     known = list(dict.fromkeys(name for pair in zip(named, moved, strict=True) for name in pair if name))
@@ -136,14 +138,16 @@ def _seat(model: Any, key: str) -> Seat:
     k = named.index(key) if key in named else moved.index(key)
     if kinds[k] not in _AT_JOINT:
         raise InputError(f"actuator {key}", got=f"one at a {kinds[k].lower()}", allowed="one at a hinge or a slide")
-    if not moved[k]:
-        raise InputError(f"joint of actuator {key}", got="no name", allowed="a name: servos are at joints by name")
     number = int(model.actuator_trnid[k, 0])
     kind = mujoco.mjtJoint(int(model.jnt_type[number])).name.removeprefix("mjJNT_").lower()
     if kind not in ("hinge", "slide"):
         raise InputError(f"joint {moved[k]} of actuator {key}", got=f"a {kind} joint",
                          allowed="a hinge or a slide: one servo moves one degree of freedom")
-    return Seat(key, k, moved[k], number)
+    controls = int(model.actuator_ctrlnum[k]) if hasattr(model, "actuator_ctrlnum") else 1  # from MuJoCo 4 on
+    if controls != 1:
+        raise InputError(f"actuator {key}", got=f"one with {controls} controls", allowed="one with one control")
+    control = int(model.actuator_ctrladr[k]) if hasattr(model, "actuator_ctrladr") else k
+    return Seat(key, k, control, moved[k], number)
 
 
 def maps(model: Any, places: list[Seat], mounts: Mapping[str, Mount], command: Any) -> dict[str, CommandMap]:
@@ -161,17 +165,18 @@ def maps(model: Any, places: list[Seat], mounts: Mapping[str, Mount], command: A
     known = [name for seat in places for name in dict.fromkeys((seat.key, seat.joint))]
     asked: dict[str, Any] = {}
     for name, value in given.items():
-        if name not in known:
+        key = by_actuator.get(_seat(model, name).actuator) if name in known else None
+        if key is None:
             raise UnknownNameError("actuator with a servo", name, known)
-        asked[by_actuator[_seat(model, name).actuator]] = value
+        asked[key] = value
     return {seat.key: _map(model, seat, mounts[seat.key], asked.get(seat.key)) for seat in places}
 
 
 def _map(model: Any, seat: Seat, mount: Mount, given: Any) -> CommandMap:
     """Return the map that is given, or that follows from the model."""
     mujoco = load_mujoco()
-    low, high = map(float, model.actuator_ctrlrange[seat.actuator])
-    limits = (low, high) if model.actuator_ctrllimited[seat.actuator] else (-math.inf, math.inf)
+    low, high = map(float, model.actuator_ctrlrange[seat.control])
+    limits = (low, high) if model.actuator_ctrllimited[seat.control] else (-math.inf, math.inf)
     unit = "m" if mujoco.mjtJoint(int(model.jnt_type[seat.number])) == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
     if isinstance(given, CommandMap):
         return replace(given, joint=seat.joint, unit=unit)

@@ -20,7 +20,7 @@ from servotwin.simulation.compile.joints_layout import GROUP, INSTANCE, RECORD, 
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-OF_SHAFT = ("output_angle", "output_speed")
+_GIVEN = ("angle", "speed", "goal", "load", "inertia", "reached", "after")
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ class Berth:
         self.crew, self.sims = crew, crew.simulator()
         count = len(crew.which)
         self.entry: CEntry = self.sims.c_entry()
-        self._arrays = {name: np.zeros(count) for name in ("angle", "speed", "goal", "load", "inertia", "reached", "after")}
+        self._arrays = {name: np.zeros(count) for name in _GIVEN}
         self._status, own = np.zeros(count, np.int8), self._arrays
         self.tick = self.entry.tick(
             0.0, command_angle=own["goal"], external_torque=own["load"], set_output_angle=own["angle"],
@@ -174,7 +174,7 @@ class Instance:
         self.berths = [Berth(crew) for crew in crews]
         self.size = sum(berth.size for berth in self.berths)
         self.block = np.zeros(head + 2 * self.size)
-        self.command = np.zeros(count)
+        self.command = np.full(count, np.nan)
         self.record_words = np.zeros(len(RECORD), np.int64)
         self.rows = np.zeros((0, 0))
         behind = (2 * count + 1) * dofs + count * count
@@ -193,8 +193,8 @@ class Instance:
         self._start = self._fresh()
         if self._start is not None:
             fresh, angles = self._start
-            for name, value in (("fresh", fresh.ctypes.data), ("angles", angles.ctypes.data), ("angle_count", len(angles))):
-                self.words[INSTANCE.index(name)] = value
+            at = INSTANCE.index("fresh")
+            self.words[at:at + 3] = fresh.ctypes.data, angles.ctypes.data, len(angles)
 
     def _fresh(self) -> tuple[NDArray[np.int64], NDArray[np.int64]] | None:
         """Return what servos at rest remember, and which of these words are angles of which servo.
@@ -202,8 +202,7 @@ class Instance:
         None where that is not all: where the command counts too, or what is remembered is more than the angle.
         """
         count = len(self.command)
-        first, other = 1e-3 * (1.0 + np.arange(count)), 2e-3 * (1.0 + np.arange(count))
-        first, other = (self._within(angle) for angle in (first, other))
+        first, other = (self._within(size * np.arange(1.0, count + 1.0)) for size in (1e-3, 2e-3))
         words = [self._rested(*given) for given in ((first, first), (first, other), (other, first))]
         differ = np.flatnonzero(words[0] != words[2])
         numbers = [some.view(np.float64)[differ] for some in (words[0], words[2])]

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any, TypeVar
-
-import numpy as np
 
 from servotwin.errors import InputError, MissingExtraError, ServotwinError, SimulationError
 from servotwin.models import Model
-from servotwin.robots.command_map import CommandMap, Seat, maps, seats
+from servotwin.robots.command_map import CommandMap, maps, seats
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
@@ -94,13 +90,10 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
         places = seats(model, servos)
         mounts = {key: given if isinstance(given, Mount) else Mount(given) for key, given in servos.items()}
         self.maps: dict[str, CommandMap] = maps(model, places, mounts, command)
-        joints = {name: seat.joint for seat in places for name in (seat.joint, seat.key)}
-        self.drive = _drive(model, places, list(self.maps.values()), {joints[key]: one for key, one in mounts.items()},
-                            _by_joint(bus, joints), joint_friction)
-        self._at = np.array([seat.actuator for seat in places])
-        self._scale, self._offset = np.array([[one.scale, one.offset] for one in self.maps.values()]).T
-        self._direct = all(one.is_identity for one in self.maps.values())
-        self._new = self.drive.save(self.data).servos
+        self.drive = ServoDrive(
+            model, {seat.joint: mounts[seat.key] for seat in places}, joint_friction=joint_friction,
+            bus=_by_joint(bus, {seat.key: seat.joint for seat in places}),
+            controls={one.joint: one for one in self.maps.values()})
 
     @property
     def data(self) -> Any:
@@ -126,7 +119,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
         """Let the environment begin anew, and the servos with it, at rest."""
         with contextlib.suppress(ServotwinError):
             self.drive.check(self.data)  # what went wrong in the episode before
-        self.drive.restore(self.data, replace(self.drive.save(self.data), servos=self._new))
+        self.drive.reset(self.data)
         return self._with_servos(lambda: self.env.reset(seed=seed, options=options))
 
     def _with_servos(self, call: Callable[[], _T]) -> _T:
@@ -136,32 +129,13 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
             raise InputError("model of the environment", got="another one than when it was wrapped",
                              allowed="the same: wrap an environment that changes its model anew")
         before, servos = mujoco.get_mjcb_control(), self.drive.callback()
-        if before is not None and not _is_same(before, servos):
-            raise InputError("MuJoCo's control callback", got="one that is not this drive's", allowed="none while an "
-                             "environment with servos steps; mujoco.set_mjcb_control(None) ends it")
-        mujoco.set_mjcb_control(servos if self._direct else self._mapped(servos))
+        mujoco.set_mjcb_control(servos)
         try:
             result = call()
         finally:
             mujoco.set_mjcb_control(before)
         self.drive.check(self.data)
         return result
-
-    def _mapped(self, servos: Any) -> Callable[[Any, Any], None]:
-        """Return a control callback by which the servos see angles where the environment has put its controls."""
-        own, at, scale, offset = self.drive.model, self._at, self._scale, self._offset
-        sizes = own.nq, own.nv, own.nu
-
-        def control(model: Any, data: Any) -> None:
-            if (model.nq, model.nv, model.nu) != sizes:
-                return
-            controls = data.ctrl
-            kept = controls[at]
-            controls[at] = offset + scale * kept
-            servos(model._address, data._address)
-            controls[at] = kept
-
-        return control
 
     # --- what shows ---------------------------------------------------------------------------------------------------
 
@@ -207,22 +181,6 @@ def _check(env: Any, servos: Any) -> None:
         raise InputError("servos of an environment", got=servos, allowed="a mapping of actuators to models or Mounts")
 
 
-def _drive(model: Any, places: list[Seat], commands: list[CommandMap], servos: dict[str, Mount], bus: Any,
-           joint_friction: str) -> ServoDrive:
-    """Return the servos, to which the ends of their controls are shown as angles."""
-    at = [seat.actuator for seat in places]
-    ends, limited = model.actuator_ctrlrange[at], model.actuator_ctrllimited[at]
-    try:
-        for k, one in zip(at, commands, strict=True):
-            angles = sorted((one.angle_low, one.angle_high))
-            model.actuator_ctrllimited[k] = np.isfinite(angles).all()
-            if model.actuator_ctrllimited[k]:
-                model.actuator_ctrlrange[k] = angles
-        return ServoDrive(model, servos, bus=bus, joint_friction=joint_friction)
-    finally:
-        model.actuator_ctrlrange[at], model.actuator_ctrllimited[at] = ends, limited
-
-
 def _by_joint(bus: Any, joints: Mapping[str, str]) -> Any:
     """Return supplies with names of joints for those of actuators; anything else as it is, for the drive to refuse."""
     try:
@@ -230,8 +188,3 @@ def _by_joint(bus: Any, joints: Mapping[str, str]) -> Any:
     except (TypeError, ValueError):
         return bus
 
-
-def _is_same(callback: Any, own: Any) -> bool:
-    """Tell whether a control callback is the same function of C as another one."""
-    return isinstance(callback, type(own)) and (
-        ctypes.cast(callback, ctypes.c_void_p).value == ctypes.cast(own, ctypes.c_void_p).value)

@@ -14,7 +14,7 @@ from servotwin.datasheet.full_drive import FullDrive
 from servotwin.datasheet.warming import WIRE_LIMIT, Masses, thermal_masses
 from servotwin.errors import InputError
 from servotwin.physics import Temperatures, winding_resistance
-from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE, copper_loss
+from servotwin.physics.thermal import COPPER_COEFFICIENT, copper_loss
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -25,6 +25,7 @@ _NUMBERS = ("winding_capacity", "housing_capacity", "winding_to_housing", "housi
             "magnet_coefficient")
 _LONGEST = 3600.0  # s; what is not too hot by then never gets so
 _STEPS = 720
+_MELTED = 1e4  # K; beyond it numbers say nothing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,16 +36,23 @@ class Heating:
     ----------
     heat : float
         Mean of i² R over the motion [W].
-    winding : float
-        Temperature to which the winding comes in the end; inf where it has none [K].
+    winding, housing : float
+        Temperatures to which they come in the end; inf where there is none [K].
     limit_time : float
-        When it passes 130 °C, beginning cool; nan where it does not within an hour [s].
+        When the winding passes 130 °C, beginning cool; nan where it does not within an hour [s].
+    trip_temperature : float
+        Of the housing, at which the program trips; inf where it does not [K].
+    trip_time : float
+        When it gets so hot, likewise [s].
     masses : Masses
     """
 
     heat: float
     winding: float
+    housing: float
     limit_time: float
+    trip_temperature: float
+    trip_time: float
     masses: Masses
 
 
@@ -76,14 +84,14 @@ def mean_heat(record: ServoRecord, masses: Masses, since: float, until: float) -
         return math.nan
     if "winding_temperature" not in record:
         R = record.mount.model.value("motor.armature_resistance")
-        return float(np.mean(copper_loss(record["armature_current"][inside], R)))
+        return copper_loss(math.sqrt(float(np.mean(record["armature_current"][inside]**2))), R)
     winding, housing = record["winding_temperature"][inside], record["housing_temperature"][inside]
     lost = float(np.trapezoid(housing - masses.ambient, time)) / masses.housing_to_ambient
     kept = masses.winding_capacity * (winding[-1] - winding[0]) + masses.housing_capacity * (housing[-1] - housing[0])
     return max((float(kept) + lost) / float(time[-1] - time[0]), 0.0)
 
 
-def heating(heat: float, mean_winding: float, masses: Masses) -> Heating:
+def heating(heat: float, mean_winding: float, masses: Masses, trip_temperature: float = math.inf) -> Heating:
     """Return how warm a servo gets that goes on making a heat [W], which grows with the resistance of its copper.
 
     Parameters
@@ -93,6 +101,8 @@ def heating(heat: float, mean_winding: float, masses: Masses) -> Heating:
     mean_winding : float
         [K]
     masses : Masses
+    trip_temperature : float
+        Of the housing, at which the servo's program trips [K]
 
     Examples
     --------
@@ -104,24 +114,26 @@ def heating(heat: float, mean_winding: float, masses: Masses) -> Heating:
     per_watt = masses.winding_to_housing + masses.housing_to_ambient
     cold = heat / float(winding_resistance(mean_winding, 1.0))  # at the reference temperature
     slope = COPPER_COEFFICIENT * cold * per_watt
-    end = math.inf if slope >= 1.0 else (
-        masses.ambient + cold * per_watt * (1.0 + COPPER_COEFFICIENT * (masses.ambient - REFERENCE_TEMPERATURE))
-        / (1.0 - slope))
-    return Heating(heat=heat, winding=end, limit_time=_passing(cold, masses) if end > WIRE_LIMIT else math.nan,
-                   masses=masses)
+    first = cold * per_watt * float(winding_resistance(masses.ambient, 1.0))
+    rise = math.inf if slope >= 1.0 else first / (1.0 - slope)
+    winding_time, housing_time = _passing(cold, masses, WIRE_LIMIT, trip_temperature)
+    return Heating(
+        heat=heat, winding=masses.ambient + rise, housing=masses.ambient + rise * masses.housing_to_ambient / per_watt,
+        limit_time=winding_time, trip_temperature=trip_temperature, trip_time=housing_time, masses=masses)
 
 
-def _passing(cold: float, masses: Masses) -> float:
-    """Return when a winding passes its limit [s], of a heat [W] that it makes at the reference temperature."""
-    now, step = Temperatures(masses.ambient, masses.ambient), _LONGEST / _STEPS
+def _passing(cold: float, masses: Masses, winding: float, housing: float) -> tuple[float, float]:
+    """Return when winding and housing pass temperatures [K], of a heat [W] made at the reference temperature."""
+    now, step, found = Temperatures(masses.ambient, masses.ambient), _LONGEST / _STEPS, [math.nan, math.nan]
     for k in range(_STEPS):
-        heat = cold * float(winding_resistance(now.winding, 1.0))
-        after = masses.after(step, heat, now)
-        if after.winding > WIRE_LIMIT:
-            share = (WIRE_LIMIT - now.winding) / (after.winding - now.winding)
-            return step * (k + float(share))
+        if now.winding > _MELTED:
+            break
+        after = masses.after(step, cold * float(winding_resistance(now.winding, 1.0)), now)
+        for at, (limit, old, new) in enumerate(zip((winding, housing), now, after, strict=True)):
+            if math.isnan(found[at]) and new > limit:
+                found[at] = step * (k + float((limit - old) / (new - old)))
         now = Temperatures(float(after.winding), float(after.housing))
-    return math.nan
+    return found[0], found[1]
 
 
 def lasting_torque(model: Model, masses: Masses) -> float:

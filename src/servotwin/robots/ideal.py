@@ -1,14 +1,17 @@
 """The same robot with ideal actuators: its joints follow their motion exactly, and what that takes.
 
-A motion is straight lines between samples, which no joint follows: its speed jumps at each sample. An ideal joint moves
-on the mean of the motion over a short window, which makes parabolas of the corners and leaves straight lines as they are
-(Craig, Introduction to Robotics, 3rd ed. 2005, section 7.3, linear function with parabolic blends):
+A motion is straight lines between samples, which no joint follows: its speed jumps at each sample. An ideal joint
+moves on the mean of the motion over a short window, which makes parabolas of the corners and leaves straight lines as
+they are (Craig, Introduction to Robotics, 3rd ed. 2005, section 7.3, linear function with parabolic blends):
 
     q(t) = (Q(t + w/2) − Q(t − w/2))/w,    with Q' = the motion
 
 The torque is that of inverse dynamics, rotors and gears of the servos included. Joints without a servo, and things that
 lie about, move as they are pushed: there the joints with servos are given an inertia beside which nothing counts, and
 with it the acceleration that they have to have.
+
+Where such a robot runs into itself or into what is fixed, nothing yields and no torque makes sense: such contacts are
+told, and their forces do not count.
 """
 
 from __future__ import annotations
@@ -27,7 +30,7 @@ from servotwin.robots.places import load_mujoco
 from servotwin.units import is_finite
 
 Array = NDArray[np.float64]
-WINDOWS = (0.02, 0.1)  # s, shortest and longest window of a motion: a frame of a servo, and what nobody sees
+WINDOWS = (0.05, 0.1)  # s, shortest and longest window of a motion: in the former no servo gets up to speed
 _HEAVY = 1e8  # times what a joint carries
 _LIGHTEST = 1e-9  # kg m², of a joint that carries nothing
 
@@ -38,6 +41,21 @@ class Course(NamedTuple):
     angle: Array
     speed: Array
     acceleration: Array
+
+
+class Touch(NamedTuple):
+    """Two bodies of which neither yields, that run into each other: names, first time [s], and for how long [s]."""
+
+    first: str
+    second: str
+    time: float
+    duration: float
+
+    @property
+    def words(self) -> str:
+        """One sentence."""
+        return (f"with ideal actuators {self.first} runs into {self.second} at {max(self.time, 0.0):.2f} s, for "
+                f"{self.duration:.2f} s in all; the torque of that does not count")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,6 +74,8 @@ class IdealRun:
         That each of them takes, to move its own rotor and gear included [N m], of a slide [N]
     poses : ndarray, shape (n, nq)
         Of the whole robot, MuJoCo's `qpos`.
+    touches : tuple of Touch
+        What it runs into, that does not yield.
     """
 
     time: Array
@@ -63,10 +83,11 @@ class IdealRun:
     courses: Mapping[str, Course]
     torque: Mapping[str, Array]
     poses: Array
+    touches: tuple[Touch, ...]
 
 
 def blend_window(motion: Motion) -> float:
-    """Return the window of a motion [s]: two of its samples, but no less than 0.02 and no more than 0.1 s.
+    """Return the window of a motion [s]: two of its samples, but no less than 0.05 and no more than 0.1 s.
 
     Examples
     --------
@@ -153,6 +174,7 @@ def ideal_run(model: Any, joints: Sequence[str], motion: Motion, time: Array, *,
                _standing(float(data.qpos[at]), len(time)) for name, at in zip(joints, angles_at, strict=True)}
     table = np.array([courses[name] for name in joints])  # joints, (angle, speed, acceleration), times
     torque, poses = np.zeros((len(joints), len(time))), np.zeros((len(time), model.nq))
+    firm = _Firm(model, set(dofs.tolist()))
     for k in range(len(time)):
         data.qpos[angles_at], data.qvel[dofs] = table[:, 0, k], table[:, 1, k]
         data.qacc[dofs] = table[:, 2, k]
@@ -160,9 +182,12 @@ def ideal_run(model: Any, joints: Sequence[str], motion: Motion, time: Array, *,
         if others_move:
             data.qfrc_applied[dofs] = weights * table[:, 2, k]
             mujoco.mj_forward(heavy, data)
+        inverse.time = time[k]
         inverse.qpos[:], inverse.qvel[:], inverse.qacc[:] = data.qpos, data.qvel, data.qacc
         mujoco.mj_inverse(exact, inverse)
         torque[:, k] = inverse.qfrc_inverse[dofs] - data.qfrc_actuator[dofs]
+        if inverse.ncon:
+            torque[:, k] += firm.forces(exact, inverse)[dofs]
         poses[k] = data.qpos
         if others_move:
             mujoco.mj_step(heavy, data)
@@ -173,7 +198,50 @@ def ideal_run(model: Any, joints: Sequence[str], motion: Motion, time: Array, *,
         raise SimulationError("MUJOCO", float(time[bad]), "MuJoCo has met a number that is not finite with ideal "
                               "actuators")
     return IdealRun(time=time, window=window, courses=courses, torque=dict(zip(joints, torque, strict=True)),
-                    poses=poses)
+                    poses=poses, touches=firm.touches(time))
+
+
+class _Firm:
+    """Contacts between bodies that all move as they have to, or not at all."""
+
+    def __init__(self, model: Any, dofs: set[int]) -> None:
+        self._mujoco, self._model = load_mujoco(), model
+        self._met: dict[tuple[int, int], list[float]] = {}
+        bound = [True]
+        for body in range(1, model.nbody):
+            first = int(model.body_dofadr[body])
+            own = range(first, first + int(model.body_dofnum[body]))
+            bound.append(bound[int(model.body_parentid[body])] and dofs.issuperset(own))
+        self._bound = bound
+
+    def forces(self, model: Any, data: Any) -> Array:
+        """Return what such contacts do to the degrees of freedom [N m or N]."""
+        forces, met = np.zeros(data.nefc), False
+        elliptic = model.opt.cone == self._mujoco.mjtCone.mjCONE_ELLIPTIC
+        for contact in data.contact:
+            bodies = [int(model.geom_bodyid[geom]) for geom in contact.geom if geom >= 0]
+            if contact.efc_address < 0 or len(bodies) < 2 or not all(self._bound[body] for body in bodies):
+                continue
+            rows = contact.dim if elliptic or contact.dim == 1 else 2 * (contact.dim - 1)
+            at = slice(contact.efc_address, contact.efc_address + rows)
+            forces[at], met = data.efc_force[at], True
+            times = self._met.setdefault((min(bodies), max(bodies)), [])
+            if not times or times[-1] != data.time:
+                times.append(float(data.time))
+        found = np.zeros(model.nv)
+        if met:
+            self._mujoco.mj_mulJacTVec(model, data, found, forces)
+        return found
+
+    def touches(self, time: Array) -> tuple[Touch, ...]:
+        """Return all that have met, the first ones first."""
+        step = float(time[1] - time[0]) if len(time) > 1 else 0.0
+        found = [Touch(self._name(second), self._name(first), times[0], step * len(times))
+                 for (first, second), times in self._met.items()]
+        return tuple(sorted(found, key=lambda touch: touch.time))
+
+    def _name(self, body: int) -> str:
+        return "what is fixed" if body == 0 else self._model.body(body).name or f"body {body}"
 
 
 def _standing(angle: float, count: int) -> Course:

@@ -15,6 +15,7 @@ from servotwin.robots.so101 import so101
 BUILT_IN: Mapping[str, Callable[[], str]] = MappingProxyType({"so101": so101})
 """MJCF of robots that come with the package, by name."""
 _SKY = {"rgb1": (0.66, 0.75, 0.86), "rgb2": (0.93, 0.95, 0.97), "width": 64, "height": 384}
+_LIGHT = ((0.4, 0.4, 0.4), (0.6, 0.6, 0.6))  # ambient and diffuse, of a robot that has none
 
 
 def robot_model(source: Any) -> Any:
@@ -24,7 +25,7 @@ def robot_model(source: Any) -> Any:
     ----------
     source : MjModel, MjSpec, str or Path
         A path is of an MJCF or URDF file; a string may be the name of a robot that comes with the package. What is
-        read from a file gets a sky where it has none: pictures would be black.
+        read from a file gets a sky and light where it has none: pictures would be black.
 
     Raises
     ------
@@ -65,6 +66,9 @@ def _read(mujoco: Any, path: Path) -> Any:
         if not any(texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX for texture in spec.textures):
             spec.add_texture(name="servotwin sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
                              builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, **_SKY)
+        if not spec.lights:
+            light = spec.visual.headlight
+            light.ambient, light.diffuse = _LIGHT
         return spec.compile()
     except Exception as error:  # MuJoCo raises ValueError, its own FatalError and what its plugins raise
         raise InputError(f"{path} is no model that MuJoCo reads ({' '.join(str(error).split())})") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,14 +89,13 @@ class Joint:
     command_at: int
 
 
-def joints_of(model: Any, servos: dict[str, Any], friction: str) -> list[Joint]:
+def joints_of(model: Any, servos: Mapping[str, Any]) -> list[Joint]:
     """Return the joints of an MjModel that servos move, checked.
 
     Raises
     ------
     InputError
-        If a joint is not there, is neither hinge nor slide, or has friction of its own that `friction` does not say
-        what to do with; or several actuators move it.
+        If a joint is not there, is neither hinge nor slide, or several actuators move it.
     """
     mujoco = load_mujoco()
     known = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, k) or "" for k in range(model.njnt)]
@@ -112,7 +112,6 @@ def joints_of(model: Any, servos: dict[str, Any], friction: str) -> list[Joint]:
         dof = int(model.jnt_dofadr[number])
         actuator, command_at = _actuator(mujoco, model, name, number)
         found.append(Joint(name, mount, number, int(model.jnt_qposadr[number]), dof, actuator, command_at))
-    _treat_friction(model, found, friction)
     return found
 
 
@@ -137,8 +136,14 @@ def _actuator(mujoco: Any, model: Any, name: str, joint: int) -> tuple[int, int]
     return own[0], int(model.actuator_ctrladr[own[0]]) if hasattr(model, "actuator_ctrladr") else own[0]
 
 
-def _treat_friction(model: Any, joints: list[Joint], friction: str) -> None:
-    """Refuse, clear or keep what the joints have of friction themselves."""
+def treat_friction(model: Any, joints: list[Joint], friction: str) -> None:
+    """Refuse, clear or keep what the joints have of friction themselves.
+
+    Raises
+    ------
+    InputError
+        If `friction` is none of these words, or a joint has some that is refused; names it.
+    """
     if friction not in ("refuse", "clear", "keep"):
         raise InputError("joint_friction", got=friction, allowed="'refuse', 'clear' or 'keep'")
     dofs = [joint.speed_at for joint in joints]
@@ -149,12 +154,8 @@ def _treat_friction(model: Any, joints: list[Joint], friction: str) -> None:
         return
     for field, word in _PASSIVE.items():
         own = [f"{joint.name} {getattr(model, field)[joint.speed_at]:g}" for joint in joints
-               if np_any(getattr(model, field)[joint.speed_at])]
+               if (getattr(model, field)[joint.speed_at] != 0.0).any()]
         if own:
             raise InputError(f"{word} of joints with servos", got=", ".join(own), allowed="0, for friction is the "
                              "servo's: joint_friction='clear' sets it so, 'keep' leaves it as the bearing's")
 
-
-def np_any(value: Any) -> bool:
-    """Tell whether a number of MuJoCo's, which may be a row of them, is not zero."""
-    return bool((value != 0.0).any())

@@ -72,10 +72,10 @@ def places() -> Places:
     option = model.opt
     option.timestep = _ODD
     within = model.opt.gravity.ctypes.data - model._address
-    words = np.frombuffer((ctypes.c_char * within).from_address(model._address), np.float64)
+    words = np.ctypeslib.as_array((ctypes.c_double * (within // 8)).from_address(model._address))
     at = np.flatnonzero(words == _ODD)
     integrator = _integrator(mujoco, model)
-    sizes = np.frombuffer((ctypes.c_char * 16).from_address(model._address), np.int64)
+    sizes = np.ctypeslib.as_array((ctypes.c_int64 * 2).from_address(model._address))
     wide = sizes.tolist() == [model.nq, model.nv]
     narrow = sizes.view(np.int32)[:2].tolist() == [model.nq, model.nv]
     library = _library(mujoco)
@@ -92,7 +92,7 @@ def _behind(address: int, wanted: Mapping[str, int]) -> dict[str, int]:
     """Return how many bytes behind an address each of some words stands first; it looks no further than it has to."""
     found: dict[str, int] = {}
     for first in range(0, _MOST, _CHUNK):
-        words = np.frombuffer((ctypes.c_int64 * _CHUNK).from_address(address + 8 * first), np.int64)
+        words = np.ctypeslib.as_array((ctypes.c_int64 * _CHUNK).from_address(address + 8 * first))
         for name, word in wanted.items():
             at = np.flatnonzero(words == word)
             if name not in found and len(at):
@@ -105,7 +105,7 @@ def _behind(address: int, wanted: Mapping[str, int]) -> dict[str, int]:
 def _integrator(mujoco: Any, model: Any) -> int | None:
     """Return where the number of the integrator stands behind the beginning of a model."""
     first = model.opt.o_friction.ctypes.data + _BEHIND[0]
-    numbers = np.frombuffer((ctypes.c_int32 * ((_BEHIND[1] - _BEHIND[0]) // 4)).from_address(first), np.int32)
+    numbers = np.ctypeslib.as_array((ctypes.c_int32 * ((_BEHIND[1] - _BEHIND[0]) // 4)).from_address(first))
     follows = np.ones(len(numbers), np.bool_)
     for kind in (mujoco.mjtIntegrator.mjINT_RK4, mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
                  mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_IMPLICIT):

@@ -92,7 +92,8 @@ class ServoRecord(Mapping[str, Array]):
         if "trip" not in self.names:
             return ()
         trips = self["trip"]
-        found = [(float(self.time[np.argmax(trips == k)]), kind) for k, kind in enumerate(TRIPS, 1) if (trips == k).any()]
+        found = [(float(self.time[np.argmax(trips == k)]), kind)
+                 for k, kind in enumerate(TRIPS, 1) if (trips == k).any()]
         return tuple(Remark(f"tripped by {kind}", time) for time, kind in sorted(found))
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -79,7 +79,8 @@ def tracking_of(record: ServoRecord, goal: Array, duration: float) -> Tracking:
     return Tracking(
         rms=_rms(error[moving]), largest=float(np.abs(error[moving]).max()), mean=float(error[moving].mean()),
         delay=delay, rms_delayed=left, droop_before=_mean(error[(time <= 0.0) & (time > -_REST)]),
-        droop_after=_mean(error[time > time[-1] - _REST]), peak_current=_highest(record, "armature_current", from_start),
+        droop_after=_mean(error[time > time[-1] - _REST]),
+        peak_current=_highest(record, "armature_current", from_start),
         mean_current=float(record[drawn][from_start].mean()),
         lowest_voltage=float(record["bus_voltage"][from_start].min()) if "bus_voltage" in record else math.nan,
         winding=_highest(record, "winding_temperature", from_start),
@@ -104,7 +105,7 @@ def best_delay(time: Array, goal: Array, angle: Array, moving: NDArray[np.bool_]
 
     delays = np.linspace(0.0, _LONGEST_DELAY, _DELAYS)
     errors = [left(delay) for delay in delays.tolist()]
-    at, step = int(np.argmin(errors)), delays[1]
+    at, step = int(np.argmin(errors)), float(delays[1])
     best = float(delays[at])
     for _ in range(20):  # halves the steps around the best
         step *= 0.5

@@ -195,6 +195,11 @@ class VectorSimulator:
         self._store.start(which, self._numbers.start(which, command, angle))
         self._command[:] = command
 
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of what can be looked at, `time` apart."""
+        return self._numbers.available
+
     # --- what can be seen and set -------------------------------------------------------------------------------------
 
     def __getitem__(self, name: str) -> Array:

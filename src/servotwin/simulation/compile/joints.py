@@ -12,7 +12,7 @@ leads to with these speeds: else a shaft that comes to rest on a tooth within a 
 """
 
 # numba's own types are not annotated
-# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped, call-arg, unreachable"
+# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped, call-arg, unreachable, var-annotated"
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ _HEAD, _EACH = len(BLOCK), len(OF_EACH)
 (_SERVOS, _DOFS, _COORDINATES, _WIDE, _BODIES, _TIMESTEP, _INTEGRATOR, _TIME, _QPOS, _QVEL, _CTRL, _APPLIED, _XFRC,
  _USERDATA, _XIPOS, _PASSIVE, _BIAS, _ACTUATOR, _CONSTRAINT, _SOLVE, _ACTUATE, _ACCELERATE, _CONSTRAIN, _PUSH, _STEP,
  _SLOT, _OWN, _OTHERS, _ANGLE_AT, _SPEED_AT, _COMMAND_AT, _GAIN, _ZERO, _ARMATURE, _LOWER, _UPPER, _LOW, _HIGH,
- _LONGEST, _KEPT_AT, _MEMORY, _INSTANCES, _ASK) = range(len(DRIVE))
+ _SCALE, _OFFSET, _CONTROL_LOW, _CONTROL_HIGH, _LONGEST, _KEPT_AT, _MEMORY, _INSTANCES, _ASK) = range(len(DRIVE))
 (_DATA, _KEPT, _ROOM, _COMMAND, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIAL_NOW, _NEW, _ANGLES,
  _ANGLE_COUNT) = range(len(INSTANCE))
 (_ADVANCE, _TICK, _DURATION, _LOOK, _LANES, _WHICH, _G_ANGLE, _G_SPEED, _G_GOAL, _G_LOAD, _G_INERTIA, _G_REACHED,
@@ -229,23 +229,43 @@ def _supported(m, d, drive, speed_at, torque):
 
 
 @njit(error_model="numpy")
-def _stand(d, drive, instance, room):
-    """Put angles, speeds and commands, as the servos see them, into their room; return who has none, or −1."""
+def _stand(d, drive, room):
+    """Put angles and speeds, as the servos see them, into their room; return who has none, or −1."""
     n = drive[_SERVOS]
     angle_at, speed_at = _words(drive[_ANGLE_AT], (n,)), _words(drive[_SPEED_AT], (n,))
-    command_at, command = _words(drive[_COMMAND_AT], (n,)), _numbers(instance[_COMMAND], (n,))
     gain, zero = _numbers(drive[_GAIN], (n,)), _numbers(drive[_ZERO], (n,))
-    low, high = _numbers(drive[_LOW], (n,)), _numbers(drive[_HIGH], (n,))
-    qpos, qvel, ctrl = _word(d, drive[_QPOS]), _word(d, drive[_QVEL]), _word(d, drive[_CTRL])
+    qpos, qvel = _word(d, drive[_QPOS]), _word(d, drive[_QVEL])
     for i in range(n):
         q, w = _number(qpos, 8 * angle_at[i]), _number(qvel, 8 * speed_at[i])
-        goal = _number(ctrl, 8 * command_at[i]) if command_at[i] >= 0 else command[i]
-        if not (math.isfinite(q) and math.isfinite(w) and math.isfinite(goal)):
+        if not (math.isfinite(q) and math.isfinite(w)):
             return i
         room[_R_ANGLE, i] = (q - zero[i]) / gain[i]
         room[_R_ACTUAL, i] = w / gain[i]
         room[_R_SPEED, i] = room[_R_ACTUAL, i] if abs(room[_R_ACTUAL, i]) > _RESTS else 0.0
-        room[_R_GOAL, i] = min(max((goal - zero[i]) / gain[i], low[i]), high[i])
+    return -1
+
+
+@njit(error_model="numpy")
+def _listen(d, drive, instance, block, room):
+    """Put the servos' commands into their room; return whose is not a number, or −1."""
+    n = drive[_SERVOS]
+    command_at, command = _words(drive[_COMMAND_AT], (n,)), _numbers(instance[_COMMAND], (n,))
+    gain, zero = _numbers(drive[_GAIN], (n,)), _numbers(drive[_ZERO], (n,))
+    low, high = _numbers(drive[_LOW], (n,)), _numbers(drive[_HIGH], (n,))
+    scale, offset = _numbers(drive[_SCALE], (n,)), _numbers(drive[_OFFSET], (n,))
+    least, most = _numbers(drive[_CONTROL_LOW], (n,)), _numbers(drive[_CONTROL_HIGH], (n,))
+    ctrl, held = _word(d, drive[_CTRL]), block[_HEAD + 11 * n:_HEAD + 12 * n]
+    for i in range(n):
+        if command_at[i] >= 0:
+            control = _number(ctrl, 8 * command_at[i])
+            if not math.isfinite(control):
+                return i
+            goal = (offset[i] + scale[i] * min(max(control, least[i]), most[i]) - zero[i]) / gain[i]
+        elif math.isfinite(command[i]):
+            goal = (command[i] - zero[i]) / gain[i]
+        else:  # nobody has said where to go
+            goal = held[i]
+        room[_R_GOAL, i] = min(max(goal, low[i]), high[i])
     return -1
 
 
@@ -424,9 +444,14 @@ def _is_stage(block, t, dt):
 
 
 @njit(error_model="numpy")
-def _start_anew(drive, instance, room, half):
+def _start_anew(drive, instance, block, room, half):
     """Put the servos at rest where their joints are, and what they remember then into a half of a block."""
     _words(instance[_RECORD], (len(RECORD),))[_USED] = 0
+    n = drive[_SERVOS]
+    lower, upper = _numbers(drive[_LOWER], (n,)), _numbers(drive[_UPPER], (n,))
+    for i in range(n):
+        room[_R_ANGLE, i] = min(max(room[_R_ANGLE, i], lower[i]), upper[i])
+        block[_HEAD + 11 * n + i] = room[_R_GOAL, i] = room[_R_ANGLE, i]
     if instance[_NEW] == 0:
         told(drive[_ASK], (ASK_RESET, instance[_DATA], 0))
         _memories(instance, half, False)
@@ -439,7 +464,7 @@ def _start_anew(drive, instance, room, half):
 
 
 @njit(error_model="numpy")
-def _begin(d, drive, instance, block, room, halves, t, dt):
+def _begin(drive, instance, block, room, halves, t, dt):
     """Find out where in time this call stands, and let the servos stand there; return whether this tick was met before.
 
     Time that goes on by a tick goes on from what the servos remember at its end; the same instant once more begins the
@@ -459,12 +484,11 @@ def _begin(d, drive, instance, block, room, halves, t, dt):
         now[:] = before
     else:
         if not onward:
-            _start_anew(drive, instance, room, half)
+            _start_anew(drive, instance, block, room, half)
             block[_FRESH] = 1.0
-            speed_at, qvel = _words(drive[_SPEED_AT], (n,)), _word(d, drive[_QVEL])
             for i in range(n):
                 now[i], now[n + i] = 0.0, 0.0
-                now[2 * n + i] = 1.0 if _number(qvel, 8 * speed_at[i]) == 0.0 else 0.0
+                now[2 * n + i] = 1.0 if room[_R_SPEED, i] == 0.0 else 0.0
         before[:] = now
     block[_START], block[_END], block[_CALLS] = t, t + dt, 1.0
     return again
@@ -513,11 +537,16 @@ def _control(m, d, drive_at):
     if rk4 and _is_stage(block, t, dt):
         block[_CALLS] += 1.0
     else:
-        culprit = _stand(d, drive, instance, room)
+        culprit = _stand(d, drive, room)
         if culprit >= 0 or dt > _number(drive_at, 8 * _LONGEST) * (1.0 + _SAME):
             _complain(instance, NOT_FINITE if culprit >= 0 else TOO_LONG, max(culprit, 0))
             return
-        again = _begin(d, drive, instance, block, room, halves, t, dt)
+        again = _begin(drive, instance, block, room, halves, t, dt)
+        culprit = _listen(d, drive, instance, block, room)
+        if culprit >= 0:
+            _complain(instance, NOT_FINITE, culprit)
+            block[_CALLS] = 0.0
+            return
         _tick(m, d, drive, instance, block, room, halves + 8 * size * int(block[_HALF]), dt, rk4, again)
         instance[_SERIAL_NOW] += 1
         block[_SERIAL] = instance[_SERIAL_NOW]

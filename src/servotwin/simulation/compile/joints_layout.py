@@ -7,9 +7,10 @@ PLACES = ("time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "userd
 """Of the engine's data: how many bytes behind its beginning the time stands, and the addresses of arrays."""
 FUNCTIONS = ("mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration", "mj_fwdConstraint", "mj_applyFT", "mj_step")
 """Addresses of functions of the engine."""
-ARRAYS = ("angle_at", "speed_at", "command_at", "gain", "zero", "armature", "lower", "upper", "low", "high")
+ARRAYS = ("angle_at", "speed_at", "command_at", "gain", "zero", "armature", "lower", "upper", "low", "high",
+          "control_scale", "control_offset", "control_low", "control_high")
 """Of each servo: places in qpos, qvel and ctrl (or −1); what a turn of the servo is at the joint, and where it begins;
-its own inertia there; ends of its travel, and of its commands."""
+its own inertia there; ends of its travel, and of its commands; what a control asks of the joint, and its ends."""
 DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integrator", *PLACES, *FUNCTIONS, "slot",
          "own", "others", *ARRAYS, "longest", "kept_at", "memory", "instances", "ask")
 """All that servos share, wherever they are simulated."""
@@ -17,8 +18,8 @@ INSTANCE = ("data", "block", "room", "command", "record", "groups", "count", "co
             "angles", "angle_count")
 """Servos in one of the engine's data; `room` is for numbers that are worked out anew at each tick. `fresh` is what they
 remember at rest (0: ask Python), in which the words of `angles`, pairs of place and servo, are the angle of a servo."""
-ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "free", "acceleration", "predicted", "found", "engine's speed",
-        "final torque", "final acceleration", "final share", "passive", "pushed")
+ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "free", "acceleration", "predicted", "found",
+        "engine's speed", "final torque", "final acceleration", "final share", "passive", "pushed")
 """Numbers of each servo there, behind the unit rows of their degrees of freedom, those of M⁻¹, all forces, and a square
 for equations. The last two are the passive force of its joint without its torque, and with it."""
 GROUP = ("advance", "tick", "duration", "look", "lanes", "which", "angle", "speed", "goal", "load", "inertia",
@@ -36,10 +37,10 @@ BLOCK = ("start", "end", "calls", "fresh", "serial", "restored", "half")
 it out last, whether it was restored with its constraint forces, and which half of the memories is of its beginning.
 Behind it stand the numbers of `OF_EACH`, the constraint forces that it took, and both halves."""
 _CARRIED = ("known torque", "known acceleration", "share", "reached", "expected")
-OF_EACH = ("torque", *_CARRIED, *(f"{name} before" for name in _CARRIED))
+OF_EACH = ("torque", *_CARRIED, *(f"{name} before" for name in _CARRIED), "held")
 """Numbers of each servo in a block: its mean torque over the tick; from where on the next torque is predicted, and how
 much of another acceleration of its joint the servo takes up, from 0 (nothing) to 1 (it holds); the angle that it has
-reached at the end of the tick, and the one that the engine should have reached."""
+reached at the end of the tick, and the one that the engine should have reached; where it holds before a command."""
 
 ASK_NEW, ASK_RESET, ASK_ROOM = range(3)
 """What compiled code asks Python for."""

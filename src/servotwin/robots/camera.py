@@ -1,0 +1,220 @@
+"""Pictures of a robot, drawn without a screen: the real one, and its ideal shadow beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes.util
+import os
+import sys
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.errors import ServotwinError, UnknownNameError
+from servotwin.robots.places import load_mujoco
+
+Picture = NDArray[np.uint8]
+_LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}  # by which MuJoCo draws without a screen
+_DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+_OFF = ("disable", "disabled", "off", "false", "0")
+_MOST_SHAPES = 20_000
+_SHADOW = (0.35, 0.55, 0.75, 0.35)  # red, green, blue, opacity
+_AZIMUTH, _ELEVATION = 125.0, -18.0  # degrees, of the view of a robot without a camera of its own
+_ROOM = 0.72  # of the picture's height that half the diagonal of the robot takes
+_LOOKS = 40  # poses by which a robot is kept in the picture
+_SIDE = "side"  # of the cameras of a model, the one whose direction is taken first
+
+
+class NoDrawingError(ServotwinError):
+    """Nothing can be drawn: no OpenGL that works without a screen."""
+
+
+class Camera:
+    """Draws pictures of a robot; close it, or use it in a `with` statement.
+
+    `MUJOCO_GL` says by what MuJoCo draws: "egl", "osmesa" or "glfw". Where it says nothing and there is no screen it is
+    EGL, or OSMesa where there is no EGL.
+
+    Parameters
+    ----------
+    model : MjModel
+        Its picture buffer is made large enough.
+    width, height : int
+        [pixels]
+    camera : str, optional
+        Of the model; unless given a view of all of the robot, from where its camera "side" is, or its first one.
+    poses : ndarray, shape (n, nq), optional
+        That this view has to have room for; the one that the model begins with unless given.
+
+    Raises
+    ------
+    NoDrawingError
+        If there is no OpenGL, one line that names what to install.
+    UnknownNameError
+        If the model has no such camera.
+    """
+
+    def __init__(self, model: Any, width: int = 640, height: int = 480, camera: str | None = None,
+                 poses: NDArray[np.float64] | None = None) -> None:
+        mujoco = load_mujoco()
+        self._mujoco, self._model = mujoco, model
+        model.vis.global_.offwidth = max(int(model.vis.global_.offwidth), width)
+        model.vis.global_.offheight = max(int(model.vis.global_.offheight), height)
+        self._width, self._height = width, height
+        self._data, self._shadow = mujoco.MjData(model), mujoco.MjData(model)
+        self._view = self._view_of(camera, np.atleast_2d(model.qpos0 if poses is None else poses))
+        self._option, self._hand = mujoco.MjvOption(), mujoco.MjvPerturb()
+        self._scene = mujoco.MjvScene(model, maxgeom=_MOST_SHAPES)
+        self._open: list[Callable[[], object]] = []
+        try:
+            context = _context_class()(width, height)
+            self._open.append(context.free)
+            context.make_current()
+            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+            self._open.append(self._context.free)
+            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        except NoDrawingError:
+            raise
+        except Exception as error:  # what a driver raises is not foreseeable
+            self.close()
+            raise _no_drawing(f"{type(error).__name__}: {error}") from None
+
+    def picture(self, pose: NDArray[np.float64], shadow: NDArray[np.float64] | None = None, *, words: str = "",
+                note: str = "") -> Picture:
+        """Return a picture of the robot in a pose, shape (height, width, 3), red, green, blue.
+
+        Parameters
+        ----------
+        pose : ndarray, shape (nq,)
+            MuJoCo's `qpos`.
+        shadow : ndarray, shape (nq,), optional
+            Another pose, drawn as a transparent shadow.
+        words, note : str
+            Written at the top and at the bottom, on the left.
+        """
+        mujoco, scene = self._mujoco, self._scene
+        all_of_it = mujoco.mjtCatBit.mjCAT_ALL.value
+        self._put(self._data, pose)
+        mujoco.mjv_updateScene(self._model, self._data, self._option, None, self._view, all_of_it, scene)
+        if shadow is not None:
+            first = scene.ngeom
+            self._put(self._shadow, shadow)
+            mujoco.mjv_addGeoms(self._model, self._shadow, self._option, self._hand,
+                                mujoco.mjtCatBit.mjCAT_DYNAMIC.value, scene)
+            for k in range(first, scene.ngeom):
+                scene.geoms[k].rgba[:] = _SHADOW
+                scene.geoms[k].transparent = 1
+        frame = mujoco.MjrRect(0, 0, self._width, self._height)
+        mujoco.mjr_render(frame, scene, self._context)
+        for place, text in ((mujoco.mjtGridPos.mjGRID_TOPLEFT, words), (mujoco.mjtGridPos.mjGRID_BOTTOMLEFT, note)):
+            if text:
+                mujoco.mjr_overlay(mujoco.mjtFont.mjFONT_NORMAL, place, frame, text, "", self._context)
+        pixels = np.empty((self._height, self._width, 3), np.uint8)
+        mujoco.mjr_readPixels(pixels, None, frame, self._context)
+        return np.ascontiguousarray(pixels[::-1])
+
+    def _view_of(self, name: str | None, poses: NDArray[np.float64]) -> Any:
+        """Return where the robot is seen from."""
+        mujoco, model, view = self._mujoco, self._model, self._mujoco.MjvCamera()
+        names = [model.camera(k).name for k in range(model.ncam)]
+        if name is not None:
+            if name not in names:
+                raise UnknownNameError("camera of the model", name, [known for known in names if known])
+            view.type, view.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, names.index(name)
+            return view
+        view.azimuth, view.elevation = _AZIMUTH, _ELEVATION
+        if names:
+            self._put(self._data, poses[0])
+            ahead = -self._data.cam_xmat[names.index(_SIDE) if _SIDE in names else 0].reshape(3, 3)[:, 2]
+            view.azimuth = np.degrees(np.arctan2(ahead[1], ahead[0]))
+            view.elevation = np.degrees(np.arcsin(np.clip(ahead[2], -1.0, 1.0)))
+        low, high = self._room_of(poses[::max(len(poses) // _LOOKS, 1)])
+        view.lookat[:] = 0.5 * (low + high)
+        half = 0.5 * float(np.linalg.norm(high - low))
+        view.distance = _ROOM * half / np.sin(0.5 * np.radians(model.vis.global_.fovy))
+        return view
+
+    def _room_of(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the corners of a box that holds the robot in all of some poses [m]."""
+        model, corners = self._model, []
+        bodies = model.geom_rbound > 0.0  # planes have none
+        for pose in poses:
+            self._put(self._data, pose)
+            places, sizes = self._data.geom_xpos[bodies], model.geom_rbound[bodies, None]
+            if len(places):
+                corners += [(places - sizes).min(axis=0), (places + sizes).max(axis=0)]
+        if not corners:
+            corners = [model.stat.center - model.stat.extent, model.stat.center + model.stat.extent]
+        return np.min(corners, axis=0), np.max(corners, axis=0)
+
+    def _put(self, data: Any, pose: NDArray[np.float64]) -> None:
+        data.qpos[:] = pose
+        self._mujoco.mj_kinematics(self._model, data)
+        self._mujoco.mj_comPos(self._model, data)
+        self._mujoco.mj_camlight(self._model, data)
+        self._mujoco.mj_tendon(self._model, data)
+
+    def close(self) -> None:
+        """Give back what the drawing holds."""
+        while self._open:
+            self._open.pop()()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+
+def check_drawing() -> None:
+    """Raise NoDrawingError unless a picture can be drawn here."""
+    mujoco = load_mujoco()
+    with contextlib.closing(Camera(mujoco.MjModel.from_xml_string("<mujoco/>"), 16, 16)):
+        pass
+
+
+def _context_class() -> Any:
+    """Return MuJoCo's class of OpenGL contexts for this machine.
+
+    Its own choice falls when it is imported, and is one that needs a screen.
+    """
+    asked = os.environ.get("MUJOCO_GL", "").lower().strip()
+    if asked in _OFF:
+        raise _no_drawing(f"MUJOCO_GL is {asked}")
+    if not sys.platform.startswith("linux"):
+        return import_module("mujoco.gl_context").GLContext
+    kind = asked if asked in ("egl", "osmesa", "glfw") else ""
+    if not kind and any(os.environ.get(name) for name in _DISPLAYS):
+        kind = "glfw"
+    if not kind:
+        found = [kind for kind, library in _LIBRARIES.items() if ctypes.util.find_library(library)]
+        if not found:
+            raise _no_drawing("neither EGL nor OSMesa is installed")
+        kind = found[0]
+    with _platform(kind):
+        return import_module(f"mujoco.{kind}").GLContext
+
+
+@contextlib.contextmanager
+def _platform(kind: str) -> Iterator[None]:
+    """Let PyOpenGL load what a kind of context needs, whatever was said before."""
+    name, before = "PYOPENGL_PLATFORM", os.environ.get("PYOPENGL_PLATFORM")
+    if kind in _LIBRARIES and "OpenGL" not in sys.modules:
+        os.environ[name] = kind
+    try:
+        yield
+    finally:
+        if before is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = before
+
+
+def _no_drawing(reason: str) -> NoDrawingError:
+    return NoDrawingError(f"no picture of the robot can be drawn here ({' '.join(reason.split())}): on Debian, apt "
+                          "install libegl1-mesa libgl1-mesa-dri, or libosmesa6 with MUJOCO_GL=osmesa")

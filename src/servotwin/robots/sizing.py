@@ -1,0 +1,305 @@
+"""Is the servo big enough: what a motion takes of each joint, in the curve of its servo.
+
+All is at the shaft of the servo: speed and torque of the joint through ratio and direction of its mount, with what the
+servo's own rotor and gear take. Where the torque drives the motion, the servo has what its curve at full drive gives at
+this speed; where it holds the motion back, at least what it has at rest, for friction and back-EMF help it then. On a
+shared supply it counts what the others leave: the least voltage that they left in the run.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.datasheet.conditions import at_voltage, changed
+from servotwin.datasheet.curve import SpeedCurve, speed_curve
+from servotwin.datasheet.warming import WIRE_LIMIT, thermal_masses
+from servotwin.errors import InputError
+from servotwin.physics.thermal import REFERENCE_TEMPERATURE, Temperatures
+from servotwin.robots.heat import Heating, heating, lasting_torque, mean_heat
+from servotwin.simulation.remarks import Remark
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.parameters.groups import Supply
+    from servotwin.robots.run import RobotRun
+
+Array = NDArray[np.float64]
+_FREE = 1e-9  # N m, below which nothing is asked of a servo
+_LOOK = 0.02  # s, over which what a servo delivers is averaged: a frame of pulses
+_SAGS = 0.99  # of the supply's voltage: what others leave above it is not told apart
+_MOST_TOLD = 100.0  # times
+_ZERO_CELSIUS = 273.15
+_COOL = Temperatures(REFERENCE_TEMPERATURE, REFERENCE_TEMPERATURE)
+
+
+class Demand(NamedTuple):
+    """What is asked of a shaft, or delivered by it, over time.
+
+    Parameters
+    ----------
+    speed : ndarray, shape (n,)
+        Magnitude [rad/s]
+    torque : ndarray, shape (n,)
+        Of the servo: positive where it drives the motion, negative where it holds it back [N m]
+    """
+
+    speed: Array
+    torque: Array
+
+
+class Worst(NamedTuple):
+    """The time [s] at which a servo has least to spare: speed [rad/s], torque asked of it, torque it has [N m]."""
+
+    time: float
+    speed: float
+    torque: float
+    available: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sizing:
+    """Whether the servo of a joint is big enough for a motion.
+
+    Parameters
+    ----------
+    joint : str
+    curve : SpeedCurve
+        Of the cold servo, alone on its supply.
+    voltage : float
+        Of that supply [V]
+    sagged : SpeedCurve, optional
+        With the least voltage that others on the supply left in the run, where that is more than 1 % less.
+    left_voltage : float
+        That voltage [V]
+    top_speed : float
+        Without load, or what its program allows [rad/s]
+    needed, delivered : Demand
+        By the ideal motion, and in the run, there as means over 20 ms; times are those of the run.
+    margin : float
+        Smallest torque available, with what others leave of the supply, over torque needed; 0 where the motion is too
+        fast, inf where it takes no torque.
+    short : float
+        How long the motion asks for more than the servo has [s]
+    worst : Worst
+        Where the margin is.
+    rms_torque, rms_delivered : float
+        Root mean square over the motion [N m]
+    lasting_torque : float
+        That the servo can lift slowly without end; nan where that is not known [N m]
+    heating : Heating, optional
+        Of a motion that is repeated; None where thermal masses are not known.
+    trips : tuple of Remark
+        Of the run.
+    """
+
+    joint: str
+    curve: SpeedCurve
+    voltage: float
+    sagged: SpeedCurve | None
+    left_voltage: float
+    top_speed: float
+    needed: Demand
+    delivered: Demand
+    margin: float
+    short: float
+    worst: Worst
+    rms_torque: float
+    rms_delivered: float
+    lasting_torque: float
+    heating: Heating | None
+    trips: tuple[Remark, ...]
+
+    @property
+    def big_enough(self) -> bool:
+        """Whether the servo has what the motion takes, stays cool enough, and does not trip."""
+        return not self.problems
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What is wrong, the worst first; empty where the servo is big enough."""
+        found = [f"{trip.kind} at {trip.time:.2f} s" for trip in self.trips]
+        if self.margin < 1.0:
+            found.append(self._shortage())
+        return (*found, *([] if self.heating is None else _too_hot(self.heating)))
+
+    @property
+    def verdict(self) -> str:
+        """One sentence.
+
+        Where the margin is less than 1 the servo may come through nevertheless, later than it should.
+        """
+        if self.problems:
+            return "; ".join(self.problems)
+        if self.margin > _MOST_TOLD:
+            return f"big enough: more than {_MOST_TOLD:.0f} times what is needed"
+        return f"big enough: {self.margin:.2g} times what is needed"
+
+    def _shortage(self) -> str:
+        at = self.worst
+        speed = f"{math.degrees(at.speed):.0f} deg/s"
+        when = f"at {at.time:.2f} s" + (f" and for {self.short:.2f} s in all" if self.short > 0.0 else "")
+        if at.available == 0.0:
+            return (f"too slow {when}: the motion needs {speed}, the servo turns at most "
+                    f"{math.degrees(self.top_speed):.0f} deg/s")
+        return f"too weak {when}: the motion needs {at.torque:.3g} N m at {speed}, the servo has {at.available:.3g} N m"
+
+
+def _too_hot(found: Heating) -> list[str]:
+    """Say what happens to a servo that goes on with its motion."""
+    limits = ((found.winding, WIRE_LIMIT, found.limit_time, "gets too hot: its winding"),
+              (found.housing, found.trip_temperature, found.trip_time, "trips by heat: its housing"))
+    said = []
+    for end, limit, time, words in limits:
+        if end > limit:
+            when = f"{time:.0f} s" if time < 100.0 else f"{time / 60.0:.0f} min"
+            said.append(f"{words} passes {limit - _ZERO_CELSIUS:.0f} deg C after "
+                        f"{'more than an hour' if math.isnan(time) else when} of this motion")
+    return said
+
+
+def sizing_of(run: RobotRun) -> dict[str, Sizing]:
+    """Return for each joint of a run whether its servo is big enough for the motion.
+
+    The motion is what counts, from its beginning to its end; before and after it the robot stands.
+
+    Parameters
+    ----------
+    run : RobotRun
+
+    Raises
+    ------
+    InputError
+        If a supply does not turn a servo.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.robots import Motion, run_motion, sizing_of
+    >>> nod = Motion(time=[0.0, 0.5, 1.0], angles={"wrist_flex": [0.0, 0.4, 0.0]}, source="a nod")
+    >>> run = run_motion("so101", {"wrist_flex": st.DigitalServo(st.load_servo("feetech-sts3215-12v"))}, nod)
+    >>> sizing_of(run)["wrist_flex"].big_enough
+    True
+    """
+    return {joint: _sized(run, joint) for joint in run.mounts}
+
+
+def supplied(model: Model, supply: Supply | None) -> Model:
+    """Return a model on a supply that it shares with others, as if it were alone on it; as it is on its own one.
+
+    Raises
+    ------
+    InputError
+        If the supply has no voltage, or one that is not for this servo.
+    """
+    if supply is None:
+        return model
+    if supply.open_circuit_voltage is None:
+        raise InputError("open_circuit_voltage of a shared supply", allowed="a positive number [V]")
+    values = {f"supply.{name}": getattr(supply, name) for name in ("internal_resistance", "current_limit")}
+    return changed(at_voltage(model, supply.open_circuit_voltage), values)
+
+
+def shaft_demand(speed: Array, torque: Array, gain: float) -> Demand:
+    """Return speed and torque of a joint as those of its servo, which a gain makes of it.
+
+    Examples
+    --------
+    >>> shaft_demand(np.array([-1.0]), np.array([0.5]), -2.0)
+    Demand(speed=array([0.5]), torque=array([-1.]))
+    """
+    return Demand(np.abs(speed / gain), np.where(speed / gain < 0.0, -1.0, 1.0) * torque * gain)
+
+
+def available(curve: SpeedCurve, demand: Demand, top_speed: float) -> Array:
+    """Return the torque [N m] that a servo has at the speeds of a demand: 0 where it does not get so fast.
+
+    Parameters
+    ----------
+    curve : SpeedCurve
+    demand : Demand
+    top_speed : float
+        That its program allows; without load it does not get faster either, unless it is driven [rad/s]
+    """
+    has = np.interp(demand.speed, curve.speed, curve.torque, right=0.0)
+    # A torque that holds back lets a shaft turn faster than without load: there the curve has negative torque.
+    for k in np.flatnonzero(demand.torque < 0.0).tolist():
+        w, tau = float(demand.speed[k]), float(demand.torque[k])
+        driven = w <= curve.no_load_speed or curve.drive.speed(tau) >= w
+        has[k] = curve.stall_torque if driven else 0.0
+    has[demand.speed > top_speed] = 0.0
+    return has
+
+
+def _sized(run: RobotRun, joint: str) -> Sizing:
+    mount, record, supply = run.mounts[joint], run.record[joint], run.supply_of(joint)
+    model = supplied(mount.model, supply)
+    curve, voltage, left = speed_curve(model, _COOL), model.value("supply.open_circuit_voltage"), _left(run, joint)
+    sagged = _sagged(model, left) if left < _SAGS * voltage else None
+    limit = model.servo.firmware.speed_limit
+    program = float(limit) if limit else math.inf
+    weakest = sagged or curve
+    course = run.ideal.courses[joint]
+    needed = shaft_demand(course.speed, run.ideal.torque[joint], mount.gain)
+    inside = (run.time >= 0.0) & (run.time <= run.motion.duration)
+    has = available(weakest, needed, program)
+    asked = np.where(np.abs(needed.torque) > _FREE, np.abs(needed.torque), _FREE)
+    ratio = np.where((np.abs(needed.torque) > _FREE) | (has == 0.0), has / asked, math.inf)
+    at = int(np.flatnonzero(inside)[np.lexsort((-needed.speed[inside], ratio[inside]))[0]])  # fastest of the worst
+    delivered = _delivered(run, joint)
+    masses = thermal_masses(mount.model.servo)
+    return Sizing(
+        joint=joint, curve=curve, voltage=voltage, sagged=sagged, left_voltage=left,
+        top_speed=min(program, weakest.no_load_speed), needed=needed, delivered=delivered, margin=float(ratio[at]),
+        short=float(np.count_nonzero(ratio[inside] < 1.0) * (run.time[1] - run.time[0])),
+        worst=Worst(float(run.time[at]), float(needed.speed[at]), float(abs(needed.torque[at])), float(has[at])),
+        rms_torque=_rms(needed.torque[inside]), rms_delivered=_rms(delivered.torque[inside]),
+        lasting_torque=math.nan if masses is None else lasting_torque(model, masses),
+        heating=None if masses is None else _heating(run, joint), trips=record.remarks)
+
+
+def _heating(run: RobotRun, joint: str) -> Heating | None:
+    record, masses = run.record[joint], thermal_masses(run.mounts[joint].model.servo)
+    if masses is None:
+        return None
+    winding = (float(record["winding_temperature"].mean()) if "winding_temperature" in record
+               else REFERENCE_TEMPERATURE)
+    heat = mean_heat(record, masses, 0.0, run.motion.duration)
+    trip = run.mounts[joint].model.servo.firmware.trip_temperature
+    return None if math.isnan(heat) else heating(heat, winding, masses, math.inf if trip is None else trip)
+
+
+def _left(run: RobotRun, joint: str) -> float:
+    """Return the least voltage [V] that others on its supply have left a servo, its own sag not counted."""
+    supply, record = run.supply_of(joint), run.record[joint]
+    if supply is None or not supply.internal_resistance or "bus_voltage" not in record:
+        return math.inf
+    left = record["bus_voltage"] + supply.internal_resistance * record["supply_current"]
+    return float(left[run.time >= 0.0].min())
+
+
+def _sagged(model: Model, left: float) -> SpeedCurve | None:
+    try:
+        return speed_curve(at_voltage(model, left), _COOL)
+    except InputError:  # it does not turn at all
+        return None
+
+
+def _delivered(run: RobotRun, joint: str) -> Demand:
+    """Return what a servo gave to its joint, and to its own rotor and gear, as means over a frame."""
+    record, mount = run.record[joint], run.mounts[joint]
+    own = float(run.model.dof_armature[run.model.joint(joint).dofadr[0]])
+    speed = record["output_speed"] * mount.gain
+    step = float(run.time[1] - run.time[0])
+    torque = record["joint_torque"] + own * np.gradient(speed, step)
+    count = max(round(_LOOK / step), 1)
+    window = np.ones(count) / count
+    return shaft_demand(np.convolve(speed, window, "same"), np.convolve(torque, window, "same"), mount.gain)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
