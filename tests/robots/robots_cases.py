@@ -7,7 +7,8 @@ import numpy as np
 import servotwin as st
 
 MASS, LENGTH, SPREAD = 0.1, 0.1, 1e-6  # kg, m, kg m²: a weight on a hinge
-WEIGHT = st.loads.Pendulum(mass=MASS, length=LENGTH, inertia=MASS * LENGTH**2 + SPREAD, hanging_angle=math.pi / 2.0)
+WEIGHT = st.loads.Pendulum(mass=MASS, length=LENGTH, inertia=MASS * LENGTH**2 + SPREAD, hanging_angle=math.pi / 2.0,
+                           gravity=9.81)
 """The same as a load: the hinge turns downwards from the horizontal."""
 
 
@@ -17,7 +18,8 @@ def option(integrator, dt, flags=""):
 
 def hinge(integrator="implicitfast", dt=1e-3, joint='type="hinge" axis="0 1 0"'):
     return f"""<mujoco>{option(integrator, dt)}<worldbody><body><joint name="elbow" {joint}/>
-      <inertial pos="{LENGTH} 0 0" mass="{MASS}" diaginertia="{SPREAD} {SPREAD} {SPREAD}"/></body></worldbody></mujoco>"""
+      <inertial pos="{LENGTH} 0 0" mass="{MASS}" diaginertia="{SPREAD} {SPREAD} {SPREAD}"/>
+    </body></worldbody></mujoco>"""
 
 
 def links(integrator="implicitfast", dt=1e-3, axis="0 1 0", actuators=""):

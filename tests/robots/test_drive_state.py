@@ -1,4 +1,4 @@
-"""One state whatever steps it: Python, the callback, rollouts on threads, MuJoCo's own copies; saved, restored, reset."""
+"""One state whatever steps it: Python, callback, rollouts on threads, MuJoCo's own copies; saved, restored, reset."""
 
 import pickle
 
