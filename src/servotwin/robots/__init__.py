@@ -7,15 +7,16 @@ from servotwin.robots.drive import ServoDrive
 from servotwin.robots.model_file import joint_names, joint_ranges, robot_model
 from servotwin.robots.motion import Motion, read_motion
 from servotwin.robots.mount import Mount
+from servotwin.robots.recipe import Recipe, recipe_of
 from servotwin.robots.record import Record, ServoRecord
 from servotwin.robots.run import RobotRun, run_motion
 from servotwin.robots.sizing import Sizing, sizing_of
 from servotwin.robots.state import DriveState
 
 __all__ = [
-    "CommandMap", "DriveState", "Motion", "Mount", "Record", "RobotRun", "ServoActuated", "ServoDrive", "ServoRecord",
-    "Sizing", "joint_names",
-    "joint_ranges", "read_motion", "robot_model", "run_motion", "sizing_of",
+    "CommandMap", "DriveState", "Motion", "Mount", "Recipe", "Record", "RobotRun", "ServoActuated", "ServoDrive",
+    "ServoRecord", "Sizing", "joint_names", "joint_ranges", "read_motion", "recipe_of", "robot_model",
+    "run_motion", "sizing_of",
 ]
 
 
