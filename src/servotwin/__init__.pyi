@@ -9,6 +9,7 @@ from servotwin import models as models
 from servotwin import parameters as parameters
 from servotwin import physics as physics
 from servotwin import plotting as plotting
+from servotwin import robots as robots
 from servotwin import signals as signals
 from servotwin import simulation as simulation
 from servotwin import studies as studies

@@ -108,10 +108,12 @@ class ServoRecord(Mapping[str, Array]):
 class Record(Mapping[str, ServoRecord]):
     """What all servos of a robot have done, by the names of their joints.
 
-    Attributes
+    Parameters
     ----------
-    time : ndarray, shape (n,)
-        Ends of the ticks [s].
+    joints : tuple of str
+    mounts : mapping of str to Mount
+    rows : ndarray, shape (n, numbers)
+        Ends of the ticks [s], which are its `time`, then what is kept of each servo.
 
     Examples
     --------

@@ -197,8 +197,8 @@ def _solve(square, x):
 
 
 @njit(error_model="numpy")
-def _learn(speed_at, inverse, known, room, dt, turn):
-    """Take torques that were found as what the next prediction starts from; return the largest speed missed."""
+def _learn(speed_at, gain, inverse, known, room, dt, turn):
+    """Take torques that were found as what the next prediction starts from; return the largest speed missed [rad/s]."""
     n = len(speed_at)
     a, predicted, found = room[_R_ACCELERATION], room[_R_PREDICTED], room[_R_FOUND]
     missed = 0.0
@@ -207,9 +207,9 @@ def _learn(speed_at, inverse, known, room, dt, turn):
         for j in range(n):
             if j != i:
                 off += inverse[i, speed_at[j]] * (found[j] - predicted[j])
-        missed = max(missed, abs(off) * dt)
+        missed = max(missed, abs(off / gain[i]) * dt)
         other = a[i] - known[n + i]
-        if turn > 0 and abs(other) * dt > _SLIGHT:
+        if turn > 0 and abs(other / gain[i]) * dt > _SLIGHT:
             known[2 * n + i] = min(max((known[i] - found[i]) / other * inverse[i, speed_at[i]], 0.0), 1.0)
         known[i], known[n + i] = found[i], a[i]
     return missed
@@ -314,7 +314,7 @@ def _go_on(instance, room, dt, watched):
         group = _words(groups[k], (len(GROUP),))
         lanes = group[_LANES]
         which, ends = _words(group[_WHICH], (lanes,)), _numbers(group[_G_AFTER], (lanes,))
-        for row in range(5):
+        for row in range(_R_INERTIA + 1):  # in the order that a group has them in too
             values = _numbers(group[_G_ANGLE + row], (lanes,))
             for n in range(lanes):
                 values[n] = room[row, which[n]]
@@ -324,7 +324,7 @@ def _go_on(instance, room, dt, watched):
             return which[0]
         status = _bytes(group[_G_STATUS], (lanes,))
         for n in range(lanes):
-            room[5, which[n]] = ends[n]
+            room[_R_AFTER, which[n]] = ends[n]
             if status[n] != 0:
                 lost = which[n]
     return lost
@@ -417,7 +417,7 @@ def _tick(m, d, drive, instance, block, room, before, dt, rk4, again):
         for i in range(n):
             change = (room[_R_AFTER, i] - room[_R_ACTUAL, i]) * gain[i]
             room[_R_FOUND, i] = (change / dt - room[_R_ACCELERATION, i]) / inverse[i, speed_at[i]]
-        if _learn(speed_at, inverse, known, room, dt, turn) <= _MISSED:
+        if _learn(speed_at, gain, inverse, known, room, dt, turn) <= _MISSED:
             break
     final = _numbers(at + 8 * (dofs * (2 * n + 1) + n * n + _R_FINAL * n), (3 * n,))
     for i in range(n):
