@@ -15,6 +15,7 @@ version = release = servotwin.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "mathml", "tables"]
 exclude_patterns = ["_build", "_ext", "_static"]
 nitpicky = False
+suppress_warnings = ["ref.python"]  # a word such as `time` that names several attributes stays a word
 
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3

@@ -11,6 +11,7 @@ from servotwin.cli.catalog import catalog
 from servotwin.cli.curves import curves
 from servotwin.cli.fit import fit
 from servotwin.cli.paper_command import paper
+from servotwin.cli.robot import robot
 from servotwin.cli.simulate import simulate
 from servotwin.cli.sweep import sweep
 from servotwin.cli.terminal import emit, emit_help
@@ -61,3 +62,4 @@ app.command("fit", help="Find the parameters of a servo, with intervals, from it
 app.command("validate", help="Compare a servo with logs, and say how far it is off.",
             epilog="Example: servotwin validate my-servo.toml new-runs/ --max-error 3deg --report check.html")(validate)
 app.add_typer(catalog, name="catalog")
+app.add_typer(robot, name="robot")

@@ -59,7 +59,18 @@ def emit_json(data: Any) -> None:
       "b": 0.0
     }
     """
-    emit(json.dumps(_finite(data), indent=2, allow_nan=False))
+    emit(json_text(data))
+
+
+def json_text(data: Any) -> str:
+    """Return one JSON document; a number that is not finite becomes null, and -0 becomes 0.
+
+    Examples
+    --------
+    >>> json_text({"a": float("nan")}).split()
+    ['{', '"a":', 'null', '}']
+    """
+    return json.dumps(_finite(data), indent=2, allow_nan=False)
 
 
 def show(*parts: RenderableType) -> None:

@@ -19,6 +19,15 @@ from servotwin.plotting.formula import Formula, formula_svg
 from servotwin.plotting.loops import loop_curve
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
 from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
+from servotwin.plotting.robots import (
+    Cloud,
+    JointTrace,
+    ServoTrace,
+    ShaftTrace,
+    joint_tracking,
+    servo_electrics,
+    shaft_torques,
+)
 from servotwin.plotting.tornado import metric_shown, tornado
 
 __all__ = [
@@ -26,10 +35,14 @@ __all__ = [
     "LINES",
     "PAPER_DIAGRAMS",
     "SHOWN",
+    "Cloud",
     "Curve",
     "Diagram",
     "Formula",
+    "JointTrace",
     "Limit",
+    "ServoTrace",
+    "ShaftTrace",
     "Shown",
     "axes_grid",
     "bandwidth_curves",
@@ -39,12 +52,15 @@ __all__ = [
     "finished",
     "formula_svg",
     "holding_curves",
+    "joint_tracking",
     "lift_curve",
     "loop_curve",
     "metric_shown",
     "pulses",
     "readable",
     "save",
+    "servo_electrics",
+    "shaft_torques",
     "shown",
     "speed_curves",
     "time_response",

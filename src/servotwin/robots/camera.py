@@ -24,7 +24,7 @@ _OFF = ("disable", "disabled", "off", "false", "0")
 _MOST_SHAPES = 20_000
 _SHADOW = (0.35, 0.55, 0.75, 0.35)  # red, green, blue, opacity
 _AZIMUTH, _ELEVATION = 125.0, -18.0  # degrees, of the view of a robot without a camera of its own
-_ROOM = 0.72  # of the picture's height that half the diagonal of the robot takes
+_ROOM = 1.06  # times the distance from which the robot just fits
 _LOOKS = 40  # poses by which a robot is kept in the picture
 _SIDE = "side"  # of the cameras of a model, the one whose direction is taken first
 
@@ -62,9 +62,9 @@ class Camera:
                  poses: NDArray[np.float64] | None = None) -> None:
         mujoco = load_mujoco()
         self._mujoco, self._model = mujoco, model
+        self._width, self._height = width, height
         model.vis.global_.offwidth = max(int(model.vis.global_.offwidth), width)
         model.vis.global_.offheight = max(int(model.vis.global_.offheight), height)
-        self._width, self._height = width, height
         self._data, self._shadow = mujoco.MjData(model), mujoco.MjData(model)
         self._view = self._view_of(camera, np.atleast_2d(model.qpos0 if poses is None else poses))
         self._option, self._hand = mujoco.MjvOption(), mujoco.MjvPerturb()
@@ -132,24 +132,35 @@ class Camera:
             ahead = -self._data.cam_xmat[names.index(_SIDE) if _SIDE in names else 0].reshape(3, 3)[:, 2]
             view.azimuth = np.degrees(np.arctan2(ahead[1], ahead[0]))
             view.elevation = np.degrees(np.arcsin(np.clip(ahead[2], -1.0, 1.0)))
-        low, high = self._room_of(poses[::max(len(poses) // _LOOKS, 1)])
+        places, radii = self._balls(poses[::max(len(poses) // _LOOKS, 1)])
+        low, high = (places - radii[:, None]).min(axis=0), (places + radii[:, None]).max(axis=0)
         view.lookat[:] = 0.5 * (low + high)
-        half = 0.5 * float(np.linalg.norm(high - low))
-        view.distance = _ROOM * half / np.sin(0.5 * np.radians(model.vis.global_.fovy))
+        view.distance = _ROOM * self._distance(view, places - view.lookat, radii)
         return view
 
-    def _room_of(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the corners of a box that holds the robot in all of some poses [m]."""
-        model, corners = self._model, []
-        bodies = model.geom_rbound > 0.0  # planes have none
+    def _distance(self, view: Any, places: NDArray[np.float64], radii: NDArray[np.float64]) -> float:
+        """Return how far a view has to be from what it looks at for some balls about it to be in the picture [m]."""
+        azimuth, elevation = np.radians([view.azimuth, view.elevation])
+        ahead = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+        right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+        half = np.radians(0.5 * float(self._model.vis.global_.fovy))
+        found = 0.0
+        for axis, angle in ((np.cross(right, ahead), half),
+                            (right, np.arctan(np.tan(half) * self._width / self._height))):
+            needed = (np.abs(places @ axis) + radii / np.cos(angle)) / np.tan(angle) - places @ ahead
+            found = max(found, float(needed.max()))
+        return found
+
+    def _balls(self, poses: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return centres and radii of balls [m] that hold all parts of the robot in some poses."""
+        model, places = self._model, []
+        parts = model.geom_rbound > 0.0  # planes have none
+        if not parts.any():
+            return np.array([model.stat.center]), np.array([model.stat.extent])
         for pose in poses:
             self._put(self._data, pose)
-            places, sizes = self._data.geom_xpos[bodies], model.geom_rbound[bodies, None]
-            if len(places):
-                corners += [(places - sizes).min(axis=0), (places + sizes).max(axis=0)]
-        if not corners:
-            corners = [model.stat.center - model.stat.extent, model.stat.center + model.stat.extent]
-        return np.min(corners, axis=0), np.max(corners, axis=0)
+            places.append(self._data.geom_xpos[parts].copy())
+        return np.concatenate(places), np.tile(model.geom_rbound[parts], len(poses))
 
     def _put(self, data: Any, pose: NDArray[np.float64]) -> None:
         data.qpos[:] = pose

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _NUMBERS = ("winding_capacity", "housing_capacity", "winding_to_housing", "housing_to_ambient", "ambient",
             "magnet_coefficient")
+_DUTIES = ("firmware.torque_limit", "firmware.duty_limit")
 _LONGEST = 3600.0  # s; what is not too hot by then never gets so
 _STEPS = 720
 _MELTED = 1e4  # K; beyond it numbers say nothing
@@ -148,10 +149,10 @@ def lasting_torque(model: Model, masses: Masses) -> float:
     warm = at_temperatures(model, hot, masses.magnet_coefficient)
     allowed = (WIRE_LIMIT - masses.ambient) / (masses.winding_to_housing + masses.housing_to_ambient)
     limit = math.sqrt(allowed / warm.value("motor.armature_resistance"))
-    own = model.servo.get("supply.current_limit")
-    if isinstance(own, float):
-        limit = min(limit, own)
+    # At full duty the current of the supply is that of the motor; what the program's own duty gives is the other bound.
+    free = {name: None for name in _DUTIES if warm.servo.get(name) is not None}
     try:
-        return FullDrive(changed(warm, {"supply.current_limit": limit})).stall_torque
+        by_heat = FullDrive(changed(warm, {**free, "supply.current_limit": limit})).stall_torque
+        return min(by_heat, FullDrive(warm).stall_torque)
     except InputError:  # the shaft does not turn by it
         return 0.0

@@ -6,9 +6,9 @@ they are (Craig, Introduction to Robotics, 3rd ed. 2005, section 7.3, linear fun
 
     q(t) = (Q(t + w/2) − Q(t − w/2))/w,    with Q' = the motion
 
-The torque is that of inverse dynamics, rotors and gears of the servos included. Joints without a servo, and things that
-lie about, move as they are pushed: there the joints with servos are given an inertia beside which nothing counts, and
-with it the acceleration that they have to have.
+The torque is that of inverse dynamics, with rotors and gears that turn with the joint. Joints without a servo, and
+things that lie about, move as they are pushed: there the joints with servos are given an inertia beside which nothing
+counts, and with it the acceleration that they have to have.
 
 Where such a robot runs into itself or into what is fixed, nothing yields and no torque makes sense: such contacts are
 told, and their forces do not count.
@@ -71,7 +71,7 @@ class IdealRun:
     courses : mapping of str to Course
         Of each joint with a servo.
     torque : mapping of str to ndarray, shape (n,)
-        That each of them takes, to move its own rotor and gear included [N m], of a slide [N]
+        That each of them takes, with a rotor and gear that are firm on it [N m], of a slide [N]
     poses : ndarray, shape (n, nq)
         Of the whole robot, MuJoCo's `qpos`.
     touches : tuple of Touch
@@ -138,7 +138,7 @@ def ideal_run(model: Any, joints: Sequence[str], motion: Motion, time: Array, *,
     Parameters
     ----------
     model : MjModel
-        Of a `ServoDrive`, whose joints carry rotors and gears of their servos.
+        Of a `ServoDrive`, whose joints carry what turns with them of their servos.
     joints : sequence of str
         With servos; those of which the motion says nothing stay where the model has them.
     motion : Motion

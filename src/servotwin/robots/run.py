@@ -19,8 +19,10 @@ from servotwin.robots.ideal import IdealRun, blend_window, ideal_run
 from servotwin.robots.model_file import joint_names, robot_model
 from servotwin.robots.motion import Motion
 from servotwin.robots.mount import Mount
+from servotwin.robots.notes import notes_of
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.record import Record
+from servotwin.robots.sizing import supplied
 from servotwin.robots.tracking import Tracking, tracking_of
 from servotwin.simulation.progress import Progress, shown
 from servotwin.units import is_finite
@@ -77,6 +79,11 @@ class RobotRun:
     def slides(self, joint: str) -> bool:
         """Tell whether a joint is a slide."""
         return joint_names(self.model)[joint] == "length"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is odd about the motion, one sentence each."""
+        return notes_of(self)
 
     def supply_of(self, joint: str) -> Supply | None:
         """Return the supply that a servo shares with others, None where it has its own."""
@@ -150,13 +157,9 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     if timestep is not None:
         own.opt.timestep = timestep
     mounts = _mounts(servos, assume_heat=assume_heat, shared=bus is not None)
-    joints = joint_names(own)
-    for joint in motion.joints:
-        if joint in joints and joint not in mounts:
-            raise InputError(f"joint {joint} of {motion.source}", got="no servo at it",
-                             allowed=f"joints with servos, {', '.join(mounts)}")
-        if joint not in joints:
-            raise UnknownNameError(f"joint of {motion.source}", joint, joints)
+    for joint, mount in mounts.items():
+        supplied(mount.model, supply_of(bus, joint))  # raises before anything is run
+    _check_joints(motion, mounts, joint_names(own))
     drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction)
     time = _times(own.opt.timestep, motion.duration, settle)
     with shown(progress, 2 * len(time), "following the motion") as tell:
@@ -187,6 +190,17 @@ def _check(motion: Motion, settle: float, hold: str, timestep: float | None) -> 
         raise InputError("hold", got=hold, allowed=" or ".join(map(repr, _HOLDS)))
     if timestep is not None and not (is_finite(timestep) and timestep > 0.0):
         raise InputError("timestep", got=timestep, allowed="a positive number of seconds")
+
+
+def _check_joints(motion: Motion, mounts: Mapping[str, Mount], joints: Mapping[str, str]) -> None:
+    if not joints.keys() >= mounts.keys():
+        return  # the drive says what is wrong with them
+    for joint in motion.joints:
+        if joint not in joints:
+            raise UnknownNameError(f"joint of {motion.source}", joint, joints)
+        if joint not in mounts:
+            raise InputError(f"joint {joint} of {motion.source}", got="no servo at it",
+                             allowed=f"joints with servos, {', '.join(mounts)}")
 
 
 def _mounts(servos: Mapping[str, Model | Mount], *, assume_heat: bool, shared: bool) -> dict[str, Mount]:

@@ -244,7 +244,7 @@ def _sized(run: RobotRun, joint: str) -> Sizing:
     program = float(limit) if limit else math.inf
     weakest = sagged or curve
     course = run.ideal.courses[joint]
-    needed = shaft_demand(course.speed, run.ideal.torque[joint], mount.gain)
+    needed = shaft_demand(course.speed, run.ideal.torque[joint] + _loose(run, joint) * course.acceleration, mount.gain)
     inside = (run.time >= 0.0) & (run.time <= run.motion.duration)
     has = available(weakest, needed, program)
     asked = np.where(np.abs(needed.torque) > _FREE, np.abs(needed.torque), _FREE)
@@ -289,16 +289,22 @@ def _sagged(model: Model, left: float) -> SpeedCurve | None:
         return None
 
 
+def _loose(run: RobotRun, joint: str) -> float:
+    """Return the inertia at the joint [kg m² or kg] of a rotor that play or an elastic gear parts from the shaft."""
+    mount, value = run.mounts[joint], run.mounts[joint].model.value_or
+    rotor = value("gear.gear_reduction", 0.0) ** 2 * value("motor.rotor_inertia", 0.0)
+    whole = (rotor + value("gear.output_inertia", 0.0)) / mount.gain**2
+    return max(whole - float(run.model.dof_armature[run.model.joint(joint).dofadr[0]]), 0.0)
+
+
 def _delivered(run: RobotRun, joint: str) -> Demand:
     """Return what a servo gave to its joint, and to its own rotor and gear, as means over a frame."""
     record, mount = run.record[joint], run.mounts[joint]
-    own = float(run.model.dof_armature[run.model.joint(joint).dofadr[0]])
     speed = record["output_speed"] * mount.gain
     step = float(run.time[1] - run.time[0])
-    torque = record["joint_torque"] + own * np.gradient(speed, step)
     count = max(round(_LOOK / step), 1)
-    window = np.ones(count) / count
-    return shaft_demand(np.convolve(speed, window, "same"), np.convolve(torque, window, "same"), mount.gain)
+    speed, torque = (np.convolve(values, np.ones(count) / count, "same") for values in (speed, record["joint_torque"]))
+    return shaft_demand(speed, torque + _loose(run, joint) * np.gradient(speed, step), mount.gain)
 
 
 def _rms(values: Array) -> float:

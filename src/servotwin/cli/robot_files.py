@@ -1,0 +1,201 @@
+"""The files that `servotwin robot run` writes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from servotwin.cli.outputs import Target, check_targets, staged
+from servotwin.cli.robot_facts import margin_words
+from servotwin.cli.terminal import json_text, patience
+from servotwin.errors import OutputError
+from servotwin.parameters.output_file import undone
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from servotwin.robots import RobotRun, Sizing
+
+SERVOS, JOINTS, SUMMARY, PAGE = "run.csv", "joints.csv", "summary.json", "index.html"
+TRACKING, ELECTRICAL, SIZING, PICTURE, VIDEO = (
+    "tracking.png", "electrical.png", "sizing.png", "robot.png", "robot.webm")
+SIZE = (640, 480)  # pixels of picture and video
+_OPTION = "--out"
+
+
+@contextmanager
+def folder(out: Path) -> Iterator[None]:
+    """Let a folder be there; one that was not and stays empty goes again.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made.
+    """
+    with ExitStack() as stack:
+        try:
+            if not out.exists():
+                out.mkdir()
+                stack.enter_context(undone(partial(_remove_if_empty, out)))
+            elif not out.is_dir():
+                raise OutputError(f"{_OPTION} {out} is no folder")
+        except FileNotFoundError:
+            raise OutputError(f"{_OPTION} {out}: the folder {out.parent} does not exist") from None
+        except (OSError, ValueError) as error:
+            if isinstance(error, OutputError):
+                raise
+            raise OutputError(f"{_OPTION} {str(out)!r} cannot be made "
+                              f"({getattr(error, 'strerror', None) or error})") from None
+        yield
+
+
+def _remove_if_empty(path: Path) -> None:
+    with suppress(OSError):
+        path.rmdir()
+
+
+def targets_in(out: Path, *, picture: bool, video: bool, force: bool, inputs: Sequence[Path]) -> list[Target]:
+    """Return the files to be written into a folder that is there, checked.
+
+    Raises
+    ------
+    OutputExistsError, OutputError
+        As `check_targets` does.
+    """
+    names = [SERVOS, JOINTS, SUMMARY, TRACKING, ELECTRICAL, SIZING, *([PICTURE] if picture else []),
+             *([VIDEO] if video else []), PAGE]
+    found = [Target(option=_OPTION, path=out / name, endings=(Path(name).suffix,)) for name in names]
+    check_targets(found, force=force, inputs=inputs)
+    return found
+
+
+def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Target], found: Mapping[str, Any], *,
+              force: bool, output_step: float, camera: str | None, rate: float) -> None:
+    """Write all files, or after an error none.
+
+    Parameters
+    ----------
+    run : RobotRun
+    sized : mapping of str to Sizing
+    targets : sequence of Target
+    found : mapping
+        What `facts` says of the run.
+    force : bool
+        Whether files that are there may be replaced.
+    output_step : float
+        Between the rows of tables [s]
+    camera : str, optional
+        By which the robot is seen.
+    rate : float
+        Pictures of the video a second [Hz]
+    """
+    from servotwin.cli.robot_page import page
+
+    with staged(targets, force=force) as drafts:
+        places = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
+        writers: dict[str, Callable[[Path], object]] = {
+            SERVOS: lambda path: _servo_table(run, path, output_step),
+            JOINTS: lambda path: path.write_bytes(_joint_table(run, output_step).encode()),
+            SUMMARY: lambda path: path.write_bytes((json_text(found) + "\n").encode()),
+            PAGE: lambda path: path.write_bytes(page(run, sized, found, list(places)).encode()),
+            **_pictures(run, sized),
+        }
+        with patience("drawing"):
+            for name, writer in writers.items():
+                writer(places[name])
+        if PICTURE in places:
+            _robot(run, places[PICTURE], places.get(VIDEO), camera, rate)
+
+
+def _every(run: RobotRun, output_step: float) -> int:
+    return max(round(output_step / float(run.time[1] - run.time[0])), 1)
+
+
+def _servo_table(run: RobotRun, path: Path, output_step: float) -> None:
+    """Write all signals of all servos."""
+    from servotwin.robots import Record
+
+    rows = np.column_stack([run.time, *(record.columns for record in run.record.values())])
+    Record(tuple(run.record), run.mounts, rows[::_every(run, output_step)]).save(path)
+
+
+def _joint_table(run: RobotRun, output_step: float) -> str:
+    """Return goal, real and ideal place of all joints, and what the motion takes of them, as CSV."""
+    from servotwin.tables import csv_text
+    from servotwin.units import from_si
+
+    every, columns = _every(run, output_step), {"time_s": run.time}
+    for joint in run.mounts:
+        slides = run.slides(joint)
+        unit, dimension = ("mm", "length") if slides else ("deg", "angle")
+        places = {"goal": run.goal(joint), "place" if slides else "angle": run.record[joint]["joint_angle"],
+                  "ideal": run.ideal.courses[joint].angle}
+        for name, values in places.items():
+            columns[f"{joint}.{name}_{unit}"] = np.asarray(from_si(values, unit, dimension))
+        columns[f"{joint}.needed_{'force_N' if slides else 'torque_Nm'}"] = run.ideal.torque[joint]
+        columns[f"{joint}.delivered_{'force_N' if slides else 'torque_Nm'}"] = run.record[joint]["joint_torque"]
+    return csv_text({name: (values[::every] + 0.0).tolist() for name, values in columns.items()}, digits=9)
+
+
+def _pictures(run: RobotRun, sized: Mapping[str, Sizing]) -> dict[str, Callable[[Path], object]]:
+    from servotwin import plotting
+
+    record = run.record
+    followed = [plotting.JointTrace(
+        joint, run.time, run.goal(joint), record[joint]["joint_angle"], run.ideal.courses[joint].angle,
+        run.slides(joint)) for joint in run.mounts]
+    drawn = [plotting.ServoTrace(joint, run.time, record[joint]["armature_current"], *(
+        record[joint].get(name) for name in ("bus_voltage", "winding_temperature", "housing_temperature")))
+        for joint in run.mounts]
+    inside = (run.time >= 0.0) & (run.time <= run.motion.duration)
+    shafts = [_shaft(each, inside) for each in sized.values()]
+    return {
+        TRACKING: lambda path: plotting.save(plotting.joint_tracking(
+            followed, events=(0.0, run.motion.duration)), path),
+        ELECTRICAL: lambda path: plotting.save(plotting.servo_electrics(drawn), path),
+        SIZING: lambda path: plotting.save(plotting.shaft_torques(shafts), path),
+    }
+
+
+def _shaft(sized: Sizing, inside: Any) -> Any:
+    from servotwin import plotting
+
+    curves = [(f"alone on {sized.voltage:g} V", sized.curve)]
+    if sized.sagged is not None:
+        curves.append(("with what the others leave", sized.sagged))
+    needed, delivered = (plotting.Cloud(each.speed[inside], each.torque[inside])
+                         for each in (sized.needed, sized.delivered))
+    worst = None if math.isinf(sized.margin) else (sized.worst.speed, sized.worst.torque)
+    return plotting.ShaftTrace(sized.joint, f"{margin_words(sized.margin)}×", curves, needed, delivered, worst,
+                               sized.rms_torque, sized.lasting_torque)
+
+
+def _robot(run: RobotRun, picture: Path, video: Path | None, camera: str | None, rate: float) -> None:
+    """Draw the robot where it is furthest off, and all of it as a video."""
+    from servotwin.robots.camera import Camera
+    from servotwin.robots.video import Video, png
+    from servotwin.simulation.progress import shown
+
+    errors = np.max([np.abs(run.goal(joint) - run.record[joint]["joint_angle"]) for joint in run.mounts], axis=0)
+    inside = np.flatnonzero((run.time >= 0.0) & (run.time <= run.motion.duration))
+
+    with Camera(run.model, *SIZE, camera, run.poses) as view:
+        def drawn(k: int) -> Any:
+            return view.picture(run.poses[k], run.ideal.poses[k], words=f"{max(run.time[k], 0.0):.2f} s",
+                                note="pale: with ideal actuators")
+
+        picture.write_bytes(png(drawn(int(inside[np.argmax(errors[inside])]))))
+        if video is None:
+            return
+        times = np.arange(0.0, run.time[-1], 1.0 / rate)
+        frames = np.minimum(np.searchsorted(run.time, times), len(run.time) - 1).tolist()
+        with Video(video, *SIZE, rate) as film, shown(True, len(frames), "drawing the video") as tell:
+            for done, k in enumerate(frames):
+                film.add(drawn(k))
+                tell(done + 1)

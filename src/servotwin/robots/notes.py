@@ -1,0 +1,57 @@
+"""What is odd about a motion: goals that a servo does not take or a joint does not reach, and collisions."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from servotwin.robots.model_file import joint_ranges
+
+if TYPE_CHECKING:
+    from servotwin.robots.run import RobotRun
+
+_SLACK = math.radians(0.5)  # rad, of ends that goals are rounded to
+
+
+def notes_of(run: RobotRun) -> tuple[str, ...]:
+    """Return sentences on goals beyond the travel of a servo or the range of its joint, and on collisions.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.robots import Motion, run_motion
+    >>> high = Motion(time=[0.0, 0.5], angles={"gripper": [1.5, 2.0]}, source="too far")
+    >>> run = run_motion("so101", {"gripper": st.DigitalServo(st.load_servo("feetech-sts3215-12v"))}, high, settle=0.0)
+    >>> notes_of(run)
+    ('goals of joint gripper go from 85.9 to 115 deg, beyond its range in the model, -10 to 100 deg',)
+    """
+    said = []
+    ranges = joint_ranges(run.model)
+    for joint in run.motion.joints:
+        goals, mount, servo = run.motion.angles[joint], run.mounts[joint], run.mounts[joint].model.servo
+        lows = [x for x in (servo.stops.lower_angle, servo.firmware.lower_goal) if x is not None]
+        highs = [x for x in (servo.stops.upper_angle, servo.firmware.upper_goal) if x is not None]
+        angles, ends = (goals - mount.zero) / mount.gain, (max(lows, default=-math.inf), min(highs, default=math.inf))
+        if _beyond(angles, ends, _SLACK):
+            said.append(f"goals of joint {joint} go {_between(angles, slides=False)} at the servo, beyond "
+                        f"what it takes, {_ends(*ends, slides=False)}")
+        slides = run.slides(joint)
+        if joint in ranges and _beyond(goals, ranges[joint], _SLACK * (mount.ratio if slides else 1.0)):
+            said.append(f"goals of joint {joint} go {_between(goals, slides=slides)}, beyond its range in the model, "
+                        f"{_ends(*ranges[joint], slides=slides)}")
+    return (*said, *(touch.words for touch in run.ideal.touches))
+
+
+def _beyond(values: np.ndarray[tuple[int], np.dtype[np.float64]], ends: tuple[float, float], slack: float) -> bool:
+    return bool(values.min() < ends[0] - slack or values.max() > ends[1] + slack)
+
+
+def _between(values: np.ndarray[tuple[int], np.dtype[np.float64]], *, slides: bool) -> str:
+    return f"from {_ends(float(values.min()), float(values.max()), slides=slides)}"
+
+
+def _ends(low: float, high: float, *, slides: bool) -> str:
+    factor, unit = (1e3, "mm") if slides else (math.degrees(1.0), "deg")
+    return f"{factor * low:.3g} to {factor * high:.3g} {unit}"
