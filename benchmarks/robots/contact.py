@@ -62,8 +62,8 @@ def table() -> None:
         "limit": (arms.limited, {"elbow": 1.2}),
         "limit, 4 ms": (lambda i, dt: arms.limited(i, dt, "0.004 1"), {"elbow": 1.2})}
     print("force at 1 and 0.25 ms (N, N m), its scatter and the fastest joint (rad/s) at rest; energy from nowhere, of "
-          "the\nlargest there is, and what contacts have given back (mJ), at 1 ms (of RK4 MuJoCo keeps the forces of one "
-          "stage)")
+          "the\nlargest there is, and what contacts have given back (mJ), at 1 ms (of RK4 MuJoCo keeps one stage's "
+          "forces)")
     print(f"{'':13}{'':9}{'integrator':13}{'1 ms':>8}{'0.25 ms':>9}{'apart':>9}{'scatter':>9}{'at rest':>10}"
           f"{'nowhere':>10}{'given':>8}")
     for name, (xml, goals) in cases.items():

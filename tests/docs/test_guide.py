@@ -51,11 +51,14 @@ def commands():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with the servo file that the guide writes."""
+    """A folder with the servo file, the robot and the motion that the guide writes."""
     place = tmp_path_factory.mktemp("guide")
     page = ROOT / "docs" / "guide" / "servos.md"
     text = next(block.code for block in blocks(page, "python") if "my-servo.toml" in block.code)
     (place / "my-servo.toml").write_text(re.search(r'"""\n(.*?)"""', text, re.DOTALL)[1], encoding="utf-8")
+    robot = next(block.code for block in blocks(ROOT / "docs" / "guide" / "robot-run.md", "python"))
+    with contextlib.chdir(place):
+        exec(robot, {})
     return place
 
 

@@ -50,7 +50,7 @@ def run(
         "'*=ID' for all other hinges.", rich_help_panel=_ROBOT)] = None,
     mount: Annotated[list[str] | None, typer.Option(
         metavar="JOINT=ZERO:DIRECTION:RATIO", help="How a servo sits at its joint, repeatable: angle of the joint "
-        "where the servo's is 0, 1 or -1, turns of the joint per turn of the servo, such as elbow=-90deg:-1:0.5; of a "
+        "where the servo's is 0, 1 or -1, turns of the joint per turn of the servo, such as elbow=-90deg:-1; of a "
         "slide its place and its way per radian, slider=0mm:1:9mm.", rich_help_panel=_ROBOT)] = None,
     model: Annotated[str | None, typer.Option(
         metavar="MODEL", help="digital, pulse, pulse-inductive or bounded (default: by the kind of each servo).",

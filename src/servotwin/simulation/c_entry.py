@@ -165,7 +165,8 @@ class CEntry:
         """
         parts = self._parts()
         arrays = (parts.store.status, parts.store.ended, parts.store.total, parts.torque)
-        return (*(piece_of(array) for array in arrays), *(piece for some in parts.store.sets for piece in some.pieces()))
+        sets = (piece for some in parts.store.sets for piece in some.pieces())
+        return (*(piece_of(array) for array in arrays), *sets)
 
     def commands(self, name: str) -> tuple[Array, Array]:
         """Return the lowest and highest command of each lane, of the kind `name`.

@@ -105,10 +105,12 @@ def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[
 def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dict[str, list[Call]]:
     """Return what is called for lanes that run one by one at each stage."""
     rows, which, alone = some.rows, some.which, _Alone(len(some.which))
-    done, calm = np.zeros(len(which), np.int64), list[Call]()
-    if not store.numbers.pulsed and some.recipe == lane_runs.PLAIN_RUNS and not store.numbers.torque.count[which].any():
-        calm = [call_of(lane_runs.CALM, "go", store.columns, which, store.now, store.status, rows, done, returns=True)]
-    advance = [*calm, call_of(TICKS, "gather", which, store.status, store.now, done, rows, *alone.room, returns=True),
+    calm = list[Call]()
+    if some.calms:
+        calm = [call_of(lane_runs.CALM, "go", store.columns, which, store.now, store.status, rows, some.done,
+                        returns=True)]
+    gather = call_of(TICKS, "gather", which, store.status, store.now, some.done, rows, *alone.room, returns=True)
+    advance = [*calm, gather,
                *alone.go_on(some.recipe, store), call_of(TICKS, "put", *alone.some("places", "records"), rows)]
     found = {
         "refit": [call_of(TICKS, "forget_motions", rows)],

@@ -67,7 +67,7 @@ class Store:
         self._buses = sets_of(numbers, self._threads, self._pool) if numbers.supplies.lanes else []
         self.sets: list[_Tiles | _Records | BusSet] = [
             *(_Tiles(kind, some_of(self.columns, kind.which), self._threads)
-              if isinstance(kind, SideBySide) else _Records(kind) for kind in self._kinds), *self._buses]
+              if isinstance(kind, SideBySide) else _Records(kind, numbers) for kind in self._kinds), *self._buses]
         self._set_of, self._place = np.empty((2, numbers.count), np.int64)
         for k, some in enumerate(self.sets):
             self._set_of[some.which], self._place[some.which] = k, np.arange(len(some.which))
@@ -204,7 +204,7 @@ class Store:
                 some.advance(self.columns, duration, self.status, self.ended)
             else:
                 self.columns.pieces[:, 1] = command
-                own = np.flatnonzero(self.status[some.which] == 0)
+                own = np.flatnonzero((self.status[some.which] == 0) & ~some.calm(self, duration))
                 if len(own) == len(some.which):
                     self._one_by_one(some.recipe, some.which, duration, some.rows)
                 elif len(own):
@@ -344,9 +344,19 @@ class _Tiles:
 class _Records:
     """Lanes that run one by one."""
 
-    def __init__(self, kind: OneByOne) -> None:
+    def __init__(self, kind: OneByOne, numbers: LaneNumbers) -> None:
         self.which, self.recipe = kind.which, kind.recipe
         self.rows = np.zeros(len(self.which), RECORD)
+        self.done = np.zeros(len(self.which), np.int64)  # those that are through this call already
+        self.calms = (not numbers.pulsed and kind.recipe == lane_runs.PLAIN_RUNS
+                      and not numbers.torque.count[kind.which].any())
+
+    def calm(self, store: Store, duration: float) -> NDArray[np.bool_]:
+        """Let those go on for a time [s] that are through it without an event; tell which."""
+        if self.calms:
+            kernels(lane_runs.CALM).go(store.columns, self.which, np.array([duration, 0.0]), store.status, self.rows,
+                                       self.done)
+        return np.asarray(self.done != 0)
 
     def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
         self.rows[places] = records

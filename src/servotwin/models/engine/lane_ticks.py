@@ -124,8 +124,8 @@ def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices,
             work[lane] += impulse_work(shaft_at(own.shaft, i), alone, point.y[1], given[SPEED, lane])
         if has[ANGLE] != 0:
             angle = within_stops(own, i, given[ANGLE, lane])
-        put_point(rows[places[k]].point, placed(point, angle, given[SPEED, lane], has[ANGLE] != 0, has[SPEED] != 0, half,
-                                                own.sensor.half_slack[i], sprung))
+        put_point(rows[places[k]].point, placed(point, angle, given[SPEED, lane], has[ANGLE] != 0, has[SPEED] != 0,
+                                                half, own.sensor.half_slack[i], sprung))
 
 
 def within_stops(numbers: Any, i: int, angle: float) -> float:
