@@ -58,6 +58,35 @@ def test_a_hinge_is_the_servo_alone(alone, kind, integrator):
     assert error[-200:].max() < 0.7e-3
 
 
+TERMS = {  # what a servo may have besides
+    "stops": (st.BoundedServo, {"stops.upper_angle": 1.0, "stops.lower_angle": 0.0, "stops.restitution": 0.4,
+                                "electronics.voltage_deadband": 100.0, "gear.gear_reduction": 60.0}),
+    "driven into a stop": (st.PulseServo, {"stops.upper_angle": 1.2, "stops.restitution": 0.4}),
+    "inductance": (st.PulseServoInductive, {"motor.armature_inductance": 5e-4}),
+    "load friction": (st.PulseServo, {"friction.load_friction_motor": 0.06, "friction.load_friction_external": 0.1}),
+    "play": (st.PulseServo, {"gear.backlash": 0.02, "gear.output_inertia": 1e-3}),
+    "elastic gear": (st.PulseServo, {"gear.stiffness": 40.0, "gear.output_inertia": 1e-3, "gear.damping": 0.02}),
+    "worn potentiometer": (st.PulseServo, {"potentiometer.backlash": 0.02}),
+    "friction that fades": (st.PulseServo, {"friction.breakaway_ratio": 1.3, "friction.stribeck_speed": 10.0,
+                                            "friction.stribeck_exponent": 1.5})}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TERMS)
+def test_every_term_is_the_servo_alone(name):
+    kind, changes = TERMS[name]
+    model = kind(st.load_servo("hitec-hs-755hb").replace(changes))
+    end = min(1.2, changes.get("stops.upper_angle", 2.0))
+    alone = st.simulate(model, st.signals.step(0.3, end, at=0.1, unit="rad"), duration=1.0, load=WEIGHT,
+                        output_step=1e-3)
+    for integrator in ("RK4", "implicitfast"):
+        time, (angle,), _, _ = followed(hinge(integrator), {"elbow": model},
+                                        lambda t: {"elbow": 0.3 if t < 0.1 else end}, 1.0)
+        error = np.abs(angle - interpolated(alone, "output_angle", time))
+        assert error.max() < (0.8e-3 if integrator == "RK4" else 0.55e-3 * np.abs(alone["output_speed"]).max())
+        assert error[-50:].max() < 0.7e-3
+
+
 @pytest.mark.parametrize("integrator", ["RK4", "implicitfast"])
 def test_it_is_of_first_order_in_the_step_or_better(alone, integrator):
     steps = np.array([2e-3, 1e-3, 5e-4])
