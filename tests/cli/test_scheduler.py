@@ -22,6 +22,7 @@ def test_an_address_that_is_none(command):
     assert command("nowhere").startswith("--scheduler: got 'nowhere (ValueError)'")
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_said_within_ten_seconds(command):
     pytest.importorskip("distributed")
     start = time.monotonic()

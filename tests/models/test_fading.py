@@ -44,6 +44,7 @@ def test_a_step_in_time_sees_friction_fade(servo, case):
     assert np.sum(errors > 1e-9) <= 0.02 * LANES
 
 
+@pytest.mark.slow
 def test_servos_on_a_bus_see_friction_fade(servo):
     """On a source without resistance servos know nothing of each other, though they are stepped together."""
     models = [st.PulseServo(servo.replace(FADES | SHARES | HEAT | {"supply.internal_resistance": 0.0}))] * 2

@@ -209,6 +209,7 @@ def test_a_current_that_ends_before_a_standstill(way):
     assert found[:, 0] == pytest.approx(back, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_current_that_flows_for_less_than_a_stride():
     """A spring drives the shaft a little beyond the drop of brushes, and slows it down again."""
     numbers = replaced(HOT, {"bridge.off.D": 2.0885, "load.stiffness": 6.0})  # V; its most is 1e-3 higher

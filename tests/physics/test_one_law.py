@@ -22,7 +22,7 @@ PUBLIC = {name: function for name in physics.__all__ if inspect.isfunction(funct
 LAWS = {name: inspect.unwrap(function) for name, function in PUBLIC.items() if hasattr(function, "__wrapped__")}
 ENGINE = sorted(set(PUBLIC) - set(physics.ANALYSIS))
 SCALED = [name for name in ENGINE if name in LAWS and inspect.signature(LAWS[name]).return_annotation != "bool"]
-FEW = ("breakaway_torque", "drive_time")
+FEW = ("drive_time",)
 # Where lanes go side by side no potentiometer has play, so that its law is not asked; and the voltage of a bus is what
 # the currents of all balance at, while that of a servo's own supply follows from its one current
 REPEATED = {"play": "tiles", "source_voltage": "on a bus", "supply_current": "on a bus"}
