@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from llvmlite import ir
 from numba import from_dtype, types
+from numba.core.cgutils import raw_memcpy
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
@@ -148,6 +149,18 @@ def told(_typing, function, arguments):
         return builder.call(builder.inttoptr(function, kind.as_pointer()), some)
 
     return word(word, arguments), generate
+
+
+@intrinsic
+def copied(_typing, to, of, size):
+    """Copy so many bytes from the address `of` to another one."""
+    def generate(context, builder, signature, arguments):
+        to, of, size = arguments
+        byte = ir.IntType(8).as_pointer()
+        raw_memcpy(builder, builder.inttoptr(to, byte), builder.inttoptr(of, byte), size, 1)
+        return context.get_dummy_value()
+
+    return types.none(types.int64, types.int64, types.int64), generate
 
 
 _ACTIVE = "servotwin_active"  # the one word that a compiled function keeps between its calls

@@ -21,7 +21,7 @@ import math
 from numba import cfunc, njit, types  # noqa: F401 - the last lines of the derived module need them
 
 from servotwin.models.engine.observe import Observed
-from servotwin.simulation.compile.intrinsics import activate, active, array_maker, called, told
+from servotwin.simulation.compile.intrinsics import activate, active, array_maker, called, copied, told
 from servotwin.simulation.compile.joints_layout import (
     ASK_NEW,
     ASK_RESET,
@@ -44,6 +44,7 @@ from servotwin.simulation.compile.joints_layout import (
 )
 
 _words, _numbers = array_maker("<i8", 1, True), array_maker("<f8", 1, True)
+_WORD = 8  # bytes
 _rows, _bytes, _halves = array_maker("<f8", 2, True), array_maker("|i1", 1, True), array_maker("<i4", 1, True)
 
 _SIGNALS, _OWN_SIGNALS = len(Observed._fields), len(KEPT)
@@ -88,21 +89,12 @@ def _number(base, offset):
 @njit(error_model="numpy")
 def _moved(own, kept, size, back):
     """Copy so many bytes from one address to another, or `back`; return how many they take there."""
-    whole = size // 8
-    a, b = _words(own, (whole,)), _words(kept, (whole,))
-    for k in range(whole):
-        if back:
-            a[k] = b[k]
-        else:
-            b[k] = a[k]
-    rest = size - 8 * whole
-    c, d = _bytes(own + 8 * whole, (rest,)), _bytes(kept + 8 * whole, (rest,))
-    for k in range(rest):
-        if back:
-            c[k] = d[k]
-        else:
-            d[k] = c[k]
-    return 8 * ((size + 7) // 8)
+    to, of = (own, kept) if back else (kept, own)
+    if size == _WORD:  # of a lane in a tile, one of many
+        _words(to, (1,))[0] = _words(of, (1,))[0]
+    else:
+        copied(to, of, size)
+    return _WORD * ((size + _WORD - 1) // _WORD)
 
 
 @njit(error_model="numpy")
