@@ -153,6 +153,7 @@ def test_bad_input_is_named(torque):
         Loop(st.PulseServo(st.load_servo("hitec-hs-755hb")))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["feetech-sts3215-12v", "miuzei-25kg"])
 def test_a_sheet_has_the_bandwidth_of_a_program_too(name):
     """It is that of simulated sines; a transfer function it has none."""

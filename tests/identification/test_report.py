@@ -99,6 +99,7 @@ def test_every_log_is_drawn_and_those_held_out_are_marked(fit, page):
     assert re.search(r'<figure class="held"><figcaption><b>step-3</b>', drawn)
 
 
+@pytest.mark.slow
 def test_of_many_logs_the_worst_the_middle_and_the_best_are_open(fit):
     """The others are folded, the worst of them first, and what is too much is said."""
     traces = tuple(replace(fit.traces[k % 4], log=replace(fit.traces[k % 4].log, name=f"log-{k}"),

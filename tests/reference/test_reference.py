@@ -282,6 +282,7 @@ def test_averaged_servo_against_scipy() -> None:
     np.testing.assert_allclose(got.w, want[1], rtol=0, atol=5e-7)
 
 
+@pytest.mark.slow
 def test_averaged_servo_against_thirty_digits() -> None:
     mpmath = pytest.importorskip("mpmath")
     P = replace(SERVO, F2=SERVO.F1, k=0.02)

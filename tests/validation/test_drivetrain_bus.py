@@ -47,6 +47,7 @@ def agrees(terms, supply, seed, longest):
     assert abs(energy.residual) <= 1e-9 * turnover
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("terms", "supply", "seed"), FEW)
 def test_three_servos_on_one_bus(terms, supply, seed):
     agrees(terms, supply, seed, longest=SHORT)
