@@ -141,6 +141,10 @@ def test_one_callback_at_a_time():
     (lambda drive, data: drive.result(data), "no record"),
     (lambda drive, data: drive.restore(data, 3), "restore"),
     (lambda drive, data: drive.torque("data"), "data: got 'str'"),
+    (lambda drive, data: drive.step("data"), "data: got 'str'"),
+    (lambda drive, data: drive.step(mujoco.MjData(mujoco.MjModel.from_xml_string(links()))), "another model"),
+    (lambda drive, data: drive.step(data, -1), "steps"),
+    (lambda drive, data: drive.step(data, 1.5), "steps"),
     (lambda drive, data: drive.torque(mujoco.MjData(mujoco.MjModel.from_xml_string(links()))), "another model"),
 ])
 def test_what_its_calls_refuse(call, message):

@@ -128,15 +128,17 @@ class ServoDrive:
         Raises
         ------
         InputError
-            If another drive or another control callback is active.
+            If the data is of another model, or another drive or another control callback is active.
         SimulationError
             If a servo or MuJoCo cannot go on.
         """
+        if type(steps) is not int or steps < 0:
+            raise InputError("step(steps)", got=steps, allowed="a whole number, at least 0")
+        instance = self._harbour.known(data) or self._of(data)
         if _active[0] is not self:
             self._activate()
         code = self._step(self._at, self.model._address, data._address, steps)
-        instance = self._harbour.seen(data)
-        if code != WELL or self._harbour.error is not None or instance is None or instance.words[_CODE] != WELL:
+        if code != WELL or self._harbour.error is not None or instance.words[_CODE] != WELL:
             self._raise(data, int(code))
 
     def callback(self) -> Any:

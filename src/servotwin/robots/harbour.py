@@ -67,9 +67,10 @@ class Harbour:
                 self._known[address].atexit = False
         return self._found[address]
 
-    def seen(self, data: Any) -> Instance | None:
-        """Return the servos in some data if there are any."""
-        return self._found.get(int(data._address))
+    def known(self, data: Any) -> Instance | None:
+        """Return the servos in some data that was asked for before."""
+        address = getattr(data, "_address", None)
+        return self._found[address] if address in self._known else None
 
     def _ask(self, what: int, first: int, second: int) -> int:
         """Answer compiled code, in whatever thread it runs; an error is kept until somebody can be told."""
