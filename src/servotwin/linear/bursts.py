@@ -54,7 +54,10 @@ class Bursts:
     stretch: float
     voltage: float
 
-    ticks = 1
+    @property
+    def ticks(self) -> int:
+        """Every frame is the same."""
+        return 1
 
     @property
     def transition(self) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from servotwin import signals
 from servotwin.errors import InputError
 from servotwin.linear.bursts import Bursts
+from servotwin.linear.law import Law
 from servotwin.linear.plant import plant_of
 from servotwin.linear.ticks import Ticks
 from servotwin.linear.transfer_function import check_model
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_FINEST = 2000  # frequencies at which margins are looked for
+_FINEST = 600  # frequencies at which margins are looked for
 _LOWEST = 1e-3  # of half the rate, the first of them
 _NOTHING = 1e-9  # a pole at z = 0 is a delay
 _LEFT_OUT = ("firmware.acceleration_limit", "firmware.speed_limit", "firmware.duty_slew")
@@ -66,7 +67,7 @@ class SampledServo:
     Parameters
     ----------
     model : PulseServo, PulseServoInductive or DigitalServo
-    law : Bursts or Ticks
+    law : Law
         What decides, and what that does to the plant.
 
     Examples
@@ -78,7 +79,7 @@ class SampledServo:
     """
 
     model: Model
-    law: Bursts | Ticks
+    law: Law
 
     def __repr__(self) -> str:
         return f"SampledServo({self.model!r}, every {1e3 * self.period:g} ms)"

@@ -7,6 +7,7 @@ its fundamental is taken over m of them. Counts, dead zone, limits and profile a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -77,7 +78,7 @@ class Ticks:
 
     def _fundamental(self, omega: Array, *, closed: bool) -> Complex:
         """Return the fundamental of the duty decided, over a command's or, with the loop open, over a duty's."""
-        ticks = [self._tick(k) for k in range(self.ticks)]
+        ticks = self._all
         size, flat = len(ticks[0].drive), np.ravel(omega)
         turn = np.exp(1j * flat * self.period)
         z, moved = np.zeros((len(flat), size), complex), np.broadcast_to(np.eye(size), (len(flat), size, size))
@@ -94,14 +95,17 @@ class Ticks:
 
     def monodromy(self, gain: float = 1.0) -> Array:
         """Return the transition of the closed loop until it is the same again, its gain `gain` times its own."""
-        found = np.eye(len(self._tick(0).drive))
-        for k in range(self.ticks):
-            tick = self._tick(k)
+        found = np.eye(len(self._all[0].drive))
+        for tick in self._all:
             found = (tick.transition + gain * np.outer(tick.drive, tick.law)) @ found
         return found
 
-    def _tick(self, k: int) -> _Tick:
-        """Return the k-th tick since the derivative was renewed; the first one renews it."""
+    @cached_property
+    def _all(self) -> list[_Tick]:
+        """The ticks until the loop is the same again: the first one renews the derivative."""
+        return [self._tick(renews=self.firmware.k_d > 0.0), *[self._tick(renews=False)] * (self.ticks - 1)]
+
+    def _tick(self, *, renews: bool) -> _Tick:
         fw, plant, n = self.firmware, self.plant, len(self.plant.B)
         late = int((fw.T_d + _SAME * fw.T_c) // fw.T_c)  # whole ticks by which a duty comes late
         rest = max(fw.T_d - late * fw.T_c, 0.0)
@@ -113,8 +117,7 @@ class Ticks:
         y = (1.0 - fw.weight) * unit[y_at] + fw.weight * q
         e = r - y
         x = -y if fw.of_measurement > 0.0 else e
-        renews = fw.k_d > 0.0 and k % self.ticks == 0
-        D = fw.k_d * (x - unit[x_at]) / (fw.m * fw.T_c) if renews else unit[D_at]
+        D = fw.k_d * (x - unit[x_at]) / (fw.m * fw.T_c) if renews else unit[D_at] * (fw.k_d > 0.0)
         integrates = fw.k_i > 0.0 and fw.at_rest == 0.0
         J = unit[J_at] + fw.k_i * fw.T_c * e if integrates else 0.0 * e
         u = fw.k_p * e + J + D
@@ -124,5 +127,6 @@ class Ticks:
         state[:, :n] = after.transition @ before.transition
         state += self.voltage * (np.outer(after.transition @ before.gain, waiting[late + 1])
                                  + np.outer(after.gain, waiting[late]))
-        new = np.vstack([state, y, D, x if renews else unit[x_at], J, *waiting[:late + 1]])
+        then = x if renews else unit[x_at] * (fw.k_d > 0.0)
+        new = np.vstack([state, y, D, then, J, *waiting[:late + 1]])
         return _Tick(new[:, :size], new[:, size + 1], new[:, size], u[:size], float(u[size]))
