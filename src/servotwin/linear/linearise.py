@@ -44,7 +44,7 @@ class Linearised:
     --------
     >>> import servotwin as st
     >>> model = st.BoundedServo(st.load_servo("hitec-hs-755hb"))
-    >>> small, large = (linearise(model, amplitude=a) for a in (0.05, 1.0))
+    >>> small, large = (linearise(model, amplitude=a) for a in (0.3, 1.2))
     >>> bool(abs(small.response(20.0)) > abs(large.response(20.0)))  # the supply limits large ones
     True
     """

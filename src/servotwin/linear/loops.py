@@ -79,6 +79,8 @@ def input_name(model: Model, name: str | None) -> str:
     if name is None:
         return "armature_voltage" if is_motor(model) else "pulse_width"
     inputs = ("armature_voltage",) if is_motor(model) else ("command_voltage", "pulse_width", "command_angle")
+    if model.endless:
+        inputs = ("pulse_width",)
     if name not in inputs:
         raise UnknownNameError(f"input of {type(model).__name__}", name, inputs)
     return name

@@ -265,6 +265,9 @@ def sampled(model: Model, load: Load | Part | None = None, *, angle: float | Non
     """
     check_model(model, frame_period, linear=False)
     load = as_load(load)
+    if model.endless:
+        raise InputError(f"the sampled loop of {model.servo.name}", got="potentiometer.fixed_angle",
+                         allowed="a servo whose feedback turns with its shaft: this one has no loop")
     if isinstance(model, DigitalServo):
         return SampledServo(model=model, law=_ticks(model, load, angle))
     if not isinstance(model, PulseServo | PulseServoInductive):
