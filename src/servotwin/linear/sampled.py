@@ -121,7 +121,7 @@ class SampledServo:
         >>> np.abs(seen.response([1.0, 20.0])).round(3)
         array([1.   , 0.824])
         >>> np.abs(seen.response([1.0, 20.0], amplitude=np.radians(5.0))).round(3)
-        array([1.   , 0.955])
+        array([1.   , 0.845])
         """
         omega = self._checked(frequencies)
         if not is_finite(amplitude) or amplitude < 0.0:
