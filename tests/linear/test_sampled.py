@@ -45,14 +45,16 @@ def test_a_burst_on_a_lossless_motor_is_a_velocity_jump():
                                / (1.0 + loop), rtol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["hitec-hs-755hb", "towerpro-mg90s", "gobilda-2000-67"])
+@pytest.mark.parametrize("name", ["hitec-hs-755hb", *(
+    pytest.param(name, marks=pytest.mark.slow) for name in ("towerpro-mg90s", "gobilda-2000-67"))])
 def test_simulated_sines_of_pulse_servos(name):
     model = st.PulseServo(bare(name))
     bandwidth = control.bandwidth(st.linear.transfer_function(model, input="command_angle"))
-    omega = bandwidth * np.array([0.4, 0.7, 1.0])
+    omega = bandwidth * np.array([0.5, 1.0])
     omega = omega[omega < math.pi / model.frame_period]
     loop, seen = st.linear.sampled(model), st.linear.frequency_response(model, omega, amplitude=SIZES)
-    for row, size, impulse, width in zip(seen.response, SIZES, (0.015, 0.07, math.inf), (1e-3, 1e-3, 0.04), strict=True):
+    for row, size, impulse, width in zip(
+            seen.response, SIZES, (0.015, 0.07, math.inf), (1e-3, 1e-3, 0.04), strict=True):
         assert np.abs(np.abs(loop.response(omega)) / np.abs(row) - 1.0).max() < impulse
         error = loop.response(omega, amplitude=size) / row
         assert np.abs(np.abs(error) - 1.0).max() < width
@@ -65,7 +67,7 @@ def test_simulated_sines_of_ticks(D, P):
     model = st.DigitalServo(sts(P, D))
     omega = 2.0 * np.pi * np.array([1.0, 4.0, 12.0])
     seen = st.linear.frequency_response(model, omega, amplitude=[0.003])
-    np.testing.assert_allclose(st.linear.sampled(model).response(omega), seen.response[0], rtol=2e-5)
+    np.testing.assert_allclose(st.linear.sampled(model).response(omega), seen.response[0], rtol=1e-4)
 
 
 def test_ticks_far_shorter_than_the_motion_are_no_ticks():
@@ -122,7 +124,8 @@ def test_one_tick_later_is_a_delay():
     (lambda s: st.linear.sampled(st.DigitalServo(sts())).loop(), "loop of a digital servo"),
     (lambda s: st.linear.sampled(st.DigitalServo(st.load_servo("miuzei-25kg"))), "diode"),
     (lambda s: st.linear.sampled(st.PulseServo(s.replace({
-        "potentiometer.fixed_angle": 1.0, "stops.lower_angle": None, "stops.upper_angle": None}))), "no loop")])
+        "potentiometer.fixed_angle": 1.0, "stops.lower_angle": None, "stops.upper_angle": None,
+        "stops.restitution": None}))), "no loop")])
 def test_bad_input(servo, make, text):
     with pytest.raises(InputError, match=text):
         make(servo)

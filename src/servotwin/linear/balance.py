@@ -29,6 +29,7 @@ _SIN, _COS = np.sin(_ROUND), np.cos(_ROUND)
 _SIZES = np.geomspace(1e-4, 4.0, 90)  # of the command's amplitude, among which that of the output is looked for
 _MOST = 1e6  # of the error over its deadband and limit
 _NOTHING = 1e-12  # V
+_HIGHEST = 15  # harmonic that counts where the shaft turns back
 _DOUBLINGS = 40  # of a mean error that is looked for
 
 
@@ -139,7 +140,7 @@ class Balance:
                 return None
             e_0 = float(brentq(lambda e: at(e)[1], min(0.0, other), max(0.0, other), xtol=1e-10))
             found = at(e_0)[0]
-        return None if found is None else found._replace(sticks=self._sticks(found))
+        return None if found is None else found._replace(sticks=self._sticks(omega, found))
 
     def _voltage(self, error: Array) -> Array:
         """Return v_a [V] of errors v_e [V]: deadband, gain, limit."""
@@ -175,19 +176,40 @@ class Balance:
         """Return the torque of springs, pendulums and constant torques against +q [N m]."""
         return self.load.external_torque(0.0, angle)
 
-    def _sticks(self, turn: Turn) -> bool:
-        """Tell whether friction holds the shaft at one of its ends, where motor and load push it back."""
+    def _sticks(self, omega: float, turn: Turn) -> bool:
+        """Tell whether friction holds the shaft where it turns back, or makes it turn back more than twice a turn.
+
+        There the push of motor and load counts, which the next harmonics of the motion change.
+        """
         n = self.numbers
         if friction.smoothed(n.friction):
             return False
-        q_0, size = turn.angle.mean, turn.angle.first.real
-        for side, F in ((1.0, n.friction.F_backward), (-1.0, n.friction.F_forward)):
-            error = turn.error.mean + side * turn.error.first.real  # at θ = ± π/2
-            voltage = float(self._voltage(np.array([error]))[0])
-            push = n.motor.K / n.motor.R * voltage - float(self._restoring(np.array([q_0 + side * size]))[0])
-            if -side * push <= F * n.friction.breakaway + n.load.coulomb:
+        angle, speed = self._motion(omega, turn)
+        control = self.centre + (turn.command.real * _SIN + turn.command.imag * _COS)
+        error = control - n.sensor.p * angle - n.sensor.b_o
+        push = n.motor.K / n.motor.R * self._voltage(error) - self._restoring(angle)
+        turns = np.flatnonzero(np.sign(speed) != np.sign(np.roll(speed, -1)))
+        for k in turns.tolist():
+            side = math.copysign(1.0, speed[k])  # it comes this way, and has to go back
+            F = n.friction.F_backward if side > 0.0 else n.friction.F_forward
+            if -side * float(push[k]) <= F * n.friction.breakaway + n.load.coulomb:
                 return True
-        return False
+        return len(turns) > 2
+
+    def _motion(self, omega: float, turn: Turn) -> tuple[Array, Array]:
+        """Return angle and speed with the harmonics that voltage, friction and load of the sine make."""
+        n, size = self.numbers, turn.angle.first.real
+        angle, speed = turn.angle.mean + size * _SIN, omega * size * _COS
+        torque = (n.motor.K / n.motor.R * self._voltage(turn.error.mean + turn.error.first.real * _SIN
+                                                        + turn.error.first.imag * _COS)
+                  - self._friction(speed) - self._restoring(angle))
+        spectrum = np.fft.rfft(torque)
+        order = np.arange(len(spectrum))
+        s = 1j * omega * order
+        plant = s * (n.shaft.J * s + n.shaft.b + n.motor.K * n.motor.K_b / n.motor.R)
+        higher = (order > 1) & (order <= _HIGHEST)
+        more = np.where(higher, spectrum / np.where(higher, plant, 1.0), 0.0)
+        return angle + np.fft.irfft(more, len(_ROUND)), speed + np.fft.irfft(s * more, len(_ROUND))
 
 
 def _bracket(excess_at: Callable[[float], float], excess: float, step: float) -> float:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_POINTS = 24  # frequencies
+_POINTS = 16  # frequencies
 _SPAN = (0.05, 2.5)  # of the bandwidth, the first and the last of them
 _USUAL = (1.0, 60.0)  # rad/s
 _LAST = 0.98  # of half the rate of frames
@@ -121,7 +121,7 @@ def overview(model: Model, load: Load | Part | None = None, *, amplitudes: Seque
     >>> import servotwin as st
     >>> seen = overview(st.BoundedServo(st.load_servo("hitec-hs-755hb")), amplitudes=[0.3])
     >>> seen.simulated.gain.shape, seen.loops
-    ((1, 24), {})
+    ((1, 16), {})
     """
     load = as_load(load)
     has_frames = isinstance(model, PulseServo | PulseServoInductive)
