@@ -18,6 +18,7 @@ from servotwin.plotting.files import save
 from servotwin.plotting.formula import Formula, formula_svg
 from servotwin.plotting.loops import loop_curve
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
+from servotwin.plotting.paths import PathTrace, robot_paths
 from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
 from servotwin.plotting.robots import (
     Cloud,
@@ -41,6 +42,7 @@ __all__ = [
     "Formula",
     "JointTrace",
     "Limit",
+    "PathTrace",
     "ServoTrace",
     "ShaftTrace",
     "Shown",
@@ -58,6 +60,7 @@ __all__ = [
     "metric_shown",
     "pulses",
     "readable",
+    "robot_paths",
     "save",
     "servo_electrics",
     "shaft_torques",

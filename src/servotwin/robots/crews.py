@@ -222,7 +222,8 @@ class Instance:
         low, high = np.full(len(angle), -np.inf), np.full(len(angle), np.inf)
         for berth in self.berths:
             which = berth.crew.which
-            for ends in (berth.entry.travel(), *([] if berth.crew.model.endless else [berth.entry.commands(berth.kind)])):
+            told_angles = [] if berth.crew.model.endless else [berth.entry.commands(berth.kind)]
+            for ends in (berth.entry.travel(), *told_angles):
                 low[which], high[which] = np.maximum(low[which], ends[0]), np.minimum(high[which], ends[1])
         inside = np.where(np.isfinite(low), low, 0.0) + angle
         return np.asarray(np.minimum(inside, high))

@@ -209,7 +209,7 @@ class ServoDrive:
     def command(self, data: Any, goals: Mapping[str, float]) -> None:
         """Tell servos where to go, of joints with and without an actuator; before that they hold where they begin.
 
-        Those that turn endlessly are told how fast, by a pulse width; before that they get the pulse at which they stand.
+        Those that turn endlessly are told how fast, by a pulse width; before that they get the one at which they stand.
 
         Parameters
         ----------

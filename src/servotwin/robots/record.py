@@ -36,7 +36,8 @@ class ServoRecord(Mapping[str, Array]):
     """What one servo has done: signals (SI) by name, shape (n,), as those of a `Result`.
 
     Beside those of its model there are `joint_angle` and `joint_command`, the angle [rad] or place [m] of the joint and
-    what was asked of it (a pulse width [s] where its servo turns endlessly), and `joint_torque`, the mean torque [N m] or force [N] that the joint has got in the tick.
+    what was asked of it (a pulse width [s] where its servo turns endlessly), and `joint_torque`, the mean torque [N m]
+    or force [N] that the joint has got in the tick.
 
     Parameters
     ----------

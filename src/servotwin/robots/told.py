@@ -38,8 +38,9 @@ class Told(NamedTuple):
     def check(self, joint: str, goal: float, frame: float) -> None:
         """Raise InputError unless a command of a joint is finite, and a pulse shorter than a frame [s]."""
         if self.kind == "pulse_width" and not 0.0 < goal < frame:
-            raise InputError(f"pulse of joint {joint}", got=goal, allowed=f"a width of more than 0 and less than a frame "
-                             f"of {frame:g} s: its servo turns endlessly, and no angle is asked of it")
+            raise InputError(f"pulse of joint {joint}", got=goal,
+                             allowed=f"a width of more than 0 and less than a frame of {frame:g} s: its servo turns "
+                             "endlessly, and no angle is asked of it")
         if not math.isfinite(goal):
             raise InputError(f"goal of joint {joint}", got=goal,
                              allowed=f"a finite number of {self.unit or 'rad, or m of a slide'}")
