@@ -66,7 +66,8 @@ def test_wheels_neither_slip_nor_bounce(robot, left, right):
     assert way > 0.03
     now = pose_of(data)
     assert math.hypot(pose.x - now.x, pose.y - now.y) < 1e-3 * way
-    assert abs(math.remainder(pose.heading - now.heading, math.tau)) < 1e-3 * max(abs(pose.heading - start.heading), 1.0)
+    turned = abs(pose.heading - start.heading)
+    assert abs(math.remainder(pose.heading - now.heading, math.tau)) < 1e-3 * max(turned, 1.0)
     assert np.ptp(heights) < 2e-5
 
 

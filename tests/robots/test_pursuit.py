@@ -66,8 +66,7 @@ def test_it_takes_a_corner_no_wider_than_its_look_ahead():
 def test_it_turns_on_the_spot_while_its_goal_is_behind():
     decision = LINE.step(PursuitState(), Pose(0.0, 0.0, 3.0))
     assert (decision.speed, decision.turn_rate) == (0.0, pytest.approx(-2.0 * 0.1 / 0.16))
-    poses, state = driven(LINE, Pose(0.0, 0.0, 3.0))
-    assert state.arrived
+    assert driven(LINE, Pose(0.0, 0.0, 3.0))[1].arrived
 
 
 def test_a_round_does_not_end_where_it_begins():

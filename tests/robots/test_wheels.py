@@ -170,7 +170,7 @@ def test_a_servo_in_pwm_mode_is_told_its_duty():
 @pytest.mark.parametrize("pulse", [0.5, 0.0, -1e-3, math.nan])
 def test_angles_are_no_pulses(pulse):
     drive, data = placed({"a": NEW})
-    with pytest.raises(InputError, match="pulse of joint a.*turns endlessly"):
+    with pytest.raises(InputError, match=r"pulse of joint a.*turns endlessly"):
         drive.command(data, {"a": pulse})
 
 

@@ -5,9 +5,9 @@ here are assumed, those of a hobbyist's robot of two plates, but for the servos'
 
 Wheels touch the ground in one point each, as thin ellipsoids do, so that their distance is that of these points.
 Friction is that of rubber on a dry floor (assumed); the ball of the caster rolls any way, and is without friction
-instead. Cone and `impratio` are such that the wheels creep by less than 3e-4 of their way at steps of 1 ms, and contacts
-are damped critically within 5 ms, so that the robot does not bounce. Its wheels are small and its caster is far behind:
-a servo of this size would otherwise spin its wheels at every burst, or tip it over. Rolling costs nothing.
+instead. Cone and `impratio` are such that the wheels creep by less than 3e-4 of their way at steps of 1 ms, and
+contacts are damped critically within 5 ms, so that the robot does not bounce. Its wheels are small and its caster is
+far behind: a servo of this size would otherwise spin its wheels at every burst, or tip it over. Rolling costs nothing.
 
 Joints have neither damping nor friction nor armature: the servos bring these.
 """

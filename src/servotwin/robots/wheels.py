@@ -99,7 +99,7 @@ class SpeedMap:
     Examples
     --------
     >>> line = SpeedMap(np.array([1.4e-3, 1.49e-3, 1.51e-3, 1.6e-3]), np.array([-2.0, 0.0, 0.0, 2.0]), 1.5e-3)
-    >>> round(1e6 * line.pulse(1.0)), round(1e6 * line.pulse(0.0)), line.speed(1.555e-3), line.most
+    >>> round(1e6 * line.pulse(1.0)), round(1e6 * line.pulse(0.0)), round(float(line.speed(1.555e-3)), 9), line.most
     (1555, 1500, 1.0, 2.0)
     """
 
