@@ -4,19 +4,24 @@ from typing import Any
 
 from servotwin.robots.command_map import CommandMap
 from servotwin.robots.drive import ServoDrive
+from servotwin.robots.mobile_robot import mobile_robot
 from servotwin.robots.model_file import joint_names, joint_ranges, robot_model
 from servotwin.robots.motion import Motion, read_motion
 from servotwin.robots.mount import Mount
+from servotwin.robots.pursuit import PurePursuit
 from servotwin.robots.recipe import Recipe, recipe_of
 from servotwin.robots.record import Record, ServoRecord
 from servotwin.robots.run import RobotRun, run_motion
 from servotwin.robots.sizing import Sizing, sizing_of
 from servotwin.robots.state import DriveState
+from servotwin.robots.waypoints import WaypointRun, ideal_waypoints, run_waypoints, unequal_servos
+from servotwin.robots.wheels import Odometry, Pose, SpeedMap, wheel_servo, wheel_speed_of, worn
 
 __all__ = [
-    "CommandMap", "DriveState", "Motion", "Mount", "Recipe", "Record", "RobotRun", "ServoActuated", "ServoDrive",
-    "ServoRecord", "Sizing", "joint_names", "joint_ranges", "read_motion", "recipe_of", "robot_model",
-    "run_motion", "sizing_of",
+    "CommandMap", "DriveState", "Motion", "Mount", "Odometry", "Pose", "PurePursuit", "Recipe", "Record", "RobotRun",
+    "ServoActuated", "ServoDrive", "ServoRecord", "Sizing", "SpeedMap", "WaypointRun", "ideal_waypoints",
+    "joint_names", "joint_ranges", "mobile_robot", "read_motion", "recipe_of", "robot_model", "run_motion",
+    "run_waypoints", "sizing_of", "unequal_servos", "wheel_servo", "wheel_speed_of", "worn",
 ]
 
 
