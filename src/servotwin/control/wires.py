@@ -50,7 +50,7 @@ def wire_of(model: Model, believed: Servo, resolution: float) -> Wire:
         return Wire(takes=VOLTAGE, unit="V", carried=lambda v: _within(v, -most, most), at_rest=lambda q: 0.0)
     if isinstance(model, DigitalServo) and model.takes_goals:
         tick, late = model.value("firmware.control_period"), model.value_or("firmware.compute_delay", 0.0)
-        if model.servo.get("potentiometer.fixed_angle") is not None:
+        if "potentiometer.fixed_angle" in model.servo.names():
             return _duties(model, tick, late)
         lower, upper = _travel(model, "firmware.lower_goal", "firmware.upper_goal")
         return Wire(takes=ANGLE, unit="rad", carried=lambda q: _within(q, lower, upper),
