@@ -26,7 +26,7 @@ from servotwin.control.trajectories import hold, quintic, s_curve, sampled, step
 __all__ = [
     "AheadOfServo", "ComputedTorque", "ControlRun", "Controller", "DeadbandCompensation", "Decision",
     "DisturbanceObserver", "Encoder", "Feedforward", "InputShaper", "LoadModel", "Measured", "Path", "Pid",
-    "PlainCommand", "PlayCompensation", "Port", "PredictiveControl", "Reference", "Sensor", "ServoInverse", "Shaped", "SimulatedServo",
-    "Tap", "ThroughServo", "Trajectory", "bare_bridge", "check_stable", "closed_loop_poles", "hold", "inverse_of",
-    "joined", "quintic", "run_loop", "s_curve", "sampled", "step", "trapezoid", "tuning", "zero_vibration",
-    "zero_vibration_derivative"]
+    "PlainCommand", "PlayCompensation", "Port", "PredictiveControl", "Reference", "Sensor", "ServoInverse", "Shaped",
+    "SimulatedServo", "Tap", "ThroughServo", "Trajectory", "bare_bridge", "check_stable", "closed_loop_poles", "hold",
+    "inverse_of", "joined", "quintic", "run_loop", "s_curve", "sampled", "step", "trapezoid", "tuning",
+    "zero_vibration", "zero_vibration_derivative"]

@@ -88,7 +88,8 @@ class ServoInverse:
         names = tuple(field.name for field in fields(self))
         positive = ("resistance", "torque_constant", "inertia", "friction_slope", "voltage_limit")
         check_numbers(self, positive, positive=True)
-        check_numbers(self, tuple(name for name in names if name not in (*positive, "volts_per_error", "profile_acceleration")))
+        may_be_absent = ("volts_per_error", "profile_acceleration")
+        check_numbers(self, tuple(name for name in names if name not in (*positive, *may_be_absent)))
         if not np.all(np.asarray(self.motor_share) < 1.0):
             raise InputError("motor_share of ServoInverse", got=self.motor_share, allowed="less than 1")
 

@@ -1,4 +1,4 @@
-"""Model predictive control of one joint: the voltages of the next ticks that follow the reference best, within bounds."""
+"""Model predictive control of one joint: the voltages that follow the next of the reference best, within bounds."""
 
 from __future__ import annotations
 
@@ -76,9 +76,9 @@ class PredictiveControl:
 
     Notes
     -----
-    Rawlings, Mayne and Diehl, Model Predictive Control, 2nd ed. 2017, chapter 1, with the constant disturbance of
-    section 1.5. The programme is solved by OSQP (Stellato et al. 2020), afresh at every tick: a step has no other memory
-    than its state.
+    Rawlings, Mayne and Diehl, Model Predictive Control, 2nd ed. 2017, chapter 1, with a constant disturbance. The
+    programme is solved by OSQP (Stellato et al., Math. Prog. Comp. 12, 2020), afresh at every tick: a step remembers
+    nothing but its state.
 
     Examples
     --------
@@ -134,7 +134,7 @@ class PredictiveControl:
         return _Horizon(free[:, 0], free[:, 1], driven[:, 0], driven[:, 1])
 
     def _model(self, time: float) -> tuple[Array, Array]:
-        """Return how (q, q̇) follow themselves and a constant voltage over a time [s]: a first-order lag of the speed."""
+        """Return how (q, q̇) follow themselves and a constant voltage over a time [s]."""
         servo = self.inverse
         a = servo.damping / servo.total_inertia
         final = 1.0 / (servo.volts_per_torque * servo.damping)  # rad/s a volt

@@ -62,7 +62,7 @@ def rates(inverse: ServoInverse, *, period: float, lag: float = 0.0, frame: floa
 
     Notes
     -----
-    Åström and Murray, Feedback Systems, 2008, section 11.4: a delay bounds the crossover; shares by the rule above.
+    Åström and Murray, Feedback Systems, 2008, chapter 11: a delay bounds the crossover; shares by the rule above.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def pid_gains(inverse: ServoInverse, bandwidth: Any, damping_ratio: float = 1.0)
 
     Notes
     -----
-    Åström and Hägglund, PID Controllers, 2nd ed. 1995, section 4.4. A motor that brakes by itself more than is asked
+    Åström and Hägglund, PID Controllers, 2nd ed. 1995, chapter 4. A motor that brakes by itself more than is asked
     for has k_d < 0: a shaft that is slowed down needs more bandwidth, not that; 0 is returned then.
 
     Examples
@@ -116,8 +116,8 @@ def pid_gains(inverse: ServoInverse, bandwidth: Any, damping_ratio: float = 1.0)
 def integral_rate(inverse: ServoInverse, *, period: float, lag: float = 0.0, frame: float = 0.0) -> Any:
     """Return k_i of an integral around the loop inside a servo, which corrects the angles that it is asked for [1/s].
 
-    k_i = 1/2Θ, where Θ is all that the inner loop is late by: what it needs to follow, (R/K)(b + B_L + K K_b/R)/(A k_s p),
-    and θ_0.
+    k_i = 1/2Θ, where Θ is all that the inner loop is late by: θ_0 and what it needs to follow,
+    (R/K)(b + B_L + K K_b/R)/(A k_s p).
 
     Parameters
     ----------
