@@ -7,7 +7,6 @@ from servotwin.models import DigitalServo
 from servotwin.parameters import Servo
 from servotwin.units import is_finite
 
-
 _TAPPED = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")  # a wire to its wiper still shows the angle
 
 

@@ -63,7 +63,7 @@ class PredictiveControl:
     speed_limit : float
         [rad/s]
     angle_per_volt : float
-        λ: an error that is worth a change of 1 V from tick to tick [rad/V].
+        λ: an error that is worth a change of 1 V from tick to tick; some counts of the encoder [rad/V].
     lag : float
         From a command until it acts, up to a period [s].
 
@@ -94,7 +94,7 @@ class PredictiveControl:
     horizon: int = 20
     observer_rate: float
     speed_limit: float = math.inf
-    angle_per_volt: float = 1e-3
+    angle_per_volt: float = 5e-3
     lag: float = 0.0
 
     def __post_init__(self) -> None:

@@ -113,17 +113,20 @@ def pid_gains(inverse: ServoInverse, bandwidth: Any, damping_ratio: float = 1.0)
     return PidGains(m * w**2 * (1.0 + 2.0 * zeta), m * w**3, np.maximum(m * w * (1.0 + 2.0 * zeta) - c, 0.0)[()])
 
 
-def integral_rate(inverse: ServoInverse, *, period: float, lag: float = 0.0, frame: float = 0.0) -> Any:
+def integral_rate(inverse: ServoInverse, *, period: float, lag: float = 0.0, frame: float = 0.0,
+                  correction: float = 0.0) -> Any:
     """Return k_i of an integral around the loop inside a servo, which corrects the angles that it is asked for [1/s].
 
-    k_i = 1/2Θ, where Θ is all that the inner loop is late by: θ_0 and what it needs to follow,
-    (R/K)(b + B_L + K K_b/R)/(A k_s p).
+    k_i = 1/2Θ, where Θ is all that the inner loop is late by: θ_0, what it needs to follow,
+    (R/K)(b + B_L + K K_b/R)/(A k_s p), and 2√(D/a) that a profile takes for a way D.
 
     Parameters
     ----------
     inverse : ServoInverse
     period, lag, frame : float
         As in `rates` [s].
+    correction : float
+        D, the largest that it is for, such as a droop; it counts where the servo has a profile [rad].
 
     Notes
     -----
@@ -139,30 +142,39 @@ def integral_rate(inverse: ServoInverse, *, period: float, lag: float = 0.0, fra
     '7.8'
     """
     slow = inverse.volts_per_torque * inverse.damping / inverse.volts_per_error
-    return 1.0 / (2.0 * (slow + _late(period, lag, frame)))
+    profile = 2.0 * np.sqrt(correction / inverse.profile_acceleration)
+    return 1.0 / (2.0 * (slow + profile + _late(period, lag, frame)))
 
 
-def lag_angle(inverse: ServoInverse, external_torque: Any = 0.0) -> Any:
+def lag_angle(inverse: ServoInverse, *, speed: float = math.inf, frame: float = 0.0) -> Any:
     """Return by how much a servo stays behind a slow motion: half its deadband, and what friction takes [rad].
 
-    h + (R/K) F/(A k_s p), F of the slower side.
+    h + (R/K) F/(A k_s p) where the bridge has a mean voltage. One pulse a frame breaks friction that its mean does not:
+    it speeds the shaft up by α = (K V/R − F)/J and friction stops it by β = F/J, so that at a speed w and by frames T_f
+    the drive takes a share √(2 w/(T_f α (1 + α/β))) of the frame, and that share of V/(A k_s p) as error.
 
     Parameters
     ----------
     inverse : ServoInverse
-    external_torque : float or ndarray
-        Through the gear, which adds to its friction [N m].
+    speed : float
+        Of the motion, where pulses drive it [rad/s].
+    frame : float
+        T_f of the pulses; 0 for a bridge that has a mean voltage [s].
 
     Examples
     --------
     >>> import servotwin as st
     >>> from servotwin.control import inverse_of
     >>> servo = inverse_of(st.PulseServo(st.load_servo("hitec-hs-755hb")))
-    >>> f"{57.29578 * lag_angle(servo):.2f} deg"
-    '2.70 deg'
+    >>> [f"{57.29578 * angle:.2f} deg" for angle in (lag_angle(servo), lag_angle(servo, speed=0.05, frame=0.02))]
+    ['2.70 deg', '1.24 deg']
     """
-    F = np.abs(inverse.friction(1.0, external_torque, external_torque))
-    return inverse.half_deadband + inverse.volts_per_torque * F / inverse.volts_per_error
+    F, V, J = inverse.friction(1.0, 0.0, 0.0), inverse.voltage_limit, inverse.total_inertia
+    mean = inverse.volts_per_torque * F
+    if frame > 0.0:
+        alpha, beta = (V / inverse.volts_per_torque - F) / J, F / J
+        mean = np.minimum(mean, V * np.sqrt(2.0 * speed / (frame * alpha * (1.0 + alpha / beta))))
+    return inverse.half_deadband + mean / inverse.volts_per_error
 
 
 def _late(period: float, lag: float, frame: float) -> float:
