@@ -115,6 +115,7 @@ def test_a_run_tells_what_happened(servo):
     assert run.energy == run.true.energy.supply > 0.0
     assert run.chatter == pytest.approx(0.5 / SLOW.duration)  # it only goes up
     assert run.effort == pytest.approx(np.sqrt(np.mean(run.true["armature_voltage"]**2)))
+    assert run.reversals == 0.0  # pulses one way, with rests between them
     assert run.true.remarks == ()
 
 
