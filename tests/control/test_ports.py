@@ -46,8 +46,8 @@ def test_pulses_go_out_in_steps_by_the_calibration_of_the_sender(servo):
 
 
 def test_what_a_wire_cannot_carry_is_the_nearest_that_it_can(servo, bus):
-    cases = [(st.PulseServo(servo), 99.0, "pulse_width", 2.7e-3), (st.GearedMotor(servo), -99.0, "armature_voltage", -6.0),
-             (control.bare_bridge(servo), 99.0, "duty", 1.0)]
+    cases = [(st.PulseServo(servo), 99.0, "pulse_width", 2.7e-3), (control.bare_bridge(servo), 99.0, "duty", 1.0),
+             (st.GearedMotor(servo), -99.0, "armature_voltage", -6.0)]
     for model, command, signal, most in cases:
         port = control.SimulatedServo(model)
         port.send(command)
@@ -117,6 +117,12 @@ def test_a_run_tells_what_happened(servo):
     assert run.effort == pytest.approx(np.sqrt(np.mean(run.true["armature_voltage"]**2)))
     assert run.reversals == 0.0  # pulses one way, with rests between them
     assert run.true.remarks == ()
+
+
+def test_a_controller_may_be_told_the_reference_ahead(servo):
+    run = control.run_loop(control.SimulatedServo(st.PulseServo(servo)), control.PlainCommand(period=0.02, ahead=0.05),
+                           SLOW)
+    assert run.command == pytest.approx(SLOW.at(run.time + 0.05).angle)
 
 
 def test_what_is_predicted_is_stated_before_running(servo):
