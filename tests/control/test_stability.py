@@ -110,6 +110,14 @@ def test_loops_by_rule_are_stable_on_every_servo_and_bear_wrong_numbers(kind, na
                     control.check_stable(controller, other, lag=1.5e-3)
 
 
+@pytest.mark.parametrize(("name", "J_L"), [("hitec-hs-755hb", 1e-3), ("towerpro-sg90", 5e-3)])
+def test_an_integral_by_rule_leaves_more_than_45_degrees_of_phase_at_the_frames_of_a_pulse_servo(name, J_L):
+    model, load = st.PulseServo(st.load_servo(name)), st.loads.Inertia(J_L)
+    most = st.linear.tune(model, load, phase_margin=math.radians(45.0)).settings["outer_gain"] / 0.02
+    rate = tuning.integral_rate(control.inverse_of(model, load), period=0.02, frame=0.02)
+    assert 0.4 * most < rate < most
+
+
 def test_a_servo_lags_slow_motions_as_the_rule_says(servo):
     model = st.PulseServo(servo)
     for speed in (0.02, 0.05):

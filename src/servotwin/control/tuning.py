@@ -118,7 +118,8 @@ def integral_rate(inverse: ServoInverse, *, period: float, lag: float = 0.0, fra
     """Return k_i of an integral around the loop inside a servo, which corrects the angles that it is asked for [1/s].
 
     k_i = 1/2Θ, where Θ is all that the inner loop is late by: θ_0, what it needs to follow,
-    (R/K)(b + B_L + K K_b/R)/(A k_s p), and 2√(D/a) that a profile takes for a way D.
+    (R/K)(b + B_L + K K_b/R)/(A k_s p), and 2√(D/a) that a profile takes for a way D. An inner loop that rings by itself
+    bears no more than twice k_i = (b + B_L + K K_b/R)/2(J + J_L), its damping ζ ω_n.
 
     Parameters
     ----------
@@ -131,7 +132,8 @@ def integral_rate(inverse: ServoInverse, *, period: float, lag: float = 0.0, fra
     Notes
     -----
     Skogestad, Simple analytic rules for model reduction and PID controller tuning, J. Process Control 13 (2003): an
-    integral alone for a process of pure delay, closed as fast as it is late.
+    integral alone for a process of pure delay, closed as fast as it is late. Of a lag of second order an integral is
+    stable up to 2 ζ ω_n. `linear.tune` finds the gain of such a loop over pulses from its frames, a gain of k_i T.
 
     Examples
     --------
@@ -143,7 +145,8 @@ def integral_rate(inverse: ServoInverse, *, period: float, lag: float = 0.0, fra
     """
     slow = inverse.volts_per_torque * inverse.damping / inverse.volts_per_error
     profile = 2.0 * np.sqrt(correction / inverse.profile_acceleration)
-    return 1.0 / (2.0 * (slow + profile + _late(period, lag, frame)))
+    rings = 0.5 * inverse.damping / inverse.total_inertia
+    return np.minimum(0.5 / (slow + profile + _late(period, lag, frame)), rings)[()]
 
 
 def lag_angle(inverse: ServoInverse, *, speed: float = math.inf, frame: float = 0.0) -> Any:
