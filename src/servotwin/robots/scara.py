@@ -28,12 +28,14 @@ SERVO_MASS = 0.11
 
 _CASE: Vector = (0.0295, 0.0145, 0.025)  # half of 59 by 29 by 50 mm, assumed: a servo of large scale [m]
 _PER_LENGTH = 0.3  # kg/m, of a printed link 30 mm wide, assumed
-_HEIGHT, _STEP = 0.17, 0.014  # of the first link above the ground, and of each further one above it, assumed [m]
+_HEIGHT, _STEP = 0.13, 0.014  # of the first link above the ground, and of each further one above it, assumed [m]
 _CARRIAGE, _TOOL_MASS = 0.05, 0.06  # kg, of the rack with its guide, and of the tool, assumed
 _REACH_DOWN = 0.125  # m, from the last link to the tip of the tool where the rack is lowest, assumed
 _LIFT = 0.05  # m, travel of the rack
 _QUARTER = 0.5 * math.pi
-_ELBOW = math.radians(60.0)  # where the elbow's servo is in the middle of its travel: the elbow bends to one side
+_MIDDLES = {name: math.radians(angle) for name, angle in (
+    ("shoulder", -30.0), ("elbow", 60.0), ("third", 0.0), ("wrist", -45.0))}
+# Where the servos are in the middle of their travel, assumed: the elbow bends to one side
 _SIDE = ((0.62, -0.66, 0.5), (0.13, 0.0, 0.1))  # place of the camera, and what it looks at [m]
 
 
@@ -76,13 +78,13 @@ def scara(*, third_link: bool = True, payload: float = 0.0, scene: bool = True) 
         place = (LENGTHS[k], 0.0, _STEP)
     body = _carriage(body, (place[0], 0.0, 0.0))
     _wrist(body, payload)
-    joints = {"shoulder": Joint(middle=0.0, start=-0.6 if third_link else -0.8),
-              "elbow": Joint(middle=_ELBOW, start=1.3 if third_link else 1.5),
-              **({"third": Joint(middle=0.0, start=0.3)} if third_link else {}),
+    joints = {"shoulder": Joint(middle=_MIDDLES["shoulder"], start=-0.6 if third_link else -0.8),
+              "elbow": Joint(middle=_MIDDLES["elbow"], start=1.3 if third_link else 1.5),
+              **({"third": Joint(middle=_MIDDLES["third"], start=0.3)} if third_link else {}),
               "lift": Joint(middle=0.5 * _LIFT, ratio=PINION, start=0.5 * _LIFT),
-              "wrist": Joint(middle=0.0, start=-1.0 if third_link else -0.7)}
+              "wrist": Joint(middle=_MIDDLES["wrist"], start=-1.0 if third_link else -0.7)}
     top = _HEIGHT + (len(hinges) - 1) * _STEP
-    return Arm(name=name, mjcf=mjcf.text(root), joints=joints, centre=(0.17, 0.0, top - _REACH_DOWN + 0.5 * _LIFT),
+    return Arm(name=name, mjcf=mjcf.text(root), joints=joints, centre=(0.19, 0.0, top - _REACH_DOWN + 0.5 * _LIFT),
                size=0.04)
 
 
@@ -101,17 +103,16 @@ def servo(centre: Vector, *, up: bool) -> tuple[Shape, ...]:
 
 def _base() -> tuple[Shape, ...]:
     return (box("printed", (0.0, 0.0, 0.004), (0.075, 0.065, 0.004)),
-            box("printed", (0.022, 0.0, 0.055), (0.005, 0.03, 0.05)),
-            box("printed", (-0.047, 0.0, 0.055), (0.005, 0.03, 0.05)),
-            box("printed", (-0.0125, 0.0, 0.1075), (0.04, 0.03, 0.0035)),
+            box("printed", (0.022, 0.0, 0.0355), (0.005, 0.03, 0.0275)),
+            box("printed", (-0.047, 0.0, 0.0355), (0.005, 0.03, 0.0275)),
+            box("printed", (-0.0125, 0.0, 0.0665), (0.04, 0.03, 0.0035)),
             *servo((-0.013, 0.0, _HEIGHT - _CASE[2] - 0.01), up=True))
 
 
 def _link(parent: Xml.Element, joint: str, place: Vector, length: float, *, last: bool) -> Xml.Element:
     """Return a link that turns about a vertical axis; at its end hangs the servo of the next one."""
     body = Xml.SubElement(parent, "body", name=f"{joint}_link", pos=words(place))
-    limits = (-_QUARTER, _QUARTER) if joint != "elbow" else (_ELBOW - _QUARTER, _ELBOW + _QUARTER)
-    Xml.SubElement(body, "joint", name=joint, type="hinge", axis="0 0 1", range=words(limits))
+    _hinge(body, joint)
     blocks = [Block(_PER_LENGTH * length, (0.5 * length, 0.0, 0.0), (0.5 * length, 0.015, 0.003))]
     shapes = [disc("printed", (0.0, 0.0, 0.0), 0.019, 0.004), disc("horn", (0.0, 0.0, 0.0), 0.009, 0.0048),
               beam("printed", (0.0, 0.0, 0.0), (length, 0.0, 0.0), 0.007, 0.03),
@@ -132,6 +133,13 @@ def _link(parent: Xml.Element, joint: str, place: Vector, length: float, *, last
     return body
 
 
+def _hinge(body: Xml.Element, joint: str) -> None:
+    """Let a body turn about the vertical, by the half turn of its servo."""
+    middle = _MIDDLES[joint]
+    Xml.SubElement(body, "joint", name=joint, type="hinge", axis="0 0 1",
+                   range=words((middle - _QUARTER, middle + _QUARTER)))
+
+
 def _carriage(parent: Xml.Element, place: Vector) -> Xml.Element:
     """Return what goes up and down: a rack with the servo of the wrist at its lower end."""
     body = Xml.SubElement(parent, "body", name="carriage", pos=words(place))
@@ -149,7 +157,7 @@ def _carriage(parent: Xml.Element, place: Vector) -> Xml.Element:
 def _wrist(parent: Xml.Element, payload: float) -> None:
     """Add what turns about the vertical at last: the tool, a pen, and what it carries."""
     body = Xml.SubElement(parent, "body", name="wrist_link")
-    Xml.SubElement(body, "joint", name="wrist", type="hinge", axis="0 0 1", range=words((-_QUARTER, _QUARTER)))
+    _hinge(body, "wrist")
     blocks = [Block(_TOOL_MASS, (0.0, 0.0, -0.1), (0.012, 0.012, 0.015))]
     shapes = [disc("horn", (0.0, 0.0, -0.088), 0.012, 0.003), box("printed", (0.0, 0.0, -0.095), (0.02, 0.008, 0.004)),
               disc("pad", (0.0, 0.0, -0.108), 0.006, 0.01),
