@@ -26,8 +26,8 @@ _LAZY = {
     **dict.fromkeys(("Fit", "Sheet", "SheetPoint", "advise", "friction_ladder", "identify", "servo_from_sheet",
                      "validate"), "identification"),
 }
-_MODULES = ("bench", "datasheet", "errors", "identification", "linear", "loads", "logs", "models", "parameters",
-            "physics", "plotting", "robots", "signals", "simulation", "studies", "units")
+_MODULES = ("bench", "control", "datasheet", "errors", "identification", "linear", "loads", "logs", "models",
+            "parameters", "physics", "plotting", "robots", "signals", "simulation", "studies", "units")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 

@@ -1,4 +1,5 @@
 from servotwin import bench as bench
+from servotwin import control as control
 from servotwin import datasheet as datasheet
 from servotwin import errors as errors
 from servotwin import identification as identification

@@ -1,0 +1,44 @@
+"""The bridge of a servo without its chip: a goal is a duty, every millisecond."""
+
+from __future__ import annotations
+
+from servotwin.errors import InputError
+from servotwin.models import DigitalServo
+from servotwin.parameters import Servo
+from servotwin.units import is_finite
+
+
+def bare_bridge(servo: Servo, *, duty_steps: int = 1000, period: float = 1e-3, delay: float = 0.0) -> DigitalServo:
+    """Return motor, gear and bridge of a servo without its own loop, told by duties: the chip is bypassed.
+
+    Its program hands a goal on as the duty, as servos with a mode for PWM do; `SimulatedServo` takes voltages for it
+    and sends v/(V_oc − V_ce0).
+
+    Parameters
+    ----------
+    servo : Servo
+        Analog or digital; of its program nothing is left.
+    duty_steps : int
+        Of full duty.
+    period : float
+        Of the program [s].
+    delay : float
+        From a tick until its duty holds [s].
+
+    Raises
+    ------
+    InputError
+        If a number makes no sense.
+    MissingParameterError
+        If the servo lacks numbers of motor, gear or supply.
+    """
+    if not (isinstance(duty_steps, int) and duty_steps >= 1):
+        raise InputError("duty_steps", got=duty_steps, allowed="a whole number of at least 1")
+    if not (is_finite(period) and period > 0.0):
+        raise InputError("period of the bridge", got=period, allowed="a positive number of seconds")
+    nothing = dict.fromkeys((name for name in servo.names() if name.startswith(("firmware.", "electronics."))), None)
+    return DigitalServo(servo.replace({
+        **nothing, "firmware.control_period": period, "firmware.compute_delay": delay, "firmware.command_kind": "goal",
+        "firmware.proportional_gain": 1.0, "firmware.duty_quantum": 1.0 / duty_steps,
+        "firmware.deadband_angle": 0.0, "firmware.lower_goal": -1.0, "firmware.upper_goal": 1.0,
+        "potentiometer.fixed_angle": 0.0}))

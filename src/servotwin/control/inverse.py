@@ -1,0 +1,264 @@
+"""The inverse servo: which torque, voltage or command goes with a motion. These are a controller's own numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from dataclasses import replace as replaced
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from servotwin import physics
+from servotwin.control.controller import check_numbers
+from servotwin.errors import InputError
+from servotwin.loads import as_load
+from servotwin.models import BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
+
+if TYPE_CHECKING:
+    from servotwin.control.reference import Reference
+    from servotwin.loads import Load, Part
+
+FRICTION_SLOPE = 10.0  # s/rad at the motor, where the servo gives none; assumed, as in the catalog
+
+
+@dataclass(frozen=True, kw_only=True)
+class ServoInverse:
+    """What a controller believes of a servo and its load, at the output shaft: equation (40), solved any way round.
+
+    Numbers of one servo, or arrays (n,) of joints. `inverse_of` takes them from a model; those of another servo, or
+    some of them replaced, are a controller that believes something wrong.
+
+    Parameters
+    ----------
+    resistance : float
+        R of winding and bridge [Ω].
+    torque_constant, back_emf_constant : float
+        K = N k_a [N m/A] and K_b = N k_b [V s/rad].
+    inertia, viscous_friction : float
+        J = N² J_m [kg m²] and b = N² B_m [N m s/rad].
+    coulomb_torque_forward, coulomb_torque_backward : float
+        N F_ec1, N F_ec2 [N m].
+    friction_slope : float
+        N k of (41) [s/rad].
+    motor_share, external_share : float
+        K_m and K_e of friction that grows with the torques through the gear [1].
+    load_inertia, load_viscous_friction : float
+        J_L [kg m²] and B_L [N m s/rad].
+    voltage_limit : float
+        The most voltage that the bridge gives [V].
+    volts_per_error : float
+        Of the servo's own loop, A k_s p or what its pulses or its program come to; nan of a motor [V/rad].
+    half_deadband : float
+        h of that loop [rad].
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.control import Reference
+    >>> servo = inverse_of(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+    >>> v = servo.voltage(Reference(0.0, speed=2.0))
+    >>> f"{v:.3f} V, {servo.command_angle(v, 1.0) - 1.0:.3f} rad"
+    '2.849 V, 0.156 rad'
+    >>> bool(servo.replace(resistance=1.1 * servo.resistance).voltage(Reference(0.0, speed=2.0)) > v)
+    True
+    """
+
+    resistance: Any
+    torque_constant: Any
+    back_emf_constant: Any
+    inertia: Any
+    viscous_friction: Any = 0.0
+    coulomb_torque_forward: Any = 0.0
+    coulomb_torque_backward: Any = 0.0
+    friction_slope: Any = FRICTION_SLOPE
+    motor_share: Any = 0.0
+    external_share: Any = 0.0
+    load_inertia: Any = 0.0
+    load_viscous_friction: Any = 0.0
+    voltage_limit: Any
+    volts_per_error: Any = math.nan
+    half_deadband: Any = 0.0
+
+    def __post_init__(self) -> None:
+        names = tuple(field.name for field in fields(self))
+        positive = ("resistance", "torque_constant", "inertia", "friction_slope", "voltage_limit")
+        check_numbers(self, positive, positive=True)
+        check_numbers(self, tuple(name for name in names if name not in (*positive, "volts_per_error")))
+        if not np.all(np.asarray(self.motor_share) < 1.0):
+            raise InputError("motor_share of ServoInverse", got=self.motor_share, allowed="less than 1")
+
+    def replace(self, **numbers: Any) -> ServoInverse:
+        """Return it with other numbers, by the names of its parameters."""
+        return replaced(self, **numbers)
+
+    @property
+    def frictionless(self) -> ServoInverse:
+        """It without dry friction: the linear plant."""
+        return self.replace(coulomb_torque_forward=0.0, coulomb_torque_backward=0.0, motor_share=0.0,
+                            external_share=0.0)
+
+    @property
+    def volts_per_torque(self) -> Any:
+        """R/K [V/(N m)]."""
+        return self.resistance / self.torque_constant
+
+    @property
+    def total_inertia(self) -> Any:
+        """J + J_L [kg m²]."""
+        return self.inertia + self.load_inertia
+
+    @property
+    def damping(self) -> Any:
+        """What slows the shaft down with a shorted winding: b + B_L + K K_b/R [N m s/rad]."""
+        return (self.viscous_friction + self.load_viscous_friction
+                + self.torque_constant * self.back_emf_constant / self.resistance)
+
+    def load_torque(self, armature_voltage: Any, motion: Reference) -> Any:
+        """Return τ_L that the servo exerts on its load, of a voltage [V] and a motion: (40) as it is, at the shaft.
+
+        τ_L = (K/R) (v_a − K_b q̇) − J q̈ − b q̇ − f(q̇); what the load takes for its own inertia is in it [N m].
+        """
+        return physics.driven_spindle_torque(
+            motion.speed, motion.acceleration, armature_voltage, armature_resistance=self.resistance,
+            torque_constant=self.torque_constant, back_emf_constant=self.back_emf_constant, rotor_inertia=self.inertia,
+            motor_viscous_friction=self.viscous_friction, gear_reduction=1.0,
+            coulomb_torque_forward=self.coulomb_torque_forward, coulomb_torque_backward=self.coulomb_torque_backward,
+            zero_crossing_slope=self.friction_slope)
+
+    def voltage(self, motion: Reference, external_torque: Any = 0.0) -> Any:
+        """Return the armature voltage that a motion takes, against an external torque beside the believed load [V].
+
+        v_a = (R/K) ((J + J_L) q̈ + (b + B_L) q̇ + τ_ext + f) + K_b q̇, with f of `friction`. A positive torque pushes
+        towards −q [N m].
+        """
+        qd, tau = motion.speed, external_torque + self.load_viscous_friction * motion.speed
+        moved = self.total_inertia * motion.acceleration + self.viscous_friction * qd + tau
+        return self.volts_per_torque * (moved + self.friction(qd, moved, tau)) + self.back_emf_constant * qd
+
+    def friction(self, speed: Any, moved: Any, external_torque: Any) -> Any:
+        """Return dry friction against a motion that takes the torque `moved` besides [N m].
+
+        f = s (F + abs(K_m τ_m + K_e τ)), s = tanh(N k q̇), of which the motor's τ_m = moved + f is one part itself.
+        """
+        s = np.tanh(self.friction_slope * speed)
+        F = np.where(s >= 0.0, self.coulomb_torque_forward, self.coulomb_torque_backward)
+        through = self.motor_share * (moved + s * F) + self.external_share * external_torque
+        return s * (F + np.abs(through) / (1.0 - self.motor_share * s * np.sign(through)))
+
+    def command_angle(self, armature_voltage: Any, angle: Any) -> Any:
+        """Return the angle to ask for so that the servo's own loop, at this angle [rad], gives this voltage [V].
+
+        q + v_a/(A k_s p) + h sgn(v_a): (40) solved for v_i with (38), around the deadband [rad].
+        """
+        return (angle + armature_voltage / self.volts_per_error
+                + self.half_deadband * np.sign(armature_voltage))
+
+
+def inverse_of(model: Model, load: Load | Part | None = None) -> ServoInverse:
+    """Return what a controller believes that knows a model, and of a load its inertia and damping.
+
+    Gravity, springs and recorded torques of the load are what `LoadModel` computes.
+
+    Parameters
+    ----------
+    model : Model
+        Any; the motors have no loop of their own.
+    load : Load, optional
+
+    Raises
+    ------
+    InputError
+        If it is no model, or the bridge of a pulse servo coasts between drives.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> round(inverse_of(st.BoundedServo(st.load_servo("hitec-hs-755hb"))).volts_per_error, 2)
+    19.17
+    """
+    if not isinstance(model, Model):
+        raise InputError("inverse_of(model)", got=model, allowed="a model of a servo, such as PulseServo(...)")
+    weight = as_load(load)
+    N = model.value_or("gear.gear_reduction", 1.0)
+    R = model.value("motor.armature_resistance") + model.value_or("supply.bridge_drop_resistance", 0.0)
+    plant = model.plant(weight)
+    lost = model.value_or("supply.bridge_drop_voltage", 0.0) + model.value_or("motor.brush_drop_voltage", 0.0)
+    gain, half = _own_loop(model, R)
+    return ServoInverse(
+        resistance=R, torque_constant=N * model.value("motor.torque_constant"),
+        back_emf_constant=N * model.value("motor.back_emf_constant"),
+        inertia=N**2 * model.value("motor.rotor_inertia"),
+        viscous_friction=N**2 * model.value("motor.motor_viscous_friction"),
+        coulomb_torque_forward=plant.friction.F_forward, coulomb_torque_backward=plant.friction.F_backward,
+        friction_slope=N * (model.value_or("friction.zero_crossing_slope", FRICTION_SLOPE) or FRICTION_SLOPE),
+        motor_share=plant.friction.K_m, external_share=plant.friction.K_e, load_inertia=model.load_inertia(weight),
+        load_viscous_friction=weight.viscous_friction,
+        voltage_limit=model.value_or("supply.open_circuit_voltage", math.inf) - lost
+        if model.servo.get("supply.open_circuit_voltage") is not None else _ENOUGH,
+        volts_per_error=gain, half_deadband=half)
+
+
+_ENOUGH = 1e3  # V, of a model without a supply
+
+
+def _own_loop(model: Model, R: float) -> tuple[float, float]:
+    """Return volts per error [V/rad] and half the deadband [rad] of the loop inside a servo; nan and 0 of a motor."""
+    p = model.value_or("potentiometer.feedback_gain", math.nan)
+    if isinstance(model, DigitalServo):
+        V = model.value("supply.open_circuit_voltage") - model.value_or("supply.bridge_drop_voltage", 0.0)
+        return model.value("firmware.proportional_gain") * V, float(model.firmware().h)
+    if isinstance(model, PulseServo | PulseServoInductive):
+        model.check_mean("the inverse servo")
+        behind = R / model.value("motor.armature_resistance")  # the mean voltage is told behind R_a alone
+        s_mu = model.value("electronics.one_shot_slope") * p
+        return behind * model.mean_gain() * p, 0.5 * model.value_or("electronics.deadband", 0.0) / s_mu
+    if model.servo.get("electronics.bridge_gain") is None or "electronics.bridge_gain" not in model.requires:
+        return math.nan, 0.0
+    gain = model.value("electronics.bridge_gain") * model.value("electronics.comparator_gain")
+    w_v = model.value_or("electronics.voltage_deadband", 0.0) if isinstance(model, BoundedServo) else 0.0
+    return gain * p, 0.5 * w_v / p
+
+
+@dataclass(frozen=True)
+class LoadModel:
+    """The external torque of a load as a function of the motion, for controllers that take one.
+
+    Parameters
+    ----------
+    load : Load
+        Of which constant torques, springs and pendulums count; inertia and damping are the inverse's.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> arm = LoadModel(st.loads.Pendulum(mass=0.1, length=0.12))
+    >>> f"{arm(1.570796, 0.0, 0.0):.5f} N m"
+    '0.11768 N m'
+    """
+
+    load: Load | Part
+
+    def __call__(self, angle: Any, speed: Any, acceleration: Any) -> Any:
+        """Return τ_ext at an angle [rad]; speed [rad/s] and acceleration [rad/s²] do not count [N m]."""
+        load = as_load(self.load)
+        amplitude, hanging = load.gravity
+        stiffness, rest = load.elasticity
+        return load.torque + stiffness * (angle - rest) + amplitude * np.sin(angle - hanging)
+
+
+def joined(inverses: Sequence[ServoInverse]) -> ServoInverse:
+    """Return the inverses of n servos as one, whose numbers are arrays (n,), for the joints of a robot.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> one = inverse_of(st.BoundedServo(st.load_servo("hitec-hs-755hb")))
+    >>> joined([one, one]).inertia.shape
+    (2,)
+    """
+    if not inverses:
+        raise InputError("joined(inverses)", got="none", allowed="at least one")
+    return ServoInverse(**{field.name: np.array([getattr(one, field.name) for one in inverses], dtype=np.float64)
+                           for field in fields(ServoInverse)})

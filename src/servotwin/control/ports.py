@@ -1,0 +1,213 @@
+"""What a controller is wired to: it measures, it sends, and time goes on; simulated here, hardware later."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from servotwin.control.controller import Measured
+from servotwin.control.inverse import ServoInverse, inverse_of
+from servotwin.control.wires import Wire, wire_of
+from servotwin.errors import InputError
+from servotwin.loads import as_load
+from servotwin.physics.pieces import Piece, Pieces, constant_pieces
+from servotwin.signals import Signal
+from servotwin.simulation import Result, Simulator, Status
+from servotwin.simulation.engine import Record, State
+from servotwin.simulation.trajectory import Trajectory as Motion
+from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from servotwin.control.sensors import Sensor
+    from servotwin.loads import Load, Part
+    from servotwin.models import Model
+    from servotwin.parameters import Servo
+
+    Array = NDArray[np.float64]
+
+
+class Port(Protocol):
+    """Four things to do with a servo, or with all servos of a robot at once."""
+
+    @property
+    def takes(self) -> str:
+        """Commands that it takes: "armature_voltage" or "command_angle"."""
+
+    @property
+    def frame(self) -> float:
+        """How often a new command can matter; 0: at any time [s]."""
+
+    @property
+    def lag(self) -> float:
+        """How long a command needs until it acts, in the mean [s]."""
+
+    @property
+    def nominal(self) -> ServoInverse | None:
+        """What its maker knows of the servo, for a look at stability before running; None where nobody does."""
+
+    @property
+    def time(self) -> float:
+        """Now [s]."""
+
+    def start(self, angle: Any) -> None:
+        """Begin anew at time 0, at rest at an angle [rad]."""
+
+    def measure(self) -> Measured:
+        """Return what the sensors show now."""
+
+    def send(self, command: Any) -> None:
+        """Command a voltage [V] or an angle [rad] from now on."""
+
+    def wait(self, until: float) -> None:
+        """Return at a time [s]."""
+
+    def record(self, time: Array) -> Mapping[str, Any]:
+        """Return true signals since the start at times [s], by name; none on hardware, which knows none."""
+
+
+class SimulatedServo:
+    """A servo on a `Simulator`, with the sensors, the steps and the delay of the one who controls it.
+
+    What it takes depends on the model: a motor and a `bare_bridge` take voltages, a servo takes angles. These go out as
+    pulses, by the sender's own calibration, or as goals on a bus.
+
+    Parameters
+    ----------
+    model : Model
+    load : Load, optional
+        What hangs on the shaft.
+    sensors : sequence of Sensor
+        All that a controller sees; nothing unless given.
+    believed : Servo, optional
+        Whose calibration makes pulses of angles; the model's own unless given.
+    resolution : float
+        Of the pulses that are sent, 1 us unless given [s].
+    delay : float
+        From a command until it is sent, as a program computes or a bus transmits [s].
+    seed : int
+        Of all noise.
+
+    Raises
+    ------
+    InputError
+        If a number makes no sense.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.control import Encoder
+    >>> port = SimulatedServo(st.PulseServo(st.load_servo("hitec-hs-755hb")), sensors=[Encoder(count=0.0)])
+    >>> port.takes, port.frame
+    ('command_angle', 0.02)
+    >>> port.start(0.5)
+    >>> port.send(1.0)
+    >>> port.wait(1.0)
+    >>> round(port.measure()["output_angle"], 2)
+    0.99
+    """
+
+    def __init__(self, model: Model, load: Load | Part | None = None, *, sensors: Sequence[Sensor] = (),
+                 believed: Servo | None = None, resolution: float = 1e-6, delay: float = 0.0, seed: int = 0) -> None:
+        for name, value in (("resolution", resolution), ("delay", delay)):
+            if not (is_finite(value) and value >= 0.0):
+                raise InputError(f"{name} of SimulatedServo", got=value, allowed="a number of at least 0 [s]")
+        self._simulator = Simulator(model, load, seed)
+        self._wire: Wire = wire_of(model, believed or model.servo, resolution)
+        self._sensors, self._delay, self._seed = tuple(sensors), float(delay), seed
+        self.nominal: ServoInverse | None = inverse_of(model, as_load(load))
+        self.start(0.0)
+
+    @property
+    def takes(self) -> str:
+        """A voltage of a motor or a bare bridge, an angle of a servo."""
+        return self._wire.takes
+
+    @property
+    def frame(self) -> float:
+        """Of the pulses, or the period of the program [s]."""
+        return self._wire.frame
+
+    @property
+    def lag(self) -> float:
+        """From a command until it acts, the wait for a frame apart [s]."""
+        return self._delay + self._wire.lag
+
+    @property
+    def time(self) -> float:
+        """Now [s]."""
+        return self._state.time
+
+    def start(self, angle: Any) -> None:
+        """Begin anew at time 0, at rest at an angle [rad]."""
+        rest = self._wire.at_rest(float(angle))
+        self._signal = self._constant(rest)
+        self._state: State = self._simulator.initial(
+            self._signal, {"output_angle": float(angle)} if "output_angle" in self._state_names else None)
+        self._sent: list[tuple[float, float]] = [(0.0, rest)]
+        self._coming: deque[tuple[float, float]] = deque()
+        self._seen: list[deque[tuple[float, Mapping[str, Any]]]] = [deque() for _ in self._sensors]
+        self._draws = np.random.default_rng(self._seed)
+        self._record = Record([], [])
+
+    @property
+    def _state_names(self) -> tuple[str, ...]:
+        return tuple(place.name for place in self._simulator.model.states)
+
+    def measure(self) -> Measured:
+        """Return what the sensors show now."""
+        found: dict[str, Any] = {"time": self.time}
+        for sensor, seen in zip(self._sensors, self._seen, strict=True):
+            draw = self._draws.standard_normal() if getattr(sensor, "noise", 0.0) else 0.0
+            seen.append((self.time, sensor.shown(self._true(sensor.signal), draw)))
+            while len(seen) > 1 and seen[1][0] <= self.time - sensor.delay + 1e-12:
+                seen.popleft()
+            found.update(seen[0][1])
+        return found
+
+    def _true(self, name: str) -> float:
+        state = self._state
+        return state[name] if name in state.names else self._simulator.observe(state, name, self._signal)
+
+    def send(self, command: Any) -> None:
+        """Command a voltage [V] or an angle [rad] from now on, the nearest that the wire carries."""
+        if not is_finite(command):
+            raise InputError(f"command at {self.time:g} s", got=command, allowed="a finite number")
+        self._coming.append((self.time + self._delay, self._wire.carried(float(command))))
+
+    def wait(self, until: float) -> None:
+        """Return at a time [s]."""
+        while self._coming and self._coming[0][0] < until - 1e-12:
+            at, value = self._coming.popleft()
+            if at > self.time:
+                self._advance(at)
+            if value != self._sent[-1][1]:
+                self._signal = self._constant(value)
+                self._sent.append((self.time, value))
+        if until > self.time:
+            self._advance(until)
+
+    def _advance(self, until: float) -> None:
+        self._state = self._simulator.recorded(self._state, until, self._signal, self._record)
+
+    def _constant(self, value: float) -> Signal:
+        return Signal(pieces=constant_pieces(value), unit=self._wire.unit, initial=value)
+
+    def result(self, time: Array) -> Result:
+        """Return all that has happened since the start, at times [s], as `simulate` would."""
+        last = dict(self._sent)  # of two commands at one time the later one
+        pieces = Pieces(tuple(Piece(start=at, value=value) for at, value in last.items()))
+        command, simulator = Signal(pieces=pieces, unit=self._wire.unit, initial=self._sent[0][1]), self._simulator
+        return Result(model=simulator.model, command=command, load=simulator.load,
+                      drive=simulator.model.command(command), time=np.asarray(time, dtype=np.float64),
+                      trajectory=Motion(tuple(self._record.segments)), events=tuple(self._record.events),
+                      status=Status.COMPLETED, ended=self.time, cause=Status.COMPLETED.message)
+
+    def record(self, time: Array) -> Mapping[str, Any]:
+        """Return true signals since the start at times [s]: a `Result`."""
+        found: Any = self.result(time)  # reads as a mapping does
+        return found  # type: ignore[no-any-return]
