@@ -2,21 +2,30 @@
 
 from typing import Any
 
+from servotwin.robots.arm import Arm
 from servotwin.robots.command_map import CommandMap
+from servotwin.robots.contour import contour_error
 from servotwin.robots.drive import ServoDrive
+from servotwin.robots.kinematics import JointPath, follow
 from servotwin.robots.model_file import joint_names, joint_ranges, robot_model
 from servotwin.robots.motion import Motion, read_motion
 from servotwin.robots.mount import Mount
 from servotwin.robots.recipe import Recipe, recipe_of
 from servotwin.robots.record import Record, ServoRecord
+from servotwin.robots.redundancy import AwayFromLimits, LeastMotion, LeastTorque
 from servotwin.robots.run import RobotRun, run_motion
+from servotwin.robots.scara import scara
 from servotwin.robots.sizing import Sizing, sizing_of
 from servotwin.robots.state import DriveState
+from servotwin.robots.task_run import TaskMetrics, TaskRun, ideal_task, run_task
+from servotwin.robots.tasks import ToolPath, task_path
+from servotwin.robots.two_link import two_link
 
 __all__ = [
-    "CommandMap", "DriveState", "Motion", "Mount", "Recipe", "Record", "RobotRun", "ServoActuated", "ServoDrive",
-    "ServoRecord", "Sizing", "joint_names", "joint_ranges", "read_motion", "recipe_of", "robot_model",
-    "run_motion", "sizing_of",
+    "Arm", "AwayFromLimits", "CommandMap", "DriveState", "JointPath", "LeastMotion", "LeastTorque", "Motion", "Mount",
+    "Recipe", "Record", "RobotRun", "ServoActuated", "ServoDrive", "ServoRecord", "Sizing", "TaskMetrics", "TaskRun",
+    "ToolPath", "contour_error", "follow", "ideal_task", "joint_names", "joint_ranges", "read_motion", "recipe_of",
+    "robot_model", "run_motion", "run_task", "scara", "sizing_of", "task_path", "two_link",
 ]
 
 

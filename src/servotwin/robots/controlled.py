@@ -118,7 +118,8 @@ class DrivePort:
 
     def _true(self, name: str) -> Array:
         if name == "output_angle":  # before the first tick servos show nothing yet
-            return (self.data.qpos[[self._at(joint) for joint in self.drive.joints]] - self._zero) / self._gain
+            places = [self._at(joint) for joint in self.drive.joints]
+            return np.asarray((self.data.qpos[places] - self._zero) / self._gain)
         return self.drive.look(self.data, name)
 
     def _at(self, joint: str) -> int:

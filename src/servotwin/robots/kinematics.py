@@ -122,7 +122,7 @@ def load_mink() -> Any:
     """
     load_mujoco()
     try:
-        import daqp
+        import daqp  # noqa: F401 - mink needs it, and says so too late
         import mink
     except ImportError as error:
         raise MissingExtraError("daqp" if error.name == "daqp" else "mink", "robots") from None
@@ -227,7 +227,8 @@ class _Solver:
             return []
         target, weight, power = self._posture
         u = np.maximum(np.abs(weight * (np.array(self._configuration.q) - target)), _LEAST)
-        task = self._mink.PostureTask(self._model, cost=_PULL * weight * u**(0.5 * power - 1.0), gain=1.0 / (power - 1.0))
+        task = self._mink.PostureTask(self._model, cost=_PULL * weight * u**(0.5 * power - 1.0),
+                                      gain=1.0 / (power - 1.0))
         task.set_target(target)
         return [task]
 

@@ -1,7 +1,7 @@
 """Which controller a robot's servos have: plain commands, or one that knows them and the arm that they move.
 
-What a controller believes is its own: an inverse of each servo, and a MuJoCo model of the arm, which may differ from the
-ones that it is wired to.
+What a controller believes is its own: an inverse of each servo, and a MuJoCo model of the arm, which may differ from
+the ones that it is wired to.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ class RigidBody:
         self._zero = np.array([mount.zero for mount in mounts.values()])
         self._gain = np.array([mount.gain for mount in mounts.values()])
         joints = [model.joint(name) for name in mounts]
-        self._angles, self._dofs = ([int(getattr(joint, name)[0]) for joint in joints] for name in ("qposadr", "dofadr"))
+        self._angles = [int(joint.qposadr[0]) for joint in joints]
+        self._dofs = [int(joint.dofadr[0]) for joint in joints]
 
     def __call__(self, angle: Any, speed: Any, acceleration: Any) -> Array:
         """Return the torque [N m] that each servo has to give for a motion of all shafts [rad], [rad/s], [rad/s²]."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -156,7 +157,7 @@ def square(centre: Place, half: float, *, speed: float = SPEED, plane: tuple[int
         corner[plane[1]] += b * half
         corners.append(corner)
     return _path(f"square of {2e3 * half:g} mm",
-                 [_straight(a, b) for a, b in zip(corners, corners[1:], strict=False)], speed)
+                 [_straight(a, b) for a, b in pairwise(corners)], speed)
 
 
 def pick_and_place(first: Place, second: Place, *, lift: float = _LIFT, turn: float = _TURN,

@@ -58,10 +58,10 @@ def two_link(*, payload: float = 0.0, scene: bool = True) -> Arm:
         box("printed", (0.0, 0.03, 0.004), (0.07, 0.08, 0.004)),
         box("printed", (-0.013, 0.04, 0.5 * (HEIGHT - 0.015)), (0.02, 0.014, 0.5 * (HEIGHT - 0.015))),
         box("servo", (-0.013, 0.04, HEIGHT), _CASE)))
-    upper = _link(base, "shoulder", (0.0, 0.0, HEIGHT), LENGTHS[0], _SHOULDER)
+    upper = _link(base, "shoulder", (0.0, 0.0, HEIGHT), _SHOULDER)
     mjcf.add_blocks(upper, [_bar(LENGTHS[0]), Block(SERVO_MASS, (LENGTHS[0] - 0.013, 0.03, 0.0), _CASE)])
     mjcf.add_shapes(upper, (*_bars(LENGTHS[0]), box("servo", (LENGTHS[0] - 0.013, 0.03, 0.0), _CASE)))
-    lower = _link(upper, "elbow", (LENGTHS[0], -0.012, 0.0), LENGTHS[1], _ELBOW)
+    lower = _link(upper, "elbow", (LENGTHS[0], -0.012, 0.0), _ELBOW)
     tip, half = (LENGTHS[1], 0.0, 0.0), min(0.5 * (payload / 7850.0) ** (1.0 / 3.0), 0.03)  # a cube of steel
     own = [_bar(LENGTHS[1]), Block(_TOOL_MASS, tip, (0.01, 0.01, 0.01))]
     shapes = [*_bars(LENGTHS[1]), {"type": "sphere", "material": "board", "pos": words(tip), "size": "0.011"}]
@@ -76,7 +76,7 @@ def two_link(*, payload: float = 0.0, scene: bool = True) -> Arm:
                places=(True, False, True), turns=False, centre=(0.17, 0.0, HEIGHT + 0.03), size=0.04, plane=(0, 2))
 
 
-def _link(parent: Xml.Element, joint: str, place: Vector, length: float, middle: float) -> Xml.Element:
+def _link(parent: Xml.Element, joint: str, place: Vector, middle: float) -> Xml.Element:
     body = Xml.SubElement(parent, "body", name="upper_arm" if joint == "shoulder" else "forearm", pos=words(place))
     Xml.SubElement(body, "joint", name=joint, type="hinge", axis="0 -1 0",
                    range=words((middle - _QUARTER, middle + _QUARTER)))
