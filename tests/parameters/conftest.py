@@ -54,7 +54,13 @@ def group_values(draw, kind):
     return values
 
 
-plain_values = st.fixed_dictionaries({}, optional={name: group_values(kind) for name, kind in GROUPS.items()})
+def without_stops_if_endless(groups):
+    """Take the stops away from a servo that turns without end."""
+    return {k: v for k, v in groups.items() if k != "stops" or "fixed_angle" not in groups.get("potentiometer", {})}
+
+
+plain_values = st.fixed_dictionaries(
+    {}, optional={name: group_values(kind) for name, kind in GROUPS.items()}).map(without_stops_if_endless)
 texts = st.text(st.characters(codec="utf-8"), max_size=40)
 toml_values = st.recursive(
     st.booleans() | st.integers(-2**60, 2**60) | st.floats(allow_nan=False, allow_infinity=False) | texts,

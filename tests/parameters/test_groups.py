@@ -27,7 +27,8 @@ NAMES = {
                    "command_pulse_offset voltage_deadband frame_period deadband stretcher_gain minimum_drive_time "
                    "stretcher_time_constant off_state silence_state one_shot_offset one_shot_slope back_emf_injection "
                    "supply_coupling pulse_timeout pulse_width_min pulse_width_max",
-    "potentiometer": "feedback_gain feedback_offset backlash noise linearity_angle linearity_error quantisation",
+    "potentiometer": "feedback_gain feedback_offset backlash noise linearity_angle linearity_error quantisation "
+                     "fixed_angle",
     "firmware": "control_period control_phase compute_delay angle_quantum filter_weight deadband_angle deadband_law "
                 "proportional_gain integral_gain derivative_gain velocity_feedforward acceleration_feedforward "
                 "derivative_of derivative_ticks derivative_threshold integral_limit anti_windup integral_at_rest "

@@ -52,7 +52,8 @@ def test_what_is_saved_is_read_back(tmp_path, servo):
     assert (again.sheet, again.fit, again.notes, again.title) == (servo.sheet, servo.fit, servo.notes, servo.title)
 
 
-def test_every_field_survives(tmp_path):
+@pytest.mark.parametrize("other", ["stops", "potentiometer"])  # of stops and an endless shaft a servo has one
+def test_every_field_survives(tmp_path, other):
     values = {group: {name: 0.7 if f.metadata["rule"] == "a number from 0 to 1" else 1.25
                       for name, f in kind.__dataclass_fields__.items() if isinstance(f.metadata.get("rule"), str)
                       and f.metadata["rule"] != "table" and not name.startswith("load_friction_")}
@@ -62,12 +63,17 @@ def test_every_field_survives(tmp_path):
     values["supply"]["bridge_drop_voltage"] = 0.1
     values["stops"]["lower_angle"] = -1.0
     values["firmware"] |= {"derivative_ticks": 2.0, "lower_goal": -1.0}
+    if other == "potentiometer":
+        gone = len(values.pop("stops"))
+    else:
+        gone = len([values["potentiometer"].pop("fixed_angle")])
     servo = servo_from_values("mine", values)
     servo.save(tmp_path / "a.toml")
     again = load_servo(tmp_path / "a.toml")
     assert again == servo
     words = sum(isinstance(f.metadata.get("rule"), tuple) for f in GROUPS["firmware"].__dataclass_fields__.values())
-    assert len(again.names()) == sum(len(kind.__dataclass_fields__) - 1 for kind in GROUPS.values()) - 7 - words
+    every = sum(len(kind.__dataclass_fields__) - 1 for kind in GROUPS.values())
+    assert len(again.names()) == every - 7 - words - gone
 
 
 def test_the_saved_file_is_plain_si_with_one_table_per_group(tmp_path):
@@ -308,3 +314,12 @@ def test_numbers_keep_every_bit(tmp_path_factory, name, value):
     path = tmp_path_factory.mktemp("bits") / "a.toml"
     servo_from_values("mine", {"electronics": {name: value}}).save(path)
     assert load_servo(path).get(f"electronics.{name}") == value
+
+
+def test_a_file_of_a_servo_that_turns_without_end_has_no_stops(tmp_path):
+    servo_from_values("mine", {"potentiometer": {"fixed_angle": 1.5}}).save(tmp_path / "wheel.toml")
+    assert load_servo(tmp_path / "wheel.toml").potentiometer.fixed_angle == 1.5
+    with (tmp_path / "wheel.toml").open("a", encoding="utf-8") as file:
+        file.write('[stops]\nupper_angle = { value = 90, unit = "deg", origin = "assumed" }\n')
+    with pytest.raises(ServoFileError, match=r"wheel\.toml.*potentiometer\.fixed_angle.*stops\.upper_angle[^\n]*$"):
+        load_servo(tmp_path / "wheel.toml")

@@ -108,6 +108,8 @@ def _speed(speed: float) -> str:
 
 
 def _standing(part: VoltageSheet) -> list[CurveRow]:
+    if not part.holding:  # a servo that turns without end holds nothing
+        return []
     move = NEVER if math.isnan(part.smallest_move) else f"{math.degrees(part.smallest_move):.2f} deg"
     pulse = "" if math.isnan(part.smallest_pulse) else f" ({1e6 * part.smallest_pulse:.1f} us)"
     found = [CurveRow("smallest move", move + pulse)]

@@ -193,14 +193,23 @@ def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: flo
     masses, cool = thermal_masses(servo), Temperatures(REFERENCE_TEMPERATURE, REFERENCE_TEMPERATURE)
     magnet = MAGNET_COEFFICIENT if masses is None else masses.magnet_coefficient
     cold = speed_curve(model, cool)
+    printed = tuple(point for point in printed_points(servo)
+                    if point.supply_voltage is not None and abs(point.supply_voltage - voltage) < _SAME_VOLTAGE)
     warm = hot_temperatures(servo, hot)
+    if model.endless:  # it holds no angle, and no angle is asked of it
+        if lift is not None:
+            raise InputError(f"lift by {servo.name}", got="potentiometer.fixed_angle",
+                             allowed="a servo that holds an angle")
+        return VoltageSheet(
+            voltage=voltage, cold=cold, hot=speed_curve(at_temperatures(model, warm, magnet), warm),
+            smallest_move=math.nan, smallest_pulse=math.nan, holding=(), bandwidth=(), printed=printed, lift=None,
+            loop=None)
     step = smallest_move(model)
     return VoltageSheet(
         voltage=voltage, cold=cold, hot=speed_curve(at_temperatures(model, warm, magnet), warm),
         smallest_move=step, smallest_pulse=_as_pulse(model, step), holding=holding_errors(model, cold.stall_torque),
         bandwidth=bandwidths(model) if bandwidth else (),
-        printed=tuple(point for point in printed_points(servo)
-                      if point.supply_voltage is not None and abs(point.supply_voltage - voltage) < _SAME_VOLTAGE),
+        printed=printed,
         lift=None if lift is None else lift_of(model, *lift), loop=loop_of(model))
 
 

@@ -130,6 +130,9 @@ def frequency_response(model: Model, frequencies: ArrayLike, *, amplitude: Array
     True
     """
     check_model(model, frame_period, linear=False)
+    if model.endless:
+        raise InputError(f"frequency response of {model.servo.name}", got="potentiometer.fixed_angle",
+                         allowed="a servo that follows its command with an angle; `transfer_function` has its speed")
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer):
         raise InputError("seed", got=seed, allowed="a whole number")
     if frame_period is not None:

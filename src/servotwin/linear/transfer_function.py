@@ -32,6 +32,7 @@ def transfer_function(model: Model, *, input: str | None = None, output: str | N
     gain that its pulses have in the mean, A k_s = (V_oc − V_ce0) K/(T_f s_r), and no delay: the burst of voltage
     comes right behind the edge that asks for it. Frames are then taken to be short beside the motion: up to 0.4 of
     the bandwidth the gain is right within a few per cent, above it is not. `frequency_response` simulates the pulses.
+    A servo that turns without end has no loop: its pulse width sets a speed, and its angle is the integral of that.
 
     Parameters
     ----------
@@ -111,6 +112,8 @@ def is_motor(model: Model) -> bool:
 def input_name(model: Model, name: str) -> str:
     """Return the name, or raise UnknownNameError unless it is a command that this model takes."""
     inputs = ("armature_voltage",) if is_motor(model) else ("command_voltage", "pulse_width", "command_angle")
+    if model.endless:
+        inputs = ("pulse_width",)
     if name not in inputs:
         raise UnknownNameError(f"input of {type(model).__name__}", name, inputs)
     return name

@@ -154,6 +154,12 @@ class Model(ABC):
                        shaft=shaft.pack(self, load, self.load_inertia(load), reduction))
 
     @property
+    def endless(self) -> bool:
+        """Whether the shaft turns without end: the feedback stands at `potentiometer.fixed_angle`, and is read."""
+        name = "potentiometer.fixed_angle"
+        return name in self.optional and self.servo.get(name) is not None
+
+    @property
     def available(self) -> tuple[str, ...]:
         """Names of the output signals that can be computed for this servo, `time` apart.
 

@@ -44,7 +44,8 @@ def default_class(servo: Servo) -> type[Model]:
         warnings.warn(f"{servo.name} is {a} whose file has no firmware ({', '.join(absent)} not given): computed as an "
                       "analog one", stacklevel=3)
     lacks = [name for name in _CHIP if servo.get(name) is None]
-    if lacks and all(servo.get(name) is not None for name in BoundedServo.requires):
+    turns = servo.get("potentiometer.fixed_angle") is not None  # which no mean-voltage servo follows
+    if lacks and not turns and all(servo.get(name) is not None for name in BoundedServo.requires):
         warnings.warn(f"{servo.name} has no chip ({', '.join(lacks)} not given): computed as a bounded servo, with the "
                       "mean voltage of its pulses", stacklevel=3)
         return BoundedServo

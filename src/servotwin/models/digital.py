@@ -73,7 +73,9 @@ class DigitalServo(SwitchedServo):
         """Names of the output signals that can be computed for this servo, `time` apart."""
         missing = {"feedback_voltage"} if self.servo.get("potentiometer.feedback_gain") is None else set()
         missing |= set(_OF_PULSES) if self.takes_goals else set()
-        return tuple(name for name in super().available if name not in missing)
+        goals = {"command_angle"} if self.takes_goals else set()  # told as it is, whatever the shaft does
+        shown = {*super().available, *goals}
+        return tuple(name for name in self.signals if name in shown and name not in missing)
 
     def pack(self, load: Load) -> Numbers:
         """Return the plant at the output shaft, with the bridge before it as at full duty."""
@@ -84,7 +86,8 @@ class DigitalServo(SwitchedServo):
             heat=heat.pack(self), elastic=elastic.pack(self, load, self.load_inertia(load)))
 
     def _sensor(self) -> sensor.Sensor:
-        return sensor.NO_SENSOR if self.servo.get("potentiometer.feedback_gain") is None else sensor.pack_pulsed(self)
+        encoder = self.servo.get("potentiometer.feedback_gain") is None
+        return sensor.NO_SENSOR if encoder and not self.endless else sensor.pack_pulsed(self)
 
     def firmware(self, signal: Signal | None = None) -> Firmware:
         """Return the numbers of the program; the frame period is that of the command where it gives one."""
@@ -121,7 +124,9 @@ class DigitalServo(SwitchedServo):
         return signal if self.takes_goals else super().framed(signal, until)
 
     def start_angle(self, drive: float) -> float:
-        """Return the angle without error, within stops and goals [rad]."""
+        """Return the angle without error, within stops and goals [rad]; 0 of a shaft that turns without end."""
+        if self.endless:
+            return abs(0.0 * drive)
         angle = drive if self.takes_goals else super().start_angle(drive)
         for low, high in (("firmware.lower_goal", "firmware.upper_goal"), ("stops.lower_angle", "stops.upper_angle")):
             angle = clipped(angle, self.value_or(low, -math.inf), self.value_or(high, math.inf))

@@ -166,7 +166,8 @@ class PulseServo(_Pulsed):
         Raises
         ------
         InputError
-            If the bridge coasts between drives: it then has no mean voltage that follows the error.
+            If the bridge coasts between drives: it then has no mean voltage that follows the error. If the servo turns
+            without end, which no mean-voltage servo does.
 
         Warns
         -----
@@ -180,6 +181,9 @@ class PulseServo(_Pulsed):
         >>> round(model.value("electronics.bridge_gain"), 2)
         45.67
         """
+        if self.endless:
+            raise InputError(f"the averaged servo of {self.servo.name}", got="potentiometer.fixed_angle",
+                             allowed="a servo whose potentiometer turns with its shaft")
         self.check_mean("the averaged servo")
         T_f = self.frame_period if frame_period is None else frame_period
         slope = self.value("electronics.one_shot_slope")

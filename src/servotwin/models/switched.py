@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from servotwin import physics
+from servotwin.errors import CommandError
 from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ SHAFT = ("output_angle", "output_speed")
 HIDDEN = ("winding_temperature", "housing_temperature", "motor_angle", "motor_speed")
 """States, angle and speed first."""
 _HEAT = ("winding_temperature", "housing_temperature")
+_NO_PULSES = ("command_voltage", "command_angle")
+"""What stands for no pulse where the shaft turns without end."""
 
 
 class SwitchedServo(Model):
@@ -37,8 +40,8 @@ class SwitchedServo(Model):
     @property
     def available(self) -> tuple[str, ...]:
         """Names of the output signals that can be computed for this servo, `time` apart."""
-        names = super().available
-        return names if self.heats else tuple(name for name in names if name not in _HEAT)
+        absent = (*(() if self.heats else _HEAT), *(_NO_PULSES if self.endless else ()))
+        return tuple(name for name in super().available if name not in absent)
 
     @property
     def heats(self) -> bool:
@@ -67,7 +70,9 @@ class SwitchedServo(Model):
         return self.frame_period if signal is None or signal.frame_period is None else signal.frame_period
 
     def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Return angles [rad] and errors [V] of the potentiometer's linearity table; empty without one."""
+        """Return angles [rad] and errors [V] of the potentiometer's linearity table; empty without, or at a stand."""
+        if self.endless:
+            return (), ()
         angles, errors = (self.servo.get(f"potentiometer.linearity_{name}") for name in ("angle", "error"))
         return (angles, errors) if isinstance(angles, tuple) and isinstance(errors, tuple) else ((), ())
 
@@ -94,8 +99,13 @@ class SwitchedServo(Model):
         Raises
         ------
         CommandError
-            If a width is not positive or not shorter than a frame, or an angle outside the travel.
+            If a width is not positive or not shorter than a frame, or an angle outside the travel; if a servo that
+            turns without end gets anything but pulses.
         """
+        if self.endless and signal.kind != "pulse_width":
+            raise CommandError(
+                f"{signal.kind} command of {self.servo.name}", got=signal.kind, allowed="pulse commands only: with "
+                "potentiometer.fixed_angle it turns without end, and no angle or voltage stands for a speed")
         if signal.kind == "voltage":
             pieces = signal.pieces.scaled(*self._voltage_line())
         elif signal.kind == "angle":
@@ -131,7 +141,9 @@ class SwitchedServo(Model):
             v_o, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0))
 
     def start_angle(self, drive: float) -> float:
-        """Return the angle without error, within the stops [rad]."""
+        """Return the angle without error, within the stops [rad]; 0 of a shaft that turns without end."""
+        if self.endless:
+            return abs(0.0 * drive)
         angles, errors = self.curve()
         angle = self._angle_of(drive)
         if angles:

@@ -107,6 +107,8 @@ class Potentiometer(Group):
     linearity_angle: tuple[float, ...] | None = table("", "angle", "angles of the linearity table")
     linearity_error: tuple[float, ...] | None = table("", "voltage", "voltage added at these angles")
     quantisation: float | None = parameter("", "voltage per count", POSITIVE, "voltage per count")
+    fixed_angle: float | None = parameter(
+        "", "angle", ANY, "angle at which a potentiometer off the shaft stands: the servo turns without end")
 
     def _relations(self) -> Iterator[Relation]:
         angles, errors = self.linearity_angle, self.linearity_error

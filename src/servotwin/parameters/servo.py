@@ -60,7 +60,7 @@ class Servo:
     Raises
     ------
     ParameterError
-        If the name is empty or no text, or the kind is none of the three.
+        If the name is empty or no text, or the kind is none of the three; if a servo that turns without end has stops.
 
     Examples
     --------
@@ -93,9 +93,16 @@ class Servo:
             raise ParameterError("name of a servo", got=self.name, allowed='a short id, such as "my-servo"')
         if self.kind not in KINDS:
             raise ParameterError(f"kind of {self.name!r}", got=self.kind, allowed=", ".join(KINDS))
+        self._check_endless()
         object.__setattr__(self, "quantities", {name: self._quantity(name) for name in self.names()})
         for name in ("quantities", "sheet", "fit"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def _check_endless(self) -> None:
+        stops = [name for name in self.names() if name.startswith("stops.")]
+        if stops and self.potentiometer.fixed_angle is not None:
+            raise ParameterError("potentiometer.fixed_angle", got=f"{stops[0]} beside it",
+                                 allowed="one of the two: a servo that turns without end has no stops")
 
     def _quantity(self, name: str) -> Quantity:
         group, key = check_name(name)
@@ -170,6 +177,29 @@ class Servo:
             if value is not None:
                 quantities[name] = _replaced(name, value, source)
         return replace(self, quantities=quantities, **groups)
+
+    def continuous(self, fixed_angle: float) -> Servo:
+        """Return the servo rebuilt to turn without end: its potentiometer off the shaft, its stops taken away.
+
+        Parameters
+        ----------
+        fixed_angle : float
+            Where the potentiometer stands; the pulse of this angle is then the neutral one [rad].
+
+        Raises
+        ------
+        ParameterError
+            If the angle is not finite.
+
+        Examples
+        --------
+        >>> from servotwin.parameters import load_servo
+        >>> wheel = load_servo("hitec-hs-755hb").continuous(1.5)
+        >>> wheel.potentiometer.fixed_angle, wheel.stops.upper_angle
+        (1.5, None)
+        """
+        stops = {name: None for name in self.names() if name.startswith("stops.")}
+        return self.replace({"potentiometer.fixed_angle": fixed_angle, **stops})
 
     def with_checked(self, values: Mapping[str, Value | None]) -> Servo:
         """Return what `replace` does, faster where numbers stand for numbers; all values were checked before."""

@@ -57,9 +57,13 @@ def read_servo_file(path: Path, name: str | None = None) -> Servo:
         if table in content:
             groups[table], found = _read_group(label, table, kind, content[table])
             quantities |= found
-    return Servo(name=content["name"], title=content.get("title", content["name"]), notes=content.get("notes", ""),
-                 kind=kind_of_servo, sheet=_table(label, content, "sheet"), fit=_table(label, content, "fit"),
-                 quantities=quantities, **groups)  # type: ignore[arg-type]
+    sheet, fit = _table(label, content, "sheet"), _table(label, content, "fit")
+    try:
+        return Servo(name=content["name"], title=content.get("title", content["name"]), notes=content.get("notes", ""),
+                     kind=kind_of_servo, sheet=sheet, fit=fit, quantities=quantities,
+                     **groups)  # type: ignore[arg-type]
+    except ParameterError as error:  # what two groups say together
+        raise ServoFileError(label, f"{error.what} is not possible", got=error.got, allowed=error.allowed) from None
 
 
 def _read_toml(path: Path, label: str) -> dict[str, Any]:

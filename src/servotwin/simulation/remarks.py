@@ -125,7 +125,9 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
     refused = ending.refused_from(accepts, rows, period, edges, end) if pulsed else math.nan
     tau = piece_value(ending.piece_before(load.torque_pieces.rows, end, False), end)
     final = [float(values[0]) for values in (last.angle, last.speed, last.winding, last.housing)]
-    if firmware is not None:
+    if model.endless:  # it is told no angle
+        marks = 0
+    elif firmware is not None:
         marks = _program_marks(numbers, firmware, last, tau, final)
     else:
         marks = ending.marks(pulsed, numbers, accepts, rows, tau, period, edges, end, numbers.source.V,

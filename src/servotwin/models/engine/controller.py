@@ -54,7 +54,7 @@ def work(inputs: Inputs, sensor: Sensor, firm: Any, q: float, wiper: float, sens
     if has_news(firmware, firm, now):
         listen(inputs, firm, now)
     if firmware.per_volt != 0.0:
-        angle = angle_of(firmware, firm, sensed_voltage(sensor, inputs.curve, wiper), sensor.b_o, inputs.seed)
+        angle = angle_of(firmware, firm, sensed_voltage(sensor, inputs.curve, wiper), inputs.seed)
     decide(firmware, firm, angle, sensed, now)
 
 
@@ -76,11 +76,11 @@ def decide(firmware: Firmware, firm: Any, angle: float, sensed: Sensed, now: flo
     firm.tick += 1
 
 
-def angle_of(firmware: Firmware, firm: Any, voltage: float, offset: float, seed: int) -> float:
+def angle_of(firmware: Firmware, firm: Any, voltage: float, seed: int) -> float:
     """Return the angle [rad] that a potentiometer shows by its voltage, before it is counted."""
     noise = firmware.noise * gaussian(seed, firm.draws) if firmware.noise > 0.0 else 0.0
     firm.draws += 1
-    return (voltage - offset + noise) * firmware.per_volt
+    return (voltage - firmware.b_o + noise) * firmware.per_volt
 
 
 def apply(firmware: Firmware, firm: Any, frames: int, latest: float) -> None:

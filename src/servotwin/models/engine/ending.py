@@ -110,7 +110,7 @@ def marks(pulsed: bool, numbers: Numbers, chip: Chip, command: NDArray[np.float6
     `tau` is the part of the load's torque that depends on time alone [N m], `source` the voltage of the supply, other
     servos' currents apart [V], `final` the last angle and speed, and temperatures of winding and housing.
     """
-    if numbers.sensor.p == 0.0:  # a motor is told no angle
+    if numbers.sensor.p == 0.0:  # neither a motor nor a servo that turns without end is told an angle
         return 0
     q, w, T_w, T_h = final[0], final[1], final[2], final[3]
     target, slack = told(pulsed, numbers, chip, command, period, edges, duration)

@@ -121,7 +121,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
             angle = q
             if measures:
                 v = feedback_voltage(q, p, b_o) if straight else sensed_voltage(numbers.sensor, inputs.curve, q)
-                angle = controller.angle_of(firmware, firm, v, b_o, seed)
+                angle = controller.angle_of(firmware, firm, v, seed)
             sensed = controller.sensed_by(numbers, firm, y) if senses else NOTHING_SENSED
             controller.decide(firmware, firm, angle, sensed, origin + t)
             controller.apply(firmware, firm, frames, t + slack)

@@ -109,7 +109,7 @@ def decide(tile: Any, size: int) -> int:
     for j in range(size):
         firmware, sensor, motor = firmware_at(tile.program, j), sensor_at(tile.sensor, j), body_at(tile.body, j).motor
         q = loop.q[j]
-        angle = (feedback_voltage(q, sensor.p, sensor.b_o) - sensor.b_o) * firmware.per_volt
+        angle = (feedback_voltage(q, sensor.p, sensor.b_o) - firmware.b_o) * firmware.per_volt
         y = control.filtered(firmware, loop.y[j], counted(angle if firmware.per_volt != 0.0 else q, firmware.quantum))
         z = control.beyond_zone(firmware, loop.goal[j], y)
         x = -y if firmware.of_measurement > 0.0 else z

@@ -108,7 +108,7 @@ def _decide_alone(lanes: Lanes, curve: Floats, records: Any, tile: Any, j: int) 
     angle = q
     if firmware.per_volt != 0.0:
         v = sensed_voltage(numbers.sensor, curve, q)
-        angle = controller.angle_of(firmware, firm, v, numbers.sensor.b_o, lanes.seeds[lane])
+        angle = controller.angle_of(firmware, firm, v, lanes.seeds[lane])
     sensed = controller.sensed_by(numbers, firm, here) if control.senses(firmware) else NOTHING_SENSED
     now = (tile.place.frames[j] + tile.clock.tick[j]) * firmware.T_c + firmware.t_phi
     given = control.tick(firmware, firm, angle, sensed, now - firm.heard)

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from servotwin.models.terms import sensor
 from servotwin.models.terms.given import Given
 
 READS = tuple(f"firmware.{name}" for name in (
@@ -86,6 +87,7 @@ class Firmware(NamedTuple):
     longest: float
     T_f: float  # of regular frames
     noise: float  # V rms
+    b_o: float  # V of the potentiometer at angle 0
 
 
 NO_FIRMWARE = Firmware(*[0.0] * len(Firmware._fields))
@@ -113,6 +115,8 @@ def pack(model: Given, period: Any) -> Firmware:
     p, b_o = model.value_or("potentiometer.feedback_gain", 0.0), model.value_or("potentiometer.feedback_offset", 0.0)
     pulses = np.all(np.asarray(slope) * p != 0.0)
     s_mu = slope * p
+    # an encoder that stands tells its angle as a voltage would, 1 V a radian
+    per_volt = 1.0 / p if np.all(p != 0.0) else 1.0 if sensor.stands(model) else 0.0
     half_deadband = 0.5 * model.value_or("electronics.deadband", 0.0) / s_mu if pulses else 0.0
     return Firmware(
         T_c=of("control_period"), t_phi=of("control_phase"), T_d=of("compute_delay"), quantum=of("angle_quantum"),
@@ -135,11 +139,12 @@ def pack(model: Given, period: Any) -> Firmware:
         resets=word("undervoltage_action", "reset"), restart_time=of("restart_time"),
         timeout=of("signal_timeout", math.inf), loss=word("signal_loss", "limp", "failsafe"),
         failsafe=of("failsafe_angle"), soft_duty=of("soft_start_duty", math.inf), soft_time=of("soft_start_time"),
-        per_volt=1.0 / p if np.all(p != 0.0) else 0.0, per_second=1.0 / s_mu if pulses else 0.0,
+        per_volt=per_volt, per_second=1.0 / s_mu if pulses else 0.0,
         at_nothing=-(T_0 / slope + b_o) / p if pulses else 0.0,
         shortest=model.value_or("electronics.pulse_width_min", 0.0),
         longest=model.value_or("electronics.pulse_width_max", math.inf), T_f=period,
-        noise=model.value_or("potentiometer.noise", 0.0))
+        noise=model.value_or("potentiometer.noise", 0.0) if np.all(p != 0.0) else 0.0,
+        b_o=b_o if np.all(p != 0.0) else 0.0)
 
 
 def _infinite_where_0(limit: Any) -> Any:

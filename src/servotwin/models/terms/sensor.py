@@ -1,9 +1,12 @@
-"""The potentiometer: gain, offset, table, steps and play."""
+"""The potentiometer: gain, offset, table, steps and play; on the shaft, or off it where a servo turns without end."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from servotwin import physics
 from servotwin.models.terms.dependence import ON_Q
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.source import Source
@@ -14,12 +17,11 @@ from servotwin.physics.potentiometer import error_between, feedback_voltage, qua
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
 READS = (
     "potentiometer.feedback_offset", "potentiometer.backlash", "potentiometer.quantisation",
-    "potentiometer.linearity_angle", "potentiometer.linearity_error",
+    "potentiometer.linearity_angle", "potentiometer.linearity_error", "potentiometer.fixed_angle",
 )
 """What may be given of a pulse servo."""
 
@@ -87,7 +89,29 @@ def pack(model: Given) -> Sensor:
                   b_o=model.value_or("potentiometer.feedback_offset", 0.0), half_slack=0.0, step=0.0)
 
 
+def stands(model: Given) -> bool:
+    """Tell whether the feedback stands still, whatever the shaft does."""
+    return model.servo.get("potentiometer.fixed_angle") is not None
+
+
+def pack_standing(model: Given) -> Sensor:
+    """Return the numbers of a feedback that stands: one voltage at every angle, with its table, in its steps.
+
+    An encoder has no voltage; its angle [rad] stands for one.
+    """
+    angle = model.value("potentiometer.fixed_angle")
+    if model.servo.get("potentiometer.feedback_gain") is None:
+        return Sensor(0.0, angle, 0.0, 0.0)
+    own = pack(model)
+    angles, errors = (model.servo.get(f"potentiometer.linearity_{name}") for name in ("angle", "error"))
+    v_o: Any = physics.sensed_voltage(angle, own.p, own.b_o, angles or (0.0,), errors or (0.0,),
+                                      model.servo.get("potentiometer.quantisation"))
+    return Sensor(0.0, v_o if np.ndim(v_o) else float(v_o), 0.0, 0.0)
+
+
 def pack_pulsed(model: Given) -> Sensor:
     """Return all numbers of a model's potentiometer."""
+    if stands(model):
+        return pack_standing(model)
     return pack(model)._replace(half_slack=0.5 * model.value_or("potentiometer.backlash", 0.0),
                                 step=model.value_or("potentiometer.quantisation", 0.0))
