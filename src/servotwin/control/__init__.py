@@ -4,6 +4,7 @@ A controller is a plain function of measured signals with explicit state: the sa
 robot, and on hardware.
 """
 
+from servotwin.control import tuning
 from servotwin.control.bare import bare_bridge
 from servotwin.control.compensation import DeadbandCompensation, PlayCompensation
 from servotwin.control.computed_torque import ComputedTorque
@@ -15,6 +16,7 @@ from servotwin.control.loop import ControlRun, run_loop
 from servotwin.control.observer import DisturbanceObserver
 from servotwin.control.pid import Pid
 from servotwin.control.ports import Port, SimulatedServo
+from servotwin.control.predictive import PredictiveControl
 from servotwin.control.reference import Path, Reference, Trajectory
 from servotwin.control.sensors import Encoder, Sensor, Tap
 from servotwin.control.shaping import InputShaper, Shaped, zero_vibration, zero_vibration_derivative
@@ -24,7 +26,7 @@ from servotwin.control.trajectories import hold, quintic, s_curve, sampled, step
 __all__ = [
     "AheadOfServo", "ComputedTorque", "ControlRun", "Controller", "DeadbandCompensation", "Decision",
     "DisturbanceObserver", "Encoder", "Feedforward", "InputShaper", "LoadModel", "Measured", "Path", "Pid",
-    "PlainCommand", "PlayCompensation", "Port", "Reference", "Sensor", "ServoInverse", "Shaped", "SimulatedServo",
-    "Tap", "ThroughServo", "Trajectory", "bare_bridge", "check_stable", "closed_loop_poles", "hold", "inverse_of",
-    "joined", "quintic", "run_loop", "s_curve", "sampled", "step", "trapezoid", "zero_vibration",
-    "zero_vibration_derivative"]
+    "PlainCommand", "PlayCompensation", "Port", "PredictiveControl", "Reference", "Sensor", "ServoInverse", "Shaped",
+    "SimulatedServo", "Tap", "ThroughServo", "Trajectory", "bare_bridge", "check_stable", "closed_loop_poles", "hold",
+    "inverse_of", "joined", "quintic", "run_loop", "s_curve", "sampled", "step", "trapezoid", "tuning",
+    "zero_vibration", "zero_vibration_derivative"]

@@ -43,8 +43,8 @@ class ComputedTorque:
 
     Notes
     -----
-    Kelly, Santibáñez and Loría, Control of Robot Manipulators in Joint Space, 2005, chapter 10; actuators as in
-    chapter 2.2 and in (40). Siciliano et al., Robotics, 2009, section 8.5.2.
+    Kelly, Santibáñez and Loría, Control of Robot Manipulators in Joint Space, 2005, chapter 10; Siciliano et
+    al., Robotics, 2009, section 8.5.2. The actuator is that of (40).
 
     Examples
     --------

@@ -52,6 +52,8 @@ class ServoInverse:
         Of the servo's own loop, A k_s p or what its pulses or its program come to; nan of a motor [V/rad].
     half_deadband : float
         h of that loop [rad].
+    profile_acceleration : float
+        a of a profile before that loop, which lags by what it takes to brake; inf without one [rad/s²].
 
     Examples
     --------
@@ -80,12 +82,14 @@ class ServoInverse:
     voltage_limit: Any
     volts_per_error: Any = math.nan
     half_deadband: Any = 0.0
+    profile_acceleration: Any = math.inf
 
     def __post_init__(self) -> None:
         names = tuple(field.name for field in fields(self))
         positive = ("resistance", "torque_constant", "inertia", "friction_slope", "voltage_limit")
         check_numbers(self, positive, positive=True)
-        check_numbers(self, tuple(name for name in names if name not in (*positive, "volts_per_error")))
+        may_be_absent = ("volts_per_error", "profile_acceleration")
+        check_numbers(self, tuple(name for name in names if name not in (*positive, *may_be_absent)))
         if not np.all(np.asarray(self.motor_share) < 1.0):
             raise InputError("motor_share of ServoInverse", got=self.motor_share, allowed="less than 1")
 
@@ -147,13 +151,15 @@ class ServoInverse:
         through = self.motor_share * (moved + s * F) + self.external_share * external_torque
         return s * (F + np.abs(through) / (1.0 - self.motor_share * s * np.sign(through)))
 
-    def command_angle(self, armature_voltage: Any, angle: Any) -> Any:
+    def command_angle(self, armature_voltage: Any, angle: Any, speed: Any = 0.0) -> Any:
         """Return the angle to ask for so that the servo's own loop, at this angle [rad], gives this voltage [V].
 
-        q + v_a/(A k_s p) + h sgn(v_a): (40) solved for v_i with (38), around the deadband [rad].
+        q + v_a/(A k_s p) + h sgn(v_a): (40) solved for v_i with (38), around the deadband; and the way q̇²/2a by which
+        a profile that moves at a speed [rad/s] stays behind its goal [rad].
         """
+        behind = 0.5 * speed * abs(speed) / self.profile_acceleration
         return (angle + armature_voltage / self.volts_per_error
-                + self.half_deadband * np.sign(armature_voltage))
+                + self.half_deadband * np.sign(armature_voltage) + behind)
 
 
 def inverse_of(model: Model, load: Load | Part | None = None) -> ServoInverse:
@@ -197,7 +203,8 @@ def inverse_of(model: Model, load: Load | Part | None = None) -> ServoInverse:
         load_viscous_friction=weight.viscous_friction,
         voltage_limit=model.value_or("supply.open_circuit_voltage", math.inf) - lost
         if model.servo.get("supply.open_circuit_voltage") is not None else _ENOUGH,
-        volts_per_error=gain, half_deadband=half)
+        volts_per_error=gain, half_deadband=half,
+        profile_acceleration=model.value_or("firmware.acceleration_limit", math.inf))
 
 
 _ENOUGH = 1e3  # V, of a model without a supply

@@ -62,7 +62,7 @@ class AheadOfServo:
     def step(self, state: Any, reference: Reference, measured: Measured) -> Decision:
         """Return the angle to ask for."""
         v, state = self.controller.step(state, reference, measured)
-        return Decision(self.inverse.command_angle(v, reference.angle), state)
+        return Decision(self.inverse.command_angle(v, reference.angle, reference.speed), state)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,7 @@ class ThroughServo(AheadOfServo):
     """Asks for the measured angle plus what a voltage needs of error: the loop inside the servo is taken out.
 
     command_angle = q + v_a/(A k_s p) + h sgn(v_a). The servo becomes a source of voltage, as far as the measurement is
-    not late: what the shaft moves until the next tick, its own loop takes off.
+    not late: what the shaft moves until the next tick, its own loop takes off. A profile in the servo spoils it.
 
     Parameters
     ----------

@@ -96,9 +96,33 @@ class DisturbanceObserver:
         """Return the controller's voltage and that which the disturbance takes."""
         g, T, q = self.filter_rate, self.period, measured["output_angle"]
         angle, voltage = smoothed(state.angle, q, g, T), held(state.voltage, state.last, g, T)
-        moves = Reference(angle.value, angle.rate, second_rate(angle, g))
-        d = voltage.value - self.inverse.frictionless.voltage(moves)
+        d = disturbance(self.inverse, angle, voltage, g)
         v_c, inner = self.controller.step(state.controller, reference, measured)
         limit = self.inverse.voltage_limit
         v = clipped(v_c + d, -limit, limit)
         return Decision(v, ObserverState(inner, angle, voltage, v))
+
+
+def disturbance(inverse: ServoInverse, angle: Smoothed, voltage: Smoothed, rate: float) -> Any:
+    """Return what a motion has taken more than the linear model takes, both seen through the same filter [V].
+
+    Parameters
+    ----------
+    inverse : ServoInverse
+        Without its dry friction.
+    angle, voltage : Smoothed
+        [rad] and [V]
+    rate : float
+        g of the filter [rad/s].
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.control import inverse_of
+    >>> from servotwin.control.smoothing import resting
+    >>> servo = inverse_of(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+    >>> disturbance(servo, resting(0.5), resting(2.0), 50.0)
+    2.0
+    """
+    moved = inverse.total_inertia * second_rate(angle, rate) + inverse.damping * angle.rate
+    return voltage.value - inverse.volts_per_torque * moved

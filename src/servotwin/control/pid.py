@@ -55,7 +55,7 @@ class Pid:
 
     Notes
     -----
-    Åström and Hägglund, PID Controllers, 2nd ed. 1995, sections 3.4 and 3.5. The rate of the reference is known and not
+    Åström and Hägglund, PID Controllers, 2nd ed. 1995, chapter 3. The rate of the reference is known and not
     taken from differences.
 
     Examples

@@ -13,6 +13,7 @@ from servotwin.control.inverse import ServoInverse, inverse_of
 from servotwin.control.wires import Wire, wire_of
 from servotwin.errors import InputError
 from servotwin.loads import as_load
+from servotwin.physics import feedback_voltage
 from servotwin.physics.pieces import Piece, Pieces, constant_pieces
 from servotwin.signals import Signal
 from servotwin.simulation import Result, Simulator, Status
@@ -170,8 +171,13 @@ class SimulatedServo:
         return found
 
     def _true(self, name: str) -> float:
-        state = self._state
-        return state[name] if name in state.names else self._simulator.observe(state, name, self._signal)
+        state, model = self._state, self._simulator.model
+        if name in state.names:
+            return state[name]
+        if name == "feedback_voltage" and "potentiometer.fixed_angle" in model.servo.names():
+            p, b_o = (model.value_or(f"potentiometer.feedback_{part}", 0.0) for part in ("gain", "offset"))
+            return feedback_voltage(state["output_angle"], p, b_o)  # of the wiper, which its chip does not see
+        return self._simulator.observe(state, name, self._signal)
 
     def send(self, command: Any) -> None:
         """Command a voltage [V] or an angle [rad] from now on, the nearest that the wire carries."""

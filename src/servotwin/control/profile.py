@@ -1,6 +1,6 @@
 """How far along a straight way from 0 to 1 one is, within limits: phases of polynomials.
 
-Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, sections 2.1, 3.2 and 3.4.
+Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, chapters 2 and 3.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ def trapezoid(waypoints: ArrayLike, *, speed: ArrayLike, acceleration: ArrayLike
 
     Notes
     -----
-    Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, section 3.2.
+    Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, 2008, chapter 3.
 
     Examples
     --------
@@ -73,7 +73,7 @@ def s_curve(waypoints: ArrayLike, *, speed: ArrayLike, acceleration: ArrayLike, 
 
     Notes
     -----
-    Seven phases of constant jerk; Biagiotti and Melchiorri 2008, section 3.4.
+    Seven phases of constant jerk; Biagiotti and Melchiorri 2008, chapter 3.
 
     Examples
     --------
@@ -109,7 +109,7 @@ def quintic(waypoints: ArrayLike, *, times: ArrayLike | None = None, speed: Arra
     Notes
     -----
     q = q_0 + Δ (10 τ³ − 15 τ⁴ + 6 τ⁵), τ = t/T: fastest 15 Δ/8T, 10 Δ/√3 T², 60 Δ/T³; Biagiotti and Melchiorri 2008,
-    section 2.1.
+    chapter 2.
 
     Examples
     --------

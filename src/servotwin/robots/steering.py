@@ -8,12 +8,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.control import Controller, PlainCommand, Sensor, ServoInverse, inverse_of, joined
+from servotwin.control import (
+    AheadOfServo,
+    ComputedTorque,
+    Controller,
+    DisturbanceObserver,
+    Encoder,
+    Feedforward,
+    Pid,
+    PlainCommand,
+    Sensor,
+    ServoInverse,
+    inverse_of,
+    joined,
+    tuning,
+)
 from servotwin.robots.arm import Arm
 from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
@@ -78,12 +94,20 @@ class Known:
         Angles at the beginning [rad].
     frame : float
         How often a new command can matter, 0 at any time [s].
+    lag : float
+        From a command until it acts [s].
     """
 
     inverse: ServoInverse
     body: RigidBody
     start: Array
     frame: float
+    lag: float
+
+    @cached_property
+    def loaded(self) -> ServoInverse:
+        """The servos with what each feels of the arm at the beginning, the others standing."""
+        return self.inverse.replace(load_inertia=self.body.inertia(self.start))
 
 
 class Steering(Protocol):
@@ -111,7 +135,7 @@ class Plain:
     Parameters
     ----------
     period : float
-        Where the servos have no frame [s].
+        Of its commands, where frames are not longer [s].
     """
 
     period: float = 0.02
@@ -121,14 +145,101 @@ class Plain:
 
     def controller(self, known: Known) -> Controller:
         """Return the controller."""
-        return PlainCommand(period=known.frame or self.period)
+        return PlainCommand(period=max(known.frame, self.period))
 
 
-def known_of(arm: Arm, mounts: Mapping[str, Mount], start: Array, frame: float) -> Known:
-    """Return what a controller knows that believes in an arm and in servos at its joints."""
+@dataclass(frozen=True, kw_only=True)
+class Ahead:
+    """Asks each servo for so much more that its own loop gives the voltage that the arm takes, by (40); no sensor.
+
+    Parameters
+    ----------
+    period : float
+        Of its commands, where frames are not longer [s].
+    """
+
+    period: float = 0.005
+
+    bare = False
+    sensors: tuple[Sensor, ...] = ()
+
+    def controller(self, known: Known) -> Controller:
+        """Return the controller."""
+        return AheadOfServo(inverse=known.inverse, controller=Feedforward(
+            period=max(known.frame, self.period), inverse=known.inverse, load_torque=known.body))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Bare:
+    """Commands voltages past the chips, every `period` [s], by what encoders at the horns show."""
+
+    period: float = 0.002
+    encoder: Encoder = Encoder()
+
+    bare = True
+
+    @property
+    def sensors(self) -> tuple[Sensor, ...]:
+        """The encoders."""
+        return (self.encoder,)
+
+    def _rates(self, known: Known) -> tuning.Rates:
+        return tuning.rates(known.loaded, period=self.period, lag=known.lag, frame=known.frame,
+                            count=self.encoder.count)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnPid(_Bare):
+    """A PID at each joint, its poles placed for motor and arm at the beginning of the task."""
+
+    def controller(self, known: Known) -> Controller:
+        """Return the controller."""
+        rates, most = self._rates(known), known.inverse.voltage_limit
+        return Pid(period=self.period, filter_rate=rates.filter_rate, lower=-most, upper=most,
+                   **tuning.pid_gains(known.loaded, rates.bandwidth)._asdict())
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigidBodyTorque(_Bare):
+    """Computed torque: rigid-body dynamics of the arm, friction and motor of each servo by (40)."""
+
+    def controller(self, known: Known) -> Controller:
+        """Return the controller."""
+        rates = self._rates(known)
+        return ComputedTorque(period=self.period, inverse=known.inverse, bandwidth=rates.bandwidth,
+                              filter_rate=rates.filter_rate, load_torque=known.body)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observed(_Bare):
+    """A disturbance observer at each joint, about a controller that knows neither friction nor the other joints."""
+
+    def controller(self, known: Known) -> Controller:
+        """Return the controller."""
+        rates = self._rates(known)
+        alone = ComputedTorque(period=self.period, inverse=known.loaded.frictionless, bandwidth=rates.bandwidth,
+                               filter_rate=rates.filter_rate)
+        return DisturbanceObserver(controller=alone, inverse=known.loaded, filter_rate=rates.observer_rate)
+
+
+def known_of(arm: Arm, mounts: Mapping[str, Mount], angles: Mapping[str, float], *, frame: float = 0.0,
+             lag: float = 0.0) -> Known:
+    """Return what a controller knows that believes in an arm, and in servos at its joints.
+
+    Parameters
+    ----------
+    arm : Arm
+    mounts : mapping of str to Mount
+    angles : mapping of str to float
+        Of the joints, at the beginning [rad or m]
+    frame, lag : float
+        Of what the controller is wired to [s].
+    """
+    start = np.array([(angles[joint] - mount.zero) / mount.gain for joint, mount in mounts.items()])
     return Known(inverse=joined([inverse_of(mount.model) for mount in mounts.values()]),
-                 body=RigidBody(arm.model(), mounts), start=start, frame=frame)
+                 body=RigidBody(arm.model(), mounts), start=start, frame=frame, lag=lag)
 
 
-STEERINGS: dict[str, Callable[[], Steering]] = {"plain": Plain}
+STEERINGS: Mapping[str, Callable[[], Steering]] = MappingProxyType({
+    "plain": Plain, "feedforward": Ahead, "pid": OwnPid, "computed-torque": RigidBodyTorque, "observer": Observed})
 """By name."""

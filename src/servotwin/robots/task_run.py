@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -25,11 +25,36 @@ from servotwin.robots.places import load_mujoco
 from servotwin.robots.redundancy import Criterion, LeastMotion
 from servotwin.robots.run import SETTLE, RobotRun, finished, supply_of, warm_mounts
 from servotwin.robots.sizing import supplied
-from servotwin.robots.steering import Known, Plain, Steering, known_of
+from servotwin.robots.steering import Plain, Steering, known_of
 from servotwin.robots.tasks import ToolPath
 
 Array = NDArray[np.float64]
 _BLEND = 2.0  # samples of the motion, over which ideal actuators blend it
+
+
+@dataclass(frozen=True, kw_only=True)
+class Belief:
+    """What a controller believes that may be wrong.
+
+    Parameters
+    ----------
+    arm : Arm
+        Such as one without the payload.
+    parameters : mapping of str to float
+        Of all servos, by dotted name (SI): by how much of the true one the controller is wrong, such as
+        ``{"motor.armature_resistance": 1.2}``.
+    """
+
+    arm: Arm
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    def mounts(self, true: Mapping[str, Mount]) -> dict[str, Mount]:
+        """Return mounts of the servos that it believes in."""
+        return {joint: replace(mount, model=self._model(mount.model)) for joint, mount in true.items()}
+
+    def _model(self, model: Model) -> Model:
+        wrong = {name: share * model.value(name) for name, share in self.parameters.items()}
+        return type(model)(model.servo.replace(wrong)) if wrong else model
 
 
 class TaskMetrics(NamedTuple):
@@ -135,7 +160,7 @@ class TaskRun:
 
 
 def run_task(arm: Arm, servos: Model | Mapping[str, Model], path: ToolPath, *, criterion: Criterion | None = None,
-             steering: Steering | None = None, believed: Known | None = None, bus: Any = None,
+             steering: Steering | None = None, believed: Belief | None = None, bus: Any = None,
              settle: float = SETTLE, assume_heat: bool = False, joint_path: JointPath | None = None) -> TaskRun:
     """Let the tool of an arm follow a path, its servos under a controller, and the same with ideal actuators beside.
 
@@ -149,7 +174,7 @@ def run_task(arm: Arm, servos: Model | Mapping[str, Model], path: ToolPath, *, c
         What a redundant arm does with its free joint; joints move as little as they can unless given.
     steering : Steering, optional
         Which controller; plain commands unless given.
-    believed : Known, optional
+    believed : Belief, optional
         What it believes of servos and arm; the truth unless given.
     bus : Supply, optional
         That servos share, as of `ServoDrive`.
@@ -191,8 +216,9 @@ def run_task(arm: Arm, servos: Model | Mapping[str, Model], path: ToolPath, *, c
     motion = joint_path.motion()
     drive = ServoDrive(arm.model(), mounts, bus=bus)
     port = DrivePort(drive, mounts, motion, settle=settle, sensors=steering.sensors)
-    start = np.array([(motion.angles[joint][0] - mount.zero) / mount.gain for joint, mount in mounts.items()])
-    controller = steering.controller(believed or known_of(arm, mounts, start, port.frame))
+    begins = {joint: float(motion.angles[joint][0]) for joint in mounts}
+    controller = steering.controller(known_of(believed.arm if believed else arm, believed.mounts(mounts) if believed
+                                              else mounts, begins, frame=port.frame, lag=port.lag))
     control = run_loop(port, controller, Delayed(_of_shafts(joint_path, mounts), settle))
     run = finished(drive, port.data, motion, mounts, bus, np.array(port.poses),
                    window=_BLEND * float(motion.time[1]))

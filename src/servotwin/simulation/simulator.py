@@ -15,8 +15,8 @@ from servotwin.models.engine.memory import ACCURACY, Memory, started, with_bodie
 from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.runs import mode_of
 from servotwin.models.samples import Samples
-from servotwin.models.terms.chip import NO_CHIP
-from servotwin.models.terms.firmware import NO_FIRMWARE
+from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
@@ -77,6 +77,7 @@ class Simulator:
         self._last: tuple[Signal, Plan] | None = None
         self._framed: tuple[Signal, float, Signal] | None = None
         self._others: dict[tuple[tuple[str, Any], ...], Simulator] = {}
+        self._circuits: dict[float | None, tuple[Chip, Firmware]] = {}  # by the frame period of a command
 
     def drive(self, command: Signal) -> Pieces:
         """Return the command as what the model follows [V]."""
@@ -272,9 +273,13 @@ class Simulator:
         """Return what the engine needs for a run under a command, and a constant torque beside the load [N m]."""
         if self._last is not None and self._last[0] is command and self._last[1].external_torque == external_torque:
             return self._last[1]
-        plan = Plan(self._numbers, self.drive(command), self._torque, self.model.chip(command) or NO_CHIP,
-                    self.model.edges(command), self.seed, self.model.curve(), float(external_torque),
-                    self.accuracy, self.model.firmware(command) or NO_FIRMWARE)
+        drive = self.drive(command)
+        if command.frame_period not in self._circuits:  # a controller has a new command at each of its ticks
+            self._circuits = {command.frame_period: (self.model.chip(command) or NO_CHIP,
+                                                     self.model.firmware(command) or NO_FIRMWARE)}
+        chip, firmware = self._circuits[command.frame_period]
+        plan = Plan(self._numbers, drive, self._torque, chip, self.model.edges(command), self.seed, self.model.curve(),
+                    float(external_torque), self.accuracy, firmware)
         self._last = (command, plan)
         return plan
 
