@@ -10,6 +10,7 @@ import typer
 
 from servotwin.cli import shared_options as shared
 from servotwin.cli.robot_arm import add_to
+from servotwin.cli.robot_compare import compare
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
@@ -193,3 +194,5 @@ def _show(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> No
 
 
 add_to(robot)
+robot.command("compare", help="Compare servos of every fidelity, and every controller, on one task of an arm.",
+              epilog="Example: servotwin robot compare scara --task circle --out compared")(compare)

@@ -39,7 +39,8 @@ ModelOption = Annotated[str | None, typer.Option(
     metavar="MODEL", help="digital, pulse, pulse-inductive, bounded or averaged (default: by the kind of each servo).",
     rich_help_panel=_ARM)]
 ControllerOption = Annotated[str, typer.Option(
-    metavar="NAME", help="What commands the servos: {}.", rich_help_panel=_ARM)]
+    metavar="NAME", help="What commands the servos: plain, feedforward, pid, computed-torque or "
+    "observer; the last three bypass the chips.", rich_help_panel=_ARM)]
 SetOption = Annotated[list[str] | None, typer.Option(
     "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable; with a unit, or in SI "
     "units.", rich_help_panel=_ARM)]
@@ -105,7 +106,7 @@ def scara(
     from servotwin.robots import scara as made
 
     with as_options():
-        arm = made(third_link=third_link, payload=_mass(payload))
+        arm = made(third_link=third_link, payload=mass(payload))
     _do(arm, Asked(out=out, task=task, size=size, speed=speed, servo=servo or [], model=model, controller=controller,
                    redundancy=redundancy, ideal=ideal, supply=supply, change=change or [], output_step=output_step,
                    video=video, force=force, as_json=as_json))
@@ -122,7 +123,7 @@ def two_link(
     from servotwin.robots import two_link as made
 
     with as_options():
-        arm = made(payload=_mass(payload))
+        arm = made(payload=mass(payload))
     _do(arm, Asked(out=out, task=task, size=size, speed=speed, servo=servo or [], model=model, controller=controller,
                    ideal=ideal, supply=supply, change=change or [], output_step=output_step, video=video, force=force,
                    as_json=as_json))
@@ -146,7 +147,8 @@ def _do(arm: Arm, asked: Asked) -> None:
     from servotwin.cli.robot import check_drawing, check_numbers
 
     check_numbers(output_step=asked.output_step, rate=written.RATE, blend=None)
-    criterion, steering, path = _criterion(arm, asked.redundancy), _steering(asked.controller), _path(arm, asked)
+    criterion, steering = _criterion(arm, asked.redundancy), _steering(asked.controller)
+    path = path_of(arm, asked.task, asked.size, asked.speed)
     models = _models(arm, asked)
     picture = check_drawing(arm.model(), None, video=asked.video)
     with files.folder(asked.out):
@@ -168,13 +170,14 @@ def _do(arm: Arm, asked: Asked) -> None:
          *(["", table(written.WAYS, written.way_rows(found))] if arm.redundant else []))
 
 
-def _path(arm: Arm, asked: Asked) -> ToolPath:
+def path_of(arm: Arm, task: str, size: str | None, speed: float) -> ToolPath:
+    """Return the path of a task, of the words of its options."""
     from servotwin.robots.tasks import task_path
     from servotwin.units.quantities import quantity
 
-    size = None if asked.size is None else quantity("--size", asked.size, "length", bare=True, positive=True)
+    length = None if size is None else quantity("--size", size, "length", bare=True, positive=True)
     with as_options():
-        return task_path(arm, asked.task, speed=asked.speed, size=size)
+        return task_path(arm, task, speed=speed, size=length)
 
 
 def _criterion(arm: Arm, name: str) -> Criterion:
@@ -230,7 +233,8 @@ def _driven(ways: Ways, targets: Sequence[Target], asked: Asked, models: Mapping
     return found
 
 
-def _mass(text: str | None) -> float:
+def mass(text: str | None) -> float:
+    """Return the payload of an option [kg]."""
     from servotwin.units.quantities import quantity
 
     return 0.0 if text is None else quantity("--payload", text, "mass", bare=True)

@@ -7,7 +7,7 @@ the ones that it is wired to.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -174,7 +174,7 @@ class _Bare:
     """Commands voltages past the chips, every `period` [s], by what encoders at the horns show."""
 
     period: float = 0.002
-    encoder: Encoder = Encoder()
+    encoder: Encoder = field(default_factory=Encoder)
 
     bare = True
 
@@ -184,8 +184,10 @@ class _Bare:
         return (self.encoder,)
 
     def _rates(self, known: Known) -> tuning.Rates:
-        return tuning.rates(known.loaded, period=self.period, lag=known.lag, frame=known.frame,
+        """Return the rates that suit the slowest joint: one filter for all."""
+        each = tuning.rates(known.loaded, period=self.period, lag=known.lag, frame=known.frame,
                             count=self.encoder.count)
+        return tuning.Rates(*(float(np.min(rate)) for rate in each))
 
 
 @dataclass(frozen=True, kw_only=True)
