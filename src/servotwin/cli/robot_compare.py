@@ -90,8 +90,8 @@ def _facts(arm: Arm, runs: Sequence[TaskRun], chosen: Sequence[Case]) -> dict[st
 
 def _rows(found: dict[str, Any]) -> list[tuple[str, ...]]:
     ideal = found["ideal_contour"]
-    rows: list[tuple[str, ...]] = [("ideal", "", "", *(f"{1e3 * ideal[name]:.5f} mm" for name in ("rms", "largest")), "", "",
-                                    "", "")]
+    exact = (f"{1e3 * ideal[name]:.5f} mm" for name in ("rms", "largest"))
+    rows: list[tuple[str, ...]] = [("ideal", "", "", *exact, "", "", "", "")]
     for case in found["cases"]:
         unit = "rad/s" if case["controller"] in ("plain", "feedforward") else "V/s"
         rows.append((case["servos"], case["controller"], case["believes"], f"{1e3 * case['contour_rms']:.3f} mm",

@@ -25,6 +25,7 @@ from servotwin.robots.tasks import ToolPath
 Array = NDArray[np.float64]
 _WELL = 1e-10  # m and rad: what the tool may be off by
 _FIRST, _EACH = 200, 30  # steps to the first place, and to each further one
+_NEAREST, _STIFF = 200, 1e-2  # steps to the nearest place, of one that is out of reach, and their damping
 _PULLS = 3  # of them with the posture
 _PULL = 1e-3  # weight of the posture beside the tool
 _LEAST = 0.1  # of u, by which a power of it is weighed
@@ -194,7 +195,7 @@ class _Solver:
         self.begin(before)
         if self._go(path, k, most, []):
             raise self._stopped(path, k)
-        distance = np.linalg.norm(self._off(path, k))
+        distance = self._least_distance(path, k)
         reach = np.linalg.norm(path.places[k])
         raise InputError(
             f"{path.name} at {path.time[k]:.2f} s", allowed=f"places that {self._arm.name} reaches",
@@ -204,6 +205,18 @@ class _Solver:
         """Return by how much the tool is off, of the coordinates that it can place [m]."""
         tool = self._configuration.get_transform_frame_to_world(TOOL, "site").translation()
         return np.asarray((path.places[k] - tool)[list(self._arm.places)])
+
+    def _least_distance(self, path: ToolPath, k: int) -> float:
+        """Return how near the tool gets to a place without limits, however it is turned [m]."""
+        mink, configuration, found = self._mink, self._configuration, math.inf
+        task = mink.FrameTask(TOOL, "site", position_cost=self._tool.cost[:3], orientation_cost=0.0)
+        for _ in range(_NEAREST):
+            turn = configuration.get_transform_frame_to_world(TOOL, "site").rotation()
+            task.set_target(mink.SE3.from_rotation_and_translation(turn, path.places[k]))
+            step = mink.solve_ik(configuration, [task], 1.0, _SOLVER, damping=_STIFF, limits=[])
+            configuration.integrate_inplace(step, 1.0)
+            found = min(found, float(np.linalg.norm(self._off(path, k))))
+        return found
 
     def _go(self, path: ToolPath, k: int, most: int, limits: list[Any]) -> bool:
         """Take steps; return whether the tool has got there."""

@@ -26,10 +26,10 @@ from servotwin.robots.kinematics import JointPath, Posture, follow, limits_of
 from servotwin.robots.tasks import ToolPath
 
 Array = NDArray[np.float64]
-_TRIES = 15
+_TRIES = 11
 _POWER = 6.0
 _CLEAR = 0.02  # of half a range: how far a posture that is tried has to stay from the limits
-_SPARSE = 80  # samples of a path by which postures are compared
+_SPARSE = 50  # samples of a path by which postures are compared
 _TRY_POSTURE = 30.0  # times the weight of a posture that is only pulled at
 
 
