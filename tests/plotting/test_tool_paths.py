@@ -11,7 +11,7 @@ LINE = np.stack([0.2 + 0.0 * TIME, 0.1 * TIME, 0.04 * TIME], axis=1)
 
 
 def test_a_path_is_drawn_in_the_plane_in_which_it_is():
-    trace = plotting.ToolTrace("servos", TIME, LINE + [0.0, 0.0, 0.001], np.full(50, 0.001))
+    trace = plotting.ToolTrace("servos", TIME, LINE + np.array([0.0, 0.0, 0.001]), np.full(50, 0.001))
     left, right = plotting.tool_paths(LINE, [trace]).axes
     assert (left.get_xlabel(), left.get_ylabel()) == ("y (mm)", "z (mm)")
     np.testing.assert_allclose(left.lines[1].get_ydata(), 40.0 * TIME + 1.0)

@@ -68,7 +68,7 @@ def test_a_payload_weighs_on_the_links():
 @pytest.mark.parametrize("payload", [-0.1, math.nan, math.inf])
 def test_a_payload_is_a_mass(payload):
     for make in (scara, two_link):
-        with pytest.raises(InputError, match="payload: got .*, allowed: a mass that is not negative"):
+        with pytest.raises(InputError, match=r"payload: got .*, allowed: a mass that is not negative"):
             make(payload=payload)
 
 

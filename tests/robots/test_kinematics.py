@@ -47,7 +47,8 @@ def test_a_scara_keeps_its_tool_turned_as_asked():
 
 
 def test_out_of_reach_is_said_with_how_far():
-    with pytest.raises(InputError, match=r"circle of 100 mm at 0\.00 s: got 'a place 40 mm out of its reach, 303 mm from") as caught:
+    words = r"circle of 100 mm at 0\.00 s: got 'a place 40 mm out of its reach, 303 mm from"
+    with pytest.raises(InputError, match=words) as caught:
         follow(scara(third_link=False), circle((0.25, 0.0, 0.045), 0.05))  # reaches 0.26 m of the 0.3
     assert "\n" not in str(caught.value)
 

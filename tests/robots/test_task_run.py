@@ -125,7 +125,7 @@ def test_a_port_takes_one_kind_of_command():
     with pytest.raises(InputError, match="servos of one controller: got 'armature_voltage and command_angle'"):
         port(mixed)
     wired, _ = port(st.PulseServo(SERVO))
-    with pytest.raises(InputError, match="command at 0 s: got .*, allowed: finite numbers"):
+    with pytest.raises(InputError, match=r"command at 0 s: got .*, allowed: finite numbers"):
         wired.send(np.array([0.1, math.nan]))
 
 

@@ -97,7 +97,7 @@ def targets_of(out: Path, names: Iterable[str], *, force: bool, inputs: Sequence
 def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Target], found: Mapping[str, Any], *,
               force: bool, output_step: float, camera: str | None, rate: float,
               more: Mapping[str, Callable[[Path], object]] | None = None, section: str = "",
-              trails: Trails | None = None) -> None:
+              trails: Trails | None = None, still: int | None = None) -> None:
     """Write all files, or after an error none.
 
     Parameters
@@ -121,6 +121,8 @@ def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Targ
         HTML on them, for the page.
     trails : callable
         Lines that are drawn in pictures, by the number of the row.
+    still : int, optional
+        Row that the picture is of; that of the largest error unless given.
     """
     from servotwin.cli.robot_page import page
 
@@ -130,14 +132,16 @@ def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Targ
             SERVOS: lambda path: _servo_table(run, path, output_step),
             JOINTS: lambda path: path.write_bytes(_joint_table(run, output_step).encode()),
             SUMMARY: lambda path: path.write_bytes((json_text(found) + "\n").encode()),
-            PAGE: lambda path: path.write_bytes(page(run, sized, found, list(places), section).encode()),
+            PAGE: lambda path: path.write_bytes(page(
+                run, sized, found, list(places), section,
+                "At the time of the largest error." if still is None else f"At {run.time[still]:.2f} s.").encode()),
             **_pictures(run, sized), **(more or {}),
         }
         with patience("drawing"):
             for name, writer in writers.items():
                 writer(places[name])
         if PICTURE in places:
-            _robot(run, places[PICTURE], places.get(VIDEO), camera, rate, trails or (lambda k: ()))
+            _robot(run, places[PICTURE], places.get(VIDEO), camera, rate, trails or (lambda k: ()), still)
 
 
 def _every(run: RobotRun, output_step: float) -> int:
@@ -203,8 +207,9 @@ def _shaft(sized: Sizing, inside: Any) -> Any:
                                sized.rms_torque, sized.lasting_torque)
 
 
-def _robot(run: RobotRun, picture: Path, video: Path | None, camera: str | None, rate: float, trails: Trails) -> None:
-    """Draw the robot where it is furthest off, and all of it as a video."""
+def _robot(run: RobotRun, picture: Path, video: Path | None, camera: str | None, rate: float, trails: Trails,
+           still: int | None) -> None:
+    """Draw the robot where it is furthest off, or at a row, and all of it as a video."""
     from servotwin.robots.camera import Camera
 
     errors = np.max([np.abs(run.goal(joint) - run.record[joint]["joint_angle"]) for joint in run.mounts], axis=0)
@@ -215,7 +220,8 @@ def _robot(run: RobotRun, picture: Path, video: Path | None, camera: str | None,
             return view.picture(run.poses[k], run.ideal.poses[k], words=f"{max(run.time[k], 0.0):.2f} s",
                                 note="pale: with ideal actuators", trails=trails(k))
 
-        picture_and_video(drawn, run.time, int(inside[np.argmax(errors[inside])]), picture, video, rate)
+        worst = int(inside[np.argmax(errors[inside])])
+        picture_and_video(drawn, run.time, worst if still is None else still, picture, video, rate)
 
 
 def picture_and_video(drawn: Callable[[int], Any], time: NDArray[np.float64], still: int, picture: Path,

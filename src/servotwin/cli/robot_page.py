@@ -24,7 +24,7 @@ figure img,figure video{width:100%;height:auto}figure.film{max-width:44rem}
 
 
 def page(run: RobotRun, sized: Mapping[str, Sizing], found: Mapping[str, Any], files: Sequence[str],
-         section: str = "") -> str:
+         section: str = "", when: str = "") -> str:
     """Return the page of a run, with a section of its own; pictures and video stand beside it, those of `files`."""
     title = f"{found['robot']}: {_motion_name(run)}"
     servos = sorted({f"{mount.model.servo.title or mount.model.servo.name} ({type(mount.model).__name__})"
@@ -32,7 +32,7 @@ def page(run: RobotRun, sized: Mapping[str, Sizing], found: Mapping[str, Any], f
     lead = (f"{len(run.mounts)} servo{'s' * (len(run.mounts) != 1)} ({'; '.join(servos)}) follow "
             f"{run.motion.source}, {run.motion.duration:.4g} s{_supply_words(run)}.")
     body = (f'<h1>{escape(title)}</h1>\n<p class="lead">{escape(lead)}</p>\n{_answer(sized)}{_notes(run)}'
-            f"{_cards(run, sized)}{film(files)}{section}<h2>Is the servo big enough</h2>\n{_sizes(run, sized)}"
+            f"{_cards(run, sized)}{film(files, when)}{section}<h2>Is the servo big enough</h2>\n{_sizes(run, sized)}"
             + figure("sizing.png", "Torque over speed of each servo: what the motion takes, rotor and gear included, "
                       "and what the servo gave, as means over 20 ms, in its curve at full drive. Filled: the servo "
                       "drives the motion; open: it holds it back. The number is the margin.")
@@ -89,14 +89,14 @@ def _cards(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
         f"<li><b>{escape(value)}</b>{escape(words)}</li>" for value, words in shown) + "</ul>\n"
 
 
-def film(files: Sequence[str]) -> str:
-    """Return the video of a robot, or its picture, if there is one among the files."""
+def film(files: Sequence[str], when: str = "") -> str:
+    """Return the video of a robot, or its picture and when that is, if there is one among the files."""
     words = "The robot; pale: the same with ideal actuators."
     if "robot.webm" in files:
         return (f'<figure class="film"><video controls loop muted poster="robot.png" src="robot.webm"></video>'
                 f"<figcaption>{words}</figcaption></figure>\n")
     if "robot.png" in files:
-        return figure("robot.png", f"{words} At the time of the largest error.", kind="film")
+        return figure("robot.png", f"{words} {when}", kind="film")
     return ""
 
 

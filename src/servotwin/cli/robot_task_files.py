@@ -121,7 +121,8 @@ def write_task(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, targets: S
         return [shown, _trail(places[inside & (run.run.time <= run.run.time[k])])]
 
     files.write_all(run.run, sized, targets, found, force=force, output_step=output_step, camera=None, rate=RATE,
-                    more=more, section=task_section(found, WAYS, way_rows(found)), trails=trails)
+                    more=more, section=task_section(found, WAYS, way_rows(found)), trails=trails,
+                    still=int(np.searchsorted(run.run.time, 0.85 * asked.duration)))
 
 
 def write_ideal(done: IdealTask, ways: Ways, targets: Sequence[Target], found: Mapping[str, Any], *, force: bool,
@@ -154,11 +155,11 @@ def _writers(path: ToolPath, ways: Ways, traces: Sequence[tuple[str, Array, Arra
         TOOL_TABLE: lambda file: file.write_bytes(_tool_table(path, drawn[0], output_step).encode()),
         TOOL_PICTURE: lambda file: plotting.save(plotting.tool_paths(path.line, drawn), file)}
     if ways.others:
-        made[USE_PICTURE] = lambda file: plotting.save(_joint_use(ways.others), file)
+        made[USE_PICTURE] = lambda file: plotting.save(joint_uses(ways.others), file)
     return made
 
 
-def _joint_use(ways: Mapping[str, JointPath]) -> Any:
+def joint_uses(ways: Mapping[str, JointPath]) -> Any:
     """Return the picture of how joints are used by each criterion: hinges alone."""
     from servotwin import plotting
     from servotwin.robots.kinematics import limits_of
