@@ -81,27 +81,25 @@ def ahead(model: st.models.Model, period: float, load: object = None) -> Maker:
     return lambda port: control.AheadOfServo(controller=feedforward, inverse=inverse)
 
 
-def torque(model: st.models.Model, load: object, external: object = None, friction: float = 1.0) -> Maker:
-    """Computed torque on a bridge; of the load it knows inertia, and what else it is told."""
-    inverse = control.inverse_of(model, load)
+def rates_on(port: SimulatedServo, inverse: control.ServoInverse, period: float = TICK) -> tuning.Rates:
+    """The rule for the rates of a loop on a port, with the encoder."""
+    return tuning.rates(inverse, period=period, lag=port.lag, frame=port.frame, count=ENCODER.count)
 
+
+def torque(inverse: control.ServoInverse, external: object = None) -> Maker:
+    """Computed torque on a bridge."""
     def make(port: SimulatedServo) -> control.ComputedTorque:
-        rates = tuning.rates(inverse, period=TICK, lag=port.lag, frame=port.frame, count=ENCODER.count)
-        own = inverse if friction else inverse.frictionless
-        return control.ComputedTorque(period=TICK, inverse=own, bandwidth=rates.bandwidth,
+        rates = rates_on(port, inverse)
+        return control.ComputedTorque(period=TICK, inverse=inverse, bandwidth=rates.bandwidth,
                                       filter_rate=rates.filter_rate, load_torque=external)
     return make
 
 
-def observed(model: st.models.Model, load: object) -> Maker:
+def observed(inverse: control.ServoInverse) -> Maker:
     """An observer beside a controller that knows no load but its inertia, and no friction."""
-    inverse = control.inverse_of(model, load)
-
-    def make(port: SimulatedServo) -> control.DisturbanceObserver:
-        rates = tuning.rates(inverse, period=TICK, lag=port.lag, frame=port.frame, count=ENCODER.count)
-        return control.DisturbanceObserver(controller=torque(model, load, friction=0.0)(port), inverse=inverse,
-                                           filter_rate=rates.observer_rate)
-    return make
+    return lambda port: control.DisturbanceObserver(
+        controller=torque(inverse.frictionless)(port), inverse=inverse,
+        filter_rate=rates_on(port, inverse).observer_rate)
 
 
 def integral(model: st.models.Model, period: float) -> Maker:
@@ -115,11 +113,8 @@ def integral(model: st.models.Model, period: float) -> Maker:
 def predictive(model: st.models.Model, load: object, period: float) -> Maker:
     """A plan of 20 ticks."""
     inverse = control.inverse_of(model, load)
-
-    def make(port: SimulatedServo) -> control.PredictiveControl:
-        rates = tuning.rates(inverse, period=period, lag=port.lag, frame=port.frame, count=ENCODER.count)
-        return control.PredictiveControl(period=period, inverse=inverse, horizon=20, observer_rate=rates.observer_rate)
-    return make
+    return lambda port: control.PredictiveControl(
+        period=period, inverse=inverse, horizon=20, observer_rate=rates_on(port, inverse, period).observer_rate)
 
 
 def swept(mean: float, amplitude: float, period: float, turns: int) -> control.Trajectory:
@@ -184,13 +179,13 @@ def bridge_cases() -> Iterator[Case]:
     up = control.quintic([0.3, 1.8, 0.3], speed=2.5)
     yield Case(controller="ComputedTorque", servo=name, task="arm of 300 g up and down at 2.5 rad/s",
                without=sent(chip, up, FRAME, arm),
-               with_it=steered(bridge, torque(bridge, arm, control.LoadModel(arm)), up, arm))
+               with_it=steered(bridge, torque(control.inverse_of(bridge, arm), control.LoadModel(arm)), up, arm))
 
     pushes = st.loads.Recorded([0.0, 0.5, 0.51, 1.2, 1.21, 9.0], [0.0, 0.0, 0.8, 0.8, -0.6, -0.6])
     pushed, still = pushes + st.loads.Inertia(2e-3), control.hold(1.0, 2.0)
     yield Case(controller="DisturbanceObserver", servo=name, task="pushed by 0.8 N m, then by −0.6 N m",
                without=sent(chip, still, FRAME, pushed),
-               with_it=steered(bridge, observed(bridge, pushed), still, pushed))
+               with_it=steered(bridge, observed(control.inverse_of(bridge, pushed)), still, pushed))
 
     heavy, jump, slow = st.loads.Inertia(0.02), control.step(0.3, 1.8, at=0.05, duration=1.5), 0.01
     wide = control.bare_bridge(servo, period=slow)
@@ -202,15 +197,9 @@ def bridge_cases() -> Iterator[Case]:
     loose = control.bare_bridge(servo.replace({"gear.backlash": play, "gear.output_inertia": 1e-3}), period=TICK)
     drag = st.loads.Coulomb(0.1) + st.loads.Inertia(1e-3)
     turns = swept(1.2, math.radians(10.0), 2.0, 2)
-    rubs = 0.1 + control.inverse_of(loose).coulomb_torque_forward
-    at_motor = control.Encoder(signal="motor_angle", shows="output_angle",
-                               ratio=1.0 / servo.gear.gear_reduction)
-
-    def drives(port: SimulatedServo) -> control.ComputedTorque:
-        inverse = control.inverse_of(loose, drag).replace(coulomb_torque_forward=rubs, coulomb_torque_backward=rubs)
-        rates = tuning.rates(inverse, period=TICK, lag=port.lag, frame=port.frame, count=ENCODER.count)
-        return control.ComputedTorque(period=TICK, inverse=inverse, bandwidth=rates.bandwidth,
-                                      filter_rate=rates.filter_rate)
+    rubs = control.inverse_of(loose, drag).coulomb_torque_forward + 0.1
+    drives = torque(control.inverse_of(loose, drag).replace(coulomb_torque_forward=rubs, coulomb_torque_backward=rubs))
+    at_motor = control.Encoder(signal="motor_angle", shows="output_angle", ratio=1.0 / servo.gear.gear_reduction)
     yield Case(controller="PlayCompensation", servo=name, task="1.5° of play behind an encoder at the motor, 20° sweep",
                against="computed torque", without=steered(loose, drives, turns, drag, at_motor),
                with_it=steered(loose, lambda port: control.PlayCompensation(controller=drives(port), play=play), turns,

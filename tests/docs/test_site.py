@@ -60,7 +60,7 @@ def test_every_equation_of_the_paper_has_its_number(site):
 def test_everything_public_is_in_the_reference(site):
     pages = "".join(path.read_text(encoding="utf-8") for path in (site / "reference").glob("*.html"))
     missing = []
-    for module in ("parameters", "signals", "loads", "models", "simulation", "linear", "datasheet", "bench",
+    for module in ("parameters", "signals", "loads", "models", "simulation", "linear", "control", "datasheet", "bench",
                    "plotting", "physics", "logs", "studies", "identification"):
         for name in getattr(st, module).__all__:
             item = getattr(getattr(st, module), name)

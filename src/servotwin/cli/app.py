@@ -10,6 +10,7 @@ from servotwin import __version__
 from servotwin.cli.catalog import catalog
 from servotwin.cli.curves import curves
 from servotwin.cli.fit import fit
+from servotwin.cli.linear import linear
 from servotwin.cli.paper_command import paper
 from servotwin.cli.robot import robot
 from servotwin.cli.simulate import simulate
@@ -51,6 +52,9 @@ app.command("curves", help="Compute the data sheets of servos: torque, speed, cu
                    "Example: servotwin curves towerpro-mg996r hitec-hs-422 --voltage 5 --lift 0.5kg --arm 10cm\n\n"
                    "Example: servotwin curves feetech-sts3215-12v --register P_Coefficient=16 --quick --loop loop.png"
             )(curves)
+app.command("linear", help="Show where a servo is linear: poles, margins, Bode plots by amplitude; or find its gain.",
+            epilog="Example: servotwin linear hitec-hs-755hb --load inertia=1e-3 --out hs755.html\n\n"
+                   "Example: servotwin linear feetech-sts3215-12v --load inertia=5e-3 --tune --overshoot 10%")(linear)
 app.command("sweep", help="Draw random parameters for a servo, simulate all, and show which of them matter.",
             epilog="Example: servotwin sweep hitec-hs-755hb --step 0:60 --vary motor.torque_constant=normal:10% "
                    "--vary electronics.deadband=uniform:4us..8us --lanes 10000 --out study --plot")(sweep)

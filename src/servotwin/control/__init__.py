@@ -8,7 +8,8 @@ from servotwin.control import tuning
 from servotwin.control.bare import bare_bridge
 from servotwin.control.compensation import DeadbandCompensation, PlayCompensation
 from servotwin.control.computed_torque import ComputedTorque
-from servotwin.control.controller import Controller, Decision, Measured, PlainCommand
+from servotwin.control.controller import Controller, Decision, PlainCommand
+from servotwin.control.controller import Measured as Measured
 from servotwin.control.feedforward import Feedforward
 from servotwin.control.inverse import LoadModel, ServoInverse, inverse_of, joined
 from servotwin.control.levels import AheadOfServo, ThroughServo
@@ -25,7 +26,7 @@ from servotwin.control.trajectories import hold, quintic, s_curve, sampled, step
 
 __all__ = [
     "AheadOfServo", "ComputedTorque", "ControlRun", "Controller", "DeadbandCompensation", "Decision",
-    "DisturbanceObserver", "Encoder", "Feedforward", "InputShaper", "LoadModel", "Measured", "Path", "Pid",
+    "DisturbanceObserver", "Encoder", "Feedforward", "InputShaper", "LoadModel", "Path", "Pid",
     "PlainCommand", "PlayCompensation", "Port", "PredictiveControl", "Reference", "Sensor", "ServoInverse", "Shaped",
     "SimulatedServo", "Tap", "ThroughServo", "Trajectory", "bare_bridge", "check_stable", "closed_loop_poles", "hold",
     "inverse_of", "joined", "quintic", "run_loop", "s_curve", "sampled", "step", "trapezoid", "tuning",

@@ -7,7 +7,7 @@ from servotwin.models import DigitalServo
 from servotwin.parameters import Servo
 from servotwin.units import is_finite
 
-_TAPPED = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")  # a wire to its wiper still shows the angle
+_TAPPED = ("potentiometer.feedback_gain", "potentiometer.feedback_offset")  # still there for who taps it
 
 
 def bare_bridge(servo: Servo, *, duty_steps: int = 1000, period: float = 1e-3, delay: float = 0.0) -> DigitalServo:
@@ -40,7 +40,7 @@ def bare_bridge(servo: Servo, *, duty_steps: int = 1000, period: float = 1e-3, d
     >>> bridge = bare_bridge(st.load_servo("hitec-hs-755hb"))
     >>> result = st.simulate(bridge, st.signals.constant(0.5, unit="rad"), duration=0.5)
     >>> f"{result['output_speed'][-1]:.3f} rad/s at {result['duty'][-1]:g} of the duty"
-    '1.930 rad/s at 0.5 of the duty'
+    '1.952 rad/s at 0.5 of the duty'
     """
     if not (isinstance(duty_steps, int) and duty_steps >= 1):
         raise InputError("duty_steps", got=duty_steps, allowed="a whole number of at least 1")

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 OUTPUT_STEP = 1e-3  # s, at which true signals are looked at
+_NOTHING = 1e-9  # V, what a braked bridge has by rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -106,7 +107,8 @@ class ControlRun:
         """How often per second the armature voltage has changed its sign; nan on hardware [1/s]."""
         if not self.true:
             return math.nan
-        signs = np.sign(np.asarray(self.true["armature_voltage"]))
+        v = np.asarray(self.true["armature_voltage"])
+        signs = np.where(np.abs(v) > _NOTHING, np.sign(v), 0.0)
         count = [np.count_nonzero(np.diff(column[column != 0.0])) for column in np.atleast_2d(signs.T)]
         return _plain(np.array(count if signs.ndim > 1 else count[0]) / self.path.duration)
 

@@ -176,7 +176,7 @@ class SimulatedServo:
             return state[name]
         if name == "feedback_voltage" and "potentiometer.fixed_angle" in model.servo.names():
             p, b_o = (model.value_or(f"potentiometer.feedback_{part}", 0.0) for part in ("gain", "offset"))
-            return feedback_voltage(state["output_angle"], p, b_o)  # of the wiper, which its chip does not see
+            return float(feedback_voltage(state["output_angle"], p, b_o))  # of the wiper, which its chip does not see
         return self._simulator.observe(state, name, self._signal)
 
     def send(self, command: Any) -> None:

@@ -188,7 +188,7 @@ class PredictiveControl:
         solver = _osqp().OSQP()
         solver.setup(sparse.csc_matrix(np.triu(scale * P)), scale * q, sparse.csc_matrix(rows), lower, upper,
                      verbose=False, eps_abs=_EXACT, eps_rel=_EXACT, max_iter=_ROUNDS, adaptive_rho_interval=50)
-        return float(V * solver.solve().x[0])
+        return float(V * solver.solve(raise_error=False).x[0])
 
 
 def _osqp() -> Any:

@@ -121,7 +121,7 @@ def _plant(servo: ServoInverse, looped: bool, period: float, late: float) -> Arr
     k = servo.volts_per_error if looped else 0.0
     unit = servo.volts_per_error if looped else 1.0
     A = np.array([[0.0, 1.0, 0.0], [-gain * k / J, -servo.damping / J, gain * unit / J], [0.0, 0.0, 0.0]])
-    first, second = expm(A * late), expm(A * (period - late))
+    first, second = expm(A * np.array([late, period - late])[:, None, None])
     of_last = second[:2, :2] @ first[:2, 2:]
     return np.hstack([second[:2, :2] @ first[:2, :2], of_last, second[:2, 2:]])
 

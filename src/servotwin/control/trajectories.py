@@ -211,16 +211,14 @@ def _shares(distance: Array, limits: tuple[Array, ...]) -> list[float]:
 
 
 def _spline(time: ArrayLike, q: Array, ends: Any) -> Trajectory:
-    from scipy.interpolate import PPoly, make_interp_spline  # slow to load
+    from scipy.interpolate import make_interp_spline  # slow to load
 
     t = np.asarray(time, dtype=np.float64)
     if t.shape != q.shape[:1] or not np.isfinite(t).all() or t[0] != 0.0 or not (np.diff(t) > 0.0).all():
         raise InputError("times", got=f"{t.shape} for {len(q)} angles" if t.shape != q.shape[:1] else t.tolist(),
                          allowed="a time for each angle, increasing from 0 [s]")
-    basis: Any = make_interp_spline(t, q, k=5, bc_type=ends)
-    spline = PPoly.from_spline(basis)
-    used = np.flatnonzero(np.diff(spline.x) > 0.0)
-    return Trajectory(np.append(spline.x[used], spline.x[-1]), spline.c[:, used])
+    spline = make_interp_spline(t, q, k=5, bc_type=ends)
+    return Trajectory(t, np.array([spline(t[:-1], nu=order) / math.factorial(order) for order in range(5, -1, -1)]))
 
 
 def _waypoints(angles: ArrayLike) -> Array:

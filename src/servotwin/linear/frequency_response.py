@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from servotwin import signals
 from servotwin.errors import InputError
+from servotwin.linear.loops import INPUT_UNITS, input_name, is_motor, slowest_decay
 from servotwin.linear.response import FrequencyResponse
-from servotwin.linear.transfer_function import INPUT_UNITS, check_model, input_name, is_motor, slowest_decay
+from servotwin.linear.transfer_function import check_model
 from servotwin.loads import as_load
 from servotwin.models import PulseServo, PulseServoInductive, mid_travel
 from servotwin.simulation import simulate, simulate_many

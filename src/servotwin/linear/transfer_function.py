@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from servotwin.errors import InputError, LoadError, UnknownNameError
+from servotwin.linear.loops import input_gain, input_name, linear_numbers, loop_of
 from servotwin.loads import as_load
-from servotwin.models import DCMotor, DigitalServo, GearedMotor, Model, PulseServo, PulseServoInductive
+from servotwin.models import DCMotor, DigitalServo, Model, PulseServo, PulseServoInductive
+from servotwin.models.terms import elastic
 from servotwin.models.terms.numbers import Numbers
 
 if TYPE_CHECKING:
@@ -18,8 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from servotwin.loads import Load, Part
-
-INPUT_UNITS = {"armature_voltage": "V", "command_voltage": "V", "pulse_width": "s", "command_angle": "rad"}
+_ROUNDING = 1e-12  # of the largest coefficient
 
 
 def transfer_function(model: Model, *, input: str | None = None, output: str | None = None,
@@ -91,32 +92,38 @@ def transfer_function(model: Model, *, input: str | None = None, output: str | N
     check_model(model, frame_period)
     if isinstance(model, PulseServo | PulseServoInductive):
         model.check_mean("the transfer function", ("motor.brush_drop_voltage",))
-    plant = _linear_plant(model, load, frame_period)
-    name_in = input_name(model, input) if input else "armature_voltage" if is_motor(model) else "pulse_width"
+    plant = linear_numbers(model, load, frame_period)
+    if elastic.present(plant.elastic):
+        return _of_matrices(model, load, input, output, frame_period)
+    name_in = input_name(model, input)
     outputs = _numerators(model, plant, _stiffness(plant, load))
     name_out = output or model.layout[0]
     if name_out not in outputs:
         raise UnknownNameError(f"output of {type(model).__name__}", name_out, tuple(outputs))
-    numerator = _input_gain(model, name_in) * plant.follower.gain * outputs[name_out]
+    numerator = input_gain(model, name_in) * plant.follower.gain * outputs[name_out]
     system: Any = control.TransferFunction(
         np.trim_zeros(numerator, "f"), np.trim_zeros(_denominator(plant, _stiffness(plant, load)), "f"),
         inputs=[name_in], outputs=[name_out], name=type(model).__name__)
     return system
 
 
-def is_motor(model: Model) -> bool:
-    """Tell whether the model follows an armature voltage, and no command."""
-    return isinstance(model, DCMotor | GearedMotor)
+def _of_matrices(model: Model, load: Load, input: str | None, output: str | None,
+                 frame_period: float | None) -> control.TransferFunction:
+    """Return the transfer function of two bodies with a spring between them, from the matrices of its states."""
+    import control
+    from scipy.signal import ss2tf
 
-
-def input_name(model: Model, name: str) -> str:
-    """Return the name, or raise UnknownNameError unless it is a command that this model takes."""
-    inputs = ("armature_voltage",) if is_motor(model) else ("command_voltage", "pulse_width", "command_angle")
-    if model.endless:
-        inputs = ("pulse_width",)
-    if name not in inputs:
-        raise UnknownNameError(f"input of {type(model).__name__}", name, inputs)
-    return name
+    loop = loop_of(model, load, input, None, frame_period)
+    name = output or model.layout[0]
+    if name not in loop.rows:
+        raise UnknownNameError(f"output of {type(model).__name__}", name, tuple(loop.rows))
+    row = loop.rows[name]
+    numerator, denominator = ss2tf(loop.A, loop.B[:, np.newaxis], row.of_state[np.newaxis, :], [[row.of_input]])
+    small = np.abs(numerator[0]) <= _ROUNDING * np.abs(numerator[0]).max()
+    system: Any = control.TransferFunction(
+        np.trim_zeros(np.where(small, 0.0, numerator[0]), "f"), denominator, inputs=[loop.input], outputs=[name],
+        name=type(model).__name__)
+    return system
 
 
 def check_model(model: Model, frame_period: float | None, *, linear: bool = True) -> None:
@@ -133,22 +140,6 @@ def check_model(model: Model, frame_period: float | None, *, linear: bool = True
     if frame_period is not None and not isinstance(model, PulseServo | PulseServoInductive):
         raise InputError(f"frame_period of {type(model).__name__}", got=frame_period,
                          allowed="none: only the pulse servos have frames")
-
-
-def _linear_plant(model: Model, load: Load, frame_period: float | None) -> Numbers:
-    """Return the model's plant, with the mean gain of its pulses where it has any."""
-    plant = model.pack(load)
-    if isinstance(model, PulseServo | PulseServoInductive):
-        return plant._replace(follower=plant.follower._replace(gain=model.mean_gain(frame_period)))
-    return plant
-
-
-def slowest_decay(model: Model, load: Load) -> float:
-    """Return by how much the slowest mode of the small-signal loop decays [1/s], an integrator apart."""
-    plant = _linear_plant(model, load, None)
-    poles = np.roots(np.trim_zeros(_denominator(plant, plant.load.stiffness), "f"))
-    decay = -poles.real[np.abs(poles) > 0.0]
-    return float(decay.min())
 
 
 def _stiffness(plant: Numbers, load: Load) -> float:
@@ -176,12 +167,3 @@ def _numerators(model: Model, plant: Numbers, stiffness: float) -> Mapping[str, 
     if plant.sensor.p > 0.0:
         numerators["feedback_voltage"] = plant.sensor.p * angle
     return numerators
-
-
-def _input_gain(model: Model, name: str) -> float:
-    """Return the gain from a command to the voltage that the model compares with its feedback."""
-    if is_motor(model):
-        return 1.0
-    zero, one = model.command_signal(name, np.array([0.0, 1.0]))  # the conversion is a straight line
-    pulsed = isinstance(model, PulseServo | PulseServoInductive)  # they follow a width, which stands for a voltage
-    return 1.0 / float(one - zero) / (model.value("electronics.one_shot_slope") if pulsed else 1.0)

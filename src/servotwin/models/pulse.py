@@ -10,7 +10,7 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.errors import InputError
-from servotwin.loads import as_load
+from servotwin.loads import Inertia, as_load
 from servotwin.models.bounded import BoundedServo
 from servotwin.models.engine.currents import stall_current
 from servotwin.models.switched import HIDDEN, MOTOR, SHAFT, SwitchedServo
@@ -120,7 +120,7 @@ class _Pulsed(SwitchedServo):
         T_f = self.frame_period if frame_period is None else frame_period
         if not (is_finite(T_f) and T_f > 0.0):
             raise InputError("frame_period", got=T_f, allowed="a positive number [s]")
-        plant = self.pack(as_load(None))
+        plant = self.pack(as_load(Inertia(1.0)))  # which does not count; an elastic gear has to have some
         gain = physics.averaged_bridge_gain(
             self.value("motor.armature_resistance") * stall_current(plant, plant.source.V), 0.0,
             self.value("electronics.stretcher_gain"), T_f, self.value("electronics.one_shot_slope"))

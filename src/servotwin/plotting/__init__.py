@@ -6,6 +6,7 @@ asked for. Angles are in degrees and pulses in microseconds.
 
 from servotwin.look import COLOURS, LINES, axes_grid, finished, readable, to_bytes
 from servotwin.plotting.block_diagrams import PAPER_DIAGRAMS, block_diagram
+from servotwin.plotting.bode import Response, bode, root_locus
 from servotwin.plotting.characteristics import (
     bandwidth_curves,
     compared_curves,
@@ -43,6 +44,7 @@ __all__ = [
     "JointTrace",
     "JointUse",
     "Limit",
+    "Response",
     "ServoTrace",
     "ShaftTrace",
     "Shown",
@@ -50,6 +52,7 @@ __all__ = [
     "axes_grid",
     "bandwidth_curves",
     "block_diagram",
+    "bode",
     "compared_curves",
     "curves",
     "finished",
@@ -62,6 +65,7 @@ __all__ = [
     "metric_shown",
     "pulses",
     "readable",
+    "root_locus",
     "save",
     "servo_electrics",
     "shaft_torques",

@@ -1,0 +1,217 @@
+"""Which gain gives a wanted margin or overshoot under a load, and what stiffness that buys."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin import physics, signals
+from servotwin.errors import InputError
+from servotwin.linear.bursts import Bursts
+from servotwin.linear.gains import Gain, gains_of
+from servotwin.linear.outer_loop import OuterLoop, stepped
+from servotwin.linear.sampled import Margins, SampledServo, sampled
+from servotwin.loads import as_load
+from servotwin.models import DigitalServo, PulseServo, PulseServoInductive, mid_travel
+from servotwin.simulation import simulate_many
+from servotwin.units import is_finite
+
+if TYPE_CHECKING:
+    from servotwin.loads import Load, Part
+    from servotwin.models import Model
+
+    _Tuned = DigitalServo | PulseServo | PulseServoInductive
+
+Array = NDArray[np.float64]
+
+_STEP = math.radians(10.0)
+_DURATION = 2.0  # s, in which a step comes to rest
+_SAMPLE = 1e-3  # s
+_OUTER = np.geomspace(0.005, 1.9, 40)  # gains that are tried of an outer loop
+_NEAR = 0.05  # an overshoot that is so near is the wanted one
+_EVEN = 0.01  # overshoots that differ by less are the same: the larger gain wins
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuning:
+    """A gain that gives what was wanted.
+
+    Parameters
+    ----------
+    model : Model
+        The servo with that gain; as it is where the gain is that of a loop around it.
+    settings : mapping of str to float
+        Registers by name and value; `firmware` parameters where the servo has no registers; "outer_gain", the part of
+        the error that a loop around a pulse servo makes good in a frame.
+    margins : Margins
+        Of the loop with that gain, friction and deadband apart.
+    overshoot : float
+        Of a simulated step, all terms counted, beyond where it ends, over its way [1].
+    step : float
+        The size of that step [rad].
+    stiffness : float
+        Torque per error of the servo itself, K k_p V/R or K A k_s p/R [N m/rad].
+    """
+
+    model: Model
+    settings: dict[str, float]
+    margins: Margins
+    overshoot: float
+    step: float
+    stiffness: float
+
+
+class _Task(NamedTuple):
+    """What is tuned."""
+
+    model: _Tuned
+    load: Load
+    step: float
+
+    @property
+    def start(self) -> float:
+        """Where the simulated step begins [rad]."""
+        return mid_travel(self.model) - 0.5 * self.step
+
+
+def tune(model: Model, load: Load | Part | None = None, *, overshoot: float | None = None,
+         phase_margin: float | None = None, derivative: bool = False, step: float = _STEP) -> Tuning:
+    """Find the largest gain that gives a wanted overshoot, or leaves a wanted phase margin.
+
+    Of a digital servo that is P of its program; of a pulse servo, whose own gain is soldered, that of an integrator
+    around it, which a microcontroller with a tap of the potentiometer can be.
+
+    Parameters
+    ----------
+    model : DigitalServo, PulseServo or PulseServoInductive
+    load : Load, optional
+        Nothing unless given.
+    overshoot : float, optional
+        Of a simulated step, over its way; within 0.05 of it [1].
+    phase_margin : float, optional
+        At least that, of the sampled loop without friction [rad].
+    derivative : bool
+        Whether D of a digital servo is looked for too.
+    step : float
+        Size of the simulated step, about the middle of the travel [rad].
+
+    Raises
+    ------
+    InputError
+        If not exactly one of both is wanted, a number is not possible, or no gain gives it: what there is is said.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = st.DigitalServo(st.load_servo("feetech-sts3215-12v"))
+    >>> found = tune(model, st.loads.Inertia(5e-3), phase_margin=np.radians(60.0))
+    >>> sorted(found.settings), bool(np.degrees(found.margins.phase) > 60.0)
+    (['P_Coefficient'], True)
+    """
+    if not isinstance(model, DigitalServo | PulseServo | PulseServoInductive):
+        raise InputError("model to tune", got=model, allowed="a digital servo, for its P, or a pulse servo, for a loop "
+                         "around it")
+    _check(overshoot, phase_margin, step)
+    task = _Task(model, as_load(load), step)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what the loop leaves out, once for each gain; simulation has it
+        rows = (gains_of(model, derivative=derivative) if isinstance(model, DigitalServo)
+                else [[Gain({"outer_gain": g}, model) for g in _OUTER.tolist()]])
+        if phase_margin is not None:
+            return _by_margin(task, rows, phase_margin)
+        return _by_overshoot(task, rows, overshoot or 0.0)
+
+
+def _check(overshoot: float | None, phase_margin: float | None, step: float) -> None:
+    if (overshoot is None) == (phase_margin is None):
+        raise InputError("what to tune for", got="both" if overshoot is not None else "nothing",
+                         allowed="an overshoot or a phase margin")
+    if overshoot is not None and not (is_finite(overshoot) and 0.0 <= overshoot < 1.0):
+        raise InputError("overshoot", got=overshoot, allowed="from 0 to less than 1, a part of the way")
+    if phase_margin is not None and not (is_finite(phase_margin) and 0.0 < phase_margin < math.pi):
+        raise InputError("phase margin", got=phase_margin, allowed="between 0 and pi rad (180 deg)")
+    if not (is_finite(step) and step > 0.0):
+        raise InputError("step", got=step, allowed="a finite positive number [rad]")
+
+
+def _by_margin(task: _Task, rows: list[list[Gain]], wanted: float) -> Tuning:
+    """Return the stiffest of the largest gains that leave a margin."""
+    def margin(gain: Gain) -> float:
+        return _loop(task, gain).margins.phase
+
+    best: Gain | None = None
+    for row in rows:
+        low, high = 0, len(row)  # the margin falls as the gain grows
+        while low < high:
+            middle = (low + high) // 2
+            enough = margin(row[middle]) >= wanted
+            low, high = (middle + 1, high) if enough else (low, middle)
+        if low > 0 and (best is None or _stiffness(row[low - 1]) > _stiffness(best)):
+            best = row[low - 1]
+    if best is None:
+        most = max(margin(row[0]) for row in rows)
+        raise InputError("phase margin", got=f"{math.degrees(wanted):.4g} deg",
+                         allowed=f"at most {math.degrees(most):.4g} deg, that of the smallest gain")
+    return _tuning(task, best, float(_overshoots(task, [best])[0]))
+
+
+def _by_overshoot(task: _Task, rows: list[list[Gain]], wanted: float) -> Tuning:
+    """Return the stiffest of the gains whose overshoot is the wanted one, as nearly as there are gains."""
+    gains = [gain for row in rows for gain in row if _loop(task, gain).stable]
+    seen = _overshoots(task, gains)
+    away = np.abs(seen - wanted)
+    if not np.nanmin(away) <= _NEAR:
+        raise InputError("overshoot", got=f"{100.0 * wanted:.4g} %",
+                         allowed=f"what there is: {100.0 * np.nanmin(seen):.3g} to {100.0 * np.nanmax(seen):.3g} % of "
+                         f"a step of {math.degrees(task.step):.4g} deg with this load")
+    even = np.flatnonzero(away <= np.nanmin(away) + _EVEN).tolist()
+    best = max(even, key=lambda k: (_stiffness(gains[k]), gains[k].settings.get("outer_gain", 0.0)))
+    return _tuning(task, gains[best], float(seen[best]))
+
+
+def _tuning(task: _Task, gain: Gain, overshoot: float) -> Tuning:
+    return Tuning(model=gain.model, settings=gain.settings, margins=_loop(task, gain).margins, overshoot=overshoot,
+                  step=task.step, stiffness=_stiffness(gain))
+
+
+def _loop(task: _Task, gain: Gain) -> SampledServo:
+    seen = sampled(gain.model, task.load)
+    if isinstance(seen.law, Bursts):
+        return SampledServo(model=seen.model, law=OuterLoop(inner=seen.law, gain=gain.settings["outer_gain"]))
+    return seen
+
+
+def _stiffness(gain: Gain) -> float:
+    """Return the torque per error of the servo itself [N m/rad]."""
+    model = gain.model
+    if isinstance(model, DigitalServo):
+        return float(model.loop_stiffness())
+    K = physics.output_torque(model.value("motor.torque_constant"), model.value("gear.gear_reduction"))
+    return float(K / model.value("motor.armature_resistance") * model.mean_gain()
+                 * model.value("potentiometer.feedback_gain"))
+
+
+def _overshoots(task: _Task, gains: list[Gain]) -> Array:
+    """Return the overshoot of simulated steps over their way; nan where a run fails."""
+    model = task.model
+    if not isinstance(model, DigitalServo):
+        frames = math.ceil(_DURATION * 3.0 / model.frame_period)  # an integrator takes its time
+        return np.array([_overshoot(stepped(model, task.load, gain.settings["outer_gain"], start=task.start,
+                                            step=task.step, frames=frames)) for gain in gains])
+    command = signals.step(task.start, task.start + task.step, at=0.0, unit="rad")
+    names = ("firmware.proportional_gain", "firmware.derivative_gain")
+    batch = simulate_many(
+        model, command, duration=_DURATION, load=task.load, outputs=("output_angle",),
+        parameters={name: np.array([gain.model.value_or(name, 0.0) for gain in gains]) for name in names},
+        output_times=_SAMPLE * np.arange(round(_DURATION / _SAMPLE) + 1))
+    return np.array([_overshoot(angles) for angles in batch["output_angle"]])
+
+
+def _overshoot(angles: Array) -> float:
+    way = angles[-1] - angles[0]
+    return math.nan if not way > 0.0 else max(0.0, float(np.max(angles) - angles[-1]) / way)
