@@ -314,3 +314,22 @@ def test_digital_lanes_are_the_servo_alone(gain, noise, load):
                           **asked)
         for signal in ("output_angle", "duty"):
             np.testing.assert_allclose(lanes[signal][k], one[signal], rtol=1e-8, atol=1e-9, err_msg=signal)
+
+
+@pytest.mark.compiles
+def test_a_study_of_it_has_metrics_that_need_no_angle_command(wheel):
+    command, asked = st.signals.step(1500.0, 1600.0, at=0.1, unit="us"), {
+        "duration": 0.3, "lanes": 8, "vary": {"potentiometer.fixed_angle": "normal:2%"}}
+    study = st.sweep(st.PulseServo(wheel), command, **asked)
+    assert study.metrics == ("slew_rate", "peak_current", "end_output_speed", "end_output_angle")
+    with pytest.raises(UnknownNameError, match="rms_error"):
+        st.sweep(st.PulseServo(wheel), command, metrics=["rms_error"], **asked)
+
+
+@pytest.mark.compiles
+def test_the_angle_where_it_stands_may_change_between_calls(wheel):
+    sims = st.VectorSimulator(st.PulseServo(wheel), lanes=3)
+    sims.reset(pulse_width=neutral_pulse(wheel))
+    sims.set(parameters={"potentiometer.fixed_angle": [NEUTRAL - 0.05, NEUTRAL, NEUTRAL + 0.05]})
+    sims.advance(0.5)
+    assert sims["output_angle"][0] > 0.1 > sims["output_angle"][1] == 0.0 > -0.1 > sims["output_angle"][2]

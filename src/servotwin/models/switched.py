@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from servotwin import physics
-from servotwin.errors import CommandError
+from servotwin.errors import CommandError, InputError
 from servotwin.models.base import Line, Model, Place, check_travel, check_widths, clipped, feedback_line, solved
+from servotwin.models.terms import sensor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -139,6 +140,22 @@ class SwitchedServo(Model):
             pulse_width, self.value("electronics.one_shot_slope"), self.value_or("electronics.one_shot_offset", 0.0))
         return physics.angle_from_voltage(
             v_o, self.value("potentiometer.feedback_gain"), self.value_or("potentiometer.feedback_offset", 0.0))
+
+    @property
+    def neutral_pulse(self) -> float:
+        """The pulse at which a servo that turns endlessly stands: that of its standing feedback [s].
+
+        Raises
+        ------
+        InputError
+            If the servo does not turn endlessly.
+        """
+        if not self.endless:
+            raise InputError(f"neutral pulse of {self.servo.name}", got="no potentiometer.fixed_angle",
+                             allowed="a servo that turns endlessly, such as servo.continuous(...)")
+        return float(physics.pulse_width_from_feedback(
+            sensor.pack_standing(self).b_o, self.value("electronics.one_shot_slope"),
+            self.value_or("electronics.one_shot_offset", 0.0)))
 
     def start_angle(self, drive: float) -> float:
         """Return the angle without error, within the stops [rad]; 0 of a shaft that turns without end."""

@@ -19,6 +19,7 @@ from servotwin.plotting.files import save
 from servotwin.plotting.formula import Formula, formula_svg
 from servotwin.plotting.loops import loop_curve
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
+from servotwin.plotting.paths import PathTrace, robot_paths
 from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
 from servotwin.plotting.robots import (
     Cloud,
@@ -44,6 +45,7 @@ __all__ = [
     "JointTrace",
     "JointUse",
     "Limit",
+    "PathTrace",
     "Response",
     "ServoTrace",
     "ShaftTrace",
@@ -65,6 +67,7 @@ __all__ = [
     "metric_shown",
     "pulses",
     "readable",
+    "robot_paths",
     "root_locus",
     "save",
     "servo_electrics",

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.models.base import PULSE_RANGE
 from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
+from servotwin.robots.told import is_pulsed, told
 from servotwin.simulation import VectorSimulator
 from servotwin.units import is_finite
 
@@ -29,7 +31,7 @@ class CommandMap:
         Ends of the control, infinite where it has none. What is beyond them counts as the end, as in MuJoCo.
     scale, offset : float
     unit : str
-        Of the angle: "rad", or "m" of a slide.
+        Of the angle: "rad", or "m" of a slide; "s" of the pulses of a servo that turns endlessly.
 
     Examples
     --------
@@ -178,11 +180,12 @@ def _map(model: Any, seat: Seat, mount: Mount, given: Any) -> CommandMap:
     low, high = map(float, model.actuator_ctrlrange[seat.control])
     limits = (low, high) if model.actuator_ctrllimited[seat.control] else (-math.inf, math.inf)
     unit = "m" if mujoco.mjtJoint(int(model.jnt_type[seat.number])) == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
+    unit = told(mount).unit or unit
     if isinstance(given, CommandMap):
         return replace(given, joint=seat.joint, unit=unit)
     if isinstance(given, str) and given == "identity":
         return CommandMap(seat.joint, *limits, unit=unit)
-    if given is None:
+    if given is None and not mount.model.endless:  # no spring pulls a wheel to an angle
         law = _spring(mujoco, model, seat.actuator)
         if law is not None:
             return CommandMap(seat.joint, *limits, scale=law[0], offset=law[1], unit=unit)
@@ -215,7 +218,9 @@ def _given_ends(key: str, given: Any, unit: str) -> tuple[float, float]:
 
 
 def _reach(model: Any, seat: Seat, mount: Mount) -> tuple[float, float]:
-    """Return where the joint can go that the servo can be told to go to as well."""
+    """Return where the joint can go that the servo can be told to go to as well, or all pulses that it takes."""
+    if mount.model.endless:
+        return _pulses(seat, mount)
     ends = VectorSimulator(mount.model, 1).c_entry().commands("command_angle")
     servo = sorted(mount.zero + mount.gain * float(end[0]) for end in ends)
     joint = model.jnt_range[seat.number].tolist() if model.jnt_limited[seat.number] else [-math.inf, math.inf]
@@ -224,4 +229,14 @@ def _reach(model: Any, seat: Seat, mount: Mount) -> tuple[float, float]:
         raise InputError(f"command of {seat.key}", got=f"a joint of {joint[0]:.4g} to {joint[1]:.4g} and a servo of "
                          f"{servo[0]:.4g} to {servo[1]:.4g}", allowed="a range in common that has ends: by the zero of "
                          "its Mount, or command={...: (lowest, highest)}")
+    return low, high
+
+
+def _pulses(seat: Seat, mount: Mount) -> tuple[float, float]:
+    """Return the shortest and the longest pulse of a servo that turns endlessly [s]."""
+    if not is_pulsed(mount.model):
+        raise InputError(f"command of {seat.key}", got="a servo on a bus that turns endlessly",
+                         allowed="'identity', or command={...: (lowest, highest)} of its goals")
+    low, high = (mount.model.value_or(f"electronics.pulse_width_{end}", usual)
+                 for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))
     return low, high

@@ -14,6 +14,7 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
 from servotwin.robots.mount import Joint
+from servotwin.robots.told import is_pulsed, told
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.c_entry import CEntry
 from servotwin.simulation.compile.joints_layout import GROUP, INSTANCE, RECORD, ROOM
@@ -123,12 +124,13 @@ class Berth:
 
     def __init__(self, crew: Crew) -> None:
         self.crew, self.sims = crew, crew.simulator()
+        self.kind = "pulse_width" if is_pulsed(crew.model) else "command_angle"
         count = len(crew.which)
         self.entry: CEntry = self.sims.c_entry()
         self._arrays = {name: np.zeros(count) for name in _GIVEN}
         self._status, own = np.zeros(count, np.int8), self._arrays
         self.tick = self.entry.tick(
-            0.0, command_angle=own["goal"], external_torque=own["load"], set_output_angle=own["angle"],
+            0.0, **{self.kind: own["goal"]}, external_torque=own["load"], set_output_angle=own["angle"],
             set_output_speed=own["speed"], set_load_inertia=own["inertia"], output_angle=own["reached"],
             output_speed=own["after"], armature_current=np.zeros(count), status=self._status)
         self._look = type(self.tick).armature_current.offset
@@ -149,7 +151,9 @@ class Berth:
 
     def reset(self, angle: Array, goal: Array) -> None:
         """Let the servos begin anew, at rest at these angles [rad] under these commands."""
-        self.sims.reset(command_angle=goal[self.crew.which], output_angle=angle[self.crew.which])
+        own = goal[self.crew.which]
+        goals = {"pulse_width": own} if self.kind == "pulse_width" else {"command_angle": own}
+        self.sims.reset(output_angle=angle[self.crew.which], **goals)
 
 
 class Instance:
@@ -170,7 +174,7 @@ class Instance:
     def __init__(self, address: int, crews: Sequence[Crew], joints: Sequence[Joint], dofs: int, head: int,
                  serial: int) -> None:
         count = len(joints)
-        self.address = address
+        self.address, self._joints = address, joints
         self.berths = [Berth(crew) for crew in crews]
         self.size = sum(berth.size for berth in self.berths)
         self.block = np.zeros(head + 2 * self.size)
@@ -203,7 +207,8 @@ class Instance:
         """
         count = len(self.command)
         first, other = (self._within(size * np.arange(1.0, count + 1.0)) for size in (1e-3, 2e-3))
-        words = [self._rested(*given) for given in ((first, first), (first, other), (other, first))]
+        words = [self._rested(angle, self._goals(goal))
+                 for angle, goal in ((first, first), (first, other), (other, first))]
         differ = np.flatnonzero(words[0] != words[2])
         numbers = [some.view(np.float64)[differ] for some in (words[0], words[2])]
         servo = np.array([int(np.argmin(np.abs(first - value))) for value in numbers[0]], np.int64)
@@ -216,11 +221,17 @@ class Instance:
         """Return angles moved into the servos' travel and commands."""
         low, high = np.full(len(angle), -np.inf), np.full(len(angle), np.inf)
         for berth in self.berths:
-            for ends in (berth.entry.travel(), berth.entry.commands("command_angle")):
-                which = berth.crew.which
+            which = berth.crew.which
+            told_angles = [] if berth.crew.model.endless else [berth.entry.commands(berth.kind)]
+            for ends in (berth.entry.travel(), *told_angles):
                 low[which], high[which] = np.maximum(low[which], ends[0]), np.minimum(high[which], ends[1])
         inside = np.where(np.isfinite(low), low, 0.0) + angle
         return np.asarray(np.minimum(inside, high))
+
+    def _goals(self, angle: Array) -> Array:
+        """Return commands that differ as angles do: the angles, or near what stops a servo that turns endlessly."""
+        rest = np.array([told(joint.mount).rest for joint in self._joints])
+        return np.where(np.isnan(rest), angle, rest + 1e-6 * angle)
 
     def _rested(self, angle: Array, goal: Array) -> NDArray[np.int64]:
         """Return the words of what servos remember that rest at these angles [rad] under these commands."""

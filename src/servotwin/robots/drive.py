@@ -19,6 +19,7 @@ from servotwin.robots.mount import Mount, joints_of, treat_friction
 from servotwin.robots.places import load_mujoco, places
 from servotwin.robots.record import Record
 from servotwin.robots.state import DriveState
+from servotwin.robots.told import told
 from servotwin.robots.wiring import arrays_of, check_options, maps_of, put_into_model, words_of
 from servotwin.simulation.compile.calls import joint_addresses
 from servotwin.simulation.compile.joints_layout import BLOCK, FAILED, FOREIGN, INSTANCE, MESSAGES, RECORD, WELL
@@ -37,7 +38,9 @@ class ServoDrive:
 
     A joint's angle is `zero + direction · ratio · servo's angle` (`Mount`). Rotor and gear become the joint's armature.
     An actuator that the model has at the joint gives its `ctrl` as the servo's command, an angle [rad] or place [m] of
-    the joint, and no force of its own any more; where there is none, `command` says where to go.
+    the joint, and no force of its own any more; where there is none, `command` says where to go. A servo that turns
+    endlessly (`potentiometer.fixed_angle`) is told a pulse width [s] instead, by `ctrl` or `command`, and on a bus its
+    goal as the number that it is; direction and ratio of its mount say nothing of these.
 
     Parameters
     ----------
@@ -92,6 +95,7 @@ class ServoDrive:
         self.model = spec.compile() if spec is not None else model
         self._joints = joints_of(self.model, servos)
         self.joints = tuple(joint.name for joint in self._joints)
+        self._told = [told(joint.mount) for joint in self._joints]
         check_options(mujoco, self.model, self._joints)
         maps = maps_of(self.model, self._joints, controls)
         crews = crews_of(self._joints, bus)
@@ -205,21 +209,22 @@ class ServoDrive:
     def command(self, data: Any, goals: Mapping[str, float]) -> None:
         """Tell servos where to go, of joints with and without an actuator; before that they hold where they begin.
 
+        Those that turn endlessly are told how fast, by a pulse width; before that they get the one at which they stand.
+
         Parameters
         ----------
         goals : mapping of str to float
-            Angle [rad] or place [m] by joint; others keep theirs.
+            Angle [rad] or place [m] by joint, pulse width [s] where its servo turns endlessly; others keep theirs.
 
         Raises
         ------
         InputError
-            If a joint has no servo, or a goal is no finite number.
+            If a joint has no servo, a goal is no finite number, or a pulse no width that fits into a frame.
         """
         command = self._of(data).command
         for name, goal in goals.items():
             k = self._number(name)
-            if not math.isfinite(goal):
-                raise InputError(f"goal of joint {name}", got=goal, allowed="a finite number of rad, or m of a slide")
+            self._told[k].check(name, goal, self._joints[k].mount.model.value_or("electronics.frame_period", 0.02))
             command[k] = goal
             if self._joints[k].command_at >= 0:
                 scale, offset = self._arrays["control_scale"][k], self._arrays["control_offset"][k]

@@ -9,10 +9,11 @@ from types import MappingProxyType
 from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.robots.mobile_robot import mobile_robot
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.so101 import so101
 
-BUILT_IN: Mapping[str, Callable[[], str]] = MappingProxyType({"so101": so101})
+BUILT_IN: Mapping[str, Callable[[], str]] = MappingProxyType({"so101": so101, "mobile": mobile_robot})
 """MJCF of robots that come with the package, by name."""
 _SKY = {"rgb1": (0.66, 0.75, 0.86), "rgb2": (0.93, 0.95, 0.97), "width": 64, "height": 384}
 _LIGHT = ((0.4, 0.4, 0.4), (0.6, 0.6, 0.6))  # ambient and diffuse, of a robot that has none

@@ -105,6 +105,9 @@ def recipe_of(model: Model) -> Recipe:
     """
     if not isinstance(model, SERVOS):
         raise InputError("recipe", got=model, allowed=" or ".join(kind.__name__ for kind in SERVOS))
+    if model.endless:
+        raise InputError(f"recipe of {model.servo.name}", got="a servo that turns endlessly",
+                         allowed="one that is told an angle")
     if isinstance(model, DigitalServo):
         V = model.value("supply.open_circuit_voltage")
         limit = model.value_or("firmware.duty_limit", 1.0) * model.value_or("firmware.torque_limit", 1.0)

@@ -15,6 +15,7 @@ from servotwin.errors import MissingExtraError, UnknownNameError
 from servotwin.models.engine.observe import Observed
 from servotwin.models.outputs import SIGNALS
 from servotwin.robots.mount import Mount
+from servotwin.robots.told import Told, told
 from servotwin.simulation import files
 from servotwin.simulation.compile.joints_layout import KEPT
 from servotwin.simulation.remarks import TRIPS, Remark
@@ -35,7 +36,8 @@ class ServoRecord(Mapping[str, Array]):
     """What one servo has done: signals (SI) by name, shape (n,), as those of a `Result`.
 
     Beside those of its model there are `joint_angle` and `joint_command`, the angle [rad] or place [m] of the joint and
-    what was asked of it, and `joint_torque`, the mean torque [N m] or force [N] that the joint has got in the tick.
+    what was asked of it (a pulse width [s] where its servo turns endlessly), and `joint_torque`, the mean torque [N m]
+    or force [N] that the joint has got in the tick.
 
     Parameters
     ----------
@@ -53,10 +55,17 @@ class ServoRecord(Mapping[str, Array]):
     def names(self) -> tuple[str, ...]:
         """Names of all signals, `time` first."""
         available = self.mount.model.available
-        return ("time", *(name for name in _COLUMNS if name in available), *_OF_JOINT)
+        names = (self._told.kind if name == "command_angle" else name for name in _COLUMNS)
+        return ("time", *(name for name in names if name in available), *_OF_JOINT)
+
+    @cached_property
+    def _told(self) -> Told:
+        return told(self.mount)
 
     def unit(self, name: str, *, slides: bool = False) -> str:
         """Return the SI unit of a signal."""
+        if name == "joint_command" and self._told.unit:
+            return self._told.unit
         if name in _OF_JOINT:
             return _OF_JOINT[name][slides]
         return "s" if name == "time" else SIGNALS[name].unit
@@ -68,10 +77,12 @@ class ServoRecord(Mapping[str, Array]):
         if name == "time":
             return self.time
         mount = self.mount
-        if name in ("joint_angle", "joint_command"):
-            own = "output_angle" if name == "joint_angle" else "command_angle"
-            return np.asarray(mount.zero + mount.gain * self.columns[:, _COLUMNS.index(own)])
-        values = self.columns[:, _COLUMNS.index(name)]
+        if name == "joint_angle":
+            return np.asarray(mount.zero + mount.gain * self.columns[:, _COLUMNS.index("output_angle")])
+        commands = self.columns[:, _COLUMNS.index("command_angle")]
+        if name == "joint_command":
+            return np.asarray(self._told.zero + self._told.gain * commands)
+        values = commands if name == "pulse_width" else self.columns[:, _COLUMNS.index(name)]
         if name in AT_MOTOR:
             return np.asarray(AT_MOTOR[name](values, mount.model.value("gear.gear_reduction")))
         return values

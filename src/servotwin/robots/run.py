@@ -214,6 +214,10 @@ def _check(motion: Motion, settle: float, hold: str, timestep: float | None) -> 
 def _check_joints(motion: Motion, mounts: Mapping[str, Mount], joints: Mapping[str, str]) -> None:
     if not joints.keys() >= mounts.keys():
         return  # the drive says what is wrong with them
+    for joint, mount in mounts.items():
+        if mount.model.endless:
+            raise InputError(f"servo of joint {joint}", got="one that turns endlessly",
+                             allowed="one that follows a motion: with potentiometer.fixed_angle it is told speeds")
     for joint in motion.joints:
         if joint not in joints:
             raise UnknownNameError(f"joint of {motion.source}", joint, joints)

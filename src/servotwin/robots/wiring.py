@@ -15,6 +15,7 @@ from servotwin.robots.command_map import CommandMap
 from servotwin.robots.crews import Berth
 from servotwin.robots.mount import Joint
 from servotwin.robots.places import Places
+from servotwin.robots.told import told
 from servotwin.simulation.compile.joints_layout import ARRAYS, DRIVE
 
 Arrays = dict[str, NDArray[Any]]
@@ -66,15 +67,17 @@ def arrays_of(joints: Sequence[Joint], berths: Sequence[Berth], maps: Sequence[C
     """Return the arrays of `joints_layout.ARRAYS`, for all servos."""
     arrays: Arrays = {name: np.zeros(len(joints), np.int64 if name.endswith("_at") else np.float64) for name in ARRAYS}
     for k, (joint, one) in enumerate(zip(joints, maps, strict=True)):
+        how = told(joint.mount)
         own = {"angle_at": joint.angle_at, "speed_at": joint.speed_at, "command_at": joint.command_at,
                "gain": joint.mount.gain, "zero": joint.mount.zero, "control_scale": one.scale,
-               "control_offset": one.offset, "control_low": one.low, "control_high": one.high}
+               "control_offset": one.offset, "control_low": one.low, "control_high": one.high, "told_gain": how.gain,
+               "told_zero": how.zero, "rest": how.rest}
         for name, value in own.items():
             arrays[name][k] = value
     for berth in berths:
         which = berth.crew.which
         arrays["lower"][which], arrays["upper"][which] = berth.entry.travel()
-        arrays["low"][which], arrays["high"][which] = berth.entry.commands("command_angle")
+        arrays["low"][which], arrays["high"][which] = berth.entry.commands(berth.kind)
         arrays["armature"][which] = berth.entry.own_inertia() / arrays["gain"][which] ** 2
     return arrays
 

@@ -48,6 +48,7 @@ METRICS: dict[str, Metric] = {
 
 OF_STEP = ("overshoot", "rise_time", "settling_time", "steady_error", "peak_current", "end_output_angle")
 OF_OTHERS = ("rms_error", "peak_error", "peak_current", "end_output_angle")
+OF_ENDLESS = ("slew_rate", "peak_current", "end_output_speed", "end_output_angle")
 _ENDS = "end_"
 _AFTER = 1e-3 * np.array([0.02, 0.2, 0.5, 1.2])  # s: motors take some 10 ms to speed up
 
@@ -71,9 +72,10 @@ def checked_metrics(metrics: Sequence[str] | None, model: Model, command: Signal
     """
     start = step_time(command)
     if metrics is None:
-        return OF_STEP if start < duration else OF_OTHERS
+        return OF_ENDLESS if model.endless else OF_STEP if start < duration else OF_OTHERS
     names = (metrics,) if isinstance(metrics, str) else tuple(dict.fromkeys(metrics))
-    known = (*METRICS, *(f"{_ENDS}{name}" for name in model.available))
+    had = {name: set(metric.signals) <= set(model.available) for name, metric in METRICS.items()}
+    known = (*(name for name in METRICS if had[name]), *(f"{_ENDS}{name}" for name in model.available))
     for name in names:
         if name not in known:
             raise UnknownNameError("metric", name, known)

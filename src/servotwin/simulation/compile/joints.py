@@ -60,7 +60,8 @@ _HEAD, _EACH = len(BLOCK), len(OF_EACH)
 (_SERVOS, _DOFS, _COORDINATES, _WIDE, _BODIES, _TIMESTEP, _INTEGRATOR, _TIME, _QPOS, _QVEL, _CTRL, _APPLIED, _XFRC,
  _USERDATA, _XIPOS, _PASSIVE, _BIAS, _ACTUATOR, _CONSTRAINT, _SOLVE, _ACTUATE, _ACCELERATE, _CONSTRAIN, _PUSH, _STEP,
  _SLOT, _OWN, _OTHERS, _ANGLE_AT, _SPEED_AT, _COMMAND_AT, _GAIN, _ZERO, _ARMATURE, _LOWER, _UPPER, _LOW, _HIGH,
- _SCALE, _OFFSET, _CONTROL_LOW, _CONTROL_HIGH, _LONGEST, _KEPT_AT, _MEMORY, _INSTANCES, _ASK) = range(len(DRIVE))
+ _SCALE, _OFFSET, _CONTROL_LOW, _CONTROL_HIGH, _TOLD_GAIN, _TOLD_ZERO, _REST, _LONGEST, _KEPT_AT, _MEMORY, _INSTANCES,
+ _ASK) = range(len(DRIVE))
 (_DATA, _KEPT, _ROOM, _COMMAND, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIAL_NOW, _NEW, _ANGLES,
  _ANGLE_COUNT) = range(len(INSTANCE))
 (_ADVANCE, _TICK, _DURATION, _LOOK, _LANES, _WHICH, _G_ANGLE, _G_SPEED, _G_GOAL, _G_LOAD, _G_INERTIA, _G_REACHED,
@@ -242,7 +243,7 @@ def _listen(d, drive, instance, block, room):
     """Put the servos' commands into their room; return whose is not a number, or −1."""
     n = drive[_SERVOS]
     command_at, command = _words(drive[_COMMAND_AT], (n,)), _numbers(instance[_COMMAND], (n,))
-    gain, zero = _numbers(drive[_GAIN], (n,)), _numbers(drive[_ZERO], (n,))
+    gain, zero = _numbers(drive[_TOLD_GAIN], (n,)), _numbers(drive[_TOLD_ZERO], (n,))
     low, high = _numbers(drive[_LOW], (n,)), _numbers(drive[_HIGH], (n,))
     scale, offset = _numbers(drive[_SCALE], (n,)), _numbers(drive[_OFFSET], (n,))
     least, most = _numbers(drive[_CONTROL_LOW], (n,)), _numbers(drive[_CONTROL_HIGH], (n,))
@@ -441,9 +442,10 @@ def _start_anew(drive, instance, block, room, half):
     _words(instance[_RECORD], (len(RECORD),))[_USED] = 0
     n = drive[_SERVOS]
     lower, upper = _numbers(drive[_LOWER], (n,)), _numbers(drive[_UPPER], (n,))
+    rest = _numbers(drive[_REST], (n,))
     for i in range(n):
         room[_R_ANGLE, i] = min(max(room[_R_ANGLE, i], lower[i]), upper[i])
-        block[_HEAD + 11 * n + i] = room[_R_GOAL, i] = room[_R_ANGLE, i]
+        block[_HEAD + 11 * n + i] = room[_R_GOAL, i] = rest[i] if math.isfinite(rest[i]) else room[_R_ANGLE, i]
     if instance[_NEW] == 0:
         told(drive[_ASK], (ASK_RESET, instance[_DATA], 0))
         _memories(instance, half, False)

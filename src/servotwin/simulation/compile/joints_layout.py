@@ -8,9 +8,10 @@ PLACES = ("time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "userd
 FUNCTIONS = ("mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration", "mj_fwdConstraint", "mj_applyFT", "mj_step")
 """Addresses of functions of the engine."""
 ARRAYS = ("angle_at", "speed_at", "command_at", "gain", "zero", "armature", "lower", "upper", "low", "high",
-          "control_scale", "control_offset", "control_low", "control_high")
+          "control_scale", "control_offset", "control_low", "control_high", "told_gain", "told_zero", "rest")
 """Of each servo: places in qpos, qvel and ctrl (or −1); what a turn of the servo is at the joint, and where it begins;
-its own inertia there; ends of its travel, and of its commands; what a control asks of the joint, and its ends."""
+its own inertia there; ends of its travel, and of its commands; what a control asks of the joint, and its ends; what a
+command of the joint is to the servo, and what it is told before there is one (nan: to hold where it begins)."""
 DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integrator", *PLACES, *FUNCTIONS, "slot",
          "own", "others", *ARRAYS, "longest", "kept_at", "memory", "instances", "ask")
 """All that servos share, wherever they are simulated."""
