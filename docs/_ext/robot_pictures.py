@@ -8,6 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from servotwin import plotting
+from servotwin.cli.robot_task_files import joint_uses
+from servotwin.robots import AwayFromLimits, LeastMotion, LeastTorque, scara, task_path
+
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 
 
@@ -25,11 +29,31 @@ def motion(folder):
     return folder / "pick.csv"
 
 
+def servotwin(*words):
+    """Run a command."""
+    subprocess.run([sys.executable, "-m", "servotwin", "robot", *map(str, words)], check=True)
+
+
+def arms(folder):
+    """Draw a SCARA robot at its task, its tool by fidelity, and what its third link is used for."""
+    servotwin("scara", "--task", "circle", "--no-video", "--out", folder / "scara")
+    shutil.copy(folder / "scara" / "robot.png", IMAGES / "arm_scara.png")
+    servotwin("compare", "scara", "--out", folder / "compared")
+    shutil.copy(folder / "compared" / "tool.png", IMAGES / "arm_compared.png")
+    servotwin("two-link", "--task", "square", "--payload", "50g", "--no-video", "--out", folder / "two")
+    shutil.copy(folder / "two" / "robot.png", IMAGES / "arm_two_link.png")
+    arm = scara()
+    path = task_path(arm, "square")
+    ways = {one.name: one.solve(arm, path) for one in (LeastMotion(), AwayFromLimits(), LeastTorque())}
+    plotting.save(joint_uses(ways), IMAGES / "arm_redundancy.png")
+
+
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        subprocess.run([sys.executable, "-m", "servotwin", "robot", "run", "so101", "--motion", str(motion(folder)),
-                        "--supply", "12:0.3", "--no-video", "--out", str(folder / "pick")], check=True)
+        servotwin("run", "so101", "--motion", motion(folder), "--supply", "12:0.3", "--no-video", "--out",
+                  folder / "pick")
         shutil.copy(folder / "pick" / "robot.png", IMAGES / "robot_run.png")
         shutil.copy(folder / "pick" / "sizing.png", IMAGES / "robot_sizing.png")
-    print("robot_run.png, robot_sizing.png")
+        arms(folder)
+    print("robot_run.png, robot_sizing.png, arm_scara.png, arm_compared.png, arm_two_link.png, arm_redundancy.png")

@@ -484,7 +484,7 @@ def test_a_recorded_load_that_ends_is_said_before_it_does(servo):
 
 def test_models_without_lanes_are_refused(servo):
     with pytest.raises(InputError, match="PulseServo"):
-        st.VectorSimulator(st.AveragedServo(servo), 2)
+        st.VectorSimulator(st.AveragedServoInductive(servo), 2)
 
 
 def test_bounded_servos_refuse_pulses_that_the_chip_does(servo):

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import shared_options as shared
+from servotwin.cli.robot_arm import add_to
+from servotwin.cli.robot_compare import compare
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
@@ -53,8 +55,8 @@ def run(
         "where the servo's is 0, 1 or -1, turns of the joint per turn of the servo, such as elbow=-90deg:-1; of a "
         "slide its place and its way per radian, slider=0mm:1:9mm.", rich_help_panel=_ROBOT)] = None,
     model: Annotated[str | None, typer.Option(
-        metavar="MODEL", help="digital, pulse, pulse-inductive or bounded (default: by the kind of each servo).",
-        rich_help_panel=_ROBOT)] = None,
+        metavar="MODEL", help="digital, pulse, pulse-inductive, bounded or averaged (default: by the kind of each "
+        "servo).", rich_help_panel=_ROBOT)] = None,
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable; with a unit, or in SI "
         "units.", rich_help_panel=_ROBOT)] = None,
@@ -104,7 +106,7 @@ def run(
     from servotwin.cli.robot_words import as_options, chosen_servos, models_of, mounts_of, supply_of, units_of
     from servotwin.robots import joint_names, joint_ranges, robot_model, run_motion, sizing_of
 
-    _check_numbers(output_step=output_step, rate=rate, blend=blend)
+    check_numbers(output_step=output_step, rate=rate, blend=blend)
     plant = robot_model(model_file)
     joints = joint_names(plant)
     chosen = chosen_servos(model_file, servo or [], joints)
@@ -113,7 +115,7 @@ def run(
     with as_options():
         followed = _read(motion, joints, joint_ranges(plant), unit=units_of(unit or []), calibration=calibration,
                          episode=episode)
-    picture = _check_drawing(plant, camera, video=video)
+    picture = check_drawing(plant, camera, video=video)
     inputs = [Path(model_file), motion, *([] if calibration is None else [calibration])]
     with files.folder(out):
         targets = files.targets_in(out, picture=picture, video=video, force=force, inputs=inputs)
@@ -131,7 +133,8 @@ def run(
         _show(done, sized, found)
 
 
-def _check_numbers(*, output_step: float, rate: float, blend: float | None) -> None:
+def check_numbers(*, output_step: float, rate: float, blend: float | None) -> None:
+    """Raise InputError unless numbers of options are possible."""
     from servotwin.errors import InputError
     from servotwin.units import is_finite
 
@@ -153,7 +156,7 @@ def _read(path: Path, joints: dict[str, str], ranges: dict[str, tuple[float, flo
         return read_motion(path, joints, ranges=ranges, **options)
 
 
-def _check_drawing(plant: Any, camera: str | None, *, video: bool) -> bool:
+def check_drawing(plant: Any, camera: str | None, *, video: bool) -> bool:
     """Return whether the robot can be drawn; raise if it cannot and a video is wanted."""
     from servotwin.robots.camera import Camera, NoDrawingError
     from servotwin.robots.video import load_opencv
@@ -188,3 +191,8 @@ def _show(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> No
                     f"{', '.join(unknown)}")] if unknown else []),
                 *(("note", text) for text in found["notes"][:_MOST_NOTES]),
                 ("written", found["files"][-1])]))
+
+
+add_to(robot)
+robot.command("compare", help="Compare servos of every fidelity, and every controller, on one task of an arm.",
+              epilog="Example: servotwin robot compare scara --task circle --out compared")(compare)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -18,9 +18,12 @@ from servotwin.errors import OutputError
 from servotwin.parameters.output_file import undone
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from numpy.typing import NDArray
 
     from servotwin.robots import RobotRun, Sizing
+    from servotwin.robots.camera import Trail
+
+    Trails = Callable[[int], Sequence[Trail]]
 
 SERVOS, JOINTS, SUMMARY, PAGE = "run.csv", "joints.csv", "summary.json", "index.html"
 TRACKING, ELECTRICAL, SIZING, PICTURE, VIDEO = (
@@ -60,23 +63,41 @@ def _remove_if_empty(path: Path) -> None:
         path.rmdir()
 
 
-def targets_in(out: Path, *, picture: bool, video: bool, force: bool, inputs: Sequence[Path]) -> list[Target]:
-    """Return the files to be written into a folder that is there, checked.
+def targets_in(out: Path, *, picture: bool, video: bool, force: bool, inputs: Sequence[Path] = (),
+               more: Iterable[str] = ()) -> list[Target]:
+    """Return the files to be written into a folder that is there, checked; `more` are names beside the usual ones.
 
     Raises
     ------
     OutputExistsError, OutputError
         As `check_targets` does.
     """
-    names = [SERVOS, JOINTS, SUMMARY, TRACKING, ELECTRICAL, SIZING, *([PICTURE] if picture else []),
-             *([VIDEO] if video else []), PAGE]
+    names = [SERVOS, JOINTS, SUMMARY, TRACKING, ELECTRICAL, SIZING, *more, *drawn_names(picture=picture, video=video)]
+    return targets_of(out, [*names, PAGE], force=force, inputs=inputs)
+
+
+def drawn_names(*, picture: bool, video: bool) -> list[str]:
+    """Return the names of what is drawn of the robot."""
+    return [*([PICTURE] if picture else []), *([VIDEO] if video else [])]
+
+
+def targets_of(out: Path, names: Iterable[str], *, force: bool, inputs: Sequence[Path] = ()) -> list[Target]:
+    """Return files of these names in a folder, checked.
+
+    Raises
+    ------
+    OutputExistsError, OutputError
+        As `check_targets` does.
+    """
     found = [Target(option=_OPTION, path=out / name, endings=(Path(name).suffix,)) for name in names]
     check_targets(found, force=force, inputs=inputs)
     return found
 
 
 def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Target], found: Mapping[str, Any], *,
-              force: bool, output_step: float, camera: str | None, rate: float) -> None:
+              force: bool, output_step: float, camera: str | None, rate: float,
+              more: Mapping[str, Callable[[Path], object]] | None = None, section: str = "",
+              trails: Trails | None = None, still: int | None = None) -> None:
     """Write all files, or after an error none.
 
     Parameters
@@ -94,6 +115,14 @@ def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Targ
         By which the robot is seen.
     rate : float
         Pictures of the video a second [Hz]
+    more : mapping of str to callable
+        Writers of further files, by name.
+    section : str
+        HTML on them, for the page.
+    trails : callable
+        Lines that are drawn in pictures, by the number of the row.
+    still : int, optional
+        Row that the picture is of; that of the largest error unless given.
     """
     from servotwin.cli.robot_page import page
 
@@ -103,14 +132,16 @@ def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Targ
             SERVOS: lambda path: _servo_table(run, path, output_step),
             JOINTS: lambda path: path.write_bytes(_joint_table(run, output_step).encode()),
             SUMMARY: lambda path: path.write_bytes((json_text(found) + "\n").encode()),
-            PAGE: lambda path: path.write_bytes(page(run, sized, found, list(places)).encode()),
-            **_pictures(run, sized),
+            PAGE: lambda path: path.write_bytes(page(
+                run, sized, found, list(places), section,
+                "At the time of the largest error." if still is None else f"At {run.time[still]:.2f} s.").encode()),
+            **_pictures(run, sized), **(more or {}),
         }
         with patience("drawing"):
             for name, writer in writers.items():
                 writer(places[name])
         if PICTURE in places:
-            _robot(run, places[PICTURE], places.get(VIDEO), camera, rate)
+            _robot(run, places[PICTURE], places.get(VIDEO), camera, rate, trails or (lambda k: ()), still)
 
 
 def _every(run: RobotRun, output_step: float) -> int:
@@ -176,11 +207,10 @@ def _shaft(sized: Sizing, inside: Any) -> Any:
                                sized.rms_torque, sized.lasting_torque)
 
 
-def _robot(run: RobotRun, picture: Path, video: Path | None, camera: str | None, rate: float) -> None:
-    """Draw the robot where it is furthest off, and all of it as a video."""
+def _robot(run: RobotRun, picture: Path, video: Path | None, camera: str | None, rate: float, trails: Trails,
+           still: int | None) -> None:
+    """Draw the robot where it is furthest off, or at a row, and all of it as a video."""
     from servotwin.robots.camera import Camera
-    from servotwin.robots.video import Video, png
-    from servotwin.simulation.progress import shown
 
     errors = np.max([np.abs(run.goal(joint) - run.record[joint]["joint_angle"]) for joint in run.mounts], axis=0)
     inside = np.flatnonzero((run.time >= 0.0) & (run.time <= run.motion.duration))
@@ -188,14 +218,38 @@ def _robot(run: RobotRun, picture: Path, video: Path | None, camera: str | None,
     with Camera(run.model, *SIZE, camera, run.poses) as view:
         def drawn(k: int) -> Any:
             return view.picture(run.poses[k], run.ideal.poses[k], words=f"{max(run.time[k], 0.0):.2f} s",
-                                note="pale: with ideal actuators")
+                                note="pale: with ideal actuators", trails=trails(k))
 
-        picture.write_bytes(png(drawn(int(inside[np.argmax(errors[inside])]))))
-        if video is None:
-            return
-        times = np.arange(0.0, run.time[-1], 1.0 / rate)
-        frames = np.minimum(np.searchsorted(run.time, times), len(run.time) - 1).tolist()
-        with Video(video, *SIZE, rate) as film, shown(True, len(frames), "drawing the video") as tell:
-            for done, k in enumerate(frames):
-                film.add(drawn(k))
-                tell(done + 1)
+        worst = int(inside[np.argmax(errors[inside])])
+        picture_and_video(drawn, run.time, worst if still is None else still, picture, video, rate)
+
+
+def picture_and_video(drawn: Callable[[int], Any], time: NDArray[np.float64], still: int, picture: Path,
+                      video: Path | None, rate: float) -> None:
+    """Write one picture, and all as a video.
+
+    Parameters
+    ----------
+    drawn : callable
+        Returns the picture of a row.
+    time : ndarray, shape (n,)
+        Of the rows [s]
+    still : int
+        Which row the picture is of.
+    picture, video : Path
+        None: no video.
+    rate : float
+        [Hz]
+    """
+    from servotwin.robots.video import Video, png
+    from servotwin.simulation.progress import shown
+
+    picture.write_bytes(png(drawn(still)))
+    if video is None:
+        return
+    times = np.arange(0.0, time[-1], 1.0 / rate)
+    frames = np.minimum(np.searchsorted(time, times), len(time) - 1).tolist()
+    with Video(video, *SIZE, rate) as written, shown(True, len(frames), "drawing the video") as tell:
+        for done, k in enumerate(frames):
+            written.add(drawn(k))
+            tell(done + 1)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from servotwin.robots import RobotRun, Sizing
 
-_STYLE = """
+STYLE = """
 figure img,figure video{width:100%;height:auto}figure.film{max-width:44rem}
 .joints :is(td,th):nth-child(n+2):not(:last-child){text-align:right;font-variant-numeric:tabular-nums}
 .joints td:nth-child(n+2):not(:last-child){white-space:nowrap}
@@ -23,26 +23,27 @@ figure img,figure video{width:100%;height:auto}figure.film{max-width:44rem}
 """
 
 
-def page(run: RobotRun, sized: Mapping[str, Sizing], found: Mapping[str, Any], files: Sequence[str]) -> str:
-    """Return the page of a run; pictures and video stand beside it, those of `files`."""
+def page(run: RobotRun, sized: Mapping[str, Sizing], found: Mapping[str, Any], files: Sequence[str],
+         section: str = "", when: str = "") -> str:
+    """Return the page of a run, with a section of its own; pictures and video stand beside it, those of `files`."""
     title = f"{found['robot']}: {_motion_name(run)}"
     servos = sorted({f"{mount.model.servo.title or mount.model.servo.name} ({type(mount.model).__name__})"
                      for mount in run.mounts.values()})
     lead = (f"{len(run.mounts)} servo{'s' * (len(run.mounts) != 1)} ({'; '.join(servos)}) follow "
             f"{run.motion.source}, {run.motion.duration:.4g} s{_supply_words(run)}.")
     body = (f'<h1>{escape(title)}</h1>\n<p class="lead">{escape(lead)}</p>\n{_answer(sized)}{_notes(run)}'
-            f"{_cards(run, sized)}{_film(files)}<h2>Is the servo big enough</h2>\n{_sizes(run, sized)}"
-            + _figure("sizing.png", "Torque over speed of each servo: what the motion takes, rotor and gear included, "
+            f"{_cards(run, sized)}{film(files, when)}{section}<h2>Is the servo big enough</h2>\n{_sizes(run, sized)}"
+            + figure("sizing.png", "Torque over speed of each servo: what the motion takes, rotor and gear included, "
                       "and what the servo gave, as means over 20 ms, in its curve at full drive. Filled: the servo "
                       "drives the motion; open: it holds it back. The number is the margin.")
             + f"<h2>Following the motion</h2>\n{_tracking(run)}"
-            + _figure("tracking.png", "Goal, servo and ideal actuator. Dashed lines: the motion begins and ends; "
+            + figure("tracking.png", "Goal, servo and ideal actuator. Dashed lines: the motion begins and ends; "
                       "before and after it the robot holds its goal.")
             + "<h2>Currents, supply, temperatures</h2>\n"
-            + _figure("electrical.png", "Motor current as its mean and, pale, all between the smallest and the "
+            + figure("electrical.png", "Motor current as its mean and, pale, all between the smallest and the "
                       f"largest; voltage at the servo; temperatures.{_heat_words(run)}")
             + f"<section><h2>How to read this page</h2>{_READING}</section>\n")
-    return document(title, body, style=_STYLE)
+    return document(title, body, style=STYLE)
 
 
 def _motion_name(run: RobotRun) -> str:
@@ -57,7 +58,7 @@ def _supply_words(run: RobotRun) -> str:
 
 
 def _notes(run: RobotRun) -> str:
-    said = "".join(f"<li>{escape(_degrees(text))}</li>" for text in run.notes)
+    said = "".join(f"<li>{escape(signed(text))}</li>" for text in run.notes)
     return f'<div class="note"><ul>{said}</ul></div>\n' if said else ""
 
 
@@ -65,7 +66,7 @@ def _answer(sized: Mapping[str, Sizing]) -> str:
     wrong = [each for each in sized.values() if not each.big_enough]
     if not wrong:
         return '<div class="yes"><p>All servos are big enough for this motion.</p></div>\n'
-    said = "".join(f"<li><b>{escape(each.joint)}</b>: {escape(_degrees(each.verdict))}</li>" for each in wrong)
+    said = "".join(f"<li><b>{escape(each.joint)}</b>: {escape(signed(each.verdict))}</li>" for each in wrong)
     return f'<div class="no"><p>Not all servos are big enough:</p><ul>{said}</ul></div>\n'
 
 
@@ -73,7 +74,7 @@ def _cards(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
     least = min(sized.values(), key=lambda each: each.margin)
     furthest = max(run.tracking, key=lambda joint: (not run.slides(joint), run.tracking[joint].rms))
     shown = [(margin_words(least.margin), f"least margin, {least.joint}"),
-             (_degrees(place(run.tracking[furthest].rms, run.slides(furthest))), f"error, rms, {furthest}")]
+             (signed(place(run.tracking[furthest].rms, run.slides(furthest))), f"error, rms, {furthest}")]
     currents = {joint: found.peak_current for joint, found in run.tracking.items()}
     most = max(currents, key=lambda joint: currents[joint])
     shown.append((f"{currents[most]:.2f} A", f"peak motor current, {most}"))
@@ -83,22 +84,24 @@ def _cards(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
     warm = {joint: found.winding for joint, found in run.tracking.items() if not math.isnan(found.winding)}
     if warm:
         hottest = max(warm, key=lambda joint: warm[joint])
-        shown.append((_degrees(celsius(warm[hottest])), f"hottest winding, {hottest}"))
+        shown.append((signed(celsius(warm[hottest])), f"hottest winding, {hottest}"))
     return '<ul class="numbers">' + "".join(
         f"<li><b>{escape(value)}</b>{escape(words)}</li>" for value, words in shown) + "</ul>\n"
 
 
-def _film(files: Sequence[str]) -> str:
+def film(files: Sequence[str], when: str = "") -> str:
+    """Return the video of a robot, or its picture and when that is, if there is one among the files."""
     words = "The robot; pale: the same with ideal actuators."
     if "robot.webm" in files:
         return (f'<figure class="film"><video controls loop muted poster="robot.png" src="robot.webm"></video>'
                 f"<figcaption>{words}</figcaption></figure>\n")
     if "robot.png" in files:
-        return _figure("robot.png", f"{words} At the time of the largest error.", kind="film")
+        return figure("robot.png", f"{words} {when}", kind="film")
     return ""
 
 
-def _figure(name: str, words: str, *, kind: str = "wide") -> str:
+def figure(name: str, words: str, *, kind: str = "wide") -> str:
+    """Return a picture with words below it."""
     return (f'<figure class="{kind}"><div><img src="{name}" alt="{escape(words)}"></div>'
             f"<figcaption>{escape(words)}</figcaption></figure>\n")
 
@@ -112,8 +115,8 @@ def _sizes(run: RobotRun, sized: Mapping[str, Sizing]) -> str:
         rows.append([
             each.joint, margin_words(each.margin), f"{worst.time:.2f} s", f"{worst.torque:.3g} N m",
             f"{worst.available:.3g} N m", f"{math.degrees(worst.speed):.0f}°/s", f"{each.rms_torque:.3g} N m",
-            _or_dash(each.lasting_torque, "{:.3g} N m"), "–" if heat is None else _degrees(celsius(heat.winding)),
-            _degrees(each.verdict)])
+            _or_dash(each.lasting_torque, "{:.3g} N m"), "–" if heat is None else signed(celsius(heat.winding)),
+            signed(each.verdict)])
     drawn = table(head, [[escape(cell) for cell in row] for row in rows], text_columns=len(head))
     return f'<div class="joints">{drawn}</div>\n'
 
@@ -126,9 +129,9 @@ def _tracking(run: RobotRun) -> str:
         slides = run.slides(joint)
         rows.append([
             joint, run.mounts[joint].model.servo.name,
-            *(_degrees(place(value, slides)) for value in (found.rms, found.largest)),
+            *(signed(place(value, slides)) for value in (found.rms, found.largest)),
             _or_dash(1e3 * found.delay, "{:.0f} ms"),
-            *(_degrees(place(value, slides)) or "–" for value in (
+            *(signed(place(value, slides)) or "–" for value in (
                 found.rms_delayed, found.droop_before, found.droop_after)),
             f"{found.peak_current:.2f} A", f"{found.mean_current:.3f} A", _or_dash(found.lowest_voltage, "{:.2f} V")])
     drawn = table(head, [[escape(cell) for cell in row] for row in rows], text_columns=len(head))
@@ -147,7 +150,7 @@ def _heat_words(run: RobotRun) -> str:
     return f" Thermal numbers of {which} are assumed by their mass."
 
 
-def _degrees(text: str) -> str:
+def signed(text: str) -> str:
     """Return a text of the terminal with the signs that a page can show."""
     return text.replace(" deg C", " °C").replace("deg/s", "°/s").replace(" deg", "°").replace("-", "−")
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from servotwin.robots import Mount
 
 ALL = "*"
-MODELS = ("digital", "pulse", "pulse-inductive", "bounded")
+MODELS = ("digital", "pulse", "pulse-inductive", "bounded", "averaged")
 _MOUNT = "JOINT=ZERO[:DIRECTION[:RATIO]], such as elbow=90deg:-1 or slider=0mm:1:9mm"
 _PYTHON = (("joint_friction='clear' sets it so, 'keep'", "--friction clear sets it so, --friction keep"),
            ("with calibration=,", "with --calibration,"), (" or ranges=, the limits of the joint in rad", ""),

@@ -30,6 +30,7 @@ from servotwin.plotting.robots import (
     servo_electrics,
     shaft_torques,
 )
+from servotwin.plotting.tool_paths import JointUse, ToolTrace, joint_use, tool_paths
 from servotwin.plotting.tornado import metric_shown, tornado
 
 __all__ = [
@@ -42,12 +43,14 @@ __all__ = [
     "Diagram",
     "Formula",
     "JointTrace",
+    "JointUse",
     "Limit",
     "PathTrace",
     "Response",
     "ServoTrace",
     "ShaftTrace",
     "Shown",
+    "ToolTrace",
     "axes_grid",
     "bandwidth_curves",
     "block_diagram",
@@ -58,6 +61,7 @@ __all__ = [
     "formula_svg",
     "holding_curves",
     "joint_tracking",
+    "joint_use",
     "lift_curve",
     "loop_curve",
     "metric_shown",
@@ -72,5 +76,6 @@ __all__ = [
     "speed_curves",
     "time_response",
     "to_bytes",
+    "tool_paths",
     "tornado",
 ]

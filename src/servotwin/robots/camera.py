@@ -6,10 +6,11 @@ import contextlib
 import ctypes.util
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
+from itertools import pairwise
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,14 @@ _AZIMUTH, _ELEVATION = 125.0, -18.0  # degrees, of the view of a robot without a
 _ROOM = 1.06  # times the distance from which the robot just fits
 _LOOKS = 40  # poses by which a robot is kept in the picture
 _SIDE = "side"  # of the cameras of a model, the one whose direction is taken first
+
+
+class Trail(NamedTuple):
+    """A line in space: points, shape (n, 3) [m], its colour (red, green, blue, opacity), how wide [pixels]."""
+
+    points: NDArray[np.float64]
+    colour: tuple[float, float, float, float]
+    width: float = 3.0
 
 
 class NoDrawingError(ServotwinError):
@@ -84,7 +93,7 @@ class Camera:
             raise _no_drawing(f"{type(error).__name__}: {error}") from None
 
     def picture(self, pose: NDArray[np.float64], shadow: NDArray[np.float64] | None = None, *, words: str = "",
-                note: str = "") -> Picture:
+                note: str = "", trails: Sequence[Trail] = ()) -> Picture:
         """Return a picture of the robot in a pose, shape (height, width, 3), red, green, blue.
 
         Parameters
@@ -95,6 +104,8 @@ class Camera:
             Another pose, drawn as a transparent shadow.
         words, note : str
             Written at the top and at the bottom, on the left.
+        trails : sequence of Trail
+            Lines in space.
         """
         mujoco, scene = self._mujoco, self._scene
         all_of_it = mujoco.mjtCatBit.mjCAT_ALL.value
@@ -108,6 +119,8 @@ class Camera:
             for k in range(first, scene.ngeom):
                 scene.geoms[k].rgba[:] = _SHADOW
                 scene.geoms[k].transparent = 1
+        for trail in trails:
+            self._draw(trail)
         frame = mujoco.MjrRect(0, 0, self._width, self._height)
         mujoco.mjr_render(frame, scene, self._context)
         for place, text in ((mujoco.mjtGridPos.mjGRID_TOPLEFT, words), (mujoco.mjtGridPos.mjGRID_BOTTOMLEFT, note)):
@@ -116,6 +129,19 @@ class Camera:
         pixels = np.empty((self._height, self._width, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, frame, self._context)
         return np.ascontiguousarray(pixels[::-1])
+
+    def _draw(self, trail: Trail) -> None:
+        """Add a line to the scene, as far as there is room."""
+        mujoco, scene = self._mujoco, self._scene
+        line = mujoco.mjtGeom.mjGEOM_LINE
+        for a, b in pairwise(np.asarray(trail.points, dtype=np.float64)):
+            if scene.ngeom >= scene.maxgeom:
+                return
+            geom = scene.geoms[scene.ngeom]
+            mujoco.mjv_initGeom(geom, line.value, np.zeros(3), np.zeros(3), np.zeros(9),
+                                np.array(trail.colour, dtype=np.float32))
+            mujoco.mjv_connector(geom, line.value, trail.width, a, b)
+            scene.ngeom += 1
 
     def _view_of(self, name: str | None, poses: NDArray[np.float64]) -> Any:
         """Return where the robot is seen from."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.models import BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
+from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
 from servotwin.robots.places import load_mujoco
 from servotwin.units import is_finite
 
-SERVOS = (BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
+SERVOS = (AveragedServo, BoundedServo, PulseServo, PulseServoInductive, DigitalServo)
 _PASSIVE = {"dof_damping": "damping", "dof_frictionloss": "friction loss"}
 
 
@@ -21,7 +21,7 @@ class Mount:
 
     Parameters
     ----------
-    model : BoundedServo, PulseServo, PulseServoInductive or DigitalServo
+    model : AveragedServo, BoundedServo, PulseServo, PulseServoInductive or DigitalServo
     zero : float
         Of the joint where the servo's angle is 0: angle of a hinge [rad], place of a slide [m].
     direction : int

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -156,7 +156,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     own = robot_model(model)
     if timestep is not None:
         own.opt.timestep = timestep
-    mounts = _mounts(servos, assume_heat=assume_heat, shared=bus is not None)
+    mounts = warm_mounts(servos, assume_heat=assume_heat, shared=bus is not None)
     for joint, mount in mounts.items():
         supplied(mount.model, supply_of(bus, joint))  # raises before anything is run
     _check_joints(motion, mounts, joint_names(own))
@@ -165,7 +165,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     with shown(progress, 2 * len(time), "following the motion") as tell:
         data = mujoco.MjData(drive.model)
         poses = np.zeros((len(time), own.nq))
-        _start(drive, data, motion, mounts, -settle)
+        begin(drive, data, motion, mounts, -settle)
         for k, goals in enumerate(_goals(motion, time - own.opt.timestep, hold)):
             if goals:
                 drive.command(data, goals)
@@ -173,9 +173,28 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
             poses[k] = data.qpos
             if k % _TELL == 0:
                 tell(k)
-        record = drive.result(data)
-        ideal = ideal_run(drive.model, drive.joints, motion, record.time, progress=lambda k: tell(len(time) + k),
-                          window=blend_window(motion) if window is None else window)
+        return finished(drive, data, motion, mounts, bus, poses, window=window, tell=lambda k: tell(len(time) + k))
+
+
+def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mount], bus: Any, poses: Array, *,
+             window: float | None = None, tell: Callable[[int], object] | None = None) -> RobotRun:
+    """Return what servos have done that were recorded in some data, beside the same robot with ideal actuators.
+
+    Parameters
+    ----------
+    drive : ServoDrive
+    data : MjData
+        Whose record has begun before the motion, which begins at time 0.
+    motion, mounts, bus, window
+        As of `run_motion`.
+    poses : ndarray, shape (n, nq)
+        At the times of the record.
+    tell : callable, optional
+        Is told how many times are done.
+    """
+    record = drive.result(data)
+    ideal = ideal_run(drive.model, drive.joints, motion, record.time, progress=tell,
+                      window=blend_window(motion) if window is None else window)
     return RobotRun(model=drive.model, motion=motion, mounts=mounts, bus=bus, record=record, poses=poses, ideal=ideal,
                     tracking={joint: tracking_of(record[joint], goal_of(motion, joint, record.time, ideal),
                                                  motion.duration) for joint in drive.joints})
@@ -207,7 +226,8 @@ def _check_joints(motion: Motion, mounts: Mapping[str, Mount], joints: Mapping[s
                              allowed=f"joints with servos, {', '.join(mounts)}")
 
 
-def _mounts(servos: Mapping[str, Model | Mount], *, assume_heat: bool, shared: bool) -> dict[str, Mount]:
+def warm_mounts(servos: Mapping[str, Model | Mount], *, assume_heat: bool, shared: bool) -> dict[str, Mount]:
+    """Return mounts of servos, with thermal numbers by their mass where that is asked for and possible."""
     if not isinstance(servos, Mapping) or not servos:
         raise InputError("servos of a robot", got=servos, allowed="a mapping of joints to models")
     found = {name: given if isinstance(given, Mount) else Mount(given) for name, given in servos.items()}
@@ -228,8 +248,14 @@ def _times(timestep: float, duration: float, settle: float) -> Array:
     return -settle + timestep * np.arange(1.0, ticks + 1.0)
 
 
-def _start(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mount], time: float) -> None:
-    """Put the robot at the first goals, and let the servos begin there."""
+def begin(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mount], time: float) -> None:
+    """Put the robot at the first goals at some time [s], let the servos begin there, and record them.
+
+    Raises
+    ------
+    InputError
+        If a servo would have to begin beyond its stops.
+    """
     model, goals = drive.model, {}
     for joint, mount in mounts.items():
         at = int(model.jnt_qposadr[model.joint(joint).id])

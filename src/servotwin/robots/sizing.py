@@ -19,6 +19,7 @@ from servotwin.datasheet.conditions import at_voltage, changed
 from servotwin.datasheet.curve import SpeedCurve, speed_curve
 from servotwin.datasheet.warming import WIRE_LIMIT, thermal_masses
 from servotwin.errors import InputError
+from servotwin.models import AveragedServo, BoundedServo
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, Temperatures
 from servotwin.robots.heat import Heating, heating, lasting_torque, mean_heat
 from servotwin.simulation.remarks import Remark
@@ -196,6 +197,8 @@ def supplied(model: Model, supply: Supply | None) -> Model:
     InputError
         If the supply has no voltage, or one that is not for this servo.
     """
+    if isinstance(model, AveragedServo):  # it knows no supply, but has one
+        model = BoundedServo(model.servo)
     if supply is None:
         return model
     if supply.open_circuit_voltage is None:

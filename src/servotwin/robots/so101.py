@@ -12,22 +12,20 @@ Joints have neither damping nor friction nor armature: the servos bring these. T
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-_Vector = tuple[float, float, float]
+from servotwin.robots import mjcf
+from servotwin.robots.mjcf import Shape, Vector, beam, box, disc, words
+
 _Quaternion = tuple[float, float, float, float]
-_Shape = Mapping[str, str]
 
 _SERVO = (0.0226, 0.01235, 0.0175)  # half of the case of an STS3215 [m]
 _HORN = (0.0125, 0.0, 0.0181)  # middle of its horn, from the middle of its case [m]
-_COLOURS = {"printed": "0.98 0.78 0.16 1", "servo": "0.13 0.14 0.16 1", "horn": "0.72 0.74 0.78 1",
-            "pad": "0.26 0.28 0.33 1", "board": "0.16 0.44 0.36 1"}
-_HAZE = "0.93 0.95 0.97 1"
 _SIDE = ((0.3, -1.4, 0.42), (0.06, 0.0, 0.22))  # place of the camera, and what it looks at [m]
 
 
@@ -53,48 +51,27 @@ class _Link:
 
     name: str
     joint: str
-    place: _Vector = (0.0, 0.0, 0.0)
+    place: Vector = (0.0, 0.0, 0.0)
     turn: _Quaternion = (1.0, 0.0, 0.0, 0.0)
     limits: tuple[float, float]
     mass: float
-    centre: _Vector
+    centre: Vector
     inertia: tuple[float, float, float, float, float, float]
-    shapes: tuple[_Shape, ...]
+    shapes: tuple[Shape, ...]
 
 
-def _words(numbers: Sequence[float]) -> str:
-    return " ".join(f"{float(x):.9g}" for x in numbers)
-
-
-def _box(colour: str, centre: _Vector, half: _Vector) -> _Shape:
-    return {"type": "box", "material": colour, "pos": _words(centre), "size": _words(half)}
-
-
-def _disc(colour: str, centre: _Vector, radius: float, half: float) -> _Shape:
-    """Return a disc about the z axis."""
-    return {"type": "cylinder", "material": colour, "pos": _words(centre), "size": _words((radius, half))}
-
-
-def _beam(colour: str, start: _Vector, end: _Vector, width: float, thickness: float, *, across: int = 2) -> _Shape:
-    """Return a box from one point to another, as wide as said along the axis `across` of the link."""
-    a, b = np.array(start), np.array(end)
-    along, side = (b - a) / np.linalg.norm(b - a), np.eye(3)[across]
-    return {"type": "box", "material": colour, "pos": _words((a + b) / 2.0), "xyaxes": _words((*along, *side)),
-            "size": _words((float(np.linalg.norm(b - a)) / 2.0, width / 2.0, thickness / 2.0))}
-
-
-def _servo(place: _Vector, turn: _Quaternion, *, horn: bool = True) -> tuple[_Shape, ...]:
+def _servo(place: Vector, turn: _Quaternion, *, horn: bool = True) -> tuple[Shape, ...]:
     """Return a servo, whose horn turns about its own z axis."""
     w, *v = np.array(turn) / np.linalg.norm(turn)
     offset = np.array(_HORN)
     at = np.array(place) + offset + 2.0 * np.cross(v, np.cross(v, offset) + w * offset)
-    case = {"type": "box", "material": "servo", "pos": _words(place), "quat": _words(turn), "size": _words(_SERVO)}
-    disc = {"type": "cylinder", "material": "horn", "pos": _words(tuple(at)), "quat": _words(turn),
-            "size": _words((0.0105, 0.0012))}
+    case = {"type": "box", "material": "servo", "pos": words(place), "quat": words(turn), "size": words(_SERVO)}
+    disc = {"type": "cylinder", "material": "horn", "pos": words(tuple(at)), "quat": words(turn),
+            "size": words((0.0105, 0.0012))}
     return (case, disc) if horn else (case,)
 
 
-def _fork(reach: float, *, low: float, high: float, to: tuple[float, float], hub: float = 0.0125) -> tuple[_Shape, ...]:
+def _fork(reach: float, *, low: float, high: float, to: tuple[float, float], hub: float = 0.0125) -> tuple[Shape, ...]:
     """Return two cheeks with round ends about the joint, and what joins them.
 
     Parameters
@@ -108,17 +85,17 @@ def _fork(reach: float, *, low: float, high: float, to: tuple[float, float], hub
     """
     end = (reach * to[0], reach * to[1])
     cheeks = tuple(shape for z in (low, high) for shape in (
-        _disc("printed", (0.0, 0.0, z), hub, 0.0026), _disc("horn", (0.0, 0.0, z), 0.55 * hub, 0.0032),
-        _beam("printed", (0.0, 0.0, z), (*end, z), 0.0044, 1.8 * hub)))
+        disc("printed", (0.0, 0.0, z), hub, 0.0026), disc("horn", (0.0, 0.0, z), 0.55 * hub, 0.0032),
+        beam("printed", (0.0, 0.0, z), (*end, z), 0.0044, 1.8 * hub)))
     middle = 0.5 * (low + high)
-    return (*cheeks, _beam("printed", (*end, middle), (*to, middle), high - low + 0.0044, 1.9 * hub))
+    return (*cheeks, beam("printed", (*end, middle), (*to, middle), high - low + 0.0044, 1.9 * hub))
 
 
 _BASE = (
-    _box("printed", (0.008, 0.0, 0.003), (0.05, 0.04, 0.003)),
-    _box("printed", (0.0263, 0.0, 0.024), (0.0275, 0.0185, 0.02)),
-    _box("printed", (-0.024, 0.0, 0.03), (0.003, 0.027, 0.028)),
-    _box("board", (-0.0285, 0.0, 0.034), (0.0015, 0.024, 0.02)),
+    box("printed", (0.008, 0.0, 0.003), (0.05, 0.04, 0.003)),
+    box("printed", (0.0263, 0.0, 0.024), (0.0275, 0.0185, 0.02)),
+    box("printed", (-0.024, 0.0, 0.03), (0.003, 0.027, 0.028)),
+    box("board", (-0.0285, 0.0, 0.034), (0.0015, 0.024, 0.02)),
     *_servo((0.0263353, 0.0, 0.0437), (1.0, 0.0, 0.0, 0.0)),
 )
 _BASE_MASS = (0.147, (0.0137179, -5.19711e-05, 0.0334843),
@@ -127,44 +104,44 @@ _LINKS = (
     _Link(name="shoulder", joint="shoulder_pan", place=(0.0388353, -8.97657e-09, 0.0624), turn=(0.0, 0.0, -1.0, 0.0),
           limits=(-1.91986, 1.91986), mass=0.100006, centre=(-0.0307604, -1.66727e-05, -0.0252713),
           inertia=(8.3759e-05, 8.10403e-05, 2.39783e-05, 7.55525e-08, -1.16342e-06, 1.54663e-07),
-          shapes=(_disc("printed", (0.0, 0.0, -0.003), 0.019, 0.002),
-                  _box("printed", (-0.018, 0.0, -0.0055), (0.03, 0.0175, 0.0035)),
-                  _box("printed", (-0.0304, 0.0025, -0.024), (0.0165, 0.0165, 0.017)),
+          shapes=(disc("printed", (0.0, 0.0, -0.003), 0.019, 0.002),
+                  box("printed", (-0.018, 0.0, -0.0055), (0.03, 0.0175, 0.0035)),
+                  box("printed", (-0.0304, 0.0025, -0.024), (0.0165, 0.0165, 0.017)),
                   *_servo((-0.0303992, 0.000422241, -0.0417), (0.5, 0.5, 0.5, -0.5)))),
     _Link(name="upper_arm", joint="shoulder_lift", place=(-0.0303992, -0.0182778, -0.0542),
           turn=(0.5, -0.5, -0.5, -0.5), limits=(-1.74533, 1.74533), mass=0.103,
           centre=(-0.0898471, -0.00838224, 0.0184089),
           inertia=(4.08002e-05, 0.000147318, 0.000142487, -1.97819e-05, -4.03016e-08, 8.97326e-09),
           shapes=(*_fork(0.5, low=-0.0025, high=0.0399, to=(-0.088, -0.004)),
-                  _box("printed", (-0.1, -0.0125, 0.0205), (0.014, 0.0185, 0.0165)),
+                  box("printed", (-0.1, -0.0125, 0.0205), (0.014, 0.0185, 0.0165)),
                   *_servo((-0.11257, -0.0155, 0.0187), (0.0, -1.0, 1.0, 0.0)))),
     _Link(name="lower_arm", joint="elbow_flex", place=(-0.11257, -0.028, 0.0), turn=(1.0, 0.0, 0.0, 1.0),
           limits=(-1.69, 1.69), mass=0.104, centre=(-0.0980701, 0.00324376, 0.0182831),
           inertia=(2.87438e-05, 0.000159844, 0.00014529, 7.41152e-06, 1.26409e-06, -4.90188e-08),
           shapes=(*_fork(0.5, low=-0.0025, high=0.0399, to=(-0.1, 0.004)),
-                  _box("printed", (-0.1115, 0.0045, 0.0205), (0.017, 0.0145, 0.0165)),
+                  box("printed", (-0.1115, 0.0045, 0.0205), (0.017, 0.0145, 0.0165)),
                   *_servo((-0.1224, 0.0052, 0.0187), (0.0, 0.0, 1.0, 0.0)))),
     _Link(name="wrist", joint="wrist_flex", place=(-0.1349, 0.0052, 0.0), turn=(1.0, 0.0, 0.0, -1.0),
           limits=(-1.65806, 1.65806), mass=0.079, centre=(-0.000103312, -0.0386143, 0.0281156),
           inertia=(3.68263e-05, 2.5391e-05, 2.1e-05, 1.7893e-08, -5.28128e-08, 3.6412e-06),
           shapes=(*_fork(0.8, low=-0.0025, high=0.0399, to=(0.0, -0.03), hub=0.011),
-                  _box("printed", (0.0, -0.036, 0.0262), (0.0145, 0.0125, 0.0215)),
+                  box("printed", (0.0, -0.036, 0.0262), (0.0145, 0.0125, 0.0215)),
                   *_servo((0.0, -0.0424, 0.0306), (0.5, 0.5, 0.5, -0.5)))),
     _Link(name="gripper", joint="wrist_roll", place=(0.0, -0.0611, 0.0181), turn=(0.0, 0.0, 1.0, 1.0),
           limits=(-2.79253, 2.79253), mass=0.087, centre=(0.000213627, 0.000245138, -0.025187),
           inertia=(2.75087e-05, 4.33657e-05, 3.45059e-05, -3.35241e-07, -5.7352e-06, -5.17847e-08),
-          shapes=(_disc("printed", (0.0, 0.0, -0.0025), 0.017, 0.0025),
-                  _box("printed", (0.003, 0.0, -0.007), (0.0245, 0.0165, 0.0025)),
-                  _beam("printed", (-0.0185, 0.0, -0.005), (-0.0185, 0.0, -0.046), 0.033, 0.005, across=1),
-                  _beam("printed", (-0.0185, 0.0, -0.043), (-0.0135, 0.0, -0.1), 0.022, 0.005, across=1),
-                  _beam("pad", (-0.0142, 0.0, -0.062), (-0.0094, 0.0, -0.1), 0.02, 0.003, across=1),
+          shapes=(disc("printed", (0.0, 0.0, -0.0025), 0.017, 0.0025),
+                  box("printed", (0.003, 0.0, -0.007), (0.0245, 0.0165, 0.0025)),
+                  beam("printed", (-0.0185, 0.0, -0.005), (-0.0185, 0.0, -0.046), 0.033, 0.005, across=1),
+                  beam("printed", (-0.0185, 0.0, -0.043), (-0.0135, 0.0, -0.1), 0.022, 0.005, across=1),
+                  beam("pad", (-0.0142, 0.0, -0.062), (-0.0094, 0.0, -0.1), 0.02, 0.003, across=1),
                   *_servo((0.0077, 0.0001, -0.0234), (1.0, -1.0, 0.0, 0.0)))),
     _Link(name="moving_jaw", joint="gripper", place=(0.0202, 0.0188, -0.0234), turn=(1.0, 1.0, 0.0, 0.0),
           limits=(-0.174533, 1.74533), mass=0.012, centre=(-0.00157495, -0.0300244, 0.0192755),
           inertia=(6.61427e-06, 1.89032e-06, 5.28738e-06, -3.19807e-07, -5.90717e-09, -1.09945e-07),
           shapes=(*_fork(0.7, low=-0.0005, high=0.0385, to=(0.0, -0.03), hub=0.0105),
-                  _beam("printed", (0.001, -0.028, 0.019), (-0.0105, -0.077, 0.019), 0.022, 0.006),
-                  _beam("pad", (-0.0045, -0.045, 0.019), (-0.0138, -0.077, 0.019), 0.02, 0.003))),
+                  beam("printed", (0.001, -0.028, 0.019), (-0.0105, -0.077, 0.019), 0.022, 0.006),
+                  beam("pad", (-0.0045, -0.045, 0.019), (-0.0138, -0.077, 0.019), 0.02, 0.003))),
 )
 _TOOL = ((-0.0079, -0.000218121, -0.0981274), (1.0, 0.0, 1.0, 0.0))  # `gripperframe` of the publication, in `gripper`
 
@@ -198,68 +175,22 @@ def so101(*, scene: bool = True, motors: bool = False) -> str:
     >>> so101().count("<joint "), so101(scene=False, motors=True).count("<motor ")
     (6, 6)
     """
-    root = Xml.Element("mujoco", model="so101")
-    Xml.SubElement(root, "compiler", angle="radian", autolimits="true")
-    # The arm has conaffinity alone: what has both bits, as geoms have by default, touches it, and it never itself.
-    default = Xml.SubElement(Xml.SubElement(root, "default"), "default", attrib={"class": "so101"})
-    Xml.SubElement(default, "geom", contype="0", conaffinity="1")
-    assets = Xml.SubElement(root, "asset")
-    for name, colour in _COLOURS.items():
-        Xml.SubElement(assets, "material", name=name, rgba=colour, specular="0.15", shininess="0.3")
-    world = Xml.SubElement(root, "worldbody")
+    root, assets, world = mjcf.new_robot("so101")
     if scene:
-        _add_scene(root, assets, world)
+        mjcf.add_scene(root, assets, world, *_SIDE)
     body = Xml.SubElement(world, "body", name="base", childclass="so101")
-    _add_mass(body, *_BASE_MASS)
-    _add_shapes(body, _BASE)
+    mjcf.add_mass(body, *_BASE_MASS)
+    mjcf.add_shapes(body, _BASE)
     for link in _LINKS:
-        body = Xml.SubElement(body, "body", name=link.name, pos=_words(link.place), quat=_words(link.turn))
-        Xml.SubElement(body, "joint", name=link.joint, type="hinge", axis="0 0 1", range=_words(link.limits))
-        _add_mass(body, link.mass, link.centre, link.inertia)
-        _add_shapes(body, link.shapes)
+        body = Xml.SubElement(body, "body", name=link.name, pos=words(link.place), quat=words(link.turn))
+        Xml.SubElement(body, "joint", name=link.joint, type="hinge", axis="0 0 1", range=words(link.limits))
+        mjcf.add_mass(body, link.mass, link.centre, link.inertia)
+        mjcf.add_shapes(body, link.shapes)
         if link.name == "gripper":
-            Xml.SubElement(body, "site", name="tool", pos=_words(_TOOL[0]), quat=_words(_TOOL[1]), size="0.004",
+            Xml.SubElement(body, "site", name="tool", pos=words(_TOOL[0]), quat=words(_TOOL[1]), size="0.004",
                            rgba="0.9 0.2 0.2 0.6", group="3")
     if motors:
         actuators = Xml.SubElement(root, "actuator")
         for joint in JOINTS:
             Xml.SubElement(actuators, "motor", name=joint, joint=joint)
-    Xml.indent(root)
-    return Xml.tostring(root, encoding="unicode") + "\n"
-
-
-def _add_mass(body: Xml.Element, mass: float, centre: Sequence[float], inertia: Sequence[float]) -> None:
-    Xml.SubElement(body, "inertial", pos=_words(centre), mass=_words((mass,)), fullinertia=_words(inertia))
-
-
-def _add_shapes(body: Xml.Element, shapes: Sequence[_Shape]) -> None:
-    for shape in shapes:
-        Xml.SubElement(body, "geom", attrib=dict(shape))
-
-
-def _add_scene(root: Xml.Element, assets: Xml.Element, world: Xml.Element) -> None:
-    """Add ground, sky, light and camera."""
-    visual = Xml.SubElement(root, "visual")
-    Xml.SubElement(visual, "headlight", ambient="0.32 0.32 0.34", diffuse="0.3 0.3 0.3", specular="0.1 0.1 0.1")
-    Xml.SubElement(visual, "global", offwidth="1280", offheight="960")
-    Xml.SubElement(visual, "quality", shadowsize="4096")
-    Xml.SubElement(visual, "map", zfar="30")
-    Xml.SubElement(visual, "rgba", haze=_HAZE)
-    Xml.SubElement(assets, "texture", name="sky", type="skybox", builtin="gradient", rgb1="0.66 0.75 0.86",
-                   rgb2="0.93 0.95 0.97", width="256", height="1536")
-    Xml.SubElement(assets, "texture", name="ground", type="2d", builtin="checker", rgb1="0.86 0.88 0.9",
-                   rgb2="0.79 0.82 0.85", width="256", height="256")
-    Xml.SubElement(assets, "material", name="ground", texture="ground", texrepeat="20 20", texuniform="true",
-                   specular="0", shininess="0")
-    Xml.SubElement(world, "geom", name="ground", type="plane", size="0 0 0.05", material="ground")
-    # A spot light casts the shadow: that of a directional one is noisy at the edge of its map.
-    Xml.SubElement(world, "light", name="lamp", pos="0.7 -1 2.4", dir="-0.25 0.38 -0.9", cutoff="80", exponent="0",
-                   diffuse="0.4 0.4 0.39", specular="0.2 0.2 0.2")
-    Xml.SubElement(world, "light", name="sky", pos="0 0 3", dir="0.2 0.3 -0.9", directional="true",
-                   castshadow="false", diffuse="0.3 0.3 0.3", specular="0 0 0")
-    place, target = map(np.array, _SIDE)
-    forward = (target - place) / np.linalg.norm(target - place)
-    right = np.cross(forward, (0.0, 0.0, 1.0))
-    right = right / np.linalg.norm(right)
-    Xml.SubElement(world, "camera", name="side", pos=_words(_SIDE[0]), fovy="32",
-                   xyaxes=_words((*right, *np.cross(right, forward))))
+    return mjcf.text(root)

@@ -20,7 +20,7 @@ from servotwin.models.outputs import FIELDS as FIELDS_OF
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
-from servotwin.simulation.lane_inputs import LAWS, Lanes
+from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes
 from servotwin.simulation.lane_loads import LOAD_NAMES, column_load, recorded_torque, structure
 from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Raw, Tables, Work, no_tables, regular_edges
 from servotwin.simulation.start import check_start, start_vector
@@ -252,7 +252,7 @@ class Chunk:
             first, count, rows = recorded_torque(*self._of_loads).tables()
             recorded = np.array([bool(load.recorded) for load in self._of_loads[0]])[self._of_loads[1]]
             torque = Tables(first, np.where(recorded, count, 0), rows)
-        return Work(law=LAWS[type(self.model)], numbers=mapped(flat, numbers),
+        return Work(law=TICK_LAWS[type(self.model)], numbers=mapped(flat, numbers),
                     chip=None if chip is None else mapped(flat, chip), command=command, torque=torque,
                     constant_torque=flat(self.load.torque), edges=self.commands.frame_edges(self.which),
                     start=self.start, seeds=self.lanes.seeds[self.which], duration=asked.duration,

@@ -20,7 +20,7 @@ from servotwin.models.engine.ticks import LONGEST
 from servotwin.signals import Signal, constant
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.bus_supply import supplies_of
-from servotwin.simulation.lane_inputs import lanes_of, pick
+from servotwin.simulation.lane_inputs import TICK_LAWS, lanes_of, pick
 from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
@@ -55,7 +55,7 @@ class VectorSimulator:
 
     Parameters
     ----------
-    model : PulseServo, PulseServoInductive, DigitalServo or BoundedServo
+    model : PulseServo, PulseServoInductive, DigitalServo, BoundedServo or AveragedServo
     lanes : int
         Number of servos.
     load : Load or sequence of Load, optional
@@ -101,7 +101,7 @@ class VectorSimulator:
         supplies = supplies_of(bus, model, count)
         base = _whole("seed", seed, None)
         start = _first_command(model)
-        inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count))
+        inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count), TICK_LAWS)
         if inputs.count != count:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")

@@ -22,7 +22,7 @@ from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.simulation import lane_runs
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
-from servotwin.simulation.lane_inputs import LAWS, Lanes, lanes_of
+from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes, lanes_of
 from servotwin.simulation.lane_memory import RECORD
 from servotwin.simulation.lanes import Tables
 from servotwin.simulation.packing import Asked, Chunk, Commands, flat, groups
@@ -73,7 +73,7 @@ class LaneNumbers:
         commands = Commands(inputs)
         self.chunks = [Chunk(own, commands, part) for which in groups(inputs, commands)
                        for own, part in supplies.parts(inputs, which)]
-        law = LAWS[type(inputs.model)]
+        law = TICK_LAWS[type(inputs.model)]
         self.pulsed, self.digital = law != "bounded", law == "digital"  # whether there is a bridge, and a program
         self.curve = np.array(inputs.model.curve(), np.float64).reshape(2, -1)
         self.neutral = np.empty(self.count)
@@ -83,7 +83,7 @@ class LaneNumbers:
         for chunk in self.chunks:
             self.load_total[chunk.which] = flat(chunk.load.total_inertia)
             self.reduction[chunk.which] = flat(chunk.model.value("gear.gear_reduction"))
-            self.V_oc[chunk.which] = flat(chunk.model.value("supply.open_circuit_voltage"))
+            self.V_oc[chunk.which] = flat(chunk.model.value_or("supply.open_circuit_voltage", math.nan))
         for k in np.concatenate([*supplies.lanes, np.zeros(0, np.int64)]).tolist():
             check_rigid(f"lane {k} on a bus", Elastic(*(x[0] for x in self.now("elastic", np.array([k])))))
         self.given = self.columns.numbers.copy()
@@ -148,7 +148,7 @@ class LaneNumbers:
         merged = {name: self._merged(name, value, which) for name, value in parameters.items()}
         known = {**inputs.numbers, **inputs.words}
         loads = [inputs.loads[k] for k in inputs.load_of.tolist()]
-        inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
+        inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds, TICK_LAWS)
         return LaneNumbers(inputs, self.accuracy, self.supplies, self.imposed)
 
     def _merged(self, name: str, value: Any, which: Indices) -> Any:

@@ -1,0 +1,240 @@
+"""`servotwin robot scara` and `two-link`: arms whose tool follows a path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from servotwin.cli import shared_options as shared
+from servotwin.cli.robot_words import ALL, Chosen, as_options, models_of, named_words, supply_of
+from servotwin.cli.terminal import emit_json, pairs, patience, show, table
+
+if TYPE_CHECKING:
+    from servotwin.cli.outputs import Target
+    from servotwin.models import Model
+    from servotwin.robots.arm import Arm
+    from servotwin.robots.kinematics import JointPath
+    from servotwin.robots.redundancy import Criterion
+    from servotwin.robots.steering import Steering
+    from servotwin.robots.tasks import ToolPath
+
+_TASK, _ARM = "Task", "Arm and servos"
+_SERVO = "hitec-hs-755hb"
+
+TaskOption = Annotated[str, typer.Option(
+    metavar="TASK", help="What the tool does: circle, square or pick-and-place.", rich_help_panel=_TASK)]
+SizeOption = Annotated[str | None, typer.Option(
+    metavar="LENGTH", help="Radius of the circle, half of the side of the square, half of the way over, such as 40mm "
+    "(default).", rich_help_panel=_TASK)]
+SpeedOption = Annotated[float, typer.Option(
+    metavar="M/S", help="Of the tool along its path.", rich_help_panel=_TASK)]
+ServoOption = Annotated[list[str] | None, typer.Option(
+    metavar="[JOINT=]ID", help=f"Servo of all joints, or of one; repeatable: catalog id, or path of a servo file "
+    f"(default: {_SERVO}).", rich_help_panel=_ARM)]
+ModelOption = Annotated[str | None, typer.Option(
+    metavar="MODEL", help="digital, pulse, pulse-inductive, bounded or averaged (default: by the kind of each servo).",
+    rich_help_panel=_ARM)]
+ControllerOption = Annotated[str, typer.Option(
+    metavar="NAME", help="What commands the servos: plain, feedforward, pid, computed-torque or "
+    "observer; the last three bypass the chips.", rich_help_panel=_ARM)]
+SetOption = Annotated[list[str] | None, typer.Option(
+    "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable; with a unit, or in SI "
+    "units.", rich_help_panel=_ARM)]
+SupplyOption = Annotated[str | None, typer.Option(
+    metavar="VOLTS[:OHMS]", help="Supply that all servos share, such as 6V:0.1ohm (default: each its own).",
+    rich_help_panel=_ARM)]
+PayloadOption = Annotated[str | None, typer.Option(
+    metavar="MASS", help="That the tool carries, such as 100g (default: none).", rich_help_panel=_ARM)]
+IdealOption = Annotated[bool, typer.Option(
+    "--ideal", help="With ideal actuators instead of servos.", rich_help_panel=_ARM)]
+OutOption = Annotated[Path, typer.Option(
+    metavar="FOLDER", help="Folder for tables, pictures, video and page.", rich_help_panel=shared.OUTPUT)]
+StepOption = Annotated[float, typer.Option(
+    metavar="SECONDS", help="Time between rows of the tables.", rich_help_panel=shared.OUTPUT)]
+VideoOption = Annotated[bool, typer.Option(
+    "--video/--no-video", help="Draw a video.", rich_help_panel=shared.OUTPUT)]
+ForceOption = Annotated[bool, typer.Option(
+    "--force", help="Replace existing files.", rich_help_panel=shared.OUTPUT)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What the options of a command say, in its words."""
+
+    out: Path
+    task: str
+    size: str | None
+    speed: float
+    servo: list[str]
+    model: str | None
+    controller: str
+    redundancy: str = "none"
+    ideal: bool
+    supply: str | None
+    change: list[str]
+    output_step: float
+    video: bool
+    force: bool
+    as_json: bool
+
+
+class Ways(NamedTuple):
+    """How the joints of an arm may move for one path of its tool: as asked for, and by other criteria."""
+
+    joints: JointPath
+    others: Mapping[str, JointPath]
+
+
+def scara(
+    out: OutOption, task: TaskOption = "circle", size: SizeOption = None, speed: SpeedOption = 0.08,
+    servo: ServoOption = None, model: ModelOption = None, controller: ControllerOption = "plain",
+    third_link: Annotated[bool, typer.Option(
+        "--third-link/--no-third-link", help="With the third link, which makes it redundant.",
+        rich_help_panel=_ARM)] = True,
+    redundancy: Annotated[str, typer.Option(
+        metavar="CRITERION", help="What the third link is used for: none (joints move little), limits (far from the "
+        "joints' limits) or torque (little torque).", rich_help_panel=_ARM)] = "none",
+    payload: PayloadOption = None, ideal: IdealOption = False, supply: SupplyOption = None, change: SetOption = None,
+    output_step: StepOption = 0.01, video: VideoOption = True, force: ForceOption = False,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """Let the SCARA robot do a task."""
+    from servotwin.robots import scara as made
+
+    with as_options():
+        arm = made(third_link=third_link, payload=mass(payload))
+    _do(arm, Asked(out=out, task=task, size=size, speed=speed, servo=servo or [], model=model, controller=controller,
+                   redundancy=redundancy, ideal=ideal, supply=supply, change=change or [], output_step=output_step,
+                   video=video, force=force, as_json=as_json))
+
+
+def two_link(
+    out: OutOption, task: TaskOption = "circle", size: SizeOption = None, speed: SpeedOption = 0.08,
+    servo: ServoOption = None, model: ModelOption = None, controller: ControllerOption = "plain",
+    payload: PayloadOption = None, ideal: IdealOption = False, supply: SupplyOption = None, change: SetOption = None,
+    output_step: StepOption = 0.01, video: VideoOption = True, force: ForceOption = False,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """Let the two-link arm do a task."""
+    from servotwin.robots import two_link as made
+
+    with as_options():
+        arm = made(payload=mass(payload))
+    _do(arm, Asked(out=out, task=task, size=size, speed=speed, servo=servo or [], model=model, controller=controller,
+                   ideal=ideal, supply=supply, change=change or [], output_step=output_step, video=video, force=force,
+                   as_json=as_json))
+
+
+def add_to(robot: typer.Typer) -> None:
+    """Add the commands of this module to `servotwin robot`."""
+    robot.command("scara", help="Let the paper's SCARA robot, redundant or not, do a task: contour error, joints, "
+                  "currents, sag, heat, video.", epilog=(
+        "Example: servotwin robot scara --task circle --out circle\n\n"
+        "Example: servotwin robot scara --task square --redundancy torque --supply 6V:0.1ohm --out square\n\n"
+        "Example: servotwin robot scara --no-third-link --ideal --out ideal"))(scara)
+    robot.command("two-link", help="Let an arm of two links in a vertical plane do a task.", epilog=(
+        "Example: servotwin robot two-link --task square --payload 50g --out square"))(two_link)
+
+
+def _do(arm: Arm, asked: Asked) -> None:
+    """Do a task, write its files and tell of it."""
+    from servotwin.cli import robot_files as files
+    from servotwin.cli import robot_task_files as written
+    from servotwin.cli.robot import check_drawing, check_numbers
+
+    check_numbers(output_step=asked.output_step, rate=written.RATE, blend=None)
+    criterion, steering = _criterion(arm, asked.redundancy), _steering(asked.controller)
+    path = path_of(arm, asked.task, asked.size, asked.speed)
+    models = _models(arm, asked)
+    picture = check_drawing(arm.model(), None, video=asked.video)
+    with files.folder(asked.out):
+        targets = files.targets_of(asked.out, written.names(
+            ideal=asked.ideal, redundant=arm.redundant, picture=picture, video=asked.video), force=asked.force)
+        with patience("inverse kinematics"):
+            joints = criterion.solve(arm, path)
+            ways = Ways(joints, written.other_ways(arm, path, criterion, joints))
+        if asked.ideal:
+            found = _ideal(ways, targets, asked)
+        else:
+            found = _driven(ways, targets, asked, models, steering)
+    found["files"] = [str(target.path) for target in targets]
+    if asked.as_json:
+        emit_json(found)
+        return
+    show(f"{found['robot']}: {path.name}, {path.duration:.4g} s",
+         pairs([*written.told(found), ("written", found["files"][-1])]),
+         *(["", table(written.WAYS, written.way_rows(found))] if arm.redundant else []))
+
+
+def path_of(arm: Arm, task: str, size: str | None, speed: float) -> ToolPath:
+    """Return the path of a task, of the words of its options."""
+    from servotwin.robots.tasks import task_path
+    from servotwin.units.quantities import quantity
+
+    length = None if size is None else quantity("--size", size, "length", bare=True, positive=True)
+    with as_options():
+        return task_path(arm, task, speed=speed, size=length)
+
+
+def _criterion(arm: Arm, name: str) -> Criterion:
+    from servotwin.errors import UnknownNameError
+    from servotwin.robots.redundancy import CRITERIA, LeastMotion, check_redundant
+
+    known = {one.name: one for one in CRITERIA}
+    if name not in known:
+        raise UnknownNameError("redundancy", name, known)
+    if not isinstance(known[name], LeastMotion):
+        check_redundant(arm, name)
+    return known[name]
+
+
+def _steering(name: str) -> Steering:
+    from servotwin.errors import UnknownNameError
+    from servotwin.robots.steering import STEERINGS
+
+    if name not in STEERINGS:
+        raise UnknownNameError("controller", name, STEERINGS)
+    return STEERINGS[name]()
+
+
+def _models(arm: Arm, asked: Asked) -> dict[str, Model]:
+    words = [word if "=" in word else f"{ALL}={word}" for word in asked.servo]
+    chosen = dict(named_words("--servo", words, "ID or JOINT=ID", dict.fromkeys(arm.joints, "angle")))
+    each = {joint: Chosen(chosen.get(joint, chosen.get(ALL, _SERVO))) for joint in arm.joints}
+    return models_of(each, asked.model, asked.change, [])
+
+
+def _ideal(ways: Ways, targets: Sequence[Target], asked: Asked) -> dict[str, Any]:
+    from servotwin.cli import robot_task_files as written
+    from servotwin.robots.task_run import ideal_task
+
+    done = ideal_task(ways.joints)
+    found = written.ideal_facts(done, ways)
+    written.write_ideal(done, ways, targets, found, force=asked.force, output_step=asked.output_step)
+    return found
+
+
+def _driven(ways: Ways, targets: Sequence[Target], asked: Asked, models: Mapping[str, Model],
+            steering: Steering) -> dict[str, Any]:
+    from servotwin.cli import robot_task_files as written
+    from servotwin.robots import sizing_of
+    from servotwin.robots.task_run import run_task
+
+    with as_options(), patience("following the path"):
+        done = run_task(ways.joints.arm, models, ways.joints.path, steering=steering, bus=supply_of(asked.supply),
+                        assume_heat=True, joint_path=ways.joints)
+        sized = sizing_of(done.run)
+    found = written.task_facts(done, sized, ways, asked.controller)
+    written.write_task(done, sized, ways, targets, found, force=asked.force, output_step=asked.output_step)
+    return found
+
+
+def mass(text: str | None) -> float:
+    """Return the payload of an option [kg]."""
+    from servotwin.units.quantities import quantity
+
+    return 0.0 if text is None else quantity("--payload", text, "mass", bare=True)
