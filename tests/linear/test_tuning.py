@@ -30,8 +30,8 @@ def overshoot(found, load):
 @pytest.mark.parametrize(("name", "inertia", "wanted"), [
     ("dsservo-ds3218", 1e-3, 0.2),
     *(pytest.param(*case, marks=pytest.mark.slow) for case in (
-        ("hitec-hs-755hb", 2e-2, 0.2), ("hitec-hs-755hb", 1e-3, 0.1), ("dynamixel-xl430-w250", 1e-3, 0.05), ("dynamixel-xl430-w250", 2e-2, 0.2),
-        ("dsservo-ds3218", 2e-2, 0.1), ("feetech-sts3215-12v", 1e-3, 0.08),
+        ("hitec-hs-755hb", 2e-2, 0.2), ("hitec-hs-755hb", 1e-3, 0.1), ("dynamixel-xl430-w250", 1e-3, 0.05),
+        ("dynamixel-xl430-w250", 2e-2, 0.2), ("dsservo-ds3218", 2e-2, 0.1), ("feetech-sts3215-12v", 1e-3, 0.08),
         ("feetech-sts3215-12v", 2e-2, 0.08)))])
 def test_the_gain_gives_the_overshoot(name, inertia, wanted):
     load = st.loads.Inertia(inertia)
