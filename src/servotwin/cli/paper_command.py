@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated
@@ -31,9 +32,11 @@ def paper(
         emit_json({
             "folder": str(report.folder), "report": str(report.page),
             "figures": [str(path) for path in report.figures], "data": [str(path) for path in report.data],
-            "numbers": dict(report.numbers)})
+            "numbers": dict(report.numbers), "left_out": report.left_out})
         return
     numbers = [(name, f"{value:.5g}") for name, value in report.numbers.items()]
+    if report.left_out:
+        warnings.warn(report.left_out, stacklevel=2)
     show(pairs([("report", str(report.page)),
                 ("figures", f"{len(report.figures)} files in {report.folder / 'figures'}"),
                 ("data", f"{len(report.data)} files in {report.folder / 'data'}")]),

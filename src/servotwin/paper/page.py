@@ -8,29 +8,32 @@ from typing import TYPE_CHECKING
 
 from servotwin import __version__
 from servotwin.look import document, escape, fixed, number, picture, plain
-from servotwin.paper import linear, tables, vibration_page
+from servotwin.paper import linear, robots_page, tables, vibration_page
 from servotwin.paper.findings import corrections, disagreements
 from servotwin.paper.study import LABELS, LOAD_INERTIA, SERVO, BenchStudy, PaperStudy
 
 if TYPE_CHECKING:
     from servotwin.paper.figures import Picture
+    from servotwin.paper.robots_page import Robots
 
 _SECTIONS = (
     ("summary", "Summary"), ("values", "What the paper does not give"), ("step", "The step from 0 to 180°"),
     ("bench", "The bench"), ("measured", "Measured beside simulated"), ("fits", "Straight lines through Table II"),
     ("vibration", "The vibration of the first implementation"),
+    ("robots", "The robots that it is for"),
     ("models", "Block diagrams and transfer functions"), ("corrections", "Corrections to the paper"),
     ("disagreements", "Disagreements and gaps in its data"), ("parameters", "Parameters and where they come from"),
     ("files", "Files beside this report"),
 )
 
 
-def page(study: PaperStudy, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
+def page(study: PaperStudy, robots: Robots | str, pictures: Sequence[Picture], svg: Mapping[str, bytes]) -> str:
     """Return the whole report; `svg` holds the pictures by name."""
     parts = {
         "summary": _summary(study), "values": _values(study), "step": _step(study, pictures, svg),
         "bench": _bench(study, pictures, svg), "measured": _measured(study, pictures, svg),
         "fits": _fits(study), "vibration": vibration_page.section(study, lambda names: _figures(names, pictures, svg)),
+        "robots": robots_page.section(robots, lambda names: _figures(names, pictures, svg)),
         "models": _models(study, pictures, svg),
         "corrections": tables.findings_table(corrections(study), "What the equations need"),
         "disagreements": tables.findings_table(disagreements(study), "What the data say"),

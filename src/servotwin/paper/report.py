@@ -34,6 +34,8 @@ class PaperReport:
         Pictures (PNG and SVG), and CSV files.
     numbers : mapping
         Headline numbers, the unit in each name.
+    left_out : str
+        What is missing for a part of the report, and that part; empty where nothing is.
     """
 
     folder: Path
@@ -41,6 +43,7 @@ class PaperReport:
     figures: tuple[Path, ...]
     data: tuple[Path, ...]
     numbers: Mapping[str, float]
+    left_out: str = ""
 
 
 def write_paper_report(out: Path, *, force: bool,
@@ -78,14 +81,14 @@ def write_paper_report(out: Path, *, force: bool,
         _make(out)
         try:
             partial.mkdir(0o700)
-            numbers = _write_all(partial, tell)
+            numbers, left_out = _write_all(partial, tell)
             with moving():
                 names = _move(partial, out)
         except OSError as error:
             raise OutputError(f"{out} cannot be written ({error.strerror})") from None
     tell("done", 1.0)
     return PaperReport(
-        folder=out, page=out / _PAGE, numbers=numbers,
+        folder=out, page=out / _PAGE, numbers=numbers, left_out=left_out,
         figures=tuple(out / name for name in names if name.parts[0] == "figures"),
         data=tuple(out / name for name in names if name.parts[0] == "data"))
 
@@ -122,14 +125,17 @@ def _remove_empty(folders: Sequence[Path]) -> None:
             return
 
 
-def _write_all(folder: Path, tell: Callable[[str, float], None]) -> dict[str, float]:
+def _write_all(folder: Path, tell: Callable[[str, float], None]) -> tuple[dict[str, float], str]:
+    """Write everything; return headline numbers, and what is left out."""
     from servotwin import plotting
-    from servotwin.paper import figures, vibration_page
+    from servotwin.paper import figures, robots_page, vibration_page
     from servotwin.paper.page import page
 
     study = run_study(tell)
-    pictures = (*figures.pictures(study, lambda done: tell("drawing", 0.25 + 0.3 * done)),
-                *vibration_page.pictures(study))
+    tell("letting robots do short tasks", 0.22)
+    robots = robots_page.run_robots(study.servo)
+    pictures = (*figures.pictures(study, lambda done: tell("drawing", 0.35 + 0.2 * done)),
+                *vibration_page.pictures(study), *robots_page.pictures(robots))
     (folder / "figures").mkdir()
     (folder / "data").mkdir()
     svg: dict[str, bytes] = {}
@@ -142,8 +148,9 @@ def _write_all(folder: Path, tell: Callable[[str, float], None]) -> dict[str, fl
             _write_csv(folder / "data" / f"{picture.name}.csv", picture.columns)
     _write_tables(folder / "data", study)
     tell("writing the page", 0.92)
-    (folder / _PAGE).write_text(page(study, pictures, svg), encoding="utf-8", newline="\n")
-    return headline_numbers(study)
+    (folder / _PAGE).write_text(page(study, robots, pictures, svg), encoding="utf-8", newline="\n")
+    left_out = f"figures 28 to 30 are left out: {robots}" if isinstance(robots, str) else ""
+    return headline_numbers(study) | robots_page.headline(robots), left_out
 
 
 def _move(partial: Path, out: Path) -> list[Path]:
