@@ -11,6 +11,7 @@ import typer
 from servotwin.cli import shared_options as shared
 from servotwin.cli.robot_arm import add_to
 from servotwin.cli.robot_compare import compare
+from servotwin.cli.robot_mobile import mobile
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
 
 if TYPE_CHECKING:
@@ -194,5 +195,7 @@ def _show(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> No
 
 
 add_to(robot)
+robot.command("mobile", help="Let the paper's mobile robot drive along waypoints, and say how far its odometry is off.",
+              epilog="Example: servotwin robot mobile --unequal --encoders 512 --out round")(mobile)
 robot.command("compare", help="Compare servos of every fidelity, and every controller, on one task of an arm.",
               epilog="Example: servotwin robot compare scara --task circle --out compared")(compare)

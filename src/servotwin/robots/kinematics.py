@@ -160,7 +160,7 @@ def follow(arm: Arm, path: ToolPath, *, start: Array | None = None, posture: Pos
     >>> arm = two_link()
     >>> found = follow(arm, circle(arm.centre, 0.03, plane=(0, 2)))
     >>> found.angles[0].round(3).tolist()
-    [0.819, -1.499]
+    [0.78, -1.459]
     """
     solver = _Solver(arm, posture)
     solver.begin(arm.start if start is None else start)
