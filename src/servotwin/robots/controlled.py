@@ -120,6 +120,9 @@ class DrivePort:
         if name == "output_angle":  # before the first tick servos show nothing yet
             places = [self._at(joint) for joint in self.drive.joints]
             return np.asarray((self.data.qpos[places] - self._zero) / self._gain)
+        if name == "motor_angle" and not self.poses:  # centred in the play
+            reductions = [self._mounts[joint].model.value("gear.gear_reduction") for joint in self.drive.joints]
+            return np.asarray(self._true("output_angle") * reductions)
         return self.drive.look(self.data, name)
 
     def _at(self, joint: str) -> int:

@@ -7,7 +7,7 @@ the ones that it is wired to.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Protocol
@@ -19,11 +19,13 @@ from servotwin.control import (
     AheadOfServo,
     ComputedTorque,
     Controller,
+    DeadbandCompensation,
     DisturbanceObserver,
     Encoder,
     Feedforward,
     Pid,
     PlainCommand,
+    PlayCompensation,
     Sensor,
     ServoInverse,
     inverse_of,
@@ -92,6 +94,10 @@ class Known:
     body : RigidBody
     start : ndarray, shape (n,)
         Angles at the beginning [rad].
+    speed : ndarray, shape (n,)
+        Of the motion, root mean square [rad/s].
+    play : ndarray, shape (n,)
+        Of the gears, in all [rad].
     frame : float
         How often a new command can matter, 0 at any time [s].
     lag : float
@@ -101,6 +107,8 @@ class Known:
     inverse: ServoInverse
     body: RigidBody
     start: Array
+    speed: Array
+    play: Array
     frame: float
     lag: float
 
@@ -118,9 +126,8 @@ class Steering(Protocol):
         """Whether the chips of the servos are bypassed: it commands voltages."""
         ...
 
-    @property
-    def sensors(self) -> Sequence[Sensor]:
-        """What it has to see."""
+    def sensors(self, mounts: Mapping[str, Mount]) -> Sequence[Sensor]:
+        """Return what it has to see of the servos at these joints."""
         ...
 
     def controller(self, known: Known) -> Controller:
@@ -141,11 +148,39 @@ class Plain:
     period: float = 0.02
 
     bare = False
-    sensors: tuple[Sensor, ...] = ()
+
+    def sensors(self, mounts: Mapping[str, Mount]) -> tuple[Sensor, ...]:
+        """None."""
+        return ()
 
     def controller(self, known: Known) -> Controller:
         """Return the controller."""
         return PlainCommand(period=max(known.frame, self.period))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeyondDeadband:
+    """Asks each servo for so much more as its deadband and friction swallow; no sensor.
+
+    Parameters
+    ----------
+    period : float
+        Of its commands, where frames are not longer [s].
+    """
+
+    period: float = 0.02
+
+    bare = False
+
+    def sensors(self, mounts: Mapping[str, Mount]) -> tuple[Sensor, ...]:
+        """None."""
+        return ()
+
+    def controller(self, known: Known) -> Controller:
+        """Return the controller."""
+        swallowed = tuning.lag_angle(known.loaded, speed=known.speed, frame=known.frame)
+        return DeadbandCompensation(controller=PlainCommand(period=max(known.frame, self.period)),
+                                    half_width=swallowed)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,7 +196,10 @@ class Ahead:
     period: float = 0.005
 
     bare = False
-    sensors: tuple[Sensor, ...] = ()
+
+    def sensors(self, mounts: Mapping[str, Mount]) -> tuple[Sensor, ...]:
+        """None."""
+        return ()
 
     def controller(self, known: Known) -> Controller:
         """Return the controller."""
@@ -178,9 +216,8 @@ class _Bare:
 
     bare = True
 
-    @property
-    def sensors(self) -> tuple[Sensor, ...]:
-        """The encoders."""
+    def sensors(self, mounts: Mapping[str, Mount]) -> tuple[Sensor, ...]:
+        """Return the encoders."""
         return (self.encoder,)
 
     def _rates(self, known: Known) -> tuning.Rates:
@@ -199,6 +236,25 @@ class OwnPid(_Bare):
         rates, most = self._rates(known), known.inverse.voltage_limit
         return Pid(period=self.period, filter_rate=rates.filter_rate, lower=-most, upper=most,
                    **tuning.pid_gains(known.loaded, rates.bandwidth)._asdict())
+
+
+@dataclass(frozen=True, kw_only=True)
+class AtMotor(OwnPid):
+    """The same by encoders at the motors, as finely at the horn: it does not see the play of the gears."""
+
+    def sensors(self, mounts: Mapping[str, Mount]) -> tuple[Sensor, ...]:
+        """Return the encoders, that show the horns' angles where there is no play."""
+        reductions = np.array([mount.model.value("gear.gear_reduction") for mount in mounts.values()])
+        return (replace(self.encoder, signal="motor_angle", shows="output_angle", ratio=1.0 / reductions),)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeyondPlay(AtMotor):
+    """The same, told to go half of the play further than the tool has to."""
+
+    def controller(self, known: Known) -> Controller:
+        """Return the controller."""
+        return PlayCompensation(controller=super().controller(known), play=known.play)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,8 +280,8 @@ class Observed(_Bare):
         return DisturbanceObserver(controller=alone, inverse=known.loaded, filter_rate=rates.observer_rate)
 
 
-def known_of(arm: Arm, mounts: Mapping[str, Mount], angles: Mapping[str, float], *, frame: float = 0.0,
-             lag: float = 0.0) -> Known:
+def known_of(arm: Arm, mounts: Mapping[str, Mount], angles: Mapping[str, float], *, speed: Any = 0.0,
+             frame: float = 0.0, lag: float = 0.0) -> Known:
     """Return what a controller knows that believes in an arm, and in servos at its joints.
 
     Parameters
@@ -234,14 +290,19 @@ def known_of(arm: Arm, mounts: Mapping[str, Mount], angles: Mapping[str, float],
     mounts : mapping of str to Mount
     angles : mapping of str to float
         Of the joints, at the beginning [rad or m]
+    speed : float or ndarray, shape (n,)
+        Of the servos' shafts in the motion, root mean square [rad/s].
     frame, lag : float
         Of what the controller is wired to [s].
     """
     start = np.array([(angles[joint] - mount.zero) / mount.gain for joint, mount in mounts.items()])
     return Known(inverse=joined([inverse_of(mount.model) for mount in mounts.values()]),
-                 body=RigidBody(arm.model(), mounts), start=start, frame=frame, lag=lag)
+                 body=RigidBody(arm.model(), mounts), start=start, speed=np.broadcast_to(speed, start.shape),
+                 play=np.array([mount.model.value_or("gear.backlash", 0.0) for mount in mounts.values()]),
+                 frame=frame, lag=lag)
 
 
 STEERINGS: Mapping[str, Callable[[], Steering]] = MappingProxyType({
-    "plain": Plain, "feedforward": Ahead, "pid": OwnPid, "computed-torque": RigidBodyTorque, "observer": Observed})
+    "plain": Plain, "deadband": BeyondDeadband, "feedforward": Ahead, "pid": OwnPid, "motor-pid": AtMotor,
+    "play": BeyondPlay, "computed-torque": RigidBodyTorque, "observer": Observed})
 """By name."""

@@ -215,11 +215,13 @@ def run_task(arm: Arm, servos: Model | Mapping[str, Model], path: ToolPath, *, c
         mounts = {joint: _bare(mount) for joint, mount in mounts.items()}
     motion = joint_path.motion()
     drive = ServoDrive(arm.model(), mounts, bus=bus)
-    port = DrivePort(drive, mounts, motion, settle=settle, sensors=steering.sensors)
+    port = DrivePort(drive, mounts, motion, settle=settle, sensors=steering.sensors(mounts))
     begins = {joint: float(motion.angles[joint][0]) for joint in mounts}
-    controller = steering.controller(known_of(believed.arm if believed else arm, believed.mounts(mounts) if believed
-                                              else mounts, begins, frame=port.frame, lag=port.lag))
-    control = run_loop(port, controller, Delayed(_of_shafts(joint_path, mounts), settle))
+    shafts = _of_shafts(joint_path, mounts)
+    controller = steering.controller(known_of(
+        believed.arm if believed else arm, believed.mounts(mounts) if believed else mounts, begins,
+        speed=np.sqrt(np.mean(np.square(shafts.at(motion.time).speed), axis=0)), frame=port.frame, lag=port.lag))
+    control = run_loop(port, controller, Delayed(shafts, settle))
     run = finished(drive, port.data, motion, mounts, bus, np.array(port.poses),
                    window=_BLEND * float(motion.time[1]))
     return TaskRun(arm=arm, path=joint_path, criterion=criterion, run=run, control=control)
