@@ -9,7 +9,7 @@ import pytest
 from robots.robots_cases import links
 from servotwin.errors import MissingExtraError, OutputError, UnknownNameError
 from servotwin.robots import robot_model
-from servotwin.robots.camera import Camera, NoDrawingError, check_drawing
+from servotwin.robots.camera import Camera, NoDrawingError, Trail, check_drawing
 from servotwin.robots.video import Video, load_opencv, png
 
 mujoco = pytest.importorskip("mujoco", reason="the extra `robots` is not installed")
@@ -115,3 +115,16 @@ def test_png_is_lossless():
 
     picture = np.random.default_rng(0).integers(0, 255, (5, 7, 3), dtype=np.uint8)
     np.testing.assert_array_equal((255.0 * imread(BytesIO(png(picture))))[:, :, :3].round(), picture)
+
+
+def test_lines_in_space_are_drawn_in_their_colours(model):
+    line = np.array([[0.0, 0.0, 0.05], [0.15, 0.0, 0.05], [0.15, 0.0, -0.05]])
+    with Camera(model, 160, 120) as view:
+        plain = view.picture(POSE).astype(float)
+        drawn = view.picture(POSE, trails=[Trail(line, (1.0, 0.0, 0.0, 1.0))]).astype(float)
+        again = view.picture(POSE).astype(float)
+    changed = np.abs(drawn - plain).max(axis=2) > 50.0
+    assert 30 < changed.sum() < 4000
+    red = drawn[changed]
+    assert (red[:, 0] > red[:, 1] + 30.0).mean() > 0.8
+    np.testing.assert_array_equal(plain, again)

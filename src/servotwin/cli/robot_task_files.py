@@ -61,7 +61,7 @@ def other_ways(arm: Arm, path: ToolPath, criterion: Criterion, joints: JointPath
 def task_facts(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, controller: str) -> dict[str, Any]:
     """Return what is worth knowing of a task that servos have done, in SI, ready for JSON."""
     return facts(run.run, dict(sized), run.arm.name) | _of_task(ways) | {
-        "controller": controller, "actuators": "servos", "task_metrics": run.metrics._asdict(),
+        "controller": controller, "chips_bypassed": run.control_bypasses, "actuators": "servos", "task_metrics": run.metrics._asdict(),
         "ideal_contour": {"rms": run.ideal_contour.rms, "largest": run.ideal_contour.largest}}
 
 
@@ -89,7 +89,8 @@ def told(found: Mapping[str, Any]) -> list[tuple[str, str]]:
                 ("largest torque", ", ".join(f"{joint} {value:.3g}" for joint, value in found["largest_torque"].items())
                  + " N m (lift: N)" * ("lift" in found["largest_torque"]))]
     metrics = found["task_metrics"]
-    servos = sorted({f"{each['servo']}, model {each['model']}" for each in found["joints"].values()})
+    kind = ("chip bypassed" if found["chips_bypassed"] else "model {}").format
+    servos = sorted({f"{each['servo']}, {kind(each['model'])}" for each in found["joints"].values()})
     return [("servos", "; ".join(servos)), ("controller", found["controller"]),
             ("contour error", f"{1e3 * metrics['contour_rms']:.3g} mm rms, {1e3 * metrics['contour_largest']:.3g} mm "
              f"at most; with ideal actuators {1e6 * ideal['largest']:.2g} um"),

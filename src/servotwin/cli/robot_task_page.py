@@ -25,7 +25,7 @@ def task_section(found: Mapping[str, Any], ways: Sequence[str], rows: Sequence[S
             "command goes", "energy"]
     lines = [["servos", _mm(metrics["contour_rms"]), _mm(metrics["contour_largest"]), _mm(metrics["tool_rms"]),
               f"{math.degrees(metrics['angle_rms']):.2f}°", f"{metrics['effort']:.2f} V",
-              _chatter(metrics["chatter"], found["controller"]), _joules(metrics["energy"])],
+              _chatter(metrics["chatter"], bypassed=found["chips_bypassed"]), _joules(metrics["energy"])],
              ["ideal", _mm(ideal["rms"]), _mm(ideal["largest"]), "–", "–", "–", "–", "–"]]
     drawn = table(head, [[escape(cell) for cell in line] for line in lines], text_columns=len(head))
     return ('<h2>The tool</h2>\n<p>The contour error is the distance of the tool from its path, however late it is.</p>'
@@ -62,8 +62,8 @@ def _mm(value: float) -> str:
     return f"{1e6 * value:.2g} µm" if value < 1e-5 else f"{1e3 * value:.3g} mm"
 
 
-def _chatter(value: float, controller: str) -> str:
-    return f"{value:.3g} {'rad/s' if controller in ('plain', 'feedforward') else 'V/s'}"
+def _chatter(value: float, *, bypassed: bool) -> str:
+    return f"{value:.3g} {'V/s' if bypassed else 'rad/s'}"
 
 
 def _joules(value: float) -> str:

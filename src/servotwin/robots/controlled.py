@@ -22,6 +22,7 @@ from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.record import ServoRecord
 from servotwin.robots.run import begin
+from servotwin.robots.told import told
 
 Array = NDArray[np.float64]
 _SAME = 1e-9  # s
@@ -62,6 +63,8 @@ class DrivePort:
         ordered = [mounts[joint] for joint in drive.joints]
         self._zero, self._gain = (np.array(column) for column in zip(
             *((mount.zero, mount.gain) for mount in ordered), strict=True))
+        self._told_zero, self._told_gain = (np.array(column) for column in zip(
+            *((each.zero, each.gain) for each in map(told, ordered)), strict=True))
         self._wires = [_Sent(mount, resolution) for mount in ordered]
         self._takes = {wire.takes for wire in self._wires}
         if len(self._takes) > 1:
@@ -134,8 +137,8 @@ class DrivePort:
         if not all(map(math.isfinite, values)):
             raise InputError(f"command at {self.time:g} s", got=values, allowed="finite numbers")
         shafts = np.array([wire.shaft(value) for wire, value in zip(self._wires, values, strict=True)])
-        self.drive.command(self.data, dict(zip(self.drive.joints, (self._zero + self._gain * shafts).tolist(),
-                                               strict=True)))
+        goals = self._told_zero + self._told_gain * shafts
+        self.drive.command(self.data, dict(zip(self.drive.joints, goals.tolist(), strict=True)))
 
     def wait(self, until: float) -> None:
         """Return at a time [s]."""

@@ -35,7 +35,7 @@ _SAMPLE = 0.002  # s, of a motion
 
 
 class Posture(NamedTuple):
-    """Where joints would be if the tool did not mind: the least Σ |u|ᵖ of u = (q − target) · weight.
+    """Where joints would be if the tool did not mind: the least sum of powers of u = (q − target) · weight.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Posture(NamedTuple):
     weight : ndarray, shape (joints,)
         [1/rad or 1/m]
     power : float
-        p; the larger, the more the joint that is furthest off counts.
+        Of the magnitude of u; the larger, the more the joint that is furthest off counts.
     """
 
     target: Array

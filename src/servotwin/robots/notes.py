@@ -31,7 +31,7 @@ def notes_of(run: RobotRun) -> tuple[str, ...]:
     ranges = joint_ranges(run.model)
     for joint in run.motion.joints:
         goals, mount, servo = run.motion.angles[joint], run.mounts[joint], run.mounts[joint].model.servo
-        if "potentiometer.fixed_angle" in servo.names():  # a bridge without its chip, whose goals are duties
+        if mount.model.endless:  # such as a bridge without its chip, whose goals are duties
             continue
         lows = [x for x in (servo.stops.lower_angle, servo.firmware.lower_goal) if x is not None]
         highs = [x for x in (servo.stops.upper_angle, servo.firmware.upper_goal) if x is not None]

@@ -108,6 +108,11 @@ class TaskRun:
     run: RobotRun
     control: ControlRun
 
+    @property
+    def control_bypasses(self) -> bool:
+        """Whether the chips of the servos were bypassed: commands are voltages."""
+        return all(mount.model.endless for mount in self.run.mounts.values())
+
     @cached_property
     def tool(self) -> Array:
         """Where the tool was at the times of the run, shape (n, 3) [m]."""
