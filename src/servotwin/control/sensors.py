@@ -45,7 +45,7 @@ class Encoder:
         What it looks at.
     shows : str, optional
         As what the controller sees it; the signal itself unless given.
-    ratio : float
+    ratio : float or ndarray
         By which it is multiplied, such as 1/N for an encoder on the motor [1].
     noise : float
         Standard deviation before the step (SI).
@@ -61,7 +61,7 @@ class Encoder:
     count: float = 2.0 * math.pi / 4096.0
     signal: str = "output_angle"
     shows: str | None = None
-    ratio: float = 1.0
+    ratio: Any = 1.0
     noise: float = 0.0
     delay: float = 0.0
 

@@ -149,7 +149,7 @@ def integral_rate(inverse: ServoInverse, *, period: float, lag: float = 0.0, fra
     return np.minimum(0.5 / (slow + profile + _late(period, lag, frame)), rings)[()]
 
 
-def lag_angle(inverse: ServoInverse, *, speed: float = math.inf, frame: float = 0.0) -> Any:
+def lag_angle(inverse: ServoInverse, *, speed: Any = math.inf, frame: float = 0.0) -> Any:
     """Return by how much a servo stays behind a slow motion: half its deadband, and what friction takes [rad].
 
     h + (R/K) F/(A k_s p) where the bridge has a mean voltage. One pulse a frame breaks friction that its mean does not:
@@ -159,7 +159,7 @@ def lag_angle(inverse: ServoInverse, *, speed: float = math.inf, frame: float = 
     Parameters
     ----------
     inverse : ServoInverse
-    speed : float
+    speed : float or ndarray
         Of the motion, where pulses drive it [rad/s].
     frame : float
         T_f of the pulses; 0 for a bridge that has a mean voltage [s].

@@ -1,8 +1,8 @@
-"""What controllers make of servos: every task of an arm by every fidelity under every controller, and when it gets hard.
+"""What controllers make of servos: every task of an arm by every fidelity, and when it gets hard.
 
-A case is a task, a fidelity of the servos, a controller and a condition. Controllers that drive the motors past the chips
-do so on the parameters that the fidelity reads: the averaged servo has a supply without end, the bounded one no more than
-limit, drop, stiction, the pulse servo all that its file gives.
+A case is a task, a fidelity of the servos, a controller and a condition. Controllers that drive the motors past the
+chips do so on the parameters that the fidelity reads: the averaged servo has a supply without end, the bounded one no
+more than limit, drop and stiction, the pulse servo all that its file gives.
 """
 
 from __future__ import annotations
