@@ -77,7 +77,7 @@ def mobile(
     with files.folder(out):
         targets = files.targets_of(out, names, force=force)
         with as_options():
-            run = _run(corners, servos, speed, lookahead, encoders, supply, ideal=ideal)
+            run = _run(corners, servos, _wheel(servo), speed, lookahead, encoders, supply, ideal=ideal)
         found = _facts(run, servo, encoders, unequal=unequal, ideal=ideal)
         _write(run, found, targets, output_step, force=force)
     found["files"] = [str(target.path) for target in targets]
@@ -119,20 +119,26 @@ def points_of(text: str | None) -> Any:
 
 
 def _servos(servo: str, *, unequal: bool) -> tuple[Model, Model]:
-    from servotwin.robots import unequal_servos, wheel_servo
+    from servotwin.robots import unequal_servos
 
-    return unequal_servos(servo) if unequal else (wheel_servo(servo),) * 2
+    return unequal_servos(servo) if unequal else (_wheel(servo),) * 2
 
 
-def _run(corners: Any, servos: Sequence[Model], speed: float, lookahead: float, encoders: int | None,
+def _wheel(servo: str) -> Model:
+    from servotwin.robots import wheel_servo
+
+    return wheel_servo(servo)
+
+
+def _run(corners: Any, servos: Sequence[Model], nominal: Model, speed: float, lookahead: float, encoders: int | None,
          supply: str | None, *, ideal: bool) -> WaypointRun:
     from servotwin.cli.robot_words import supply_of
-    from servotwin.robots import ideal_waypoints, run_waypoints, wheel_servo
+    from servotwin.robots import ideal_waypoints, run_waypoints
 
     if ideal:
         return ideal_waypoints(corners, speed=speed, lookahead=lookahead)
-    return run_waypoints(servos, corners, encoders=encoders, nominal=wheel_servo(servos[0].servo.name), speed=speed,
-                         lookahead=lookahead, bus=supply_of(supply), progress=True)
+    return run_waypoints(servos, corners, encoders=encoders, nominal=nominal, speed=speed, lookahead=lookahead,
+                         bus=supply_of(supply), progress=True)
 
 
 def _facts(run: WaypointRun, servo: str, encoders: int | None, *, unequal: bool, ideal: bool) -> dict[str, Any]:

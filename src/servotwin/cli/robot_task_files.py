@@ -61,7 +61,8 @@ def other_ways(arm: Arm, path: ToolPath, criterion: Criterion, joints: JointPath
 def task_facts(run: TaskRun, sized: Mapping[str, Sizing], ways: Ways, controller: str) -> dict[str, Any]:
     """Return what is worth knowing of a task that servos have done, in SI, ready for JSON."""
     return facts(run.run, dict(sized), run.arm.name) | _of_task(ways) | {
-        "controller": controller, "chips_bypassed": run.control_bypasses, "actuators": "servos", "task_metrics": run.metrics._asdict(),
+        "controller": controller, "chips_bypassed": run.control_bypasses, "actuators": "servos",
+        "task_metrics": run.metrics._asdict(),
         "ideal_contour": {"rms": run.ideal_contour.rms, "largest": run.ideal_contour.largest}}
 
 

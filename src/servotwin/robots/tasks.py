@@ -33,6 +33,7 @@ _STEP = 0.01  # s, between samples
 _POINTS = 4000  # of the line that a closed path is
 _LIFT = 0.035  # m, by which a thing is lifted
 _TURN = math.radians(30.0)  # by which it is turned on its way
+_UPRIGHT = 0.5  # of the speed: up and down
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,6 +80,8 @@ class Stretch(NamedTuple):
         By which its line is drawn.
     wait : float
         How long it takes at least [s]
+    pace : float
+        Its speed, as a share of that of the path.
     """
 
     at: Callable[[Array], Array]
@@ -86,6 +89,7 @@ class Stretch(NamedTuple):
     turn: float = 0.0
     points: int = 2
     wait: float = 0.0
+    pace: float = 1.0
 
 
 def circle(centre: Place, radius: float, *, speed: float = SPEED, plane: tuple[int, int] = (0, 1)) -> ToolPath:
@@ -164,6 +168,8 @@ def pick_and_place(first: Place, second: Place, *, lift: float = _LIFT, turn: fl
                    speed: float = SPEED) -> ToolPath:
     """Return a tool that goes down to a place, waits, lifts, goes over to another, goes down, waits and lifts again.
 
+    Up and down it is half as fast: the servo of a rack turns through half its travel then.
+
     What it carries is no part of the path: an arm has its payload all the time.
 
     Parameters
@@ -186,8 +192,9 @@ def pick_and_place(first: Place, second: Place, *, lift: float = _LIFT, turn: fl
     up = np.array([0.0, 0.0, lift])
     a, b = np.array(first), np.array(second)
     return _path("pick and place", [
-        _straight(a + up, a), _waiting(a, 0.0), _straight(a, a + up), _straight(a + up, b + up, turn),
-        _straight(b + up, b, turn), _waiting(b, turn), _straight(b, b + up, turn)], speed)
+        _straight(a + up, a, pace=_UPRIGHT), _waiting(a, 0.0), _straight(a, a + up, pace=_UPRIGHT),
+        _straight(a + up, b + up, turn), _straight(b + up, b, turn, _UPRIGHT), _waiting(b, turn),
+        _straight(b, b + up, turn, _UPRIGHT)], speed)
 
 
 def _pick_and_place(arm: Arm, size: float, speed: float) -> ToolPath:
@@ -242,9 +249,10 @@ def _check(**numbers: float) -> None:
             raise InputError(f"{name} of a tool's path", got=value, allowed="a positive number, in m and m/s")
 
 
-def _straight(start: Sequence[float] | Array, end: Sequence[float] | Array, turn: float = 0.0) -> Stretch:
+def _straight(start: Sequence[float] | Array, end: Sequence[float] | Array, turn: float = 0.0,
+              pace: float = 1.0) -> Stretch:
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
-    return Stretch(lambda share: a + share[:, None] * (b - a), float(np.linalg.norm(b - a)), turn)
+    return Stretch(lambda share: a + share[:, None] * (b - a), float(np.linalg.norm(b - a)), turn, pace=pace)
 
 
 def _waiting(place: Array, turn: float) -> Stretch:
@@ -253,7 +261,8 @@ def _waiting(place: Array, turn: float) -> Stretch:
 
 def _path(name: str, stretches: Sequence[Stretch], speed: float) -> ToolPath:
     """Return stretches one after the other, at the speed in the middle of each that is long enough."""
-    times = [max(stretch.length / speed + min(_RAMP, stretch.length / speed), stretch.wait) for stretch in stretches]
+    cruises = [stretch.length / (speed * stretch.pace) for stretch in stretches]
+    times = [max(cruise + min(_RAMP, cruise), stretch.wait) for cruise, stretch in zip(cruises, stretches, strict=True)]
     starts = np.concatenate([[0.0], np.cumsum(times)])
     count = math.ceil(starts[-1] / _STEP - 1e-9) + 1
     time = np.linspace(0.0, starts[-1], count)
