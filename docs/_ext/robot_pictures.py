@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+import servotwin as st
 from servotwin import plotting
 from servotwin.cli.robot_task_files import joint_uses
-from servotwin.robots import AwayFromLimits, LeastMotion, LeastTorque, scara, task_path
+from servotwin.robots import AwayFromLimits, LeastMotion, LeastTorque, run_task, scara, task_path
+from servotwin.robots.comparison import NOMINAL, Case, Comparison
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 
@@ -34,12 +36,25 @@ def servotwin(*words):
     subprocess.run([sys.executable, "-m", "servotwin", "robot", *map(str, words)], check=True)
 
 
+def by_fidelity():
+    """Draw the circle of a SCARA by servos of four fidelities."""
+    together = Comparison(servo=st.load_servo("hitec-hs-755hb"), bus_servo=st.load_servo("feetech-sts3215-12v"))
+    traces, joints = [], None
+    for servos in ("averaged", "bounded", "pulse", "digital"):
+        case = Case("scara", "circle", servos, "plain", NOMINAL)
+        joints = joints or together.joints(case)
+        run = run_task(together.arm(case), together.model(case), joints.path, joint_path=joints)
+        traces.append(plotting.ToolTrace(servos, run.run.time[run.moving], run.tool[run.moving], run.contour.error))
+    plotting.save(plotting.tool_paths(joints.path.line, traces), IMAGES / "arm_compared.png")
+
+
 def arms(folder):
     """Draw a SCARA robot at its task, its tool by fidelity, and what its third link is used for."""
     servotwin("scara", "--task", "circle", "--no-video", "--out", folder / "scara")
     shutil.copy(folder / "scara" / "robot.png", IMAGES / "arm_scara.png")
-    servotwin("compare", "scara", "--out", folder / "compared")
-    shutil.copy(folder / "compared" / "tool.png", IMAGES / "arm_compared.png")
+    servotwin("compare", "--out", folder / "compared")  # minutes
+    shutil.copy(folder / "compared" / "conditions.png", IMAGES / "compare_conditions.png")
+    by_fidelity()
     servotwin("two-link", "--task", "square", "--payload", "50g", "--no-video", "--out", folder / "two")
     shutil.copy(folder / "two" / "robot.png", IMAGES / "arm_two_link.png")
     arm = scara()
@@ -56,4 +71,5 @@ if __name__ == "__main__":
         shutil.copy(folder / "pick" / "robot.png", IMAGES / "robot_run.png")
         shutil.copy(folder / "pick" / "sizing.png", IMAGES / "robot_sizing.png")
         arms(folder)
-    print("robot_run.png, robot_sizing.png, arm_scara.png, arm_compared.png, arm_two_link.png, arm_redundancy.png")
+    print("robot_run.png, robot_sizing.png, arm_scara.png, arm_compared.png, arm_two_link.png, arm_redundancy.png, "
+          "compare_conditions.png")

@@ -18,7 +18,6 @@ from servotwin.cli.robot_compare_words import (
 )
 from servotwin.cli.robot_page import figure
 from servotwin.look import document, escape, table
-from servotwin.plotting import Curve
 from servotwin.robots.comparison import CONDITIONS, FIDELITIES
 from servotwin.robots.steering import STEERINGS
 
@@ -32,16 +31,10 @@ _STYLE = "figure img{width:100%;height:auto;max-width:48rem}td:nth-child(n+2){wh
 
 def conditions_picture(done: Sequence[Outcome]) -> Figure:
     """Return the errors of all controllers in each condition, by pulse servos, mean of all tasks."""
-    names = list(STEERINGS)
-    drawn = [Curve(condition, list(range(len(names))),
-                   [1e3 * errors(done, name, "pulse", condition) for name in names], points=True, style=k)
-             for k, condition in enumerate(CONDITIONS)]
-    made = plotting.curves(drawn, x_label="", y_label="tool behind, rms (mm)", height=3.8)
-    ax = made.axes[0]
-    ax.set_yscale("log")
-    ax.set_xticks(range(len(names)), [TITLES[name].replace(", ", ",\n").replace(" ", "\n", 1) for name in names],
-                  fontsize=6.5)
-    return made
+    return plotting.ranking(
+        [TITLES[name] for name in STEERINGS], x_label="tool behind, rms (mm)",
+        values={condition: [1e3 * errors(done, name, "pulse", condition) for name in STEERINGS]
+                for condition in CONDITIONS})
 
 
 def page(found: dict[str, Any], done: Sequence[Outcome]) -> str:
@@ -49,7 +42,8 @@ def page(found: dict[str, Any], done: Sequence[Outcome]) -> str:
     title = "Controllers of servos, compared"
     parts = [f"<h1>{title}</h1>\n<p class=\"lead\">{len(done)} runs: every task under every controller, by servos "
              f"<code>{escape(found['servo'])}</code> of every fidelity and by "
-             f"<code>{escape(found['bus_servo'])}</code>; then, by pulse servos, with wrong beliefs, load, a low battery and worn gears.</p>\n",
+             f"<code>{escape(found['bus_servo'])}</code>; then, by pulse servos, with wrong beliefs, load, a low "
+             "battery and worn gears.</p>\n",
              "<h2>When it gets hard</h2>\n", figure("conditions.png", "How far the tool is from where it should be, "
                                                     "mean of all tasks, pulse servos."),
              _table(CONDITION_HEAD, condition_rows(done), "Tool behind, rms, mean of all tasks, pulse servos"),
@@ -80,8 +74,8 @@ _READING = """<section><h2>How to read this page</h2><ul>
 path</b>: however late it is.</li>
 <li><b>Fidelities.</b> Ideal torque: a motor gives what it is asked for, without friction or limit. Averaged: (35) to
 (41) of the paper, no limit. Bounded: limit, deadband, stiction. Pulse: single pulses of the chip, and all that the file
-gives. Digital: the bus servo. Plain commands, deadband compensation and (40) go through the servo's own loop; the others
-drive the motor past the chip by encoders of 4096 counts, at the horns or at the motors.</li>
+gives. Digital: the bus servo. Plain commands, deadband compensation and (40) go through the servo's own loop; the
+others drive the motor past the chip by encoders of 4096 counts, at the horns or at the motors.</li>
 <li><b>Conditions.</b> 30 % wrong: controllers believe in 30 % more resistance and rotor inertia and in 30 % less
 friction. With load: the tool carries twice what they know of. Low battery: four tired cells for all servos. Worn gears:
 1° of play, which the play compensation knows.</li>

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 TITLES = {
     "plain": "plain commands", "deadband": "deadband compensation", "feedforward": "(40) as feedforward",
-    "pid": "PID", "motor-pid": "PID, encoders at motors", "play": "the same, play compensation",
+    "pid": "PID", "motor-pid": "PID at motors", "play": "PID at motors, play compensated",
     "computed-torque": "computed torque", "observer": "disturbance observer"}
 """Of the controllers; the last five drive the motors past the chips."""
 CONDITION_HEAD = ("controller", *CONDITIONS)

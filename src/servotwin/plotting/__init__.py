@@ -20,6 +20,7 @@ from servotwin.plotting.formula import Formula, formula_svg
 from servotwin.plotting.loops import loop_curve
 from servotwin.plotting.panels import Curve, Limit, curves, pulses
 from servotwin.plotting.paths import PathTrace, robot_paths
+from servotwin.plotting.ranking import ranking
 from servotwin.plotting.responses import SHOWN, Shown, shown, time_response
 from servotwin.plotting.robots import (
     Cloud,
@@ -66,6 +67,7 @@ __all__ = [
     "loop_curve",
     "metric_shown",
     "pulses",
+    "ranking",
     "readable",
     "robot_paths",
     "root_locus",
