@@ -20,7 +20,7 @@ def asked(monkeypatch):
         if out.exists() and not force:
             raise OutputExistsError(out)
         return SimpleNamespace(folder=out, page=out / "report.html", figures=(out / "figures" / "a.png",), data=(),
-                               numbers={"worst_angle_deg": 0.98765432})
+                               numbers={"worst_angle_deg": 0.98765432}, left_out="")
 
     monkeypatch.setattr("servotwin.paper.write_paper_report", write)
     return calls
@@ -39,7 +39,7 @@ def test_json(cli, asked):
     found = cli("paper", "--out", "here", "--force", "--json").data
     assert asked == [(Path("here"), True)]
     assert found == {"folder": "here", "report": "here/report.html", "figures": ["here/figures/a.png"], "data": [],
-                     "numbers": {"worst_angle_deg": 0.98765432}}
+                     "numbers": {"worst_angle_deg": 0.98765432}, "left_out": ""}
 
 
 @pytest.mark.usefixtures("asked")

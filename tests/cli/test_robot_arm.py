@@ -86,18 +86,37 @@ def test_bad_input_is_one_line(robot, tmp_path, words, said):
 
 
 @pytest.mark.slow
-def test_fidelities_and_controllers_in_one_table(robot, tmp_path):
-    ended = robot("compare", "two-link", "--size", "20mm", "--speed", "0.15", "--json", "--out", "out")
+def test_controllers_fidelities_and_conditions_on_one_page(robot, tmp_path):
+    ended = robot("compare", "--robot", "two-link", "--speed", "0.15", "--json", "--out", "out")
     assert ended.code == 0, ended.err
     cases = ended.data["cases"]
-    assert [case["servos"] for case in cases[:4]] == ["averaged", "bounded", "pulse", "digital"]
-    by_controller = {(case["controller"], case["believes"]): case["contour_rms"] for case in cases if
-                     case["servos"] == "pulse"}
-    assert by_controller["computed-torque", "right"] < by_controller["computed-torque", "wrong"]
-    assert by_controller["computed-torque", "right"] < 0.2 * by_controller["plain", "–"]
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"compare.csv", "summary.json", "tool.png",
+    assert len(cases) == 69
+    assert not any(case["failure"] for case in cases)
+
+    def behind(controller, servos="pulse", condition="nominal"):
+        return next(case["tool_rms"] for case in cases if (case["controller"], case["servos"], case["condition"]) == (
+            controller, servos, condition))
+
+    assert behind("computed-torque") < 0.1 * behind("plain")
+    assert behind("computed-torque") < 0.3 * behind("computed-torque", condition="30 % wrong")
+    assert behind("feedforward", "averaged") < 0.1 * behind("feedforward")
+    assert behind("observer", condition="30 % wrong") < 1.2 * behind("observer")
+    for name in ("plain", "deadband", "feedforward", "pid", "observer"):
+        assert behind(name, condition="low battery") > 1.2 * behind(name)
+    assert behind("computed-torque", "ideal torque") < behind("computed-torque")
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"compare.csv", "summary.json", "conditions.png",
                                                                     "index.html"}
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "computed torque" in page
+    assert "worse than" not in page.split("Where each loses")[0]
 
 
-def test_a_comparison_is_on_an_arm(robot):
-    assert "unknown robot to compare on 'so101'" in robot("compare", "so101", "--out", "out").err
+@pytest.mark.parametrize(("words", "said"), [
+    (("--robot", "so101"), "unknown robot to compare on 'so101'"),
+    (("--task", "cube"), "unknown task to compare 'cube'"),
+    (("--robot", "two-link", "--task", "square"), "unknown task of these robots 'square'"),
+    (("--servo", "no-such"), "unknown servo 'no-such'"), (("--speed", "0"), "speed")])
+def test_what_cannot_be_compared(robot, tmp_path, words, said):
+    ended = robot("compare", *words, "--out", "out")
+    assert said in ended.error
+    assert not (tmp_path / "out").exists()

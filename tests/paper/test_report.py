@@ -3,15 +3,18 @@
 import csv
 import os
 import re
+import sys
 from html.parser import HTMLParser
 
 import pytest
 
 from servotwin.errors import OutputError, OutputExistsError
 from servotwin.paper import report as paper
+from servotwin.paper import robots_page
+from servotwin.parameters import load_servo
 
 MODELS = ("averaged", "bounded", "pulse")
-NUMBERS = (2, 4, 5, 6, 8, 13, 14, 15, 16, 17, 22, 23, 24, 25, 26, 27)
+NUMBERS = (2, 4, 5, 6, 8, 13, 14, 15, 16, 17, 22, 23, 24, 25, 26, 27, 28, 29, 30)
 VOID = {"meta", "img", "br", "hr", "link", "input", "wbr"}
 
 
@@ -98,6 +101,24 @@ def test_the_vibration_and_its_cure(report, page):
     assert seen["separate"] == {6.0}
     assert min(seen["common"]) < 5.0
     assert max(seen["common"]) == 6.0
+
+
+def test_the_robots_do_their_tasks(report, page):
+    numbers = report[0].numbers
+    for name in ("figure_28", "figure_29"):
+        assert numbers[f"{name}_feedforward_contour_rms_mm"] < 0.4 * numbers[f"{name}_plain_contour_rms_mm"]
+    assert numbers["figure_30_unequal_missed_mm"] > 50.0
+    assert {"robots", "figure-28", "figure-29", "figure-30"} <= set(page.ids)
+    assert report[0].left_out == ""
+
+
+def test_without_mujoco_the_robots_are_left_out(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    left_out = robots_page.run_robots(load_servo("hitec-hs-755hb"))
+    assert left_out == "MuJoCo is needed for this: pip install 'servotwin[robots]'"
+    assert robots_page.pictures(left_out) == ()
+    assert left_out in robots_page.section(left_out, lambda names: "")
+    assert robots_page.headline(left_out) == {}
 
 
 def test_nothing_else_is_left(report):

@@ -197,5 +197,5 @@ def _show(done: RobotRun, sized: dict[str, Sizing], found: dict[str, Any]) -> No
 add_to(robot)
 robot.command("mobile", help="Let the paper's mobile robot drive along waypoints, and say how far its odometry is off.",
               epilog="Example: servotwin robot mobile --unequal --encoders 512 --out round")(mobile)
-robot.command("compare", help="Compare servos of every fidelity, and every controller, on one task of an arm.",
-              epilog="Example: servotwin robot compare scara --task circle --out compared")(compare)
+robot.command("compare", help="Compare all controllers on all tasks of the arms, by every fidelity.",
+              epilog="Example: servotwin robot compare --robot two-link --out compared")(compare)

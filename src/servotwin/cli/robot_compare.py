@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from servotwin.cli import robot_arm as arms
-from servotwin.cli import robot_files as files
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, json_text, pairs, show
 from servotwin.cli.terminal import table as shown_table
-from servotwin.tables import csv_text
 
 if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
@@ -40,6 +38,7 @@ def compare(
 ) -> None:
     """Compare controllers on all tasks by all fidelities, and when it gets hard."""
     from servotwin.cli import robot_compare_words as words
+    from servotwin.cli import robot_files as files
     from servotwin.cli.model_words import servo_of
     from servotwin.robots.comparison import Comparison
 
@@ -99,6 +98,7 @@ def _write(done: Sequence[Outcome], found: dict[str, Any], targets: Sequence[Tar
     from servotwin import plotting
     from servotwin.cli.outputs import staged
     from servotwin.cli.robot_compare_page import conditions_picture, page
+    from servotwin.tables import csv_text
 
     with staged(targets, force=force) as drafts:
         places: dict[str, Path] = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.units.quantities import quantity
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -161,6 +160,8 @@ def mounts_of(models: Mapping[str, Model], words: Sequence[str], joints: Mapping
 
 
 def _mount(joint: str, text: str, kind: str) -> dict[str, Any]:
+    from servotwin.units.quantities import quantity
+
     what, parts = f"--mount {joint}", [part.strip() for part in text.split(":")]
     if len(parts) > 3:
         raise InputError(what, got=text, allowed=_MOUNT)
@@ -193,6 +194,7 @@ def supply_of(text: str | None) -> Supply | None:
     (12.0, 0.15)
     """
     from servotwin.parameters import Supply
+    from servotwin.units.quantities import quantity
 
     if text is None:
         return None

@@ -101,7 +101,7 @@ def cases(robots: Sequence[str] = tuple(ROBOTS), tasks: Sequence[str] | None = N
     --------
     >>> chosen = list(cases(["two-link"]))
     >>> len(chosen), chosen[0]
-    (66, Case(robot='two-link', task='circle', servos='ideal torque', controller='pid', condition='nominal'))
+    (69, Case(robot='two-link', task='circle', servos='ideal torque', controller='pid', condition='nominal'))
     """
     for robot in robots:
         for task in (task for task in TASKS[robot] if tasks is None or task in tasks):
