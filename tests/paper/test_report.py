@@ -115,7 +115,7 @@ def test_the_robots_do_their_tasks(report, page):
 def test_without_mujoco_the_robots_are_left_out(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     left_out = robots_page.run_robots(load_servo("hitec-hs-755hb"))
-    assert left_out == "MuJoCo is needed for this: pip install 'servotwin[robots]'"
+    assert left_out == "mujoco is needed for this: pip install 'servotwin[robots]'"
     assert robots_page.pictures(left_out) == ()
     assert left_out in robots_page.section(left_out, lambda names: "")
     assert robots_page.headline(left_out) == {}
@@ -192,7 +192,7 @@ def quick(monkeypatch):
             (folder / name).mkdir()
         (folder / "figures" / "figure-13.png").write_bytes(b"new")
         (folder / "report.html").write_text("new")
-        return {}
+        return {}, ""
     monkeypatch.setattr(paper, "_write_all", write)
 
 
