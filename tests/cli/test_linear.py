@@ -11,6 +11,7 @@ import servotwin as st
 SERVO = "hitec-hs-755hb"
 
 
+@pytest.mark.slow
 def test_the_numbers_are_those_of_the_functions(cli):
     found = cli("linear", SERVO, "--load", "inertia=1e-3", "--amplitude", "5deg", "--frame", "20ms,10ms", "--json").data
     model, load = st.PulseServo(st.load_servo(SERVO)), st.loads.Inertia(1e-3)
@@ -43,6 +44,7 @@ def test_files(cli, tmp_path):
     assert "exists" in cli("linear", SERVO, "--csv", str(names[2])).error
 
 
+@pytest.mark.slow
 def test_tuning(cli):
     found = cli("linear", SERVO, "--load", "inertia=5e-3", "--tune", "--phase-margin", "50deg", "--json").data
     alone = st.linear.tune(st.PulseServo(st.load_servo(SERVO)), st.loads.Inertia(5e-3),
@@ -54,6 +56,7 @@ def test_tuning(cli):
     assert "of the error at the tap" in said
 
 
+@pytest.mark.slow
 def test_what_has_no_linear_loop_still_has_sines(cli):
     seen = cli("linear", "miuzei-25kg", "--amplitude", "20deg")
     assert "diode" in seen.err

@@ -53,6 +53,7 @@ def test_a_phase_margin_is_kept_by_the_largest_gain():
     assert found.stiffness == pytest.approx(float(found.model.loop_stiffness()))
 
 
+@pytest.mark.slow
 @quiet
 def test_a_derivative_buys_stiffness():
     model, load = st.DigitalServo(st.load_servo("dsservo-ds3218")), st.loads.Inertia(2e-2)
