@@ -39,8 +39,18 @@ def test_waypoints_from_a_table_on_ideal_wheels(robot, tmp_path):
     assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
 
 
+def test_a_circle(robot):
+    found = robot("--task", "circle", "--size", "40cm", "--ideal", "--json").data
+    corners = np.array(found["waypoints"])
+    np.testing.assert_allclose(np.hypot(corners[:, 0], corners[:, 1] - 0.2), 0.2, rtol=1e-12)
+    assert found["largest_off_path"] < 0.02
+
+
 @pytest.mark.parametrize(("words", "said"), [
     (("--waypoints", "0,0; 1"), "--waypoints: got '0,0; 1', allowed: X,Y;X,Y;... in metres"),
+    (("--task", "cube"), "unknown round of the mobile robot 'cube'"),
+    (("--size", "-1cm"), "size of a round: got -0.01"),
+    (("--size", "1m", "--waypoints", "0,0;1,0"), "--size: got '1m', allowed: a round"),
     (("--waypoints", "none.csv"), "--waypoints: got 'none.csv'"),
     (("--speed", "9", "--waypoints", "0,0;0.1,0"), "speed of the mobile robot: got 9.0, allowed: at most"),
     (("--encoders", "0"), "encoders: got 0"),

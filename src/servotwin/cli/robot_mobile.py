@@ -21,9 +21,14 @@ _DRIVE, _WHEELS = "Waypoints", "Robot and servos"
 def mobile(
     out: Annotated[Path, typer.Option(
         metavar="FOLDER", help="Folder for tables, pictures, video and page.", rich_help_panel=shared.OUTPUT)],
+    task: Annotated[str, typer.Option(
+        metavar="ROUND", help="square or circle.", rich_help_panel=_DRIVE)] = "square",
+    size: Annotated[str | None, typer.Option(
+        metavar="LENGTH", help="Side or diameter of the round, such as 60cm (the default).",
+        rich_help_panel=_DRIVE)] = None,
     waypoints: Annotated[str | None, typer.Option(
-        metavar="X,Y;X,Y;...", help="In metres, such as '0,0; 0.6,0; 0.6,0.6'; or a CSV file with columns x_m and y_m "
-        "(default: a square of 0.6 m).", rich_help_panel=_DRIVE)] = None,
+        metavar="X,Y;X,Y;...", help="Instead of a round, in metres, such as '0,0; 0.6,0; 0.6,0.6'; or a CSV file with "
+        "columns x_m and y_m.", rich_help_panel=_DRIVE)] = None,
     speed: Annotated[float, typer.Option(
         metavar="M/S", help="Of the robot.", rich_help_panel=_DRIVE)] = 0.08,
     lookahead: Annotated[float, typer.Option(
@@ -58,7 +63,7 @@ def mobile(
     from servotwin.robots import robot_model
 
     check_numbers(output_step=output_step, rate=written.RATE, blend=None)
-    corners = written.points_of(waypoints)
+    corners = written.points_of(waypoints, task, size)
     servos = _servos(servo, unequal=unequal)
     picture = not ideal and check_drawing(robot_model("mobile"), None, video=video)
     names = [*([] if ideal else [files.SERVOS]), written.PATH_TABLE, files.SUMMARY, written.PATHS,

@@ -27,13 +27,13 @@ _ABOVE = 0.002  # m, of lines over the ground
 _SPARSE = 400  # points of a line
 
 
-def points_of(text: str | None) -> Any:
-    """Return waypoints [m], shape (n, 2), of the words of their option; a square where there are none.
+def points_of(text: str | None, task: str = "square", size: str | None = None) -> Any:
+    """Return waypoints [m], shape (n, 2), of the words of their option; those of a round where there are none.
 
     Raises
     ------
     InputError
-        If they have another form.
+        If they have another form, or a round has none.
 
     Examples
     --------
@@ -41,10 +41,13 @@ def points_of(text: str | None) -> Any:
     [[0.0, 0.0], [0.6, 0.0]]
     """
     from servotwin.errors import InputError
-    from servotwin.robots.waypoints import SQUARE
+    from servotwin.robots import round_of
+    from servotwin.units.quantities import quantity
 
     if text is None:
-        return np.array(SQUARE)
+        return round_of(task, *([] if size is None else [quantity("--size", size, "length", bare=True)]))
+    if size is not None:
+        raise InputError("--size", got=size, allowed="a round (--task), not --waypoints")
     form = "X,Y;X,Y;... in metres, such as '0,0; 0.6,0', or a CSV file with columns x_m and y_m"
     try:
         if text.lower().endswith(".csv"):

@@ -22,7 +22,7 @@ from servotwin.robots.state import DriveState
 from servotwin.robots.task_run import TaskMetrics, TaskRun, ideal_task, run_task
 from servotwin.robots.tasks import ToolPath, task_path
 from servotwin.robots.two_link import two_link
-from servotwin.robots.waypoints import WaypointRun, ideal_waypoints, run_waypoints, unequal_servos
+from servotwin.robots.waypoints import WaypointRun, ideal_waypoints, round_of, run_waypoints, unequal_servos
 from servotwin.robots.wheels import Odometry, Pose, SpeedMap, wheel_servo, wheel_speed_of, worn
 
 __all__ = [
@@ -30,8 +30,8 @@ __all__ = [
     "Mount", "Odometry", "Pose", "PurePursuit", "Recipe", "Record", "RobotRun", "ServoActuated", "ServoDrive",
     "ServoRecord", "Sizing", "SpeedMap", "TaskMetrics", "TaskRun", "ToolPath", "WaypointRun", "contour_error",
     "follow", "ideal_task", "ideal_waypoints", "joint_names", "joint_ranges", "mobile_robot", "read_motion",
-    "recipe_of", "robot_model", "run_motion", "run_task", "run_waypoints", "scara", "sizing_of", "task_path",
-    "two_link", "unequal_servos", "wheel_servo", "wheel_speed_of", "worn",
+    "recipe_of", "robot_model", "round_of", "run_motion", "run_task", "run_waypoints", "scara", "sizing_of",
+    "task_path", "two_link", "unequal_servos", "wheel_servo", "wheel_speed_of", "worn",
 ]
 
 

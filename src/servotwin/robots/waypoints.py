@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from servotwin.errors import InputError
+from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import Model
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.mobile_robot import MASS, TRACK, WHEEL_RADIUS, WHEELS
@@ -40,6 +40,9 @@ Array = NDArray[np.float64]
 _Two = tuple[float, float]  # of left and right
 SQUARE = ((0.0, 0.0), (0.6, 0.0), (0.6, 0.6), (0.0, 0.6), (0.0, 0.0))
 """Corners of a round of 2.4 m [m]."""
+ROUNDS = ("square", "circle")
+"""Rounds by name: what `round_of` makes."""
+_CORNERS = 24  # of a circle
 _DIRECTIONS = (1, -1)  # of the servos, which look outwards on both sides
 _NEUTRAL_OFF, _WEAKER = 8e-6, 0.9  # of `unequal_servos`: s, and of torque per current; assumed
 _SAME = 1e-9
@@ -59,6 +62,36 @@ def unequal_servos(servo: str = "hitec-hs-755hb") -> tuple[Model, Model]:
     """
     new = wheel_servo(servo)
     return worn(new, neutral=_NEUTRAL_OFF), worn(new, torque=_WEAKER)
+
+
+def round_of(name: str, size: float = 0.6) -> Array:
+    """Return waypoints of a round that begins at the origin, along x, shape (n, 2) [m].
+
+    Parameters
+    ----------
+    name : str
+        One of `ROUNDS`; the circle is one of 24 corners.
+    size : float
+        Side of the square, diameter of the circle [m]
+
+    Raises
+    ------
+    UnknownNameError, InputError
+        If there is no such round, or it has no size.
+
+    Examples
+    --------
+    >>> round_of("square", 0.5)[2].tolist(), len(round_of("circle"))
+    ([0.5, 0.5], 25)
+    """
+    if name not in ROUNDS:
+        raise UnknownNameError("round of the mobile robot", name, ROUNDS)
+    if not (is_finite(size) and size > 0.0):
+        raise InputError("size of a round", got=size, allowed="a positive number of metres")
+    if name == "square":
+        return size / SQUARE[1][0] * np.array(SQUARE)
+    turn = np.linspace(0.0, 2.0 * math.pi, _CORNERS + 1)
+    return 0.5 * size * np.column_stack([np.sin(turn), 1.0 - np.cos(turn)])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
