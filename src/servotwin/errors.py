@@ -171,6 +171,25 @@ class SimulationError(ServotwinError, RuntimeError):
         return (type(self), (self.status, self.time, self.cause))
 
 
+class BenchError(ServotwinError, OSError):
+    """A bench of real or emulated hardware does not do what it should: no port, no answer, a cut wire, no tool.
+
+    Examples
+    --------
+    >>> str(BenchError("port /dev/ttyUSB0", "there is no such port"))
+    'port /dev/ttyUSB0: there is no such port'
+    """
+
+    def __init__(self, what: str, problem: str) -> None:
+        self.what = what
+        self.problem = problem
+        super().__init__(f"{what}: {problem}")
+
+    def __str__(self) -> str:
+        """Return one line."""
+        return "".join(c if c.isprintable() else repr(c)[1:-1] for c in f"{self.what}: {self.problem}")
+
+
 def _rebuild(kind: type[InputError], args: tuple[object, ...], state: dict[str, object]) -> InputError:
     error = kind.__new__(kind)
     error.args = args
