@@ -20,7 +20,7 @@ class Rig(Protocol):
 
     @property
     def columns(self) -> Sequence[str]:
-        """Columns of its rows, named as those of a log: `time_s`, `pulse_width_us`, `feedback_voltage_V`, …"""
+        """Columns of its rows, named as those of a log: `time_s`, `pulse_width_us`, `feedback_voltage_V` and more."""
 
     def facts(self) -> Mapping[str, Any]:
         """Return what the sidecar of a log says of it, in plain JSON: firmware, wiring, calibration, registers."""
