@@ -21,7 +21,7 @@ FORMAT = "servotwin-log-1"
 FOLDER_FILE = "logs.json"
 _TEXTS = ("name", "motion", "source")
 _KEYS = (*_TEXTS, "conditions", "load", "parameters", "leave_out", "command_hold", "command", "columns",
-         "drop_repeated")
+         "drop_repeated", "recorded")
 _MERGED = ("conditions", "parameters")  # entry by entry, where folder and file both speak
 _COLUMN_KEYS = ("column", "unit", "scale", "offset")
 
@@ -134,6 +134,10 @@ def _entry(what: str, key: str, value: Any) -> Any:
     if key in _TEXTS:
         if not isinstance(value, str):
             raise InputError(what, got=value, allowed="a text")
+        return value
+    if key == "recorded":  # what a recorder tells of its bench, for people
+        if not isinstance(value, dict):
+            raise InputError(what, got=value, allowed="an object")
         return value
     if key == "drop_repeated":
         if not isinstance(value, bool):
