@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import re
 from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.bench.wire.protocol import protocol
@@ -12,6 +13,7 @@ from servotwin.errors import BenchError, MissingExtraError
 if TYPE_CHECKING:
     from typing import Any
 
+_NUMBER = re.compile(r"[(\[](?:Errno )?(\d+)[,\]]")
 _MOST = 65536  # bytes of one read
 _MEANING = {
     errno.ENOENT: "there is no such port; servotwin bench list shows those that there are",
@@ -120,12 +122,12 @@ class SerialBackend:
     def _failed(self, error: Exception) -> BenchError:
         number = getattr(error, "errno", None)
         text = str(error)
-        if number is None and ("exclusively lock" in text or "PermissionError" in text):
+        if number is None and (found := _NUMBER.search(text)):  # pyserial puts the system's words into its own
+            number = int(found[1])
+        if "exclusively lock" in text or "PermissionError" in text:
             number = errno.EBUSY
-        if number is None and ("readiness" in text or "disconnected" in text):
+        if "readiness" in text or "disconnected" in text:
             number = errno.EIO
-        if number == errno.EAGAIN and "lock" in text:
-            number = errno.EBUSY
         return BenchError(self.name, _MEANING.get(number or 0) or text)
 
 
