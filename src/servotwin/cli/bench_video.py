@@ -140,8 +140,9 @@ def _write(targets: list[Target], text: str, sidecar: str, *, force: bool) -> No
 def _show(filmed: Filmed, remarks: list[str], files: list[str], *, commanded: bool) -> None:
     facts = filmed.facts
     rows = [
-        ("clip", f"{facts['pictures']} pictures of {facts['width_px']} x {facts['height_px']} in {facts['seconds']:.3f} "
-                 f"s, {facts['shortest_interval_s'] * 1e3:.1f} to {facts['longest_interval_s'] * 1e3:.1f} ms apart"),
+        ("clip", f"{facts['pictures']} pictures of {facts['width_px']} x {facts['height_px']} in "
+                 f"{facts['seconds']:.3f} s, {facts['shortest_interval_s'] * 1e3:.1f} to "
+                 f"{facts['longest_interval_s'] * 1e3:.1f} ms apart"),
         ("mark", f"{facts['mark']}, {facts['side_px']:.0f} pixels wide, seen in {facts['seen']} pictures, tilted by "
                  f"{facts['tilt_deg']:.0f} deg"),
         ("angle", f"standard error {facts['angle_std_deg']:.3f} deg at rest; counted {facts['turned']}"),

@@ -14,7 +14,8 @@ from servotwin.look.opencv import load_opencv, quiet
 from servotwin.units import is_finite
 
 _HEAD = 64  # bytes
-_SLACK = 0.1  # s that a clip may end before what its file says, beside three frames
+_SLACK = 0.1  # s that a clip may end before what its file says, beside three pictures
+_TRIMMED = 2.5  # s more for mp4: phones keep, unseen, what stood before a trimmed clip up to a whole picture (assumed)
 
 
 @dataclass(frozen=True)
@@ -58,10 +59,15 @@ class Clip:
         if not (is_finite(slow) and slow > 0.0):
             raise InputError("slow", got=slow, allowed="a positive number")
         head = _head(self.path)
+        self._boxed = head[4:8] == b"ftyp"  # mp4 and mov
+        if self._boxed and _ends_early(self.path):
+            raise InputError(f"{self.path}: the clip is cut, the end of its file is missing; copy it from the phone "
+                             "again")
         with quiet():
-            self._film = cv2.VideoCapture(str(self.path), cv2.CAP_FFMPEG)
+            # one thread, or what others complain of would be told between two pictures
+            self._film = cv2.VideoCapture(str(self.path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
         if not self._film.isOpened():
-            raise _unreadable(self.path, head)
+            raise InputError(f"{self.path}", got="no video that OpenCV reads", allowed="a video, such as .mp4 or .mov")
         self._position = cv2.CAP_PROP_POS_MSEC
         rate, count = (self._film.get(name) for name in (cv2.CAP_PROP_FPS, cv2.CAP_PROP_FRAME_COUNT))
         self._said = count / rate * slow if rate > 0.0 and count > 0.0 else 0.0
@@ -94,11 +100,13 @@ class Clip:
         self._check_end(last, steps[1:])
 
     def _check_end(self, last: float, steps: list[float]) -> None:
+        end = max(last, 0.0)
+        usual = float(np.median(steps)) if steps else 0.0
+        if self._said - end > 3.0 * usual + (_SLACK + _TRIMMED * self._boxed) * self._slow:
+            raise InputError(f"{self.path}: its pictures end after {end:.2f} s of {self._said:.2f} s: the clip is cut "
+                             "or damaged; copy it from the phone again")
         if not steps:
             raise InputError(f"{self.path}", got="fewer than two pictures", allowed="a clip of a turning horn")
-        if self._said - last > 3.0 * float(np.median(steps)) + _SLACK * self._slow:
-            raise InputError(f"{self.path}: its pictures end after {last:.2f} s of {self._said:.2f} s: the clip is cut "
-                             "or damaged; copy it from the phone again")
 
 
 def _head(path: Path) -> bytes:
@@ -115,11 +123,20 @@ def _head(path: Path) -> bytes:
     return head
 
 
-def _unreadable(path: Path, head: bytes) -> InputError:
-    if head[4:8] == b"ftyp":  # an mp4, whose table of pictures often comes last
-        return InputError(f"{path}: the clip is cut or damaged (its table of pictures cannot be read); copy it from "
-                          "the phone again")
-    return InputError(f"{path}", got="no video that OpenCV reads", allowed="a video, such as .mp4 or .mov")
+def _ends_early(path: Path) -> bool:
+    """Return whether an mp4 is shorter than its boxes say, or the one with the table of pictures is missing."""
+    at, size, kinds = 0, path.stat().st_size, set()
+    with path.open("rb") as file:
+        while at + 8 <= size:
+            file.seek(at)
+            head = file.read(16)
+            length = int.from_bytes(head[:4], "big")
+            length = int.from_bytes(head[8:16], "big") if length == 1 else length or size - at
+            if length < 8:
+                return True
+            kinds.add(head[4:8])
+            at += length
+    return at > size or b"moov" not in kinds
 
 
 def _word(code: int) -> str:
