@@ -15,9 +15,8 @@ static struct message_stream asked;  // by the last `stream`
 
 static void apply_stream(void) {
   // Mode "paper" has its own reference, and reads what it needs whatever else is asked for
-  uint8_t paper = mode == MODE_PAPER;
   pulse_rate(RATE_OFF);  // no scan may start in between
-  adc_configure(asked.mask, paper ? PAPER_CHANNELS : 0, paper ? REFERENCE_EXTERNAL : asked.reference);
+  adc_configure(asked.mask, mode == MODE_PAPER ? PAPER_CHANNELS : 0, orders_reference());
   tell_configure(asked.mask, asked.rate);
   pulse_rate(asked.rate);
 }
@@ -153,3 +152,5 @@ void orders_obey(const struct frame *heard) {
 }
 
 uint8_t orders_mode(void) { return mode; }
+
+uint8_t orders_reference(void) { return mode == MODE_PAPER ? REFERENCE_EXTERNAL : asked.reference; }

@@ -177,6 +177,8 @@ ISR(TIMER1_COMPB_vect) {
   // A frame without a pulse has no match at OCR1A, so it begins here
   uint16_t next = (uint16_t)tick;
   if (prepared && !width && (int16_t)((uint16_t)next_rise - next) < 0) next = (uint16_t)next_rise;
+  // simavr 1.6 toggles twice where any OCR1x is written in the very cycle of a match: let a match that is close pass
+  if (pin != LOW) while ((uint16_t)(OCR1A - TCNT1 + 1) < LEAST) {}
   if ((int16_t)(next - TCNT1) < (int16_t)LEAST) next = TCNT1 + LEAST;
   OCR1B = next;
 }

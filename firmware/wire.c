@@ -128,3 +128,5 @@ const struct frame *wire_hear(void) {
   }
   return 0;
 }
+
+uint8_t wire_is_quiet(void) { return hear_tail == hear_head; }

@@ -20,3 +20,4 @@ void wire_start(void);
 void wire_send(struct frame *frame, uint8_t kind, uint32_t time, uint8_t length);
 void wire_drop(uint8_t frames);                  // count frames that could not even be made
 const struct frame *wire_hear(void);             // the next valid frame, or none; valid until the next call
+uint8_t wire_is_quiet(void);                     // nothing is to be heard

@@ -22,7 +22,6 @@ static avr_irq_t *wire_in, *analog;
 static avr_timer_t *timer1;
 static char bytes[TOKEN];    // of a "wire" line, in hex
 static char *next_byte;      // in there, NULL: none
-static uint8_t shown[64], n_shown;
 static uint64_t worst;
 
 static void quiet(avr_t *a, const int level, const char *format, va_list arguments) {
@@ -73,7 +72,8 @@ static void on_pulse(struct avr_irq_t *irq, uint32_t level, void *unused) {
   before = (int)level;
   // An instruction is one piece to the simulator, so the pin follows the timer up to some cycles late
   uint64_t match = timer1->tov_base + timer1->comp[AVR_TIMER_COMPA].comp_cycles;
-  if (!timer1->comp[AVR_TIMER_COMPA].comp_cycles) match = avr->cycle;
+  if (!timer1->comp[AVR_TIMER_COMPA].comp_cycles) match = avr->cycle;  // not the timer: set by hand
+  if (match > avr->cycle) match -= timer1->tov_cycles;  // the timer has just begun again
   if (avr->cycle - match > worst) worst = avr->cycle - match;
   fprintf(log_file, "P %llu %u\n", (unsigned long long)match, level);
 }
