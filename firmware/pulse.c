@@ -14,6 +14,7 @@
 #define SOON 2500u     // ticks from an order to the first edge
 #define FAR 0x8000u    // ticks; where no match can be before the next push
 #define LEAST 3u       // ticks that a match must lie ahead of the counter to be met for sure
+#define CLOSE 8u       // ticks around a match in which OCR1B is not written
 #define LIMIT 60000u   // a distance that is larger lies in the past: > period_max
 
 enum { LOW, ARMED, HIGH };  // the pin: low without a match to come, low with one, high
@@ -177,8 +178,8 @@ ISR(TIMER1_COMPB_vect) {
   // A frame without a pulse has no match at OCR1A, so it begins here
   uint16_t next = (uint16_t)tick;
   if (prepared && !width && (int16_t)((uint16_t)next_rise - next) < 0) next = (uint16_t)next_rise;
-  // simavr 1.6 toggles twice where any OCR1x is written in the very cycle of a match: let a match that is close pass
-  if (pin != LOW) while ((uint16_t)(OCR1A - TCNT1 + 1) < LEAST) {}
+  // simavr 1.6 toggles twice where OCR1B is written in the very cycle of a match of OCR1A: let one that is close pass
+  if (pin != LOW) while ((uint16_t)(OCR1A - TCNT1 + 1) < CLOSE) {}
   if ((int16_t)(next - TCNT1) < (int16_t)LEAST) next = TCNT1 + LEAST;
   OCR1B = next;
 }
