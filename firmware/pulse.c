@@ -14,23 +14,28 @@
 #define SOON 2500u     // ticks from an order to the first edge
 #define FAR 0x8000u    // ticks; where no match can be before the next push
 #define LEAST 3u       // ticks that a match must lie ahead of the counter to be met for sure
+#ifndef START
+#define START 0        // of the time, in overflows of Timer1; a test lets it wrap soon
+#endif
 #define CLOSE 8u       // ticks around a match in which OCR1B is not written
 #define LIMIT 60000u   // a distance that is larger lies in the past: > period_max
+
+#define ORIGIN ((uint32_t)(START) << 16)
 
 enum { LOW, ARMED, HIGH };  // the pin: low without a match to come, low with one, high
 
 static uint8_t pin, mode, rate;
 static uint8_t running;            // frames follow one another
 static uint8_t prepared;           // it is decided what the next frame is: width, period, event
-static uint32_t next_rise;         // of the next frame; at rest the earliest time for one
+static uint32_t next_rise = ORIGIN; // of the next frame; at rest the earliest time for one
 static uint16_t width, period;
 static uint8_t event;
 static uint16_t shown_width, shown_period;
 static struct point steady;        // what goes on where nothing else is said; of `frames` what is left of a point
 static uint8_t playing;
 static uint32_t total, played, frames;
-static uint16_t overflows, late, silence_left;
-static uint32_t tick;              // the next one of the 1 kHz grid
+static uint16_t overflows = START, late, silence_left;
+static uint32_t tick = ORIGIN + SCAN_PERIOD;  // the next one of the 1 kHz grid
 static struct edge edges[EDGES];
 static volatile uint8_t head, tail, lost;
 
@@ -195,7 +200,6 @@ void pulse_start(void) {
   TCNT1 = 0;
   OCR1A = FAR;
   OCR1B = SCAN_PERIOD;
-  tick = SCAN_PERIOD;
   steady.period = PERIOD_MAX;
   TIFR1 = _BV(OCF1A) | _BV(OCF1B) | _BV(TOV1);
   TIMSK1 = _BV(OCIE1A) | _BV(OCIE1B) | _BV(TOIE1);

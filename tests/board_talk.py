@@ -143,8 +143,8 @@ def run_board(command: list[str], firmware: Path, script: Script, seconds: float
     told, log = folder / "script.txt", folder / "log.txt"
     told.write_text(str(script))
     done = subprocess.run([*command, str(firmware), str(told), str(log), str(seconds)], capture_output=True, text=True,
-                          timeout=1200, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+                          errors="replace", timeout=1200, check=False)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
     result = read_log(log.read_text())
     result.said = done.stdout
     return result
