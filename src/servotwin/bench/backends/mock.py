@@ -159,10 +159,10 @@ class MockBackend:
 
     def _points(self, values: Mapping[str, Any]) -> str:
         points = [_Point(*one) for one in values["points"]]
-        if values["first"] != self._taken % 2**16:
-            return "order"
         if not points or not all(one.frames and _possible(one) for one in points):
             return "range"
+        if values["first"] != self._taken % 2**16:
+            return "order"
         if len(points) > self._room:
             return "full"
         self._queue.extend(points)
@@ -176,7 +176,7 @@ class MockBackend:
     def _play(self, values: Mapping[str, Any]) -> str:
         if self._playing:
             return "ok"
-        if not self._queue:
+        if not self._queue or not values["total"]:
             return "range"
         self._total, self._played, self._left = values["total"], 0, 0
         self._playing, self._started = True, False
