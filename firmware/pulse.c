@@ -115,12 +115,9 @@ static void prepare(void) {
   }
   event = 0;
   if (playing) advance_queue();
+  if (mode == MODE_PAPER && adc_known & _BV(CHANNEL_COMMAND)) steady.width = paper_width(adc_latest[CHANNEL_COMMAND]);
   width = steady.width;
   period = steady.period;
-  if (mode == MODE_PAPER) {
-    width = adc_known & _BV(CHANNEL_COMMAND) ? paper_width(adc_latest[CHANNEL_COMMAND]) : 0;
-    period = PAPER_PERIOD;
-  }
   prepared = 1;
   if (width) {
     OCR1A = (uint16_t)next_rise;
@@ -243,7 +240,10 @@ void pulse_mode(uint8_t new_mode) {
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
     rest();
     mode = new_mode;
-    if (mode == MODE_PAPER) run();
+    if (mode == MODE_PAPER) {
+      steady = (struct point){0, 0, PAPER_PERIOD};  // no pulse before the first count
+      run();
+    }
   }
 }
 
@@ -253,7 +253,7 @@ void pulse_rate(uint8_t new_rate) {
 
 void pulse_count(struct pulse_counts *counts) {
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    uint8_t pulsing = !running ? 0 : playing ? 2 : mode == MODE_PAPER || steady.width ? 1 : 0;
+    uint8_t pulsing = !running ? 0 : playing ? 2 : steady.width ? 1 : 0;
     *counts = (struct pulse_counts){played, frames, late, pulsing, queue_room()};
   }
 }

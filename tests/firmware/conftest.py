@@ -1,5 +1,7 @@
 """The firmware as it is shipped, in simavr."""
 
+import json
+import os
 import shutil
 import subprocess
 import sys
@@ -54,3 +56,22 @@ def board(simavr, tmp_path):
         return run_board([str(simavr)], firmware, script, seconds, tmp_path)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def avr8js():
+    """Install avr8js in the user's cache and return the command of its harness."""
+    if not (shutil.which("node") and shutil.which("npm")):
+        pytest.skip("no node or npm (Debian: nodejs, npm)")
+    wanted = (HERE / "package.json").read_text()
+    version = json.loads(wanted)["dependencies"]["avr8js"]
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = cache / "servotwin-tests" / f"avr8js-{version}"
+    if not (folder / "node_modules/avr8js/package.json").exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "package.json").write_text(wanted)
+        done = subprocess.run(["npm", "install", "--no-audit", "--no-fund", "--no-package-lock"], cwd=folder,
+                              capture_output=True, text=True, check=False)
+        if done.returncode:
+            pytest.skip(f"npm could not install avr8js {version}: {done.stderr.strip().splitlines()[-1:]}")
+    return ["env", f"AVR8JS={folder}", "node", str(HERE / "edges.mjs")]
