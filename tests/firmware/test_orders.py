@@ -32,7 +32,7 @@ ROW = (1, 3000, 40000)
 
 
 @pytest.mark.parametrize(("order", "result"), [
-    (pulse(3000, 40000), OK), (pulse(0, 6006), OK), (pulse(200, 6006), OK), (pulse(3003, 6006), OK),
+    (pulse(3000, 40000), OK), (pulse(0, 6006), OK), (pulse(200, 6006), OK), (pulse(5606, 6006), OK),
     (pulse(6000, 50000), OK), (pulse(199, 6006), RANGE), (pulse(5607, 6006), RANGE), (pulse(6001, 50000), RANGE),
     (pulse(3000, 6005), RANGE), (pulse(3000, 50001), RANGE), (pulse(0, 0), RANGE),
     (frame(PULSE, b"123"), LENGTH), (frame(PULSE), LENGTH), (frame(LIMP, b"1"), LENGTH),
