@@ -6,6 +6,7 @@ wrong.
 
 from __future__ import annotations
 
+import binascii
 import struct
 import subprocess
 from dataclasses import dataclass, field
@@ -18,12 +19,7 @@ IDENTITY, DONE, STATUS, EDGE, SAMPLES, EVENT = range(0x81, 0x87)
 
 
 def crc16(data: bytes) -> int:
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = (crc << 1 ^ (0x1021 if crc & 0x8000 else 0)) & 0xFFFF
-    return crc
+    return binascii.crc_hqx(data, 0xFFFF)  # polynomial 0x1021, not reflected
 
 
 def stuffed(data: bytes) -> bytes:
@@ -113,6 +109,12 @@ class Log:
         """Rising edge and width of every whole pulse [cycles]."""
         assert [level for _, level in self.edges] == [k % 2 == 0 for k in range(len(self.edges))]
         return [(up, down - up) for (up, _), (down, _) in zip(self.edges[::2], self.edges[1::2], strict=False)]
+
+
+def status(log: Log) -> dict[str, int]:
+    """Return the last status that the board told."""
+    names = ("answers", "mode", "pulsing", "room", "played", "frames", "good", "bad", "dropped", "late")
+    return dict(zip(names, struct.unpack("<BBBBIIHHHH", log.of(STATUS)[-1].payload), strict=True))
 
 
 def read_log(text: str) -> Log:

@@ -1,6 +1,7 @@
 """Mode "paper": the bench of the paper without a computer, and what its display shows."""
 
 import struct
+from itertools import pairwise
 
 import pytest
 
@@ -86,7 +87,7 @@ def test_it_needs_no_computer_and_obeys_only_torque_off_and_a_change_of_mode(boa
     assert [one.payload[1] for one in log.of(DONE)] == [OK, *[MODE_RESULT] * 4, OK, OK, OK, 3, OK]
     assert [tuple(one.payload[1:3]) for one in log.of(STATUS)] == [(1, 1), (0, 0)]
     ups = [up / 16e6 for up, _ in log.pulses]
-    assert max(b - a for a, b in zip(ups, ups[1:], strict=False) if b < 2.6) < 0.0164  # 1 s of silence is none here
+    assert max(b - a for a, b in pairwise(ups) if b < 2.6) < 0.0164  # 1 s of silence is none here
     assert not [up for up in ups if 2.62 < up < 3.0 or 3.64 < up]
     assert {wide // CYCLES_PER_TICK for up, wide in log.pulses if 3.01 * 16e6 < up < 3.29 * 16e6} == {3000}
     assert {wide // CYCLES_PER_TICK for up, wide in log.pulses if 3.35 * 16e6 < up} == {3052}

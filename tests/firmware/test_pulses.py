@@ -2,6 +2,7 @@
 
 import os
 import struct
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -14,12 +15,12 @@ from board_talk import (
     LIMP,
     PLAY,
     SAMPLES,
-    STATUS,
     Script,
     frame,
     points,
     pulse,
     run_board,
+    status,
     stream,
 )
 
@@ -44,11 +45,6 @@ def events(log):
     return [(one.payload[0], one.time) for one in log.of(EVENT) if one.payload[0] != RESET]
 
 
-def status(log):
-    names = ("answers", "mode", "pulsing", "room", "played", "frames", "good", "bad", "dropped", "late")
-    return dict(zip(names, struct.unpack("<BBBBIIHHHH", log.of(STATUS)[-1].payload), strict=True))
-
-
 def gaps(log):
     """Places where the board's own count of frames jumps."""
     return [(a.sequence, b.sequence) for a, b in zip(log.frames, log.frames[1:], strict=False)
@@ -60,7 +56,7 @@ def check_exact(log, width, period, frames):
     assert len(pulses) == frames
     assert max(abs(wide - width * CYCLES_PER_TICK) for _, wide in pulses) <= 1
     assert max(abs(b - a - period * CYCLES_PER_TICK)
-               for (a, _), (b, _) in zip(pulses, pulses[1:], strict=False)) <= 1
+               for (a, _), (b, _) in pairwise(pulses)) <= 1
 
 
 @pytest.mark.parametrize(("width", "period"), [(3001, 40000), (2000, 6006), (200, 6007), (6000, 50000)])
@@ -73,7 +69,7 @@ def test_width_and_period_are_exact_under_full_load(board, width, period):
     assert status(log)["late"] == status(log)["dropped"] == status(log)["bad"] == 0
     # No scan is missing, and the times told are those of the pin
     told = log.of(SAMPLES)
-    assert {b.time - a.time for a, b in zip(told, told[1:], strict=False)} == {8 * 2000}
+    assert {b.time - a.time for a, b in pairwise(told)} == {8 * 2000}
     origin = log.pulses[0][0] - log.of(EDGE)[0].time * CYCLES_PER_TICK
     assert all(up == origin + edge.time * CYCLES_PER_TICK
                for (up, _), edge in zip(log.pulses, log.of(EDGE), strict=False))
@@ -88,7 +84,7 @@ def test_frame_rate_sweep_and_missing_frames_come_as_they_are_queued(board):
     told = [(edge.time, *struct.unpack("<HHB", edge.payload[:5])) for edge in log.of(EDGE)]
     assert [(width, period) for _, width, period, _ in told[:len(frames)]] == frames
     assert {mask for *_, mask in told} == {1}
-    assert all(b[0] - a[0] == a[2] for a, b in zip(told, told[1:], strict=False))
+    assert all(b[0] - a[0] == a[2] for a, b in pairwise(told))
     # After the last point its pulse goes on, and the pin did what was told
     assert {edge[1:3] for edge in told[len(frames):]} == {(3333, 33333)}
     origin = log.pulses[0][0] - told[0][0] * CYCLES_PER_TICK
@@ -170,7 +166,7 @@ def test_time_wraps(make, board):
     assert min(one.time for one in log.frames) < 1_000_000 < 2**31 < max(one.time for one in log.frames)
     for kind, step in ((EDGE, 40000), (SAMPLES, 16000)):
         told = log.of(kind)
-        assert {(b.time - a.time) % 2**32 for a, b in zip(told, told[1:], strict=False)} == {step}
+        assert {(b.time - a.time) % 2**32 for a, b in pairwise(told)} == {step}
 
 
 @pytest.mark.parametrize(("width", "period"), [(3001, 40000), (2000, 6006)])
