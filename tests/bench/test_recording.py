@@ -137,7 +137,7 @@ def test_a_log_can_be_played_again(tmp_path):
     assert again.duration == pytest.approx(steps.duration)
 
 
-class _Stop(Exception):
+class StopError(Exception):
     pass
 
 
@@ -146,9 +146,9 @@ def test_what_ends_a_run_keeps_its_rows_and_lets_the_servo_go(tmp_path):
 
     def stop(row):
         if next(rows) == 40:
-            raise _Stop
+            raise StopError
 
-    with pytest.raises(_Stop):
+    with pytest.raises(StopError):
         record(rig, SHORT, tmp_path / "a.csv", limits=PULSES, about=ABOUT, watch=stop)
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 42
     assert json.loads((tmp_path / "a.json").read_text())["recorded"]["complete"] is False
@@ -281,6 +281,6 @@ def test_a_wiring_comes_back_from_its_file(tmp_path):
 def test_a_wrong_wiring_names_file_and_key(tmp_path, text):
     file = tmp_path / "bench.toml"
     file.write_text(text)
-    with pytest.raises(InputError, match="bench.toml") as caught:
+    with pytest.raises(InputError, match=r"bench\.toml") as caught:
         load_wiring(file)
     assert "\n" not in str(caught.value)

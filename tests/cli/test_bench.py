@@ -8,9 +8,9 @@ import sys
 import time
 
 import pytest
-from bench_wires import BoardOnTerminal
 
 import servotwin as st
+from bench_wires import BoardOnTerminal
 from servotwin.bench.backends import MockBackend
 
 pytest.importorskip("serial")
@@ -134,7 +134,7 @@ def recording(board, tmp_path, environment):
 
 
 def pulsing(board):
-    return board.board._pulsing
+    return board.board._framing
 
 
 @pytest.mark.parametrize("how", ["killed", "interrupted", "cable"])

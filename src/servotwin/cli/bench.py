@@ -115,5 +115,6 @@ bench.command("record", help="Record experiments with a servo into logs that ser
                      "Example: servotwin bench record feetech-sts3215-12v --bus feetech --id 1 --range -60deg:60deg "
                      "--voltage 12V --current-limit 1.5A --out runs")(record)
 bench.command("rehearse", help="Record experiments from an emulated bench: the firmware itself beside a simulated "
-              "servo.", epilog=f"Example: servotwin bench rehearse hitec-hs-755hb -e steps,chirp {_RANGE} --out rehearsal"
+              "servo.",
+              epilog=f"Example: servotwin bench rehearse hitec-hs-755hb -e steps,chirp {_RANGE} --out rehearsal"
               )(rehearse)

@@ -23,7 +23,8 @@ WiringOption = Annotated[Path | None, typer.Option(
     "given.", rich_help_panel=BENCH)]
 ExperimentOption = Annotated[str, typer.Option(
     "--experiment", "-e", metavar="NAMES", help="steps, staircase, ramp, chirp, prbs, frame_rates, missing, "
-    "torque_off, hold, several with commas; all; or advise: the one that would tell most of this servo.", rich_help_panel=RUN)]
+    "torque_off, hold, several with commas; all; or advise: the one that would tell most of this servo.",
+    rich_help_panel=RUN)]
 RangeOption = Annotated[str | None, typer.Option(
     "--range", metavar="LOW:HIGH", help="Commands that are allowed, such as 1000us:2000us, or -60deg:60deg on a bus.",
     rich_help_panel=RUN)]
