@@ -6,7 +6,8 @@ import time
 import pytest
 
 from bench_wires import BoardOnTerminal
-from servotwin.bench.backends import MockBackend, SerialBackend
+from servotwin.bench.backends import EmulatedBackend, MockBackend, SerialBackend
+from servotwin.bench.emulator.build import harness
 from servotwin.bench.wire import Board, Frame, Splitter, protocol, to_wire
 from servotwin.errors import BenchError
 
@@ -22,7 +23,15 @@ def serial(made):
     return SerialBackend(terminal.port)
 
 
-BACKENDS = {"mock": mock, "serial": serial}
+def emulator(made):
+    try:
+        harness()
+    except BenchError as error:
+        pytest.skip(str(error))
+    return EmulatedBackend()
+
+
+BACKENDS = {"mock": mock, "serial": serial, "emulator": emulator}
 
 
 @pytest.fixture(params=BACKENDS)
