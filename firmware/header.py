@@ -6,7 +6,9 @@ from pathlib import Path
 
 TYPES = {"u8": ("uint8_t", "", 1), "u16": ("uint16_t", "", 2), "u32": ("uint32_t", "", 4), "text8": ("char", "[8]", 8)}
 TABLES = ("channels", "reference", "rate", "mode", "result", "event")
-HEAD = "// Made by header.py of protocol.toml, which says what all of this means. Do not edit.\n#pragma once\n#include <stdint.h>"
+HEAD = """// Made by header.py of protocol.toml, which says what all of this means. Do not edit.
+#pragma once
+#include <stdint.h>"""
 
 
 def constants(protocol: dict) -> list[str]:

@@ -17,6 +17,8 @@ static uint8_t step;  // of `wake`, then address, line, address, line
 
 void lcd_start(void) {
   DDRD |= LCD_DATA_MASK | _BV(LCD_RS_BIT) | _BV(LCD_E_BIT);
+  // D2 and D3 are INT0 and INT1 too. They are not used, but simavr 1.6 looks at a low one each cycle unless told "edges"
+  EICRA = _BV(ISC11) | _BV(ISC10) | _BV(ISC01) | _BV(ISC00);
   due = WAKES;
 }
 

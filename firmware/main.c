@@ -20,9 +20,10 @@ static void show(uint32_t time) {
     if ((int32_t)(time - next) < 0) return;
     next = time + SHOW_EVERY;
     readings_text(text, orders_mode(), orders_reference());
-    full = 1;
+    full = 1;  // and on the next pass its first byte: making a text takes longer than the display does
+  } else if (lcd_step(time, text)) {
+    full = 0;
   }
-  if (lcd_step(time, text)) full = 0;
 }
 
 // Until the next interrupt, which comes within a millisecond.

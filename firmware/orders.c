@@ -31,7 +31,7 @@ static void change_mode(uint8_t new_mode) {
 
 static uint8_t is_pulse(uint16_t width, uint16_t period) {
   if (period < PERIOD_MIN || period > PERIOD_MAX) return 0;
-  return !width || (width >= WIDTH_MIN && width <= WIDTH_MAX && width <= period / 2);
+  return !width || (width >= WIDTH_MIN && width <= WIDTH_MAX && width <= period - LOW_MIN);
 }
 
 static uint8_t set_pulse(const struct message_pulse *order) {

@@ -14,22 +14,28 @@
 #define SOON 2500u     // ticks from an order to the first edge
 #define FAR 0x8000u    // ticks; where no match can be before the next push
 #define LEAST 3u       // ticks that a match must lie ahead of the counter to be met for sure
+#ifndef START
+#define START 0        // of the time, in overflows of Timer1; a test lets it wrap soon
+#endif
+#define CLOSE 8u       // ticks around a match in which OCR1B is not written
 #define LIMIT 60000u   // a distance that is larger lies in the past: > period_max
+
+#define ORIGIN ((uint32_t)(START) << 16)
 
 enum { LOW, ARMED, HIGH };  // the pin: low without a match to come, low with one, high
 
 static uint8_t pin, mode, rate;
 static uint8_t running;            // frames follow one another
 static uint8_t prepared;           // it is decided what the next frame is: width, period, event
-static uint32_t next_rise;         // of the next frame; at rest the earliest time for one
+static uint32_t next_rise = ORIGIN; // of the next frame; at rest the earliest time for one
 static uint16_t width, period;
 static uint8_t event;
 static uint16_t shown_width, shown_period;
 static struct point steady;        // what goes on where nothing else is said; of `frames` what is left of a point
 static uint8_t playing;
 static uint32_t total, played, frames;
-static uint16_t overflows, late, silence_left;
-static uint32_t tick;              // the next one of the 1 kHz grid
+static uint16_t overflows = START, late, silence_left;
+static uint32_t tick = ORIGIN + SCAN_PERIOD;  // the next one of the 1 kHz grid
 static struct edge edges[EDGES];
 static volatile uint8_t head, tail, lost;
 
@@ -109,12 +115,9 @@ static void prepare(void) {
   }
   event = 0;
   if (playing) advance_queue();
+  if (mode == MODE_PAPER && adc_known & _BV(CHANNEL_COMMAND)) steady.width = paper_width(adc_latest[CHANNEL_COMMAND]);
   width = steady.width;
   period = steady.period;
-  if (mode == MODE_PAPER) {
-    width = adc_known & _BV(CHANNEL_COMMAND) ? paper_width(adc_latest[CHANNEL_COMMAND]) : 0;
-    period = PAPER_PERIOD;
-  }
   prepared = 1;
   if (width) {
     OCR1A = (uint16_t)next_rise;
@@ -177,8 +180,8 @@ ISR(TIMER1_COMPB_vect) {
   // A frame without a pulse has no match at OCR1A, so it begins here
   uint16_t next = (uint16_t)tick;
   if (prepared && !width && (int16_t)((uint16_t)next_rise - next) < 0) next = (uint16_t)next_rise;
-  // simavr 1.6 toggles twice where any OCR1x is written in the very cycle of a match: let a match that is close pass
-  if (pin != LOW) while ((uint16_t)(OCR1A - TCNT1 + 1) < LEAST) {}
+  // simavr 1.6 toggles twice where OCR1B is written in the very cycle of a match of OCR1A: let one that is close pass
+  if (pin != LOW) while ((uint16_t)(OCR1A - TCNT1 + 1) < CLOSE) {}
   if ((int16_t)(next - TCNT1) < (int16_t)LEAST) next = TCNT1 + LEAST;
   OCR1B = next;
 }
@@ -194,7 +197,6 @@ void pulse_start(void) {
   TCNT1 = 0;
   OCR1A = FAR;
   OCR1B = SCAN_PERIOD;
-  tick = SCAN_PERIOD;
   steady.period = PERIOD_MAX;
   TIFR1 = _BV(OCF1A) | _BV(OCF1B) | _BV(TOV1);
   TIMSK1 = _BV(OCIE1A) | _BV(OCIE1B) | _BV(TOIE1);
@@ -238,7 +240,10 @@ void pulse_mode(uint8_t new_mode) {
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
     rest();
     mode = new_mode;
-    if (mode == MODE_PAPER) run();
+    if (mode == MODE_PAPER) {
+      steady = (struct point){0, 0, PAPER_PERIOD};  // no pulse before the first count
+      run();
+    }
   }
 }
 
@@ -248,7 +253,7 @@ void pulse_rate(uint8_t new_rate) {
 
 void pulse_count(struct pulse_counts *counts) {
   ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-    uint8_t pulsing = !running ? 0 : playing ? 2 : mode == MODE_PAPER || steady.width ? 1 : 0;
+    uint8_t pulsing = !running ? 0 : playing ? 2 : steady.width ? 1 : 0;
     *counts = (struct pulse_counts){played, frames, late, pulsing, queue_room()};
   }
 }

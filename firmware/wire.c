@@ -19,9 +19,9 @@ struct wire_counts wire_counts;
 struct frame wire_frame;
 
 void wire_start(void) {
-  UBRR0 = F_CPU / (8ul * BAUD) - 1;
   UCSR0A = _BV(U2X0);
   UCSR0C = _BV(UCSZ01) | _BV(UCSZ00);
+  UBRR0 = F_CPU / (8ul * BAUD) - 1;  // last: simavr finds the speed out here
   UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
 }
 

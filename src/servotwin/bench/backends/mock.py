@@ -88,7 +88,7 @@ class MockBackend:
         self._mode = self._rate = self._mask = self._reference = 0
         self._queue: deque[_Point] = deque()
         self._taken = self._played = self._total = self._left = 0
-        self._playing = self._pulsing = False
+        self._playing = self._framing = False
         self._started = False
         self._point = _Point(1, 0, protocol().ticks(0.02))
         self._edge = self._fall = self._scan = _FAR
@@ -138,7 +138,7 @@ class MockBackend:
             self._tell("identity", answers=frame.sequence, name="servotwn", major=_VERSION[0], minor=_VERSION[1],
                        mode=self._mode, cause=1)
         elif kind.name == "ask":
-            state = 0 if not self._pulsing else 2 if self._playing else 1
+            state = 2 if self._playing else 1 if self._framing and self._point.width else 0
             self._tell("status", answers=frame.sequence, mode=self._mode, pulsing=state, room=self._room,
                        played=self._played, frames=self._pulses % 2**32, good=self._good % 2**16,
                        bad=self._in.bad % 2**16, dropped=0, late=0)
@@ -152,17 +152,17 @@ class MockBackend:
         point = _Point(1, values["width"], values["period"])
         if not _possible(point):
             return "range"
-        self._leave_queue()
+        self._playing, self._left = False, 0
         self._point = point
-        self._begin(pulsing=point.width > 0)
+        self._begin()
         return "ok"
 
     def _points(self, values: Mapping[str, Any]) -> str:
         points = [_Point(*one) for one in values["points"]]
-        if values["first"] != self._taken % 2**16:
-            return "order"
         if not points or not all(one.frames and _possible(one) for one in points):
             return "range"
+        if values["first"] != self._taken % 2**16:
+            return "order"
         if len(points) > self._room:
             return "full"
         self._queue.extend(points)
@@ -176,16 +176,16 @@ class MockBackend:
     def _play(self, values: Mapping[str, Any]) -> str:
         if self._playing:
             return "ok"
-        if not self._queue:
+        if not self._queue or not values["total"]:
             return "range"
         self._total, self._played, self._left = values["total"], 0, 0
         self._playing, self._started = True, False
-        self._begin(pulsing=True)
+        self._begin()
         return "ok"
 
     def _limp(self, values: Mapping[str, Any]) -> str:
         self._leave_queue()
-        self._pulsing, self._edge = False, _FAR
+        self._framing, self._edge = False, _FAR
         return "ok"
 
     def _stream(self, values: Mapping[str, Any]) -> str:
@@ -206,15 +206,15 @@ class MockBackend:
 
     # time goes on
 
-    def _begin(self, *, pulsing: bool) -> None:
-        if pulsing and not self._pulsing:
+    def _begin(self) -> None:
+        if not self._framing:
             self._edge = self._now + protocol().ticks(0.001)
-        self._pulsing = pulsing
-        if not pulsing:
-            self._edge = _FAR
+        self._framing = True
 
     def _step(self, until: int) -> None:
-        silent = _FAR if not self._pulsing else self._heard + protocol().ticks(protocol().numbers["silence"])
+        silent = _FAR
+        if self._framing or self._queue:
+            silent = self._heard + protocol().ticks(protocol().numbers["silence"])
         self._now = max(self._now, min(self._edge, self._fall, self._scan, silent, until))
         if self._now == self._fall:
             self._plant.fall(self._time)

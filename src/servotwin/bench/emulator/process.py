@@ -72,7 +72,7 @@ class Microcontroller:
         self._pins = pins
         self._heard = bytearray()
         self._looked = b""
-        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 - it lives as long as the process
+        self._errors: IO[bytes] = tempfile.TemporaryFile()
         try:
             self._process = subprocess.Popen([harness(), os.fspath(program)], stdin=subprocess.PIPE,
                                              stdout=subprocess.PIPE, stderr=self._errors, bufsize=0)

@@ -6,6 +6,7 @@ wrong.
 
 from __future__ import annotations
 
+import binascii
 import struct
 import subprocess
 from dataclasses import dataclass, field
@@ -18,12 +19,7 @@ IDENTITY, DONE, STATUS, EDGE, SAMPLES, EVENT = range(0x81, 0x87)
 
 
 def crc16(data: bytes) -> int:
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte << 8
-        for _ in range(8):
-            crc = (crc << 1 ^ (0x1021 if crc & 0x8000 else 0)) & 0xFFFF
-    return crc
+    return binascii.crc_hqx(data, 0xFFFF)  # polynomial 0x1021, not reflected
 
 
 def stuffed(data: bytes) -> bytes:
@@ -115,6 +111,12 @@ class Log:
         return [(up, down - up) for (up, _), (down, _) in zip(self.edges[::2], self.edges[1::2], strict=False)]
 
 
+def status(log: Log) -> dict[str, int]:
+    """Return the last status that the board told."""
+    names = ("answers", "mode", "pulsing", "room", "played", "frames", "good", "bad", "dropped", "late")
+    return dict(zip(names, struct.unpack("<BBBBIIHHHH", log.of(STATUS)[-1].payload), strict=True))
+
+
 def read_log(text: str) -> Log:
     log = Log()
     for line in text.splitlines():
@@ -143,8 +145,39 @@ def run_board(command: list[str], firmware: Path, script: Script, seconds: float
     told, log = folder / "script.txt", folder / "log.txt"
     told.write_text(str(script))
     done = subprocess.run([*command, str(firmware), str(told), str(log), str(seconds)], capture_output=True, text=True,
-                          timeout=1200, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+                          errors="replace", timeout=1200, check=False)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
     result = read_log(log.read_text())
     result.said = done.stdout
     return result
+
+
+def millivolt_of(count: int) -> int:
+    """Return what to feed simavr's converter at a reference of 2.5 V, so that it reads this count."""
+    return -(-count * 2500 // 1023)
+
+
+def screens(display: list[tuple[int, int, int]]) -> list[tuple[int, str]]:
+    """Return what a 16x2 HD44780 shows each time that its last place is written: (cycle, 32 characters).
+
+    It checks the display's times too: 4.1 ms and 100 us while it wakes, 1.52 ms to clear, 37 us for all else.
+    """
+    nibbles = list(display)
+    assert [(rs, nibble) for _, rs, nibble in nibbles[:4]] == [(0, 3), (0, 3), (0, 3), (0, 2)]
+    assert nibbles[0][0] > 0.040 * CYCLES
+    assert nibbles[1][0] - nibbles[0][0] > 0.0041 * CYCLES
+    assert nibbles[2][0] - nibbles[1][0] > 100e-6 * CYCLES
+    memory, at, shown, ready = {}, 0, [], nibbles[3][0] + 37e-6 * CYCLES
+    for (cycle, rs, high), (_, same, low) in zip(nibbles[4::2], nibbles[5::2], strict=False):
+        assert rs == same
+        assert cycle > ready
+        byte = high << 4 | low
+        ready = cycle + (1.52e-3 if byte == 1 and not rs else 37e-6) * CYCLES
+        if rs:
+            memory[at] = chr(byte)
+            at += 1
+            if at == 0x40 + 16:
+                shown.append((cycle, "".join(memory[k] for k in [*range(16), *range(0x40, 0x50)])))
+        elif byte & 0x80:
+            at = byte & 0x7F
+    return shown
