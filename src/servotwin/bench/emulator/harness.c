@@ -47,6 +47,8 @@
 #define UBRRH 0xC5
 #define UCSRA 0xC0
 #define ADMUX 0x7C
+#define ADCSRA 0x7A
+#define ADEN 7
 #define PULSE 1          /* bits of port B */
 #define LIGHT 5
 #define DISPLAY_E 0x08   /* of port D */
@@ -62,6 +64,8 @@ static avr_timer_t *timer1;
 static avr_irq_t *port_b;
 
 static int running, owed, channel, levels[8];
+static uint64_t converter_on; /* cycle; its clock counts from there */
+static avr_cycle_count_t waits;
 static uint16_t count;
 static uint8_t display;
 static void (*chip_reset)(avr_t *);
@@ -217,15 +221,33 @@ static avr_cycle_count_t on_end(avr_t *a, avr_cycle_count_t when, void *unused) 
     return 0;
 }
 
+static void on_power(avr_irq_t *irq, uint32_t value, void *unused) {
+    (void)unused;
+    if (value && !irq->value) converter_on = avr->cycle;
+}
+
+static avr_cycle_count_t later(avr_t *a, avr_cycle_count_t when, void *unused) { /* simavr knows no clock to wait for */
+    (void)unused;
+    for (avr_cycle_timer_slot_p t = a->cycle_timers.timer; t; t = t->next) {
+        if (t->param != adc) continue;
+        avr_cycle_timer_register(a, t->when + waits - a->cycle, t->timer, adc);
+        break;
+    }
+    (void)when;
+    return 0;
+}
+
 static void on_trigger(avr_irq_t *irq, uint32_t value, void *unused) {
     (void)irq, (void)unused;
     union { avr_adc_mux_t mux; uint32_t value; } asked = {.value = value};
     if (asked.mux.kind != ADC_MUX_SINGLE) return;
     channel = asked.mux.src;
     uint8_t shift = avr->data[adc->r_adcsra] & 7;
-    uint32_t clock = 1u << (shift ? shift : 1); /* data sheet, table 24-1: held after 1.5 of these, at first 13.5 */
-    avr_cycle_timer_register(avr, (adc->first ? 27 : 3) * clock / 2, on_hold, NULL);
-    avr_cycle_timer_register(avr, (adc->first ? 25 : 13) * clock - 1, on_end, NULL);
+    uint32_t clock = 1u << (shift ? shift : 1); /* data sheet, 24.4: begins with the next one of these */
+    waits = clock - (avr->cycle - converter_on) % clock;
+    avr_cycle_timer_register(avr, waits + (adc->first ? 27 : 3) * clock / 2, on_hold, NULL); /* table 24-1 */
+    avr_cycle_timer_register(avr, waits + (adc->first ? 25 : 13) * clock - 1, on_end, NULL);
+    avr_cycle_timer_register(avr, 1, later, NULL);
 }
 
 /* the board */
@@ -359,6 +381,7 @@ int main(int argc, char **argv) {
     avr_irq_register_notify(port_d + IOPORT_IRQ_REG_PORT, on_display, NULL);
     avr_irq_register_notify(uart->io.irq + UART_IRQ_OUTPUT, from_board, NULL);
     avr_irq_register_notify(adc->io.irq + ADC_IRQ_OUT_TRIGGER, on_trigger, NULL);
+    avr_irq_register_notify(avr_iomem_getirq(avr, ADCSRA, NULL, ADEN), on_power, NULL);
     chip_reset = avr->reset;
     avr->reset = on_reset;
     for (;;) obey();
