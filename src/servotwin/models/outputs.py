@@ -36,6 +36,11 @@ _at_duty, _share_of, _on_share_of = (
     array_form(law, __name__) for law in (duty.at_duty, duty.share_of, duty.on_share_of))
 
 
+def of_numbers(samples: Samples) -> bool:
+    """Tell whether samples are numbers, not arrays: then the laws themselves do, without a look at all their parts."""
+    return isinstance(samples.speed, float)
+
+
 def any_of(condition: Any) -> bool:
     """Tell whether something is so in any lane; of a number alone numpy takes a while to tell."""
     return condition if isinstance(condition, bool) else bool(np.any(condition))
@@ -100,7 +105,8 @@ def _circuit(plant: Numbers, samples: Samples, drive: Pieces) -> tuple[Numbers, 
     if not any_of(plant.source.V > 0.0):
         return plant, drive(samples.time), samples.angle, samples.speed, i
     if not _digital(plant) and any_of(heeds_silence(plant.bridge)):
-        plant = plant._replace(bridge=_off_now(plant.bridge, samples.silent))
+        off = off_now if of_numbers(samples) else _off_now
+        plant = plant._replace(bridge=cast("Any", off)(plant.bridge, samples.silent))
     shared = getattr(samples, "bus", None)
     if shared is not None:
         plant = _on_bus(plant, shared * _share_of(plant.bridge, samples.duty) if _digital(plant) else shared)
@@ -144,6 +150,8 @@ def _reduction(model: Shown) -> float:
 def _electrical_signal(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
     def compute(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
         plant, u, q, w, i = _circuit(warm_plant(model, samples, load), samples, drive)
+        if of_numbers(samples) and not _digital(plant):
+            return cast("Array", getattr(observe.electrical(plant, u, q, w, i), name))
         values = getattr(_shown(plant, samples, _electrical(plant, u, q, w, i)), name)
         return np.broadcast_to(values, np.broadcast_shapes(np.shape(values), np.shape(w)))
     return compute
