@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _TABLE = "urrea-kern-table-2"
 _FRAME = 1.0 / 61.0  # s, as Table II prints it
+_SHOWN = 3  # pulses
 _PICTURES = ((0, 22), (2, 23), (4, 24))  # row of the table, number of the paper's figure
 
 
@@ -88,16 +89,11 @@ def _beside(value: float, off: float, unit: str = "", digits: int = 0) -> str:
 
 
 def _oscilloscope(row: ChainRow, printed: float) -> Figure:
-    """Draw the last pulses at the pin over those that Table II prints."""
-    import numpy as np
-
-    from servotwin.plotting import Curve, curves
-    from servotwin.plotting.panels import pulse_corners
+    """Draw the last pulses at the pin, and below them what Table II prints."""
+    from servotwin.plotting.panels import Train, pulses
 
     start = row.pulses[0][0]
-    edges, widths = [rise - start for rise, _ in row.pulses], [width for _, width in row.pulses]
-    seen = pulse_corners(edges, widths)
-    paper = pulse_corners([k * _FRAME for k in range(len(edges))], [printed] * len(edges))
-    drawn = [Curve(f"emulated pin, {1e6 * widths[0]:.1f} us", 1e3 * seen[0], seen[1]),
-             Curve(f"Table II, {1e6 * printed:.0f} us at 61 Hz", 1e3 * paper[0], np.asarray(paper[1]) - 1.4)]
-    return curves(drawn, x_label="time (ms)", y_label="logic level, the paper's below")
+    edges, widths = [rise - start for rise, _ in row.pulses[:_SHOWN]], [width for _, width in row.pulses[:_SHOWN]]
+    paper = Train(f"Table II: {1e6 * printed:.0f} µs, 61 Hz", [k * _FRAME for k in range(len(edges))],
+                  [printed] * len(edges))
+    return pulses(edges, widths, frame_period=edges[1], beside=paper, label="pin of the emulated board")

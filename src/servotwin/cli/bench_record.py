@@ -124,7 +124,7 @@ def rehearse(
 
 def _bus_rig(family: str, port: str, identity: int | None, baud: int | None, period: float) -> Rig:
     """Return the servo with this number, or the only one that answers."""
-    from servotwin.bench.bus import BAUDS, rig_of, scan
+    from servotwin.bench.bus import BAUDS, IDS, rig_of, scan
     from servotwin.cli.terminal import patience
     from servotwin.errors import BenchError, UnknownNameError
 
@@ -132,10 +132,10 @@ def _bus_rig(family: str, port: str, identity: int | None, baud: int | None, per
         raise UnknownNameError("bus", family, _BUSES)
     with patience("looking for servos"):
         found = [one for one in scan(port, bauds=BAUDS if baud is None else [baud],
-                                     **({} if identity is None else {"ids": [identity]}))
+                                     ids=IDS if identity is None else [identity])
                  if one.protocol.startswith(family) and identity in (None, one.id)]
     if len(found) != 1:
-        there = ", ".join(f"{one.id} ({one.model})" for one in found) or "no servo that answers"
+        there = ", ".join(f"{one.id} ({one.model.name if one.model else one.number})" for one in found) or "no servo that answers"
         raise BenchError(f"port {port}", there + ("; --id says which one" if found else ""))
     return rig_of(port, found[0], rate=1.0 / period)
 
