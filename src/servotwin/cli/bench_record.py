@@ -56,7 +56,8 @@ def record(
 
     kind = "pulse_width" if bus is None else "angle"
     if bus is None and (identity is not None or baud is not None):
-        raise InputError("--baud" if identity is None else "--id", got="no --bus", allowed="with --bus feetech or dynamixel")
+        raise InputError("--baud" if identity is None else "--id", got="no --bus",
+                         allowed="with --bus feetech or dynamixel")
     limits = words.limits_from(kind, span, voltage, current_limit)
     about = words.about_from(servo, licence, author, note, load)
     made = _experiments(experiment, limits, servo, load, duration, words.seconds("--frame-period", frame_period), seed)
@@ -135,8 +136,9 @@ def _bus_rig(family: str, port: str, identity: int | None, baud: int | None, per
                                      ids=IDS if identity is None else [identity])
                  if one.protocol.startswith(family) and identity in (None, one.id)]
     if len(found) != 1:
-        there = ", ".join(f"{one.id} ({one.model.name if one.model else one.number})" for one in found) or "no servo that answers"
-        raise BenchError(f"port {port}", there + ("; --id says which one" if found else ""))
+        names = [f"{one.id} ({one.model.name if one.model else one.number})" for one in found]
+        raise BenchError(f"port {port}", f"{', '.join(names)}; --id says which one" if names
+                         else "no servo answers (power, wiring, --baud?)")
     return rig_of(port, found[0], rate=1.0 / period)
 
 

@@ -168,8 +168,9 @@ def pulses(edges: Sequence[float], widths: Sequence[float], *, frame_period: flo
             ax.plot(1e3 * time, level, color=LINES[0][0], linewidth=1.5, solid_joinstyle="miter")
             low = -0.15 if beside is None else _beside(ax, beside)
             ax.set_ylim(low, 1.6)
-            ax.yaxis.set_major_locator(FixedLocator([0.0, 1.0] if beside is None else [0.0, 1.0, -_BELOW, 1.0 - _BELOW]))
-            ax.yaxis.set_major_formatter(FixedFormatter(["low", "high"] * (1 if beside is None else 2)))
+            levels = [0.0, 1.0] if beside is None else [0.0, 1.0, -_BELOW, 1.0 - _BELOW]
+            ax.yaxis.set_major_locator(FixedLocator(levels))
+            ax.yaxis.set_major_formatter(FixedFormatter(["low", "high"] * (len(levels) // 2)))
             ax.set_ylabel("logic level")
             ax.set_xlabel("time (ms)")
         above, below = axes
@@ -177,7 +178,7 @@ def pulses(edges: Sequence[float], widths: Sequence[float], *, frame_period: flo
             below.annotate(text, xy=(0.99, y), xycoords=("axes fraction", "data"), ha="right", va="center", fontsize=8,
                            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})
         above.set_xlim(1e3 * float(time[0]), 1e3 * float(time[-1]))
-        below.set_xlim(-0.4, max(3.0, 1.2e3 * max(widths)))
+        below.set_xlim(-0.4, max(3.0, 1.2e3 * max(widths)) if beside is None else 1e3 * max(widths) + 2.2)
         _span(above, 1e3 * edges[0], 1e3 * edges[1], 1.22,
               f"$T_f$ = {1e3 * frame_period:.3f} ms,  $f$ = {1.0 / frame_period:.3f} Hz")
         _span(below, 0.0, 1e3 * widths[0], 1.22, f"$t_a$ = {1e6 * widths[0]:.0f} µs")
