@@ -28,7 +28,7 @@ def software():
 def test_emulated_rows_are_as_near_to_table_ii_as_those_of_the_bench_in_software(chain, software):
     columns = st.load_dataset("urrea-kern-table-2").columns
     ours, theirs = (np.abs(np.array(compare(rows, columns))) for rows in (chain, software))
-    assert (ours <= theirs.max(axis=0) + [1e-5, 1e-6, 1e-12, 0, 0]).all()
+    assert (ours <= theirs.max(axis=0) + np.array([1e-5, 1e-6, 1e-12, 0.0, 0.0])).all()
 
 
 def test_emulated_rows_are_those_of_the_bench_in_software(chain, software):
