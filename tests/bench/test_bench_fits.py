@@ -1,4 +1,4 @@
-"""From the emulated bench to a fitted servo: two fixed servos; twenty are in benchmarks/bench/coverage.py."""
+"""From the emulated bench to a fitted servo: two fixed servos; twenty are in benchmarks/bench/intervals.py."""
 
 import math
 
