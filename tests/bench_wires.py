@@ -8,7 +8,7 @@ from servotwin.bench.backends import MockBackend
 
 
 class BoardOnTerminal:
-    """A board on a pseudo-terminal, for real serial programs; its time is that of the wall, roughly."""
+    """A board on a pseudo-terminal, for real serial programs; its time goes some times as fast as that of the wall."""
 
     def __init__(self, board=None, bend=None):
         self.board = board or MockBackend()
@@ -32,16 +32,18 @@ class BoardOnTerminal:
                 pass
             except OSError:
                 return
-            data = self.board.read(0.004)
+            data = self.board.read(0.005)
             if data:
                 try:
                     os.write(self._master, self._bend(data))
                 except OSError:
                     return
-            self._stop.wait(0.002)
+            self._stop.wait(0.001)
 
     def cut(self):
         """Pull the cable."""
+        if self._stop.is_set():
+            return
         self._stop.set()
         self._thread.join()
         os.close(self._slave)

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import fields
 
 import servotwin as st
+from servotwin.bench.wire import protocol
 from servotwin.logs import LOG_FORMATS
 from servotwin.models import MODELS
 from servotwin.models.outputs import SIGNALS
@@ -165,13 +166,41 @@ def api(module: str) -> str:
     return markdown(("name", "what it is"), rows)
 
 
+def protocol_messages() -> str:
+    """The messages of the bench's wire."""
+    rows = [(f"`{kind.name}`", f"0x{kind.number:02x}", kind.sender, f"`{kind.answer}`" if kind.answer else "", kind.text)
+            for kind in protocol().kinds.values()]
+    return markdown(("message", "kind", "from", "answer", "what for"), rows)
+
+
+def protocol_fields() -> str:
+    """The fields of these messages, in their order."""
+    rows = [(f"`{kind.name}`", f"`{field.name}`", field.type, field.unit, field.text)
+            for kind in protocol().kinds.values() for field in kind.fields]
+    return markdown(("message", "field", "type", "unit", "what it is"), rows)
+
+
+def protocol_numbers() -> str:
+    """The numbers that both sides keep."""
+    return markdown(("name", "value"), [(f"`{name}`", f"{value:g}") for name, value in protocol().numbers.items()])
+
+
+def protocol_words() -> str:
+    """The names of numbers in messages."""
+    rows = [(f"`{table}`", ", ".join(f"{number} {name}" for name, number in words.items()))
+            for table, words in protocol().words.items()]
+    return markdown(("of", "numbers"), rows)
+
+
 def _is_own(module, name: str) -> bool:
     item = getattr(module, name)
     return not name.startswith("_") and getattr(item, "__module__", None) == module.__name__
 
 
 TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "signals": signals,
-          "units": units, "catalog": catalog, "log-formats": log_formats, "top-level": top_level, "api": api}
+          "units": units, "catalog": catalog, "log-formats": log_formats, "top-level": top_level, "api": api,
+          "protocol-messages": protocol_messages, "protocol-fields": protocol_fields,
+          "protocol-numbers": protocol_numbers, "protocol-words": protocol_words}
 
 
 def setup(app):

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import servotwin as st
 from servotwin.bench import calibrate_table
 from servotwin.bench.table_words import plus_minus, residual_pattern
-from servotwin.cli.fit_table import show_table_calibration
+from servotwin.cli.fit_table import calibrate_from
 from servotwin.errors import InputError, OutputExistsError
 
 SOURCE = "Table II"
@@ -231,7 +231,7 @@ def app():
             as_json: bool = False) -> None:
         from pathlib import Path
 
-        show_table_calibration(Path(table), servo, None if out is None else Path(out), force=force, as_json=as_json)
+        calibrate_from(Path(table), servo, None if out is None else Path(out), force=force, as_json=as_json)
 
     return made
 

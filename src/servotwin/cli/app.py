@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from servotwin import __version__
+from servotwin.cli.bench import bench
 from servotwin.cli.catalog import catalog
 from servotwin.cli.curves import curves
 from servotwin.cli.fit import fit
@@ -67,3 +68,4 @@ app.command("validate", help="Compare a servo with logs, and say how far it is o
             epilog="Example: servotwin validate my-servo.toml new-runs/ --max-error 3deg --report check.html")(validate)
 app.add_typer(catalog, name="catalog")
 app.add_typer(robot, name="robot")
+app.add_typer(bench, name="bench")

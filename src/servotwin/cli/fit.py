@@ -108,9 +108,9 @@ def fit(
     """Find the parameters of a servo, with intervals."""
     _check_words(logs, servo, table, report, scheduler, advise=advise)
     if table is not None:
-        from servotwin.cli.fit_table import show_table_calibration
+        from servotwin.cli.fit_table import calibrate_from
 
-        show_table_calibration(table, servo, out, force=force, as_json=as_json)
+        calibrate_from(table, servo, out, force=force, as_json=as_json)
         return
     targets = _targets(out, report, [*(logs or []), Path(servo or "")], force=force)
     search = _search(servo or "", model, change or [], free, bounds or [], prior or [], priors=not no_priors)

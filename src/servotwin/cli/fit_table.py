@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from servotwin.parameters import Quantity
 
 
-def show_table_calibration(path: Path, servo: str | None, out: Path | None, *, force: bool = False,
-                           as_json: bool = False) -> None:
+def calibrate_from(path: Path, servo: str | None, out: Path | None, *, force: bool = False,
+                   as_json: bool = False) -> None:
     """Calibrate from a bench table, show what was found, and write the servo.
 
     Parameters
@@ -48,6 +48,11 @@ def show_table_calibration(path: Path, servo: str | None, out: Path | None, *, f
     if as_json:
         emit_json(calibration_facts(found, out))
         return
+    show_table_calibration(found, out)
+
+
+def show_table_calibration(found: TableCalibration, out: Path | None) -> None:
+    """Show what a table says, and where the servo is, if it was written."""
     written = [] if out is None else ["", pairs([("written", str(out))])]
     show(f"{found.source}: {found.table.rows} rows, " + ", ".join(c.name for c in found.table.columns), "",
          _lines(found), "", *_parameters(found), *[f"- {text}" for text in found.findings()], *written)

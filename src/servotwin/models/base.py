@@ -70,6 +70,7 @@ class Model(ABC):
     """Whether the class follows a body behind an elastic shaft."""
 
     _packed: tuple[Load, Numbers] | None = None
+    _shown: tuple[Load, tuple[str, ...]] | None = None
 
     def __init__(self, servo: Servo) -> None:
         if not isinstance(servo, Servo):
@@ -218,7 +219,9 @@ class Model(ABC):
         """
         if name == "time":
             return samples.time
-        names = self.signals_with(load)
+        if self._shown is None or self._shown[0] is not load:
+            self._shown = (load, self.signals_with(load))
+        names = self._shown[1]
         if name not in names:
             raise UnknownNameError(f"signal of {type(self).__name__}", name, ("time", *names))
         return outputs.SIGNALS[name].compute(self, samples, drive, load)

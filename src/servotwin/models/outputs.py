@@ -36,6 +36,16 @@ _at_duty, _share_of, _on_share_of = (
     array_form(law, __name__) for law in (duty.at_duty, duty.share_of, duty.on_share_of))
 
 
+def of_numbers(samples: Samples) -> bool:
+    """Tell whether samples are numbers, not arrays: then the laws themselves do, without a look at all their parts."""
+    return isinstance(samples.speed, float)
+
+
+def any_of(condition: Any) -> bool:
+    """Tell whether something is so in any lane; of a number alone numpy takes a while to tell."""
+    return condition if isinstance(condition, bool) else bool(np.any(condition))
+
+
 class Shown(Protocol):
     """What a signal asks of a model."""
 
@@ -67,7 +77,7 @@ class Output(NamedTuple):
 def warm_plant(model: Shown, samples: Samples, load: Load) -> Numbers:
     """Return the plant at the temperatures of the samples, and at their duty."""
     plant = model.plant(load)
-    if np.any(plant.heat.C_w > 0.0):
+    if any_of(plant.heat.C_w > 0.0):
         plant = cast("Numbers", _at_temperature(plant, samples.winding, samples.housing))
     return cast("Numbers", _at_duty(plant, samples.duty)) if _digital(plant) else plant
 
@@ -86,16 +96,17 @@ def _shown(plant: Numbers, samples: Samples, found: Electrical) -> Electrical:
 
 
 def _digital(plant: Numbers) -> bool:
-    return bool(np.any(plant.bridge.pwm > 0.0))
+    return any_of(plant.bridge.pwm > 0.0)
 
 
 def _circuit(plant: Numbers, samples: Samples, drive: Pieces) -> tuple[Numbers, Any, Any, Any, Any]:
     """Return what the electrical side is asked with; fields that do not count are not looked at."""
-    i = samples.current if np.any(plant.motor.L > 0.0) else 0.0
-    if not np.any(plant.source.V > 0.0):
+    i = samples.current if any_of(plant.motor.L > 0.0) else 0.0
+    if not any_of(plant.source.V > 0.0):
         return plant, drive(samples.time), samples.angle, samples.speed, i
-    if not _digital(plant) and np.any(heeds_silence(plant.bridge)):
-        plant = plant._replace(bridge=_off_now(plant.bridge, samples.silent))
+    if not _digital(plant) and any_of(heeds_silence(plant.bridge)):
+        off = off_now if of_numbers(samples) else _off_now
+        plant = plant._replace(bridge=cast("Any", off)(plant.bridge, samples.silent))
     shared = getattr(samples, "bus", None)
     if shared is not None:
         plant = _on_bus(plant, shared * _share_of(plant.bridge, samples.duty) if _digital(plant) else shared)
@@ -105,7 +116,7 @@ def _circuit(plant: Numbers, samples: Samples, drive: Pieces) -> tuple[Numbers, 
 
 def _apart(plant: Numbers) -> bool:
     """Tell whether the motor may turn otherwise than the output: in a gear with play, or in an elastic one."""
-    return bool(np.any(plant.play.half) or (np.any(plant.elastic.k) and not np.any(plant.elastic.J)))
+    return any_of(plant.play.half != 0.0) or (any_of(plant.elastic.k != 0.0) and not any_of(plant.elastic.J != 0.0))
 
 
 def motor_speed_of(plant: Numbers, samples: Samples) -> Array:
@@ -119,10 +130,10 @@ def torques_of(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Tor
     i = _armature_current(*_circuit(plant, samples, drive))
     external = load.external_torque(samples.time, samples.angle)
     mode: Any = Mode(0, cast("Any", samples.contact), RIGID, FREE, 0)
-    if not np.any(plant.play.half) and not np.any(plant.elastic.k):
+    if not any_of(plant.play.half != 0.0) and not any_of(plant.elastic.k != 0.0):
         return cast("Torques", _torques(plant, mode, w, w, i, external))
     mode = mode._replace(mesh=samples.mesh, motor=samples.motor)
-    if np.any(plant.elastic.k):
+    if any_of(plant.elastic.k != 0.0):
         y = (samples.angle, w, 0.0, 0.0, 0.0, samples.motor_angle, samples.motor_speed)
         return cast("Torques", _torques_of_two(plant, mode, y, i, external))
     return cast("Torques", _torques(plant, mode, w, samples.motor_speed, i, external))
@@ -139,6 +150,8 @@ def _reduction(model: Shown) -> float:
 def _electrical_signal(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
     def compute(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
         plant, u, q, w, i = _circuit(warm_plant(model, samples, load), samples, drive)
+        if of_numbers(samples) and not _digital(plant):
+            return cast("Array", getattr(observe.electrical(plant, u, q, w, i), name))
         values = getattr(_shown(plant, samples, _electrical(plant, u, q, w, i)), name)
         return np.broadcast_to(values, np.broadcast_shapes(np.shape(values), np.shape(w)))
     return compute
@@ -158,9 +171,9 @@ def _motor_torque(model: Shown, samples: Samples, drive: Pieces, load: Load) -> 
 
 def _feedback(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
     sensor, (angles, errors) = model.plant(load).sensor, model.curve()
-    if not angles and not np.any(sensor.step) and not np.any(sensor.half_slack):
+    if not angles and not any_of(sensor.step != 0.0) and not any_of(sensor.half_slack != 0.0):
         return np.asarray(physics.feedback_voltage(samples.angle, sensor.p, sensor.b_o))
-    count = sensor.step if np.any(sensor.step) else None
+    count = sensor.step if any_of(sensor.step != 0.0) else None
     return np.asarray(physics.sensed_voltage(
         samples.wiper, sensor.p, sensor.b_o, angles or (0.0,), errors or (0.0,), count))
 
@@ -175,7 +188,7 @@ def _of_motor(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
 
 def _load_angle(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
     """Angle of the body behind an elastic shaft; that of the output where there is none."""
-    return samples.motor_angle if np.any(model.plant(load).elastic.J) else samples.angle
+    return samples.motor_angle if any_of(model.plant(load).elastic.J != 0.0) else samples.angle
 
 
 def _commanded(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
@@ -201,6 +214,9 @@ def _duty(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
     d = cast("Array", samples.duty)
     return np.where(np.abs(d) <= 1.0, d, 0.0)
 
+
+PLAIN = ("armature_voltage", "armature_current", "motor_torque", "bus_voltage", "supply_current", "feedback_voltage")
+"""Signals that do not ask for the mode, and are the same to the last bit of samples that are numbers, not arrays."""
 
 SIGNALS: dict[str, Output] = {
     "command_voltage": Output("V", "voltage command v_i", _commanded("command_voltage")),

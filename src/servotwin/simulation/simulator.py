@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +13,9 @@ from servotwin.errors import CommandError, InputError, SimulationError, UnknownN
 from servotwin.loads import Constant, as_load
 from servotwin.models import DigitalServo, Model
 from servotwin.models.engine.memory import ACCURACY, Memory, started, with_bodies
-from servotwin.models.engine.modes import INSIDE, RIGID
+from servotwin.models.engine.modes import INSIDE, RIGID, Mode
 from servotwin.models.engine.runs import mode_of
+from servotwin.models.outputs import PLAIN
 from servotwin.models.samples import Samples
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
@@ -73,6 +75,7 @@ class Simulator:
         self.seed = _seed(seed)
         self.accuracy = accuracy_of(accuracy)
         self._numbers = model.pack(self.load)
+        self._places = model.states
         self._torque = self.load.torque_pieces
         self._last: tuple[Signal, Plan] | None = None
         self._framed: tuple[Signal, float, Signal] | None = None
@@ -116,7 +119,7 @@ class Simulator:
         y = start_vector(self.model.states, self._numbers, angle, initial or {})
         check_start(self.model.states, self._numbers, y)
         mesh = INSIDE if self._numbers.play.half > 0.0 else RIGID
-        return State(time=0.0, places=self.model.states, memory=started(y, mesh))
+        return State(time=0.0, places=self._places, memory=started(y, mesh))
 
     def advance(self, state: State, until: float, command: Signal, *, external_torque: float = 0.0) -> State:
         """Return the state at `until` [s] under a command.
@@ -169,16 +172,13 @@ class Simulator:
         """
         self._check(state, "observe(state)")
         own = self._with(state.changes)
-        plan, load = own.plan(own.framed(command, state.time), external_torque), own.load
-        if external_torque:
-            load = load + Constant(external_torque)
-        y, chip = np.array(state.memory.point.y)[:, None], state.memory.chip
-        mode = np.array(mode_of(plan.numbers, plan.chip, plan.inputs, state.memory))[:, None]
-        told = np.array(told_by(plan, state.memory))[:, None]
-        drive = sign_of(state.memory.firm[0].duty) if plan.digital else chip.drive
-        samples = Samples.make(np.array([state.time]), y, np.array([state.memory.point.wiper]), mode,
-                               np.array([drive]), np.array([chip.error]), np.array([chip.silent]), None, told)
-        return float(own.model.output(name, samples, plan.command, load)[0])
+        plan = own.plan(own.framed(command, state.time), external_torque)
+        load = own.load + Constant(external_torque) if external_torque else own.load
+        if name in PLAIN:
+            with suppress(ArithmeticError, ValueError):  # of numbers; arrays have inf or nan instead
+                return float(own.model.output(name, _sample(plan, state, None), plan.command, load))
+        mode = mode_of(plan.numbers, plan.chip, plan.inputs, state.memory)
+        return float(own.model.output(name, _sample(plan, state, mode), plan.command, load)[0])
 
     def changed(self, state: State, *, parameters: Mapping[str, Any] | None = None,
                 torque_enable: bool | None = None) -> State:
@@ -241,13 +241,14 @@ class Simulator:
         return self._others[changes]
 
     def _check(self, state: State, what: str, model: Model | None = None) -> None:
-        model = model or self.model
         if not isinstance(state, State):
             raise InputError(what, got=state, allowed="a state of this simulator")
-        own = tuple(place.name for place in model.states)
+        if state.places is self._places and model is None:
+            return
+        own = tuple(place.name for place in (model or self.model).states)
         if state.names != own:
             raise InputError(what, got=f"a state of {', '.join(state.names)}",
-                             allowed=f"one of {', '.join(own)}, as {type(model).__name__} has")
+                             allowed=f"one of {', '.join(own)}, as {type(model or self.model).__name__} has")
 
     def recorded(self, state: State, until: float, command: Signal, record: Record | None, *,
                  external_torque: float = 0.0) -> State:
@@ -376,6 +377,15 @@ def _thousandths(duration: float, show: Callable[[int], None]) -> Callable[[floa
             last = done
             show(done)
     return tell
+
+
+def _sample(plan: Plan, state: State, mode: Mode | None) -> Samples:
+    """Return a state as arrays of one sample, or as numbers where the mode is not asked for."""
+    point, chip = state.memory.point, state.memory.chip
+    drive = sign_of(state.memory.firm[0].duty) if plan.digital else chip.drive
+    fields: Any = (state.time, *point.y, point.wiper, *(mode or (0,) * 5)[:4], drive, chip.error, chip.silent, None,
+                   *told_by(plan, state.memory))
+    return Samples(*fields if mode is None else (None if x is None else np.array([x]) for x in fields))
 
 
 def _model(model: Model) -> Model:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 from servotwin.bench.wire.frames import Frame, Splitter, to_wire
@@ -11,7 +11,8 @@ from servotwin.bench.wire.protocol import Kind, protocol
 from servotwin.errors import BenchError, InputError
 
 _VERSION = (1, 0)  # of the firmware that it stands for
-_REFERENCE = {"external": 2.5, "supply": 5.0, "internal": 1.1}  # V
+REFERENCES: Mapping[str, float] = {"external": 2.5, "supply": 5.0, "internal": 1.1}
+"""Of the converter: the guide's TL431, USB, the ATmega328P's sheet [V]."""
 _FAR = 2**62  # ticks; never
 
 
@@ -24,15 +25,21 @@ class Plant(Protocol):
     def fall(self, time: float) -> None:
         """Take the falling edge of a pulse [s]."""
 
-    def voltages(self, time: float) -> Sequence[float]:
-        """Return the voltages at the pins of the channels at a time, not before the last one [V]."""
+    def voltage(self, channel: str, time: float) -> float:
+        """Return the voltage at the pin of a channel at a time, not before the last one [V]."""
 
 
-class _Still:
-    """Pins that never change."""
+class StillPins:
+    """Pins that never change.
 
-    def __init__(self, voltages: Sequence[float]) -> None:
-        self._voltages = voltages
+    Parameters
+    ----------
+    volts : float
+        At each of them [V].
+    """
+
+    def __init__(self, volts: float = 1.25) -> None:
+        self._volts = volts
 
     def rise(self, time: float) -> None:
         """Nothing happens."""
@@ -40,9 +47,9 @@ class _Still:
     def fall(self, time: float) -> None:
         """Nothing happens."""
 
-    def voltages(self, time: float) -> Sequence[float]:
-        """Return what they are."""
-        return self._voltages
+    def voltage(self, channel: str, time: float) -> float:
+        """Return what they are [V]."""
+        return self._volts
 
 
 class _Point(NamedTuple):
@@ -60,6 +67,8 @@ class MockBackend:
         What hangs on its pins; 1.25 V at each unless given.
     start : int
         Its clock when it is opened [ticks].
+    references : mapping of str to float, optional
+        Of the converter, other than `REFERENCES` [V].
 
     Examples
     --------
@@ -72,8 +81,10 @@ class MockBackend:
 
     name = "mock"
 
-    def __init__(self, plant: Plant | None = None, *, start: int = 0) -> None:
-        self._plant: Plant = plant or _Still((1.25,) * len(protocol().words["channels"]))
+    def __init__(self, plant: Plant | None = None, *, start: int = 0,
+                 references: Mapping[str, float] | None = None) -> None:
+        self._volts = {**REFERENCES, **(references or {})}
+        self._plant: Plant = plant or StillPins()
         self._start = self._now = start
         self._is_open = False
 
@@ -88,7 +99,7 @@ class MockBackend:
         self._mode = self._rate = self._mask = self._reference = 0
         self._queue: deque[_Point] = deque()
         self._taken = self._played = self._total = self._left = 0
-        self._playing = self._pulsing = False
+        self._playing = self._framing = False
         self._started = False
         self._point = _Point(1, 0, protocol().ticks(0.02))
         self._edge = self._fall = self._scan = _FAR
@@ -138,7 +149,7 @@ class MockBackend:
             self._tell("identity", answers=frame.sequence, name="servotwn", major=_VERSION[0], minor=_VERSION[1],
                        mode=self._mode, cause=1)
         elif kind.name == "ask":
-            state = 0 if not self._pulsing else 2 if self._playing else 1
+            state = 2 if self._playing else 1 if self._framing and self._point.width else 0
             self._tell("status", answers=frame.sequence, mode=self._mode, pulsing=state, room=self._room,
                        played=self._played, frames=self._pulses % 2**32, good=self._good % 2**16,
                        bad=self._in.bad % 2**16, dropped=0, late=0)
@@ -152,17 +163,17 @@ class MockBackend:
         point = _Point(1, values["width"], values["period"])
         if not _possible(point):
             return "range"
-        self._leave_queue()
+        self._playing, self._left = False, 0
         self._point = point
-        self._begin(pulsing=point.width > 0)
+        self._begin()
         return "ok"
 
     def _points(self, values: Mapping[str, Any]) -> str:
         points = [_Point(*one) for one in values["points"]]
-        if values["first"] != self._taken % 2**16:
-            return "order"
         if not points or not all(one.frames and _possible(one) for one in points):
             return "range"
+        if values["first"] != self._taken % 2**16:
+            return "order"
         if len(points) > self._room:
             return "full"
         self._queue.extend(points)
@@ -176,16 +187,16 @@ class MockBackend:
     def _play(self, values: Mapping[str, Any]) -> str:
         if self._playing:
             return "ok"
-        if not self._queue:
+        if not self._queue or not values["total"]:
             return "range"
         self._total, self._played, self._left = values["total"], 0, 0
         self._playing, self._started = True, False
-        self._begin(pulsing=True)
+        self._begin()
         return "ok"
 
     def _limp(self, values: Mapping[str, Any]) -> str:
         self._leave_queue()
-        self._pulsing, self._edge = False, _FAR
+        self._framing, self._edge = False, _FAR
         return "ok"
 
     def _stream(self, values: Mapping[str, Any]) -> str:
@@ -206,15 +217,15 @@ class MockBackend:
 
     # time goes on
 
-    def _begin(self, *, pulsing: bool) -> None:
-        if pulsing and not self._pulsing:
+    def _begin(self) -> None:
+        if not self._framing:
             self._edge = self._now + protocol().ticks(0.001)
-        self._pulsing = pulsing
-        if not pulsing:
-            self._edge = _FAR
+        self._framing = True
 
     def _step(self, until: int) -> None:
-        silent = _FAR if not self._pulsing else self._heard + protocol().ticks(protocol().numbers["silence"])
+        silent = _FAR
+        if self._framing or self._queue:
+            silent = self._heard + protocol().ticks(protocol().numbers["silence"])
         self._now = max(self._now, min(self._edge, self._fall, self._scan, silent, until))
         if self._now == self._fall:
             self._plant.fall(self._time)
@@ -274,11 +285,11 @@ class MockBackend:
 
     def _counts(self) -> list[int]:
         numbers, counts, k = protocol().numbers, [], 0
-        reference = _REFERENCE[protocol().word("reference", self._reference)]
-        for channel in range(len(protocol().words["channels"])):
+        reference = self._volts[protocol().word("reference", self._reference)]
+        for name, channel in protocol().words["channels"].items():
             if self._mask >> channel & 1:
                 held = (self._now + numbers["hold_ticks"] + k * numbers["channel_ticks"]) * protocol().tick
-                volts = self._plant.voltages(held)[channel]
+                volts = self._plant.voltage(name, held)
                 counts.append(min(max(int(1024 * volts / reference), 0), 1023))
                 k += 1
         return counts

@@ -17,6 +17,7 @@ from servotwin.errors import BenchError, InputError
 _BATCH = 10  # points of one message
 _SETTLE, _STILL, _LOOK = 5.0, 2.0, 0.2  # s: longest wait, and counts that a tap at rest may move between two looks
 _PATIENCE = 1.0  # s without a row until the board is asked how it does
+_COUNT = 1e-7  # s, well below a tick
 _ALIVE = 0.25  # s between two signs of life
 
 
@@ -187,29 +188,28 @@ class _Upload:
 class _Rows:
     """Makes rows of what the board tells, in the order of their times.
 
-    An edge is told at once and scans some of them together, so edges wait for the scans around them.
+    Scans are told some at a time and edges at once, so each waits until the other is known up to its time: an edge says
+    when the next one comes, and scans are regular.
     """
 
     def __init__(self, wiring: Wiring, rate: str, frames: int) -> None:
         self._wiring, self._fast, self._frames = wiring, rate == "fast", frames
         self._start: float | None = None
         self._pulse = math.nan  # us, of the frame under way
-        self._edges: deque[tuple[float, float, float]] = deque()  # time, pulse, end of its frame
-        self._seen = 0
-        self._end = math.inf
+        self._edges: deque[tuple[float, float]] = deque()  # time, pulse
+        self._scans: deque[tuple[float, list[float]]] = deque()  # time, values
+        self._edge_known, self._scan_known = 0.0, -math.inf  # until when
         self.complete = False
 
     def of(self, message: Message) -> list[Sequence[float]]:
         """Return the rows that a message completes."""
         if message.name == "event":
             self._event(message)
-        elif self._start is None:
-            pass  # of the pulses before the first frame
-        elif message.name == "edge" and message.time >= self._start - 1e-9:
-            return self._edge(message)
-        elif message.name == "samples":
+        elif self._start is not None and message.name == "samples":
             return self._samples(message)
-        return []
+        elif self._start is not None and message.name == "edge" and message.time > self._start - _COUNT:
+            return self._edge(message)
+        return []  # of the pulses before the first frame
 
     def _event(self, message: Message) -> None:
         name = protocol().word("event", message.values["event"])
@@ -221,38 +221,44 @@ class _Rows:
             raise BenchError("the bench", f"the board {problem}")
 
     def _edge(self, message: Message) -> list[Sequence[float]]:
-        if self._seen == self._frames:
-            return []
-        self._seen += 1
-        width, tick = message.values["width"], protocol().tick
-        pulse = 1e6 * width * tick if width else math.nan
-        time = message.time - (self._start or 0.0)
-        end = time + message.values["period"] * tick
-        if self._seen == self._frames:
-            self._end = end
-            self.complete = not self._fast
-        if self._fast:
-            self._edges.append((time, round(pulse, 3), end))
-            return []
-        return [(_round(time), round(pulse, 3), *self._values(message.values["counts"]))]
+        if self._frames == 0:
+            return []  # the last pulse goes on; its frames are not asked for
+        self._frames -= 1
+        width, tick, time = message.values["width"], protocol().tick, message.time - (self._start or 0.0)
+        pulse = round(1e6 * width * tick, 3) if width else math.nan
+        if not self._fast:
+            self.complete = self._frames == 0
+            return [(_round(time), pulse, *self._values(message.values["counts"]))]
+        self._edges.append((time, pulse))
+        self._edge_known = time + message.values["period"] * tick
+        return self._ready()
 
     def _samples(self, message: Message) -> list[Sequence[float]]:
         words, width = protocol(), len(self._wiring.order)
-        counts = message.values["counts"]
-        rows: list[Sequence[float]] = []
         period, held = words.numbers["scan_period"] * words.tick, words.numbers["hold_ticks"] * words.tick
-        for k in range(len(counts) // width):
-            time = message.time - (self._start or 0.0) + k * period + held
-            while self._edges and self._edges[0][0] < time - 1e-9:
-                edge, self._pulse, _ = self._edges.popleft()
-                rows.append((_round(edge), self._pulse, *(math.nan,) * width))
-            if self._edges and abs(self._edges[0][0] - time) <= 1e-9:
-                self._pulse = self._edges.popleft()[1]
-            if time >= self._end:
-                self.complete = True
+        counts, first = message.values["counts"], message.time - (self._start or 0.0) + held
+        count = len(counts) // width
+        for k in range(max(math.ceil(-first / period), 0), count):  # some may be older than the first edge
+            self._scans.append((first + k * period, self._values(counts[k * width:(k + 1) * width])))
+        self._scan_known = first + count * period
+        rows = self._ready()
+        self.complete = self._frames == 0 and bool(self._scans)
+        return rows
+
+    def _ready(self) -> list[Sequence[float]]:
+        """Return the rows that nothing can come before any more."""
+        rows: list[Sequence[float]] = []
+        while self._edges or self._scans:
+            edge = self._edges[0][0] if self._edges else math.inf
+            scan = self._scans[0][0] if self._scans else math.inf
+            if min(edge, scan) > min(self._edge_known, self._scan_known) - 0.5 * _COUNT and math.inf in (edge, scan):
                 break
-            if time >= 0.0:
-                rows.append((_round(time), self._pulse, *self._values(counts[k * width:(k + 1) * width])))
+            if edge < scan + 0.5 * _COUNT:
+                self._pulse = self._edges.popleft()[1]
+            values: Sequence[float] = (math.nan,) * len(self._wiring.order)
+            if scan < edge + 0.5 * _COUNT:
+                values = self._scans.popleft()[1]
+            rows.append((_round(min(edge, scan)), self._pulse, *values))
         return rows
 
     def _values(self, counts: Sequence[int]) -> list[float]:

@@ -22,6 +22,15 @@ class Rig(Protocol):
     def columns(self) -> Sequence[str]:
         """Columns of its rows, named as those of a log: `time_s`, `pulse_width_us`, `feedback_voltage_V` and more."""
 
+    def open(self) -> object:
+        """Take the wire and look who is there; the servo is limp.
+
+        Raises
+        ------
+        BenchError
+            If nobody answers.
+        """
+
     def facts(self) -> Mapping[str, Any]:
         """Return what the sidecar of a log says of it, in plain JSON: firmware, wiring, calibration, registers."""
 
@@ -39,9 +48,6 @@ class Rig(Protocol):
         BenchError
             If the wire is cut or does not answer.
         """
-
-    def current(self) -> float:
-        """Return the largest supply current since the last call [A], nan where it is not measured."""
 
     def limp(self) -> None:
         """Let the servo go: no pulses, torque off. Never raises; where nobody hears, the bench does it by itself."""

@@ -168,14 +168,13 @@ def load_wiring(path: str | Path) -> Wiring:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    base = nominal_wiring(str(content["reference"])) if "reference" in content else Wiring()
     made: dict[str, Any] = {}
     for key, value in content.items():
         if key not in _KEYS:
             raise InputError(f"{path}: {UnknownNameError('key', key, _KEYS)}")
         made[key] = _quantity(path, key, value) if key in _UNITS else tuple(value) if key == "channels" else value
     try:
-        return replace(base, **made)
+        return replace(nominal_wiring(content.get("reference", "external")), **made)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 

@@ -14,6 +14,7 @@ from servotwin.errors import BenchError, InputError
 
 NAME = "servotwn"  # of the firmware, as it says it
 _ANSWER = 0.25  # s until an order is given once more
+_SHORTEST = 1e-3  # s of a wait
 _TRIES = 4
 _START = 3.0  # s that a board needs at most after its port was opened: an Uno resets then
 _FIRMWARE = "servotwin bench flash puts the firmware onto it"
@@ -143,11 +144,10 @@ class Board:
 
     def wait(self, seconds: float) -> None:
         """Let a time of the board pass; what it tells meanwhile is listened to, and it hears that we are there."""
-        start = self.order("ask")
-        del start
+        self.order("ask")
         until = self.time + seconds
         while self.time < until:
-            self.take(min(_ANSWER, until - self.time))
+            self.take(min(_ANSWER, max(until - self.time, _SHORTEST)))
             self.order("ask")
 
     def take(self, timeout: float) -> None:

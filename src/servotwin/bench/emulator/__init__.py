@@ -1,0 +1,1 @@
+"""The board without a board: its firmware on an emulated microcontroller, in lockstep with a simulated servo."""

@@ -1,0 +1,66 @@
+"""The harness is compiled where it runs: libsimavr is under the GPL, so nothing that is linked to it is shipped."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from servotwin.errors import BenchError
+from servotwin.simulation.compile.storage import cache_folder, key_of
+
+LIBRARIES = ("-lsimavr", "-lelf")
+_COMPILERS = ("cc", "gcc", "clang")
+_PACKAGES = "sudo apt install gcc libsimavr-dev libelf-dev"
+
+
+def harness() -> Path:
+    """Return the compiled harness, which is kept in the user's cache.
+
+    Raises
+    ------
+    BenchError
+        If there is no C compiler, or simavr is not installed.
+    """
+    with as_file(files("servotwin.bench.emulator") / "harness.c") as source:
+        text = source.read_text(encoding="utf-8")
+        name = f"harness-{key_of(text, *LIBRARIES)}"
+        try:
+            return _kept(cache_folder(), name, source)
+        except OSError as error:
+            if isinstance(error, BenchError):
+                raise
+            return _kept(Path(tempfile.mkdtemp(prefix="servotwin-")), name, source)
+
+
+def _kept(folder: Path, name: str, source: Path) -> Path:
+    path = folder / name
+    if path.exists():
+        return path
+    folder.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(prefix=name, dir=folder)
+    os.close(handle)
+    try:
+        _compile(source, temporary)
+        Path(temporary).replace(path)  # two processes that compile at once make the same
+    finally:
+        Path(temporary).unlink(missing_ok=True)
+    return path
+
+
+def _compile(source: Path, target: str) -> None:
+    compiler = next((found for found in map(shutil.which, _COMPILERS) if found), None)
+    if compiler is None:
+        raise BenchError("emulator", f"there is no C compiler to build it with ({_PACKAGES})")
+    done = subprocess.run([compiler, "-O2", "-o", target, str(source), *LIBRARIES], capture_output=True, text=True,
+                          check=False)
+    if done.returncode == 0:
+        return
+    said = done.stderr
+    if "simavr" in said or "-lelf" in said or "libelf" in said:
+        raise BenchError("emulator", f"simavr is not installed ({_PACKAGES})")
+    last = next((line for line in said.splitlines() if "error" in line), "no reason given")
+    raise BenchError("emulator", f"{compiler} cannot build it: {last.strip()} ({_PACKAGES})")

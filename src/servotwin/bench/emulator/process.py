@@ -1,0 +1,196 @@
+"""The emulated microcontroller, in a process of its own: it goes on by a time, and says what happens at its pins."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from struct import Struct
+from typing import IO, NamedTuple
+
+from servotwin.bench.emulator.build import harness
+from servotwin.errors import BenchError
+
+FREQUENCY = 16_000_000
+"""Clock of the microcontroller [Hz]."""
+CYCLE = 1.0 / FREQUENCY
+"""Of its clock [s]."""
+
+_HEAD = Struct("<QBBH")
+_GO, _ANSWER, _POKE, _LOOK = Struct("<cQ"), Struct("<cH"), Struct("<cHB"), Struct("<cHB")
+_MOST = 65536  # bytes of one read, of one message
+_PATIENCE = 2.0  # s for a process to end by itself
+_BACKLOG = 4096  # bytes of one order, so that neither side waits for the other with both pipes full
+
+
+class Pins(NamedTuple):
+    """Who is told what happens at the pins; times in cycles.
+
+    Parameters
+    ----------
+    pulse : callable
+        (cycle, level) of the pulse's pin.
+    light : callable
+        (cycle, level) of the light's pin.
+    display : callable
+        Half a byte as E falls, with RS as bit 4.
+    convert : callable
+        (cycle, channel, reference bits) of a voltage that is held; returns what the converter finds.
+    reset : callable
+        The board has been reset by itself.
+    """
+
+    pulse: Callable[[int, int], None]
+    light: Callable[[int, int], None]
+    display: Callable[[int], None]
+    convert: Callable[[int, int, int], int]
+    reset: Callable[[], None]
+
+
+class Microcontroller:
+    """An ATmega328P at 16 MHz with a program, switched on; it ends with the process that has started it.
+
+    Parameters
+    ----------
+    program : path
+        Intel hex.
+    pins : Pins
+
+    Raises
+    ------
+    BenchError
+        If simavr or a compiler is missing, or the program cannot be read.
+    """
+
+    def __init__(self, program: str | os.PathLike[str], pins: Pins) -> None:
+        if not Path(program).is_file():
+            raise BenchError(os.fspath(program), "there is no such firmware")
+        self.cycle = 0
+        self.lost = 0  # bytes to the board that came too fast for it
+        self._pins = pins
+        self._heard = bytearray()
+        self._looked = b""
+        self._errors: IO[bytes] = tempfile.TemporaryFile()
+        try:
+            self._process = subprocess.Popen([harness(), os.fspath(program)], stdin=subprocess.PIPE,
+                                             stdout=subprocess.PIPE, stderr=self._errors, bufsize=0)
+        except BaseException:
+            self._errors.close()
+            raise
+        pipes = self._process.stdin, self._process.stdout
+        self._in, self._out = (pipe.fileno() for pipe in pipes if pipe is not None)
+
+    @property
+    def pid(self) -> int:
+        """Number of its process."""
+        return self._process.pid
+
+    def go(self, until: int) -> bytes:
+        """Go on to a cycle, or a little beyond, and return what has come over the wire meanwhile.
+
+        Raises
+        ------
+        BenchError
+            If the process has ended, or the program has crashed.
+        """
+        self._order(_GO.pack(b"g", until))
+        self._listen(ord("h"))
+        heard, self._heard = bytes(self._heard), bytearray()
+        return heard
+
+    def send(self, data: bytes) -> None:
+        """Put bytes onto the wire to the board."""
+        for k in range(0, len(data), _BACKLOG):
+            part = data[k:k + _BACKLOG]
+            self._order(_ANSWER.pack(b"w", len(part)) + part)
+
+    def poke(self, address: int, data: bytes) -> None:
+        """Put bytes into registers or SRAM, addressed as the program does."""
+        for k, byte in enumerate(data):
+            self._order(_POKE.pack(b"p", address + k, byte))
+
+    def look(self, address: int, size: int) -> bytes:
+        """Return bytes of registers or SRAM, at most 255; none beyond their end."""
+        self._order(_LOOK.pack(b"m", address, size))
+        self._listen(ord("m"))
+        return self._looked
+
+    def pull(self, port: str, bit: int, level: int) -> None:
+        """Hold a pin at a level from outside."""
+        self._order(b"d" + port.encode() + bytes((bit, level)))
+
+    def close(self) -> None:
+        """End it."""
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None and not pipe.closed:
+                pipe.close()
+        try:
+            self._process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._errors.close()
+
+    def _order(self, data: bytes) -> None:
+        try:
+            while data:
+                data = data[os.write(self._in, data):]
+        except OSError:
+            raise self._dead() from None
+
+    def _listen(self, last: int) -> None:
+        """Tell the pins what happens, until an event of this kind has come."""
+        pins, unpack, data, ends = self._pins, _HEAD.unpack_from, b"", False
+        while not ends:
+            try:
+                more = os.read(self._out, _MOST)
+            except OSError:
+                more = b""
+            if not more:
+                raise self._dead()
+            data, at = data + more, 0
+            while len(data) - at >= _HEAD.size:
+                cycle, kind, a, b = unpack(data, at)
+                if kind == 65:  # A
+                    self._order(_ANSWER.pack(b"v", pins.convert(cycle, a, b)))
+                elif kind == 80:  # P
+                    pins.pulse(cycle, a)
+                elif kind == 84 or kind == 109:  # T, m
+                    if len(data) - at < _HEAD.size + b:
+                        break
+                    at += b
+                    text = data[at + _HEAD.size - b:at + _HEAD.size]
+                    if kind == 84:
+                        self._heard += text
+                    else:
+                        self._looked = text
+                else:
+                    self._seldom(cycle, kind, a)
+                at += _HEAD.size
+                ends = ends or kind == last
+                self.cycle = cycle if kind == 104 else self.cycle
+            data = data[at:]
+
+    def _seldom(self, cycle: int, kind: int, a: int) -> None:
+        if kind == 76:  # L
+            self._pins.light(cycle, a)
+        elif kind == 68:  # D
+            self._pins.display(a)
+        elif kind == 79:  # O
+            self.lost += 1
+        elif kind == 82:  # R
+            self._pins.reset()
+        elif kind == 120:  # x
+            raise BenchError("emulator", f"the program has crashed after {cycle * CYCLE:.6f} s")
+
+    def _dead(self) -> BenchError:
+        try:
+            self._process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            return BenchError("emulator", "its process does not answer any more")
+        self._errors.seek(0)
+        said = self._errors.read(_MOST).decode(errors="replace").strip().splitlines()
+        why = said[-1] if said else f"its process has ended ({self._process.returncode})"
+        return BenchError("emulator", why)

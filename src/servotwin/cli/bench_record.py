@@ -1,0 +1,238 @@
+"""`servotwin bench record` and `rehearse`: experiments on a bench, or on an emulated one, become logs."""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from servotwin.cli import bench_options as words
+from servotwin.cli import shared_options as shared
+from servotwin.cli.terminal import emit_json, show, table
+
+if TYPE_CHECKING:
+    from servotwin.bench.recording import About, Experiment, Limits, Recorded, Rig
+
+_BUSES = ("feetech", "dynamixel")
+_NEXT = "servotwin fit {folder} --servo {servo}"
+
+
+def record(
+    servo: Annotated[str, typer.Argument(
+        help="What is on the bench: catalog id or servo file (.toml), or any words where the logs are for others.")],
+    out: words.OutOption,
+    port: words.PortOption = None,
+    bus: Annotated[str | None, typer.Option(
+        metavar="FAMILY", help="Bus servos at a USB adapter instead of a board: feetech or dynamixel.",
+        rich_help_panel=words.BENCH)] = None,
+    identity: Annotated[int | None, typer.Option(
+        "--id", metavar="NUMBER", help="Of the servo on the bus; the only one that answers unless given.",
+        rich_help_panel=words.BENCH)] = None,
+    baud: Annotated[int | None, typer.Option(
+        metavar="BIT/S", help="Of the bus; found unless given.", rich_help_panel=words.BENCH)] = None,
+    wiring: words.WiringOption = None,
+    experiment: words.ExperimentOption = "steps",
+    span: words.RangeOption = None,
+    voltage: words.VoltageOption = None,
+    current_limit: words.CurrentOption = None,
+    duration: words.DurationOption = 10.0,
+    frame_period: words.FramePeriodOption = "20ms",
+    rate: words.RateOption = "fast",
+    seed: words.SeedOption = 0,
+    load: words.LoadOption = None,
+    licence: words.LicenceOption = "not said",
+    author: words.AuthorOption = "",
+    note: words.NoteOption = "",
+    force: words.ForceOption = False,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """Record experiments."""
+    from servotwin.errors import InputError
+
+    kind = "pulse_width" if bus is None else "angle"
+    if bus is None and (identity is not None or baud is not None):
+        raise InputError("--baud" if identity is None else "--id", got="no --bus",
+                         allowed="with --bus feetech or dynamixel")
+    limits = words.limits_from(kind, span, voltage, current_limit)
+    about = words.about_from(servo, licence, author, note, load)
+    made = _experiments(experiment, limits, servo, load, duration, words.seconds("--frame-period", frame_period), seed)
+    paths = _paths(out, made, force=force)
+    rig: Rig
+    if bus is None:
+        from servotwin.bench.backends import SerialBackend
+        from servotwin.bench.recording import AnalogRig
+
+        rig = AnalogRig(SerialBackend(words.port_from(port)), words.wiring_from(wiring), rate=rate)
+    else:
+        rig = _bus_rig(bus, words.port_from(port), identity, baud, words.seconds("--frame-period", frame_period))
+    found = _recorded(_Job(rig, made, paths, limits, about, force))
+    _report(found, out, servo, rig, as_json=as_json)
+
+
+def rehearse(
+    servo: shared.ServoArgument,
+    out: words.OutOption,
+    model: Annotated[str | None, typer.Option(
+        metavar="MODEL", help="pulse, pulse-inductive or digital (default: by the kind of the servo).",
+        rich_help_panel=words.BENCH)] = None,
+    change: Annotated[list[str] | None, typer.Option(
+        "--set", metavar="NAME=VALUE", help="Replace a parameter of the servo that is emulated; repeatable.",
+        rich_help_panel=words.BENCH)] = None,
+    noise: Annotated[str, typer.Option(
+        metavar="VOLTS", help="Noise at each pin, one standard deviation (assumed).",
+        rich_help_panel=words.BENCH)] = "1mV",
+    mock: Annotated[bool, typer.Option(
+        "--mock", help="A board in Python instead of the firmware itself under simavr.",
+        rich_help_panel=words.BENCH)] = False,
+    wiring: words.WiringOption = None,
+    experiment: words.ExperimentOption = "steps",
+    span: words.RangeOption = None,
+    voltage: words.VoltageOption = None,
+    current_limit: words.CurrentOption = None,
+    duration: words.DurationOption = 10.0,
+    frame_period: words.FramePeriodOption = "20ms",
+    rate: words.RateOption = "fast",
+    seed: words.SeedOption = 0,
+    load: words.LoadOption = None,
+    force: words.ForceOption = False,
+    as_json: shared.JsonOption = False,
+) -> None:
+    """Record experiments from an emulated bench."""
+    from servotwin.bench.rehearsal import rehearsal_rig
+    from servotwin.cli.load_words import load_from
+    from servotwin.cli.model_words import model_of
+    from servotwin.units.quantities import quantity
+
+    limits = words.limits_from("pulse_width", span, voltage, current_limit)
+    whole = model_of(servo, model, [*(change or []), f"supply.open_circuit_voltage={limits.voltage}V"],
+                     ("pulse", "pulse-inductive", "digital"))
+    about = words.about_from(f"{servo} (emulated)", "CC0-1.0", "", "no real servo: the firmware of the bench under "
+                             "simavr, beside a simulated servo", load)
+    made = _experiments(experiment, limits, servo, load, duration, words.seconds("--frame-period", frame_period), seed)
+    paths = _paths(out, made, force=force)
+    rig, remark = rehearsal_rig(whole, load_from(load or [], whole), words.wiring_from(wiring), rate=rate, mock=mock,
+                                noise=quantity("--noise", noise, "voltage"), seed=seed)
+    if remark:
+        warnings.warn(remark, stacklevel=2)
+    found = _recorded(_Job(rig, made, paths, limits, about, force))
+    _report(found, out, servo, rig, as_json=as_json)
+
+
+def _bus_rig(family: str, port: str, identity: int | None, baud: int | None, period: float) -> Rig:
+    """Return the servo with this number, or the only one that answers."""
+    from servotwin.bench.bus import BAUDS, IDS, rig_of, scan
+    from servotwin.cli.terminal import patience
+    from servotwin.errors import BenchError, UnknownNameError
+
+    if family not in _BUSES:
+        raise UnknownNameError("bus", family, _BUSES)
+    with patience("looking for servos"):
+        found = [one for one in scan(port, bauds=BAUDS if baud is None else [baud],
+                                     ids=IDS if identity is None else [identity])
+                 if one.protocol.startswith(family) and identity in (None, one.id)]
+    if len(found) != 1:
+        names = [f"{one.id} ({one.model.name if one.model else one.number})" for one in found]
+        raise BenchError(f"port {port}", f"{', '.join(names)}; --id says which one" if names
+                         else "no servo answers (power, wiring, --baud?)")
+    return rig_of(port, found[0], rate=1.0 / period)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What is to be recorded, and where."""
+
+    rig: Rig
+    made: Sequence[Experiment]
+    paths: Sequence[Path]
+    limits: Limits
+    about: About
+    force: bool
+
+
+def _experiments(names: str, limits: Limits, servo: str, load: list[str] | None, duration: float,
+                 frame_period: float, seed: int) -> list[Experiment]:
+    from servotwin.bench.recording import experiments
+
+    if names != "advise":
+        return experiments(names, limits, duration=duration, frame_period=frame_period, seed=seed)
+    return [_advised(limits, servo, frame_period)]
+
+
+def _advised(limits: Limits, servo: str, frame_period: float) -> Experiment:
+    """Return the command that would tell most of this servo, fitted into the range."""
+    import numpy as np
+
+    from servotwin.bench.recording import Experiment, Hold, of_log
+    from servotwin.cli.terminal import patience
+    from servotwin.identification import advise
+    from servotwin.parameters import load_servo
+
+    with patience("simulating experiments"):
+        best = advise(load_servo(servo), voltages=[limits.voltage], sensors=()).experiments[0]
+    asked = of_log(best.command, name=best.motion.replace(" ", "_"), frame_period=frame_period)
+    values = np.array([one.value for one in asked.holds if one.value is not None])
+    low, high = float(values.min()), float(values.max())
+
+    def fitted(value: float | None) -> float | None:
+        return None if value is None else limits.at((value - low) / (high - low) if high > low else 0.5)
+
+    holds = [Hold(max(round(one.duration / frame_period), 1) * frame_period, fitted(one.value)) for one in asked.holds]
+    return Experiment(name=asked.name, motion=asked.motion, kind=limits.kind, holds=holds, frame_period=frame_period,
+                      conditions={"advised": f"{best.motion}, {best.load}"})
+
+
+def _paths(out: Path, made: Sequence[Experiment], *, force: bool) -> list[Path]:
+    """Return a file for each experiment, none of which is there."""
+    from servotwin.errors import OutputError, OutputExistsError
+
+    if out.exists() and not out.is_dir():
+        raise OutputError(f"--out {out} is no folder")
+    paths = [out / f"{one.name}.csv" for one in made]
+    for path in paths:
+        if path.exists() and not force:
+            raise OutputExistsError(path)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"--out {out} cannot be made ({error.strerror})") from None
+    return paths
+
+
+def _recorded(job: _Job) -> list[Recorded]:
+    """Record all; Ctrl-C ends the one under way, whose rows are kept, and lets the servo go."""
+    from servotwin.bench.recording import record as one_record
+    from servotwin.cli.bench_live import live_plot
+    from servotwin.cli.interrupts import finishing
+    from servotwin.parameters.output_file import undone
+
+    found = []
+    with contextlib.closing(job.rig), undone(job.rig.limp), finishing() as check:
+        job.rig.open()
+        for one, path in zip(job.made, job.paths, strict=True):
+            with live_plot(one.name) as watch:
+
+                def look(row: Any, watch: Any = watch) -> None:
+                    check()
+                    watch(row)
+
+                found.append(one_record(job.rig, one, path, limits=job.limits, about=job.about, watch=look,
+                                        overwrite=job.force))
+            check()
+    return found
+
+
+def _report(found: Sequence[Recorded], out: Path, servo: str, rig: Rig, *, as_json: bool) -> None:
+    facts = rig.facts()
+    if as_json:
+        emit_json({"logs": [{"path": str(one.path), "rows": one.rows, "seconds": one.duration} for one in found],
+                   "rig": facts})
+        return
+    rows = [(str(one.path), str(one.rows), f"{one.duration:.2f} s") for one in found]
+    lost = facts.get("lost_frames", 0)
+    remark = [f"{lost} frames of the wire were lost: there are gaps in the rows"] if lost else []
+    show(table(("log", "rows", "time"), rows), *remark, "", "next: " + _NEXT.format(folder=out, servo=servo))

@@ -1,0 +1,163 @@
+"""`servotwin bench`: boards on pseudo-terminals, and everything that can be wrong with one."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import servotwin as st
+from bench_wires import BoardOnTerminal
+from servotwin.bench.backends import MockBackend
+
+pytest.importorskip("serial")
+LIMITS = ("--range", "1000us:2000us", "--voltage", "6V", "--current-limit", "2A")
+
+
+class Rising:
+    """Pins that rise with time, so that every scan of a channel is another one."""
+
+    def rise(self, time):
+        pass
+
+    def fall(self, time):
+        pass
+
+    def voltage(self, channel, time):
+        return {"tap": 0.5 + 0.1 * (time % 10.0), "shunt": 0.2, "supply": 1.5, "command": 1.0}[channel]
+
+
+@pytest.fixture
+def board():
+    terminal = BoardOnTerminal(MockBackend(Rising()))
+    yield terminal
+    terminal.cut()
+
+
+def test_check_names_the_firmware_and_reads_the_channels(cli, board):
+    ended = cli("bench", "check", "--port", board.port, "--json")
+    assert ended.code == 0, ended.err
+    assert ended.data["firmware"] == "1.0"
+    assert ended.data["channels"]["supply"]["value"] == pytest.approx(6.0, abs=0.01)
+    assert cli("bench", "check", "--port", board.port).out.count("\n") > 5
+
+
+def test_record_makes_logs_that_can_be_read(cli, board):
+    ended = cli("bench", "record", "my servo", "--port", board.port, "-e", "hold,torque_off", "--duration", "1",
+                *LIMITS, "--licence", "CC0-1.0", "--load", "inertia=1e-3", "--out", "runs")
+    assert ended.code == 0, ended.err
+    logs = st.read_logs("runs")
+    assert {log.motion for log in logs} == {"hold", "torque_off"}
+    assert all(log.load.inertia == 1e-3 for log in logs)
+    assert any(not log.sent.all() for log in logs)
+
+
+def test_calibrations_go_into_the_wiring_and_are_used(cli, board):
+    ended = cli("bench", "calibrate", "supply", "--port", board.port, "--wiring", "bench.toml", "--meter",
+                "6.1V,6.11V,6.13V", "--json")
+    assert ended.code == 2  # one voltage all the time makes no line
+    (os.path.exists("bench.toml"), ended.err)
+    assert not os.path.exists("bench.toml")
+
+
+WRONG = [
+    (("check", "--port", "/dev/ttyNONE"), "no such port"),
+    (("record", "x", "--port", "/dev/ttyNONE", *LIMITS, "--out", "runs"), "no such port"),
+    (("record", "x", "--port", "/dev/ttyNONE", "--out", "runs"), "--range, --voltage, --current-limit"),
+    (("record", "x", *LIMITS[:4], "--out", "runs"), "--current-limit"),
+    (("record", "x", "--range", "1000:2000", *LIMITS[2:], "--out", "runs"), "--range"),
+    (("record", "x", "--range", "2000us:1000us", *LIMITS[2:], "--out", "runs"), "low below high"),
+    (("record", "x", "--range", "nanus:2000us", *LIMITS[2:], "--out", "runs"), "--range"),
+    (("record", "x", *LIMITS[:2], "--voltage", "6A", *LIMITS[4:], "--out", "runs"), "--voltage"),
+    (("record", "x", *LIMITS, "-e", "dance", "--out", "runs"), "dance"),
+    (("record", "x", *LIMITS, "--duration", "-1", "--out", "runs"), "duration"),
+    (("record", "x", *LIMITS, "--wiring", "none.toml", "--port", "p", "--out", "runs"), "none.toml"),
+    (("record", "x", *LIMITS, "--id", "3", "--out", "runs"), "--id"),
+    (("record", "x", *LIMITS, "--rate", "often", "--port", "p", "--out", "runs"), "rate"),
+    (("calibrate", "everything", "--port", "p"), "everything"),
+    (("calibrate", "supply", "--port", "p"), "--wiring"),
+    (("calibrate", "supply", "--port", "p", "--wiring", "w.toml"), "--meter"),
+    (("calibrate", "supply", "--port", "p", "--wiring", "w.toml", "--meter", "1V", "--out", "x.toml"), "--out"),
+    (("rehearse", "hitec-hs-755hb", "--mock", "--noise", "-1V", *LIMITS, "--out", "runs"), "noise"),
+    (("rehearse", "hitec-hs-755hb", "--mock", "--model", "bounded", *LIMITS, "--out", "runs"), "bounded"),
+    (("rehearse", "no-such-servo", "--mock", *LIMITS, "--out", "runs"), "no-such-servo"),
+    (("flash", "--port", "p", "--board", "mega"), "mega"),
+    (("paper", "--out", "bench.csv"), "bench.csv"),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), WRONG, ids=[" ".join(words)[:50] for words, _ in WRONG])
+def test_what_is_wrong_is_told_in_one_line(cli, tmp_path, words, said):
+    (tmp_path / "bench.csv").write_text("mine")
+    assert said in cli("bench", *words).error
+    assert not (tmp_path / "runs").exists() or not list((tmp_path / "runs").iterdir())
+    assert (tmp_path / "bench.csv").read_text() == "mine"
+
+
+@pytest.mark.parametrize(("words", "said"), [(("flash", "--port", "p"), "apt install avrdude")])
+def test_a_tool_that_is_missing_is_named(cli, monkeypatch, words, said):
+    monkeypatch.setenv("PATH", "")
+    assert said in cli("bench", *words).error
+
+
+def test_avrdude_that_fails_says_why_in_one_line(cli, tmp_path, monkeypatch):
+    (tmp_path / "bin").mkdir()
+    fake = tmp_path / "bin" / "avrdude"
+    fake.write_text("#!/bin/sh\necho 'avrdude: stk500_recv(): programmer is not responding' >&2\n"
+                    "echo 'avrdude error: not in sync: resp=0x00' >&2\nexit 1\n")
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{fake.parent}:{os.environ['PATH']}")
+    assert "nano-old" in cli("bench", "flash", "--port", "p").error
+
+
+def test_nothing_is_overwritten(cli, board, tmp_path):
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "hold.csv").write_text("mine")
+    assert "--force" in cli("bench", "record", "x", "--port", board.port, "-e", "hold", *LIMITS, "--out", "runs").error
+    assert (tmp_path / "runs" / "hold.csv").read_text() == "mine"
+
+
+def recording(board, tmp_path, environment):
+    """A recorder in a process of its own, that has written some rows."""
+    words = [sys.executable, "-m", "servotwin", "bench", "record", "x", "--port", board.port, "-e", "steps",
+             "--duration", "60", *LIMITS, "--out", "runs"]
+    process = subprocess.Popen(words, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    log, start = tmp_path / "runs" / "step.csv", time.monotonic()
+    while not log.exists() or log.stat().st_size < 20_000:
+        assert process.poll() is None, process.stderr.read().decode()
+        assert time.monotonic() - start < 60.0
+        time.sleep(0.02)
+    return process, log
+
+
+def pulsing(board):
+    return board.board._framing
+
+
+@pytest.mark.parametrize("how", ["killed", "interrupted", "cable"])
+def test_whatever_ends_a_recorder_keeps_its_rows_and_stops_the_pulses(board, tmp_path, child_environment, how):
+    process, log = recording(board, tmp_path, child_environment)
+    assert pulsing(board)
+    before = len(log.read_text().splitlines()) - 1
+    if how == "cable":
+        board.cut()
+    else:
+        process.send_signal(signal.SIGKILL if how == "killed" else signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == {"killed": -9, "interrupted": 130, "cable": 2}[how], err.decode()
+    assert b"Traceback" not in err
+    read, = st.read_logs(log)
+    assert len(read) >= before - 1
+    said = json.loads(log.with_suffix(".json").read_text())
+    assert said["recorded"]["complete"] is False
+    if how != "cable":
+        time.sleep(0.1)
+        if how == "killed":
+            start = board.board._now
+            while pulsing(board) and board.board._now - start < 4_000_000:  # ticks of its own clock
+                time.sleep(0.01)
+            assert board.board._now - start < 2_200_000
+        assert not pulsing(board)
