@@ -36,7 +36,7 @@ class Pins(NamedTuple):
         (cycle, level) of the light's pin.
     display : callable
         Half a byte as E falls, with RS as bit 4.
-    count : callable
+    convert : callable
         (cycle, channel, reference bits) of a voltage that is held; returns what the converter finds.
     reset : callable
         The board has been reset by itself.
@@ -45,7 +45,7 @@ class Pins(NamedTuple):
     pulse: Callable[[int, int], None]
     light: Callable[[int, int], None]
     display: Callable[[int], None]
-    count: Callable[[int, int, int], int]
+    convert: Callable[[int, int, int], int]
     reset: Callable[[], None]
 
 
@@ -79,8 +79,7 @@ class Microcontroller:
         except BaseException:
             self._errors.close()
             raise
-        assert_pipes = self._process.stdin, self._process.stdout
-        self._in, self._out = (pipe.fileno() for pipe in assert_pipes if pipe is not None)
+        self._in, self._out = (pipe.fileno() for pipe in (self._process.stdin, self._process.stdout) if pipe)
 
     @property
     def pid(self) -> int:
@@ -154,7 +153,7 @@ class Microcontroller:
             while len(data) - at >= _HEAD.size:
                 cycle, kind, a, b = unpack(data, at)
                 if kind == 65:  # A
-                    self._order(_ANSWER.pack(b"v", pins.count(cycle, a, b)))
+                    self._order(_ANSWER.pack(b"v", pins.convert(cycle, a, b)))
                 elif kind == 80:  # P
                     pins.pulse(cycle, a)
                 elif kind == 84 or kind == 109:  # T, m
