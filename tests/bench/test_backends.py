@@ -6,7 +6,8 @@ import time
 import pytest
 
 from bench_wires import BoardOnTerminal
-from servotwin.bench.backends import MockBackend, SerialBackend
+from servotwin.bench.backends import EmulatedBackend, MockBackend, SerialBackend
+from servotwin.bench.emulator.build import harness
 from servotwin.bench.wire import Board, Frame, Splitter, protocol, to_wire
 from servotwin.errors import BenchError
 
@@ -22,7 +23,15 @@ def serial(made):
     return SerialBackend(terminal.port)
 
 
-BACKENDS = {"mock": mock, "serial": serial}
+def emulator(made):
+    try:
+        harness()
+    except BenchError as error:
+        pytest.skip(str(error))
+    return EmulatedBackend()
+
+
+BACKENDS = {"mock": mock, "serial": serial, "emulator": emulator}
 
 
 @pytest.fixture(params=BACKENDS)
@@ -39,6 +48,13 @@ def hello(sequence):
     return to_wire(Frame(protocol().kinds["hello"].number, sequence, 0, b""))
 
 
+def started(wire):
+    """Open it, and wait until a board that starts then listens."""
+    wire.open()
+    while wire.read(0.1):
+        pass
+
+
 def heard(wire, tries=40):
     splitter = Splitter()
     for _ in range(tries):
@@ -49,23 +65,20 @@ def heard(wire, tries=40):
 
 
 def test_what_is_sent_is_answered(wire):
-    wire.open()
-    time.sleep(0.01)
+    started(wire)
     wire.send(hello(9))
     assert heard(wire).payload[:9] == b"\x09servotwn"
 
 
 def test_bytes_may_come_in_pieces(wire):
-    wire.open()
+    started(wire)
     for byte in hello(3):
         wire.send(bytes([byte]))
     assert heard(wire).payload[0] == 3
 
 
 def test_reading_ends_when_its_time_is_over(wire):
-    wire.open()
-    while wire.read(0.1):  # what it tells of its start
-        pass
+    started(wire)
     start = time.monotonic()
     assert wire.read(0.05) == b""
     assert time.monotonic() - start < 2.0
@@ -80,7 +93,7 @@ def test_a_closed_wire_says_so_in_one_line_and_opens_again(wire):
     wire.close()
     with pytest.raises(BenchError, match="not open"):
         wire.send(b"x")
-    wire.open()
+    started(wire)
     wire.send(hello(1))
     assert heard(wire).payload[0] == 1
 

@@ -42,8 +42,8 @@ class Moving:
     def fall(self, time):
         self.width = time - self.rose
 
-    def voltages(self, time):
-        return (1000.0 * self.width * 0.8, self.current, 1.5, 0.0)
+    def voltage(self, channel, time):
+        return {"tap": 1000.0 * self.width * 0.8, "shunt": self.current, "supply": 1.5, "command": 0.0}[channel]
 
 
 def rig_of(plant=None, rate="fast"):

@@ -26,8 +26,8 @@ class Rising:
     def fall(self, time):
         pass
 
-    def voltages(self, time):
-        return (0.5 + 0.1 * (time % 10.0), 0.2, 1.5, 1.0)
+    def voltage(self, channel, time):
+        return {"tap": 0.5 + 0.1 * (time % 10.0), "shunt": 0.2, "supply": 1.5, "command": 1.0}[channel]
 
 
 @pytest.fixture

@@ -159,8 +159,8 @@ def _read(path: Path, joints: dict[str, str], ranges: dict[str, tuple[float, flo
 
 def check_drawing(plant: Any, camera: str | None, *, video: bool) -> bool:
     """Return whether the robot can be drawn; raise if it cannot and a video is wanted."""
+    from servotwin.look.opencv import load_opencv
     from servotwin.robots.camera import Camera, NoDrawingError
-    from servotwin.robots.video import load_opencv
 
     if video:
         load_opencv()

@@ -20,13 +20,15 @@ _METADATA: dict[str, dict[str, Any]] = {
 _DPI = 160
 
 
-def to_bytes(figure: Figure, file_format: str) -> bytes:
+def to_bytes(figure: Figure, file_format: str, dpi: float = _DPI) -> bytes:
     """Return a figure as the contents of a file.
 
     Parameters
     ----------
     figure : Figure
     file_format : {"png", "svg", "pdf"}
+    dpi : float
+        Pixels an inch of a PNG.
 
     Raises
     ------
@@ -42,5 +44,5 @@ def to_bytes(figure: Figure, file_format: str) -> bytes:
     if file_format not in FORMATS:
         raise OutputError("format of a picture", got=file_format, allowed=", ".join(FORMATS))
     with context(), io.BytesIO() as stream:
-        figure.savefig(stream, format=file_format, dpi=_DPI, metadata=_METADATA[file_format])
+        figure.savefig(stream, format=file_format, dpi=dpi, metadata=_METADATA[file_format])
         return stream.getvalue()

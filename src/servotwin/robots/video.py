@@ -2,39 +2,21 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
-import os
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import MissingExtraError, OutputError
+from servotwin.errors import OutputError
+from servotwin.look.opencv import load_opencv, quiet
 
 Picture = NDArray[np.uint8]
 CODECS = {".webm": ("VP80", "VP90"), ".mp4": ("avc1", "vp09")}
 """By the ending of a file, what browsers play, what is tried first standing first: VP8 is written five times as fast as
 VP9, and H.264 not at all by the wheels of OpenCV, whose licence forbids it."""
-
-
-def load_opencv() -> Any:
-    """Return OpenCV's package.
-
-    Raises
-    ------
-    MissingExtraError
-        If it is not installed.
-    """
-    try:
-        import cv2
-    except ImportError:
-        raise MissingExtraError("opencv-python-headless", "video") from None
-    return cv2
 
 
 class Video:
@@ -64,7 +46,7 @@ class Video:
         self.codec = ""
         known = CODECS[path.suffix.lower()]
         for codec in known:
-            with _quiet():  # it tells on stderr of each codec that it does not have
+            with quiet():  # it tells on stderr of each codec that it does not have
                 self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), float(rate), (width, height))
             if self._writer.isOpened():
                 self.codec = codec
@@ -101,23 +83,3 @@ def png(picture: Picture) -> bytes:
     with io.BytesIO() as stream:
         Image.fromarray(picture).save(stream, format="png")
         return stream.getvalue()
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep from the terminal what compiled code writes to stderr."""
-    if sys.stderr is not None:
-        sys.stderr.flush()
-    try:
-        kept = os.dup(2)
-    except OSError:  # there is none
-        yield
-        return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)

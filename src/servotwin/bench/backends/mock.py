@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 from servotwin.bench.wire.frames import Frame, Splitter, to_wire
@@ -11,7 +11,8 @@ from servotwin.bench.wire.protocol import Kind, protocol
 from servotwin.errors import BenchError, InputError
 
 _VERSION = (1, 0)  # of the firmware that it stands for
-_REFERENCE = {"external": 2.5, "supply": 5.0, "internal": 1.1}  # V
+REFERENCES: Mapping[str, float] = {"external": 2.5, "supply": 5.0, "internal": 1.1}
+"""Of the converter: the guide's TL431, USB, the ATmega328P's sheet [V]."""
 _FAR = 2**62  # ticks; never
 
 
@@ -24,15 +25,21 @@ class Plant(Protocol):
     def fall(self, time: float) -> None:
         """Take the falling edge of a pulse [s]."""
 
-    def voltages(self, time: float) -> Sequence[float]:
-        """Return the voltages at the pins of the channels at a time, not before the last one [V]."""
+    def voltage(self, channel: str, time: float) -> float:
+        """Return the voltage at the pin of a channel at a time, not before the last one [V]."""
 
 
-class _Still:
-    """Pins that never change."""
+class StillPins:
+    """Pins that never change.
 
-    def __init__(self, voltages: Sequence[float]) -> None:
-        self._voltages = voltages
+    Parameters
+    ----------
+    volts : float
+        At each of them [V].
+    """
+
+    def __init__(self, volts: float = 1.25) -> None:
+        self._volts = volts
 
     def rise(self, time: float) -> None:
         """Nothing happens."""
@@ -40,9 +47,9 @@ class _Still:
     def fall(self, time: float) -> None:
         """Nothing happens."""
 
-    def voltages(self, time: float) -> Sequence[float]:
-        """Return what they are."""
-        return self._voltages
+    def voltage(self, channel: str, time: float) -> float:
+        """Return what they are [V]."""
+        return self._volts
 
 
 class _Point(NamedTuple):
@@ -60,6 +67,8 @@ class MockBackend:
         What hangs on its pins; 1.25 V at each unless given.
     start : int
         Its clock when it is opened [ticks].
+    references : mapping of str to float, optional
+        Of the converter, other than `REFERENCES` [V].
 
     Examples
     --------
@@ -72,8 +81,10 @@ class MockBackend:
 
     name = "mock"
 
-    def __init__(self, plant: Plant | None = None, *, start: int = 0) -> None:
-        self._plant: Plant = plant or _Still((1.25,) * len(protocol().words["channels"]))
+    def __init__(self, plant: Plant | None = None, *, start: int = 0,
+                 references: Mapping[str, float] | None = None) -> None:
+        self._volts = {**REFERENCES, **(references or {})}
+        self._plant: Plant = plant or StillPins()
         self._start = self._now = start
         self._is_open = False
 
@@ -274,11 +285,11 @@ class MockBackend:
 
     def _counts(self) -> list[int]:
         numbers, counts, k = protocol().numbers, [], 0
-        reference = _REFERENCE[protocol().word("reference", self._reference)]
-        for channel in range(len(protocol().words["channels"])):
+        reference = self._volts[protocol().word("reference", self._reference)]
+        for name, channel in protocol().words["channels"].items():
             if self._mask >> channel & 1:
                 held = (self._now + numbers["hold_ticks"] + k * numbers["channel_ticks"]) * protocol().tick
-                volts = self._plant.voltages(held)[channel]
+                volts = self._plant.voltage(name, held)
                 counts.append(min(max(int(1024 * volts / reference), 0), 1023))
                 k += 1
         return counts

@@ -62,7 +62,8 @@ class Display:
             return
         place = self._at if self._at < _ROW else self._at - _SECOND + _ROW
         if 0 <= place < len(self._memory):
-            self._memory[place] = _TABLE.get(byte) or (chr(byte) if 32 <= byte < 126 else "\ufffd")
+            letter = chr(byte) if 0x20 <= byte < 0x7E else "\N{REPLACEMENT CHARACTER}"
+            self._memory[place] = _TABLE.get(byte, letter)
         self._move(self._step)
 
     def _move(self, by: int) -> None:

@@ -1,24 +1,20 @@
-"""A simulated servo on the pins of a board: edges of its pulses drive it, and voltages show what it does.
-
-What a pulse means is known when it ends: the servo decides then, and not before. So while one is high the state runs
-on from the rising edge as under a pulse that has no end yet, and as it falls it is gone through again with its width.
-"""
+"""What hangs on the pins of a board: a simulated servo, driven by the edges of its pulses."""
 
 from __future__ import annotations
 
-import math
-import random
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.bench.emulator.front_end import CHANNELS, FrontEnd, checked
+import numpy as np
+
+from servotwin.bench.recording.wiring import Wiring
 from servotwin.errors import InputError
 from servotwin.models.base import PULSE_RANGE
 from servotwin.models.digital import DigitalServo
 from servotwin.models.switched import SwitchedServo
 from servotwin.physics.pieces import Piece, Pieces
 from servotwin.signals import Signal
-from servotwin.simulation import Simulator
+from servotwin.simulation import Simulator, State
 from servotwin.simulation.simulator import simulated
 from servotwin.simulation.times import times_asked
 from servotwin.units import is_finite
@@ -28,65 +24,100 @@ if TYPE_CHECKING:
 
     from servotwin.loads import Load, Part
     from servotwin.models import Model
-    from servotwin.simulation import Result, State
+    from servotwin.simulation import Result
 
+_NEVER = 1e9  # s
+_ENDLESS = 1e3  # s; no servo takes such a pulse
+_GLITCH = 62.5e-9  # s, a cycle of the board: the shortest pulse that there is
+_CENTRE = 1.5e-3  # s; where it stands before its first pulse: the usual centre, assumed
 _SIGNALS = {"tap": "feedback_voltage", "shunt": "supply_current", "supply": "bus_voltage"}
-_ENDLESS = 1e3  # s; longer than any servo takes
-_CENTRE = 1.5e-3  # s; where the servo stands before its first pulse, unless it is told; the usual centre, assumed
+_FRONTS = {"tap": (1.0, 0.0), "shunt": (1.0, 0.0), "supply": (0.25, 0.0), "command": (1.0, 0.0)}
 
 
-class ServoPlant:
-    """A servo with its load, driven by edges.
+class Front(NamedTuple):
+    """An analog stage before a pin: gain times value and offset.
 
     Parameters
     ----------
-    model : PulseServo, PulseServoInductive or DigitalServo
-        A digital one that is told by pulses.
+    gain : float
+        [V/V or V/A]
+    offset : float
+        [V]
+    """
+
+    gain: float
+    offset: float
+
+
+def fronts_of(wiring: Wiring) -> Mapping[str, Front]:
+    """Return the stages that a wiring describes.
+
+    Examples
+    --------
+    >>> fronts_of(Wiring())["supply"]
+    Front(gain=0.25, offset=0.0)
+    """
+    return {name: Front(wiring.pin(name, 1.0) - wiring.pin(name, 0.0), wiring.pin(name, 0.0)) for name in _FRONTS}
+
+
+class ServoOnPins:
+    """A servo whose pulses are the edges at a pin, and whose tap, current and supply are voltages at others.
+
+    A rising edge does not tell how wide its pulse will be, and no servo knows: it decides when the pulse has ended
+    (physics of the pulse servo). So whatever is asked for within a pulse is computed ahead with a pulse that is still
+    high, the longest that it takes, and once more from the rising edge when the falling one has come.
+
+    Parameters
+    ----------
+    model : Model
+        One that takes pulses and decides after them: `PulseServo`, `PulseServoInductive`, `DigitalServo`.
     load : Load, optional
-    channels : mapping of str to FrontEnd, optional
-        What stands before the pins "tap" (the potentiometer's voltage), "shunt" (the supply current), "supply" (its
-        voltage) and "command"; each as it is unless given.
-    command : float or Signal
-        Command voltage of mode "paper" [V].
-    initial : mapping, optional
-        State at t = 0, as in `Simulator.initial`; at rest where 1.5 ms asks for unless given.
+    fronts : mapping of str to Front, optional
+        Stages before the pins, by channel; those of the guide's wiring unless given.
+    command : Signal, optional
+        Command voltage of mode "paper"; 0 V unless given.
+    output_angle : float, optional
+        Where it begins [rad]; at rest where 1.5 ms asks for unless given.
+    noise : float
+        At each pin, one standard deviation [V].
     seed : int
-        Of the noise of servo and pins.
+        Of all noise.
 
     Raises
     ------
     InputError
-        If the model does not take pulses, or a number is out of its range.
+        If the model takes no pulses, or the noise makes no sense.
 
     Examples
     --------
     >>> import servotwin as st
-    >>> plant = ServoPlant(st.PulseServo(st.load_servo("hitec-hs-755hb")))
-    >>> for k in range(50):
-    ...     plant.rise(0.02 * k)
-    ...     plant.fall(0.02 * k + 2e-3)
-    >>> 1.5 < plant.voltages(1.0)[0] < 1.6
+    >>> plant = ServoOnPins(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+    >>> before = plant.voltage("tap", 0.01)
+    >>> for k in range(20):
+    ...     plant.rise(0.02 * (k + 1))
+    ...     plant.fall(0.02 * (k + 1) + 2e-3)
+    >>> plant.voltage("tap", 0.5) > before
     True
     """
 
-    def __init__(self, model: Model, load: Load | Part | None = None, *,
-                 channels: Mapping[str, FrontEnd] | None = None, command: float | Signal = 0.0,
-                 initial: Mapping[str, float] | None = None, seed: int = 0) -> None:
+    def __init__(self, model: Model, load: Load | Part | None = None, *, fronts: Mapping[str, Front] | None = None,
+                 command: Signal | None = None, output_angle: float | None = None, noise: float = 0.0,
+                 seed: int = 0) -> None:
         if not isinstance(model, SwitchedServo) or (isinstance(model, DigitalServo) and model.takes_goals):
-            raise InputError("servo on a board", got=type(model).__name__,
+            raise InputError("model on the bench", got=type(model).__name__,
                              allowed="PulseServo, PulseServoInductive, or a DigitalServo that takes pulses")
-        self.model = model
-        self.channels = checked(channels)
-        self.command = _voltage(command)
-        self._stages = [(_SIGNALS.get(name), self.channels[name]) for name in CHANNELS]
+        if not (is_finite(noise) and noise >= 0.0):
+            raise InputError("noise at the pins", got=noise, allowed="a number of at least 0 [V]")
+        self.model, self._simulator = model, Simulator(model, load, seed)
+        self._fronts = {**{name: Front(*one) for name, one in _FRONTS.items()}, **(fronts or {})}
+        self._voltage, self._noise, self._rng = command, noise, np.random.default_rng(seed)
         self._longest = model.value_or("electronics.pulse_width_max", PULSE_RANGE[1])
-        self._noise = [random.Random(seed * len(CHANNELS) + k) for k in range(len(CHANNELS))]
-        self._simulator = Simulator(model, load, seed)
-        self._command = _train([(math.inf, _CENTRE)])
-        self._width = _CENTRE  # of the pulse that has risen last
-        self._state = self._before = self._simulator.initial(self._command, initial)
-        self._initial, self._start = initial, self._state["output_angle"]
-        self._risen: float | None = None  # the edge of the pulse that is high
+        self._command = _train([(_NEVER, _CENTRE)])
+        self._width = _CENTRE  # of the pulse that has risen last, or what it is taken for while it is high
+        start = None if output_angle is None else {"output_angle": output_angle}
+        self._before = self._state = self._simulator.initial(self._command, start)  # at the last edge, and now
+        self._start = self._state["output_angle"]
+        self._high = False
         self.edges: list[tuple[float, float]] = []
         """Rising edge and width of each pulse that has ended [s]."""
 
@@ -97,98 +128,73 @@ class ServoPlant:
 
     def rise(self, time: float) -> None:
         """Take the rising edge of a pulse [s]."""
-        if self._risen is not None:
-            return
-        self._before = self._to(time)
-        self._risen = self._before.time
-        self._told(self._longest)
+        if not self._high:
+            self._before, self._high = self.state(time), True
+            self._tell(self._longest)
 
     def fall(self, time: float) -> None:
         """Take the falling edge of a pulse [s]."""
-        if self._risen is None or time <= self._risen:
+        if not self._high:
             return
-        width = time - self._risen
-        self.edges.append((self._risen, width))
-        self._told(width)
-        self._state = self._simulator.advance(self._before, max(time, self._state.time), self._command)
-        self._risen = None
+        self._tell(max(time - self._before.time, _GLITCH))
+        now = max(time, self._before.time + _GLITCH)
+        self._state, self._high = self._simulator.advance(self._before, now, self._command), False
+        self.edges.append((self._before.time, self._width))
 
-    def voltage(self, channel: int, time: float) -> float:
-        """Return the voltage at the pin of a channel at a time [s], not before the last one [V]."""
-        if not 0 <= channel < len(self._stages):
-            return 0.0
-        name, stage = self._stages[channel]
-        if name is None:
-            value = float(self.command(time)) if isinstance(self.command, Signal) else self.command
-        else:
-            value = self._simulator.observe(self._to(time), name, self._command)
-        volts = stage.gain * value + stage.offset
-        return volts + self._noise[channel].gauss(0.0, stage.noise) if stage.noise else volts
+    def state(self, time: float) -> State:
+        """Return the state at a time [s], as it is if no edge comes before it; that of now where it has gone by."""
+        if time <= self._state.time:
+            return self._state
+        if self._high and time - self._before.time > self._longest and self._width < _ENDLESS:
+            # Longer than the servo takes, so it counts as none, wherever it ends
+            self._tell(_ENDLESS)
+            self._state = self._simulator.advance(self._before, self._state.time, self._command)
+        self._state = self._simulator.advance(self._state, time, self._command)
+        return self._state
 
-    def voltages(self, time: float) -> Sequence[float]:
-        """Return the voltages at the pins of all channels at a time [s], not before the last one [V]."""
-        return [self.voltage(channel, time) for channel in range(len(CHANNELS))]
+    def voltage(self, channel: str, time: float) -> float:
+        """Return the voltage at the pin of a channel [V]."""
+        front = self._fronts[channel]
+        noise = self._noise * float(self._rng.standard_normal()) if self._noise else 0.0
+        return front.gain * self._value(channel, time) + front.offset + noise
 
-    def signal(self, name: str) -> float:
-        """Return any signal of the servo as it stands now (SI), without front end and noise."""
-        return self._simulator.observe(self._state, name, self._command)
-
-    def run(self, until: float) -> None:
-        """Let time pass [s]."""
-        self._to(until)
-
-    def truth(self, duration: float | None = None, *, output_times: ArrayLike | None = None) -> Result:
-        """Simulate anew, from the start, what the pulses so far have done, and return the result.
+    def truth(self, output_times: ArrayLike | None = None) -> Result:
+        """Simulate anew, from the start until now, what the pulses so far have done.
 
         Parameters
         ----------
-        duration : float, optional
-            As far as the servo is unless given [s].
         output_times : array_like, optional
-            [s]
+            Each millisecond unless given [s].
 
         Raises
         ------
         InputError
             If no time has passed.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> plant = ServoOnPins(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+        >>> plant.rise(0.001)
+        >>> plant.fall(0.003)
+        >>> round(float(plant.truth([0.002])["output_angle"][0] - plant.truth([0.0])["output_angle"][0]), 6)
+        0.0
         """
-        until = self.time if duration is None else duration
-        edges = [*self.edges, *([] if self._risen is None else [(self._risen, self._width)])]
-        command = _train(edges or [(math.inf, _CENTRE)])
-        initial = self._initial or {"output_angle": self._start}
-        times = times_asked(until, None, output_times)
-        return simulated(self._simulator, command, until, times, initial)
+        pulses = [*self.edges, *([(self._before.time, self._width)] if self._high else [])]
+        return simulated(self._simulator, _train(pulses or [(_NEVER, _CENTRE)]), self.time,
+                         times_asked(self.time, None, output_times), {"output_angle": self._start})
 
-    def _to(self, time: float) -> State:
-        """Return the state at a time, or as it is where that has gone by."""
-        state = self._state
-        if time <= state.time:
-            return state
-        if self._risen is not None and time - self._risen > self._longest and self._width != _ENDLESS:
-            # Longer than the servo takes: whatever its end will be, it counts as none
-            self._told(_ENDLESS)
-            state = self._simulator.advance(self._before, state.time, self._command)
-        self._state = state = self._simulator.advance(state, time, self._command)
-        return state
+    def _value(self, channel: str, time: float) -> float:
+        if channel == "command":
+            return 0.0 if self._voltage is None else float(self._voltage(time))
+        return self._simulator.observe(self.state(time), _SIGNALS[channel], self._command)
 
-    def _told(self, width: float) -> None:
+    def _tell(self, width: float) -> None:
         """Take a width for that of the pulse that has risen [s]."""
-        self._width = width
-        self._command = _train([(self._before.time, width)])
+        self._width, self._command = width, _train([(self._before.time, width)])
 
 
-def _train(edges: Sequence[tuple[float, float]]) -> Signal:
-    """Return pulses as a command; the checks of `pulse_train` are those of hands that write."""
-    pieces = Pieces(tuple(Piece(rise if math.isfinite(rise) else 0.0, width) for rise, width in edges))
-    return Signal(pieces=pieces, unit="s", initial=edges[0][1], edges=tuple(rise for rise, _ in edges))
-
-
-def _voltage(command: float | Signal) -> float | Signal:
-    if isinstance(command, Signal):
-        if command.kind != "voltage":
-            raise InputError("command voltage of a board", got=f"a {command.kind.replace('_', ' ')}",
-                             allowed="a voltage")
-        return command
-    if not is_finite(command):
-        raise InputError("command voltage of a board", got=command, allowed="a finite number [V]")
-    return float(command)
+def _train(pulses: Sequence[tuple[float, float]]) -> Signal:
+    """Return rising edges and widths [s] as a command, without the checks for hands that write some."""
+    edges = tuple(rise for rise, _ in pulses)
+    return Signal(pieces=Pieces(tuple(Piece(*one) for one in pulses)), unit="s", initial=pulses[0][1], edges=edges)

@@ -79,7 +79,8 @@ class Microcontroller:
         except BaseException:
             self._errors.close()
             raise
-        self._in, self._out = (pipe.fileno() for pipe in (self._process.stdin, self._process.stdout) if pipe)
+        pipes = self._process.stdin, self._process.stdout
+        self._in, self._out = (pipe.fileno() for pipe in pipes if pipe is not None)
 
     @property
     def pid(self) -> int:

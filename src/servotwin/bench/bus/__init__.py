@@ -1,0 +1,10 @@
+"""Servos on a wire that tell where they are: Feetech and Dynamixel, through the makers' own packages."""
+
+from servotwin.bench.bus.bus import Bus, BusEvent
+from servotwin.bench.bus.bus_rig import BusRig, columns_of, rig_of
+from servotwin.bench.bus.families import MODELS, BusFamily, BusModel
+from servotwin.bench.bus.scan import BAUDS, FoundServo, scan, wire_of
+from servotwin.bench.bus.wire import Answer, BusWire
+
+__all__ = ["BAUDS", "MODELS", "Answer", "Bus", "BusEvent", "BusFamily", "BusModel", "BusRig", "BusWire", "FoundServo",
+           "columns_of", "rig_of", "scan", "wire_of"]

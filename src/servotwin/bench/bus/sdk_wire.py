@@ -1,0 +1,169 @@
+"""The wire through the makers' packages: they make and check the packets."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from servotwin.bench.backends.backend import Backend
+from servotwin.bench.bus.port import BusPort
+from servotwin.bench.bus.wire import Answer
+from servotwin.errors import BenchError
+
+PATIENCE = 0.02  # s: a USB adapter may keep what has come for 16 ms
+_TRIES = 4
+_LISTEN = 4  # packets too many, damaged or of others, that are passed over
+_BROKEN = (IndexError, TypeError, ValueError)  # what the packages raise on damaged packets
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a maker's package is called, and where its packets have what.
+
+    Parameters
+    ----------
+    handler : object
+        Its packet handler.
+    receive : callable
+        From port to (packet, result).
+    id_at, error_at, data_at, extra : int
+        Places in an answer, and its bytes beside the data.
+    refused : int
+        Bits of the status byte that say that nothing was done.
+    sync_read : callable, optional
+        From (port, address, size, ids) to result; None: servos are asked one by one.
+    sweep : callable, optional
+        From port to {id: model number}, in one question.
+    """
+
+    handler: Any
+    receive: Callable[[BusPort], tuple[Any, int]]
+    id_at: int
+    error_at: int
+    data_at: int
+    extra: int
+    refused: int
+    sync_read: Callable[[BusPort, int, int, list[int]], int] | None = None
+    sweep: Callable[[BusPort], dict[int, int]] | None = None
+
+
+class SdkWire:
+    """Servos that speak one dialect, on a backend.
+
+    Parameters
+    ----------
+    backend : Backend
+    dialect : Dialect
+    baud : int
+        [bit/s]
+    patience : float
+        How long an answer may be late beyond its time on the wire [s].
+    """
+
+    def __init__(self, backend: Backend, dialect: Dialect, *, baud: int = 1_000_000, patience: float = PATIENCE) -> None:
+        self.port = BusPort(backend, baud, patience)
+        self._dialect = dialect
+
+    @property
+    def name(self) -> str:
+        """The backend's."""
+        return self.port.backend.name
+
+    def open(self) -> None:
+        """Take the wire."""
+        self.port.backend.open()
+
+    def ping(self, ids: Sequence[int]) -> dict[int, int]:
+        """Return the model numbers of those servos that answer, by id."""
+        if self._dialect.sweep is not None:
+            found = self._dialect.sweep(self._ready())
+            return {one: found[one] for one in sorted(found) if one in ids}
+        return {one: 0 for one in ids if self._answers(one)}
+
+    def _answers(self, servo: int) -> bool:
+        packet = [0] * 6  # the packages' own ping asks for the model number, which lies elsewhere in another's servo
+        packet[2], packet[3], packet[4] = servo, 2, 1
+        try:
+            return bool(self._dialect.handler.txRxPacket(self._ready(), packet)[1] == 0)
+        except _BROKEN:
+            return False
+
+    def read(self, servo: int, address: int, size: int) -> Answer:
+        """Ask a servo for a block of its registers."""
+        error = 0
+        for _ in range(_TRIES):
+            self._dialect.handler.readTx(self._ready(), servo, address, size)
+            answers = self._hear([servo], size)
+            if servo in answers:
+                return answers[servo]
+            error = self._last_error
+        raise BenchError(f"servo {servo} at {self.name}", f"it refuses to tell its registers from {address} on"
+                         if error & self._dialect.refused else "it does not answer")
+
+    def read_all(self, servos: Sequence[int], address: int, size: int) -> dict[int, Answer]:
+        """Ask several servos for the same block, once."""
+        if self._dialect.sync_read is not None:
+            self._dialect.sync_read(self._ready(), address, size, list(servos))
+            return self._hear(servos, size)
+        found: dict[int, Answer] = {}
+        for servo in servos:
+            self._dialect.handler.readTx(self._ready(), servo, address, size)
+            found |= self._hear([servo], size)
+        return found
+
+    def write(self, servo: int, address: int, data: bytes) -> None:
+        """Write into a servo's registers, and see that it arrived."""
+        for _ in range(_TRIES):
+            try:
+                result, error = self._dialect.handler.writeTxRx(self._ready(), servo, address, len(data), list(data))
+            except _BROKEN:
+                continue
+            if result == 0 and not error & self._dialect.refused:
+                return
+            # it may be set to answer questions only
+            if result != 0 and self.read(servo, address, len(data)).data == data:
+                return
+        raise BenchError(f"servo {servo} at {self.name}", f"it refuses what is written into register {address}")
+
+    def write_all(self, address: int, data: Mapping[int, bytes]) -> None:
+        """Write into several servos' registers at the same instant."""
+        size = len(next(iter(data.values())))
+        words = [byte for servo, one in data.items() for byte in (servo, *one)]
+        self._dialect.handler.syncWriteTxOnly(self._ready(), address, size, words, len(words))
+
+    def close(self) -> None:
+        """Give the wire back."""
+        self.port.backend.close()
+
+    # --- packets ------------------------------------------------------------------------------------------------------
+
+    _last_error = 0
+
+    def _ready(self) -> BusPort:
+        self.port.is_using = False  # the packages leave it set behind an error
+        return self.port
+
+    def _hear(self, servos: Sequence[int], size: int) -> dict[int, Answer]:
+        """Return the answers that come until all are there, or it is too late.
+
+        The packages' own loop takes answers in order, and loses all that follow one that is missing.
+        """
+        found: dict[int, Answer] = {}
+        self._last_error = 0
+        for _ in range(len(servos) + _LISTEN):
+            if len(found) == len(servos) or (self.port.isPacketTimeout()):
+                break
+            try:
+                packet, result = self._dialect.receive(self.port)
+                if result != 0:
+                    continue
+                servo, error = packet[self._dialect.id_at], packet[self._dialect.error_at]
+                data = bytes(packet[self._dialect.data_at:self._dialect.data_at + size])
+            except _BROKEN:
+                continue
+            self._last_error = error
+            if servo in servos and len(data) == size and len(packet) >= size + self._dialect.extra:
+                found[servo] = Answer(data, error, self.port.sent, time.perf_counter())
+        return found

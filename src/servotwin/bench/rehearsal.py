@@ -1,0 +1,53 @@
+"""A bench to rehearse on: an emulated board, or a mock of it, beside a simulated servo."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from servotwin.bench.backends import EmulatedBackend, MockBackend
+from servotwin.bench.emulator.build import harness
+from servotwin.bench.emulator.plant import ServoOnPins, fronts_of
+from servotwin.bench.recording.analog_rig import AnalogRig
+from servotwin.errors import BenchError
+
+if TYPE_CHECKING:
+    from servotwin.bench.backends import Backend
+    from servotwin.bench.recording.wiring import Wiring
+    from servotwin.loads import Load
+    from servotwin.models import Model
+
+
+def rehearsal_rig(model: Model, load: Load, wiring: Wiring, *, rate: str = "fast", mock: bool = False,
+                  noise: float = 1e-3, seed: int = 0) -> tuple[AnalogRig, str]:
+    """Return a rig with a simulated servo on it, and what is to be said of it, mostly nothing.
+
+    Parameters
+    ----------
+    model : Model
+        `PulseServo`, `PulseServoInductive` or `DigitalServo`.
+    load : Load
+    wiring : Wiring
+        Its numbers are taken for true: the emulated pins are wired so.
+    rate : {"fast", "frame"}
+    mock : bool
+        A board in Python instead of the firmware. It is taken, and said, where simavr is not installed.
+    noise : float
+        At each pin, one standard deviation [V].
+    seed : int
+
+    Raises
+    ------
+    InputError
+        If a number makes no sense, or the model takes no pulses.
+    """
+    plant = ServoOnPins(model, load, fronts=fronts_of(wiring), noise=noise, seed=seed)
+    references = {wiring.reference: wiring.pin_voltage(1023.5)}
+    remark = ""
+    if not mock:
+        try:
+            harness()
+        except BenchError as error:
+            mock, remark = True, f"a mock of the board is used instead of its firmware: {error.problem}"
+    backend: Backend = (MockBackend(plant, references=references) if mock
+                        else EmulatedBackend(plant, references=references))
+    return AnalogRig(backend, wiring, rate=rate), remark
