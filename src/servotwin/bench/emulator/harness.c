@@ -5,7 +5,7 @@
  *
  * Numbers are little-endian. Commands, each a letter and its arguments:
  *     g until u64              go on to this cycle; ends with an event h
- *     v count u16              answer to an event A: what the converter has found
+ *     v number u8, counts u16  answer to an event A: what the converter finds at each of its instants
  *     w length u16, bytes      onto the wire to the board, one after the other as fast as it carries them
  *     p address u16, value u8  poke into registers or SRAM
  *     m address u16, count u8  look at registers or SRAM; answered by an event m
@@ -14,7 +14,8 @@
  *     P level                  the pulse's pin has changed
  *     L level                  the light's pin has changed
  *     D rs << 4 | nibble       half a byte to the display, as E falls
- *     A channel, reference     a voltage is held; the host owes a count, by the end of the conversion
+ *     A reference, bytes       a voltage is held; the host owes counts, by the end of the conversion: the one of now and
+ *                              those that are foreseen, as cycle u64, channel u8 each
  *     T, bytes                 from the board onto the wire
  *     O                        a byte to the board was lost: three wait unread, which is what the chip has room for
  *     m, bytes                 what a look has found
@@ -37,6 +38,8 @@
 #include <simavr/avr_uart.h>
 #include <simavr/sim_avr.h>
 #include <simavr/sim_hex.h>
+
+#include "foresight.h"
 
 #define FREQUENCY 16000000
 #define RESOLUTION 1023  /* the converter of simavr multiplies by this and divides by the reference [mV] */
@@ -173,6 +176,7 @@ static void from_board(avr_irq_t *irq, uint32_t value, void *unused) {
 static void set(int bit, int level, uint64_t cycle) {
     if (levels[bit] == level) return;
     levels[bit] = level;
+    if (bit == PULSE) forget(); /* what the servo does from here on is another thing */
     event(cycle, bit == PULSE ? 'P' : 'L', (uint8_t)level, 0, NULL, 0);
 }
 
@@ -204,12 +208,32 @@ static void on_display(avr_irq_t *irq, uint32_t value, void *unused) {
 
 static void obey(void);
 
+static uint64_t next_match(void) {
+    uint64_t match = timer1->tov_base + timer1->comp[0].comp_cycles;
+    return match > avr->cycle ? match : match + timer1->tov_cycles;
+}
+
 static avr_cycle_count_t on_hold(avr_t *a, avr_cycle_count_t when, void *unused) {
     (void)a, (void)unused;
-    event(when, 'A', (uint8_t)channel, avr->data[ADMUX] >> 6, NULL, 0);
+    struct asked now = {when, (uint8_t)channel, avr->data[ADMUX] >> 6};
+    if (is_foreseen(now, &count)) return 0;
+    uint8_t list[9 * AHEAD];
+    unsigned n = foresee(next_match());
+    for (unsigned k = 0; k < n; k++) {
+        memcpy(list + 9 * k, &foreseen[k].cycle, 8);
+        list[9 * k + 8] = foreseen[k].channel;
+    }
+    event(when, 'A', now.reference, (uint16_t)(9 * n), list, 9 * n);
     flush();
     owed = 1;
     return 0;
+}
+
+static void take_counts(void) {
+    unsigned n = (unsigned)number(1);
+    for (unsigned k = 0; k < n && k < AHEAD; k++) answers[k] = (uint16_t)number(2);
+    count = answers[0];
+    owed = 0;
 }
 
 static avr_cycle_count_t on_end(avr_t *a, avr_cycle_count_t when, void *unused) {
@@ -259,6 +283,7 @@ static void on_reset(avr_t *a) {
     set(LIGHT, 0, avr->cycle);
     first = last;
     owed = 0;
+    forget();
     event(avr->cycle, 'R', 0, 0, NULL, 0);
     if (running) running = 2; /* the timer that stops us is gone */
 }
@@ -307,7 +332,7 @@ static void go(void) {
 static void obey(void) {
     switch (next_byte()) {
     case 'g': go(); break;
-    case 'v': count = (uint16_t)number(2), owed = 0; break;
+    case 'v': take_counts(); break;
     case 'w': to_board(); break;
     case 'p': {
         uint64_t address = number(2), value = number(1);

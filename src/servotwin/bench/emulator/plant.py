@@ -128,9 +128,12 @@ class ServoOnPins:
 
     def rise(self, time: float) -> None:
         """Take the rising edge of a pulse [s]."""
-        if not self._high:
-            self._before, self._high = self.state(time), True
-            self._tell(self._longest)
+        if self._high:
+            return
+        if time < self._state.time:  # it was asked for what would have been
+            self._state = self._simulator.advance(self._before, time, self._command)
+        self._before, self._high = self.state(time), True
+        self._tell(self._longest)
 
     def fall(self, time: float) -> None:
         """Take the falling edge of a pulse [s]."""
@@ -142,8 +145,10 @@ class ServoOnPins:
         self.edges.append((self._before.time, self._width))
 
     def state(self, time: float) -> State:
-        """Return the state at a time [s], as it is if no edge comes before it; that of now where it has gone by."""
-        if time <= self._state.time:
+        """Return the state at a time [s] after the last edge, as it is if no other edge comes before it."""
+        if time < self._state.time:
+            self._state = self._before
+        elif time == self._state.time:
             return self._state
         if self._high and time - self._before.time > self._longest and self._width < _ENDLESS:
             # Longer than the servo takes, so it counts as none, wherever it ends
@@ -153,7 +158,7 @@ class ServoOnPins:
         return self._state
 
     def voltage(self, channel: str, time: float) -> float:
-        """Return the voltage at the pin of a channel [V]."""
+        """Return the voltage at the pin of a channel at a time after the last edge, if no other comes before it [V]."""
         front = self._fronts[channel]
         noise = self._noise * float(self._rng.standard_normal()) if self._noise else 0.0
         return front.gain * self._value(channel, time) + front.offset + noise
