@@ -12,7 +12,7 @@ from pathlib import Path
 from servotwin.errors import BenchError
 from servotwin.simulation.compile.storage import cache_folder, key_of
 
-_SOURCES = ("harness.c", "foresight.h")
+_SOURCES = ("harness.c", "pipes.h", "foresight.h")
 LIBRARIES = ("-lsimavr", "-lelf")
 _COMPILERS = ("cc", "gcc", "clang")
 _PACKAGES = "sudo apt install gcc libsimavr-dev libelf-dev"

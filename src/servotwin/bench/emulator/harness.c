@@ -23,8 +23,6 @@
  *     h                        there we are
  *     x                        the program has crashed, or sleeps for ever
  */
-#include <errno.h>
-#include <poll.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,6 +38,7 @@
 #include <simavr/sim_hex.h>
 
 #include "foresight.h"
+#include "pipes.h"
 
 #define FREQUENCY 16000000
 #define RESOLUTION 1023  /* the converter of simavr multiplies by this and divides by the reference [mV] */
@@ -58,7 +57,7 @@
 #define DISPLAY_RS 0x04
 #define BITS_OF_BYTE 10  /* 8N1 */
 #define UNREAD 3         /* bytes that the chip has room for, the one in its shift register too */
-#define ROOM 65536
+#define QUEUE 65536       /* bytes on their way to the board, a power of two */
 
 static avr_t *avr;
 static avr_uart_t *uart;
@@ -73,68 +72,9 @@ static uint16_t count;
 static uint8_t display;
 static void (*chip_reset)(avr_t *);
 
-/* what goes out */
-
-static uint8_t out[ROOM], told[4096];
-static size_t filled, said;
-static uint64_t said_at;
-
-static void flush(void) {
-    size_t done = 0;
-    while (done < filled) {
-        ssize_t n = write(3, out + done, filled - done);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) _exit(0); /* nobody listens any more */
-        done += (size_t)n;
-    }
-    filled = 0;
-}
-
-static void event(uint64_t cycle, char kind, uint8_t a, uint16_t b, const uint8_t *bytes, size_t length) {
-    if (filled + 12 + length > ROOM) flush();
-    memcpy(out + filled, &cycle, 8);
-    out[filled + 8] = (uint8_t)kind;
-    out[filled + 9] = a;
-    memcpy(out + filled + 10, &b, 2);
-    if (length) memcpy(out + filled + 12, bytes, length);
-    filled += 12 + length;
-}
-
-static void tell_wire(void) {
-    if (said) event(said_at, 'T', 0, (uint16_t)said, told, said);
-    said = 0;
-}
-
-/* what comes in */
-
-static uint8_t in[4096];
-static size_t held, taken;
-static pid_t parent;
-
-static uint8_t next_byte(void) {
-    while (taken == held) {
-        struct pollfd wait = {.fd = 0, .events = POLLIN};
-        int ready = poll(&wait, 1, 1000);
-        if (ready == 0 && getppid() != parent) _exit(0); /* another process may still hold the pipe */
-        if (ready <= 0) continue;
-        ssize_t n = read(0, in, sizeof in);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) _exit(0);
-        held = (size_t)n;
-        taken = 0;
-    }
-    return in[taken++];
-}
-
-static uint64_t number(int bytes) {
-    uint64_t value = 0;
-    for (int k = 0; k < bytes; k++) value |= (uint64_t)next_byte() << 8 * k;
-    return value;
-}
-
 /* the wire to the board: a byte begins as the one before ends */
 
-static uint8_t coming[ROOM];
+static uint8_t coming[QUEUE];
 static size_t first, last;
 
 static void eight_bits(void) {
@@ -147,7 +87,7 @@ static avr_cycle_count_t feed(avr_t *a, avr_cycle_count_t when, void *unused) {
     if (first == last) return 0;
     eight_bits();
     unsigned waiting = (unsigned)(uart->input.write - uart->input.read + 64) % 64;
-    uint8_t byte = coming[first++ % ROOM];
+    uint8_t byte = coming[first++ % QUEUE];
     if (waiting >= UNREAD) event(when, 'O', 0, 0, NULL, 0);
     else avr_raise_irq(uart->io.irq + UART_IRQ_INPUT, byte);
     return when + uart->cycles_per_byte;
@@ -158,7 +98,7 @@ static void to_board(void) {
     size_t length = number(2);
     while (length--) {
         uint8_t byte = next_byte();
-        if (last - first < ROOM) coming[last++ % ROOM] = byte;
+        if (last - first < QUEUE) coming[last++ % QUEUE] = byte;
     }
     if (idle && first != last) avr_cycle_timer_register(avr, 1, feed, NULL);
 }
@@ -368,13 +308,11 @@ static void *part(const char *kind, char name) { /* the chip's own record of one
 }
 
 int main(int argc, char **argv) {
-    parent = getppid();
+    open_pipes();
     if (argc != 2) {
         fprintf(stderr, "harness: give a hex file\n");
         return 2;
     }
-    dup2(1, 3); /* libraries may print; events go where they do not */
-    dup2(2, 1);
     avr_global_logger_set(quiet);
     uint32_t size = 0, start = 0;
     uint8_t *code = read_ihex_file(argv[1], &size, &start);

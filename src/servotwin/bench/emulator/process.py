@@ -189,7 +189,7 @@ class Microcontroller:
         elif kind == 82:  # R
             self._pins.reset()
         elif kind == 120:  # x
-            raise BenchError("emulator", f"the program has crashed after {cycle * CYCLE:.6f} s")
+            raise BenchError("emulator", f"the program has crashed, or sleeps for ever, after {cycle * CYCLE:.6f} s")
 
     def _dead(self) -> BenchError:
         try:
