@@ -101,7 +101,7 @@ def film(path, scene, angle, times, *, rate=30.0, codec="mp4v", seed=0):
 def _disc(scene):
     """The texture that turns, and the map to it from the plane [sides]."""
     cell = max(2, round(scene.side * _SHARP / 6))
-    n = 10 * cell
+    n = 2 * round(cell * (4.5 + 6 * max((abs(c) for _, at in scene.marks for c in at), default=0.0)))
     disc = np.full((n, n), 150, np.uint8)
     for mark, (x, y) in scene.marks:
         drawn = mark_picture(mark, cell)
@@ -161,6 +161,7 @@ def cut_in_front(clip, share):
     for k in range(struct.unpack(">I", table[place:place + 4])[0]):
         here = place + 4 + 4 * k
         table[here:here + 4] = struct.pack(">I", struct.unpack(">I", table[here:here + 4])[0] + len(table))
-    made = boxes[b"ftyp"] + bytes(table) + b"".join(box for kind, box in boxes.items() if kind not in (b"ftyp", b"moov"))
+    rest = b"".join(box for kind, box in boxes.items() if kind not in (b"ftyp", b"moov"))
+    made = boxes[b"ftyp"] + bytes(table) + rest
     clip.write_bytes(made[:int(share * len(made))])
     return clip

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from servotwin.bench.fits import TableFit
-from servotwin.bench.reading import TableRow
+from servotwin.bench.reading import Reading, TableRow
 from servotwin.errors import InputError
 
 
@@ -81,12 +81,21 @@ class ModelShares(NamedTuple):
     rest: float
 
 
-def compare(rows: Sequence[TableRow], columns: Mapping[str, ArrayLike]) -> tuple[Comparison, ...]:
+class Row(Protocol):
+    """A row of a table that shows a reading."""
+
+    @property
+    def reading(self) -> Reading:
+        """What the display shows."""
+
+
+def compare(rows: Sequence[Row], columns: Mapping[str, ArrayLike]) -> tuple[Comparison, ...]:
     """Return simulated less measured.
 
     Parameters
     ----------
-    rows : sequence of TableRow, length n
+    rows : sequence, length n
+        Of `TableRow` or `ChainRow`.
     columns : mapping
         The measured table: q_deg, V_o_V, t_a_us, ADC_i, ADC_o, each of length n.
 

@@ -11,7 +11,9 @@ import typer
 from servotwin.cli import bench_options as words
 from servotwin.cli import shared_options as shared
 from servotwin.cli.bench_calibrate import calibrate
+from servotwin.cli.bench_paper import bench_paper
 from servotwin.cli.bench_record import record, rehearse
+from servotwin.cli.bench_video import MARKER_EPILOG, MARKER_HELP, VIDEO_EPILOG, VIDEO_HELP, marker, video
 from servotwin.cli.terminal import emit, emit_help, emit_json, pairs, show, table
 
 if TYPE_CHECKING:
@@ -118,3 +120,7 @@ bench.command("rehearse", help="Record experiments from an emulated bench: the f
               "servo.",
               epilog=f"Example: servotwin bench rehearse hitec-hs-755hb -e steps,chirp {_RANGE} --out rehearsal"
               )(rehearse)
+bench.command("paper", help="Run the paper's five voltages through the emulated bench, beside its Table II.",
+              epilog="Example: servotwin bench paper --out bench-paper")(bench_paper)
+bench.command("marker", help=MARKER_HELP, epilog=MARKER_EPILOG)(marker)
+bench.command("video", help=VIDEO_HELP, epilog=VIDEO_EPILOG)(video)

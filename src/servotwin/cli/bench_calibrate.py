@@ -15,7 +15,6 @@ import typer
 from servotwin.cli import bench_options as words
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, pairs, show
-from servotwin.parameters.output_file import undone
 
 if TYPE_CHECKING:
     from servotwin.bench.recording import AnalogRig, Calibration, Limits, Wiring
@@ -147,6 +146,7 @@ def _angle(rig: AnalogRig, meter: str | None, said: tuple[str | None, str | None
 def _readings(rig: AnalogRig, limits: Limits, meter: str | None) -> dict[str, list[float]]:
     """Return pulse, tap and dial at each place; all are come to from below."""
     from servotwin.errors import InputError
+    from servotwin.parameters.output_file import undone
     from servotwin.units.quantities import quantity
 
     given = None if meter is None else meter.split(",")

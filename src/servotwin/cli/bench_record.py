@@ -18,6 +18,7 @@ from servotwin.cli.terminal import emit_json, show, table
 if TYPE_CHECKING:
     from servotwin.bench.recording import About, Experiment, Limits, Recorded, Rig
 
+_BUSES = ("feetech", "dynamixel")
 _NEXT = "servotwin fit {folder} --servo {servo}"
 
 
@@ -29,8 +30,8 @@ def record(
     bus: Annotated[str | None, typer.Option(
         metavar="FAMILY", help="Bus servos at a USB adapter instead of a board: feetech or dynamixel.",
         rich_help_panel=words.BENCH)] = None,
-    identity: Annotated[list[int] | None, typer.Option(
-        "--id", metavar="NUMBER", help="Of a servo on the bus, repeatable; 1 unless given.",
+    identity: Annotated[int | None, typer.Option(
+        "--id", metavar="NUMBER", help="Of the servo on the bus; the only one that answers unless given.",
         rich_help_panel=words.BENCH)] = None,
     baud: Annotated[int | None, typer.Option(
         metavar="BIT/S", help="Of the bus; found unless given.", rich_help_panel=words.BENCH)] = None,
@@ -54,8 +55,9 @@ def record(
     from servotwin.errors import InputError
 
     kind = "pulse_width" if bus is None else "angle"
-    if bus is None and (identity or baud):
-        raise InputError("--id" if identity else "--baud", got="no --bus", allowed="with --bus feetech or dynamixel")
+    if bus is None and (identity is not None or baud is not None):
+        raise InputError("--baud" if identity is None else "--id", got="no --bus",
+                         allowed="with --bus feetech or dynamixel")
     limits = words.limits_from(kind, span, voltage, current_limit)
     about = words.about_from(servo, licence, author, note, load)
     made = _experiments(experiment, limits, servo, load, duration, words.seconds("--frame-period", frame_period), seed)
@@ -67,7 +69,7 @@ def record(
 
         rig = AnalogRig(SerialBackend(words.port_from(port)), words.wiring_from(wiring), rate=rate)
     else:
-        raise InputError("--bus", got=bus, allowed="nothing yet")
+        rig = _bus_rig(bus, words.port_from(port), identity, baud, words.seconds("--frame-period", frame_period))
     found = _recorded(_Job(rig, made, paths, limits, about, force))
     _report(found, out, servo, rig, as_json=as_json)
 
@@ -119,6 +121,25 @@ def rehearse(
         warnings.warn(remark, stacklevel=2)
     found = _recorded(_Job(rig, made, paths, limits, about, force))
     _report(found, out, servo, rig, as_json=as_json)
+
+
+def _bus_rig(family: str, port: str, identity: int | None, baud: int | None, period: float) -> Rig:
+    """Return the servo with this number, or the only one that answers."""
+    from servotwin.bench.bus import BAUDS, IDS, rig_of, scan
+    from servotwin.cli.terminal import patience
+    from servotwin.errors import BenchError, UnknownNameError
+
+    if family not in _BUSES:
+        raise UnknownNameError("bus", family, _BUSES)
+    with patience("looking for servos"):
+        found = [one for one in scan(port, bauds=BAUDS if baud is None else [baud],
+                                     ids=IDS if identity is None else [identity])
+                 if one.protocol.startswith(family) and identity in (None, one.id)]
+    if len(found) != 1:
+        names = [f"{one.id} ({one.model.name if one.model else one.number})" for one in found]
+        raise BenchError(f"port {port}", f"{', '.join(names)}; --id says which one" if names
+                         else "no servo answers (power, wiring, --baud?)")
+    return rig_of(port, found[0], rate=1.0 / period)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+_BELOW = 1.5  # levels between two trains of pulses
 _MARKERS = ("o", "s", "^", "D", "v")
 
 
@@ -116,7 +117,23 @@ def _draw(ax: Axes, curve: Curve, style: int, place: int) -> None:
                 capsize=3.0, elinewidth=1.0, label=curve.label, zorder=3 + place)  # the last one in front
 
 
-def pulses(edges: Sequence[float], widths: Sequence[float], *, frame_period: float) -> Figure:
+class Train(NamedTuple):
+    """Another train of pulses.
+
+    Parameters
+    ----------
+    label : str
+    edges, widths : sequence of float, length n
+        Rising edges and widths, at least two [s].
+    """
+
+    label: str
+    edges: Sequence[float]
+    widths: Sequence[float]
+
+
+def pulses(edges: Sequence[float], widths: Sequence[float], *, frame_period: float, beside: Train | None = None,
+           label: str = "") -> Figure:
     """Return a figure of a train of pulses: some frames above, the first pulse large below.
 
     Parameters
@@ -125,6 +142,10 @@ def pulses(edges: Sequence[float], widths: Sequence[float], *, frame_period: flo
         Rising edges and widths, at least two [s].
     frame_period : float
         Shown between the first two edges [s].
+    beside : Train, optional
+        Another one, drawn dashed below it.
+    label : str
+        Of the first one, where there are two.
 
     Raises
     ------
@@ -145,20 +166,33 @@ def pulses(edges: Sequence[float], widths: Sequence[float], *, frame_period: flo
         time, level = pulse_corners(edges, widths)
         for ax in axes:
             ax.plot(1e3 * time, level, color=LINES[0][0], linewidth=1.5, solid_joinstyle="miter")
-            ax.set_ylim(-0.15, 1.6)
-            ax.yaxis.set_major_locator(FixedLocator([0.0, 1.0]))
-            ax.yaxis.set_major_formatter(FixedFormatter(["low", "high"]))
+            low = -0.15 if beside is None else _beside(ax, beside)
+            ax.set_ylim(low, 1.6)
+            levels = [0.0, 1.0] if beside is None else [0.0, 1.0, -_BELOW, 1.0 - _BELOW]
+            ax.yaxis.set_major_locator(FixedLocator(levels))
+            ax.yaxis.set_major_formatter(FixedFormatter(["low", "high"] * (len(levels) // 2)))
             ax.set_ylabel("logic level")
             ax.set_xlabel("time (ms)")
         above, below = axes
+        for y, text in () if beside is None else ((0.5, label), (0.5 - _BELOW, beside.label)):
+            below.annotate(text, xy=(0.99, y), xycoords=("axes fraction", "data"), ha="right", va="center", fontsize=8,
+                           bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5})
         above.set_xlim(1e3 * float(time[0]), 1e3 * float(time[-1]))
-        below.set_xlim(-0.4, max(3.0, 1.2e3 * max(widths)))
+        below.set_xlim(-0.4, max(3.0, 1.2e3 * max(widths)) if beside is None else 1e3 * max(widths) + 2.2)
         _span(above, 1e3 * edges[0], 1e3 * edges[1], 1.22,
               f"$T_f$ = {1e3 * frame_period:.3f} ms,  $f$ = {1.0 / frame_period:.3f} Hz")
         _span(below, 0.0, 1e3 * widths[0], 1.22, f"$t_a$ = {1e6 * widths[0]:.0f} µs")
         below.annotate("first pulse, enlarged", xy=(1.0, 0.88), xycoords="axes fraction", ha="right", fontsize=8,
                        color=COLOURS["grey"])
     return finished(figure)
+
+
+def _beside(ax: Axes, other: Train) -> float:
+    """Draw another train below the first one; return the lower end of the panel."""
+    time, level = pulse_corners(other.edges, other.widths)
+    ax.plot(1e3 * time, level - _BELOW, color=LINES[1][0], linestyle=LINES[1][1], linewidth=1.5,
+            solid_joinstyle="miter")
+    return -_BELOW - 0.2
 
 
 def pulse_corners(edges: Sequence[float], widths: Sequence[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -16,7 +16,7 @@ from servotwin.look.opencv import load_opencv
 _WHOLE = 15  # pictures: how often the whole picture is searched, for a second mark with the same id
 _MARGIN = 0.8  # of a mark's size, around the place where it was last
 _ALIKE = 0.5  # of the larger one's side: a second mark rather than a speck
-_BLURS = (0.0, 1.0, 2.0)  # pixels: small marks want none, large ones are found in noise and a mottled background only so
+_BLURS = (0.0, 1.0, 2.0)  # pixels: small marks want none, large ones in noise are found only so (measured)
 _SMALLEST = 8  # pixels: a picture in which there may be a mark
 _CONTRAST = 12.0  # grey levels (measured: 7, which is usual, loses half the marks in noise)
 

@@ -112,8 +112,7 @@ class Lights:
                              allowed="--led x,y,w,h around it, or --instant jump")
         if self._region is None:
             others = steps.copy()
-            others[max(k - 2, 0):k + 3] = 0.0
-            others[:, max(row - 2, 0):row + 3, max(column - 2, 0):column + 3] = 0.0
+            others[max(k - stay - 1, 0):k + stay + 2] = 0.0  # what becomes brighter then is lit by it
             if others.max() > _RIVAL * best:
                 raise InputError("LED: more than one thing in the picture becomes brighter",
                                  allowed="--led x,y,w,h around it, or --instant jump")

@@ -96,10 +96,10 @@ def _piece(axes: Axes, cells: NDArray[np.bool_], side: float, piece: float) -> N
     from matplotlib.patches import Polygon, Rectangle
 
     cell = side / CELLS
-    axes.add_patch(Rectangle((-0.5 * side, -0.5 * side), side, side, color="black", linewidth=0.0))
+    axes.add_patch(Rectangle((-0.5 * side, -0.5 * side), side, side, color="black", linewidth=0.0, snap=False))
     for row, column, rows, columns in _runs(cells):
         axes.add_patch(Rectangle((-0.5 * side + column * cell, 0.5 * side - (row + rows) * cell), columns * cell,
-                                 rows * cell, color="white", linewidth=0.0))
+                                 rows * cell, color="white", linewidth=0.0, snap=False))
     tip = 0.5 * piece
     axes.add_patch(Polygon([(tip, 0.0), (tip - 0.4 * cell, 0.3 * cell), (tip - 0.4 * cell, -0.3 * cell)],
                            color=COLOURS["black"], linewidth=0.0))
