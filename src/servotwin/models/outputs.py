@@ -28,17 +28,35 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_electrical, _armature_current, _torques, _torques_of_two, _on_bus, _off_now, _at_temperature = (
-    array_form(law, __name__) for law in (
-        observe.electrical, observe.armature_current, observe.torques, observe.torques_of_two, observe.on_bus, off_now,
-        at_temperature))
-_at_duty, _share_of, _on_share_of = (
-    array_form(law, __name__) for law in (duty.at_duty, duty.share_of, duty.on_share_of))
+_torques, _torques_of_two = (array_form(law, __name__) for law in (observe.torques, observe.torques_of_two))
 
 
-def of_numbers(samples: Samples) -> bool:
-    """Tell whether samples are numbers, not arrays: then the laws themselves do, without a look at all their parts."""
-    return isinstance(samples.speed, float)
+class _Laws(NamedTuple):
+    """What the engine observes, as laws over numbers or over arrays."""
+
+    electrical: Callable[..., Any]
+    armature_current: Callable[..., Any]
+    on_bus: Callable[..., Any]
+    off_now: Callable[..., Any]
+    at_temperature: Callable[..., Any]
+    at_duty: Callable[..., Any]
+    share_of: Callable[..., Any]
+    on_share_of: Callable[..., Any]
+
+
+_OF_NUMBERS = _Laws(observe.electrical, observe.armature_current, observe.on_bus, off_now, at_temperature, duty.at_duty,
+              duty.share_of, duty.on_share_of)
+_OVER_ARRAYS = _Laws(*(array_form(law, __name__) for law in _OF_NUMBERS))
+
+
+def _laws(samples: Samples) -> _Laws:
+    """Return the laws over arrays, which look for them in all that they are given; of one sample those over numbers."""
+    return _OF_NUMBERS if _alone(samples) else _OVER_ARRAYS
+
+
+def _alone(samples: Any) -> bool:
+    """Tell whether samples are the numbers of a single one, which no annotation says."""
+    return isinstance(samples.time, float)
 
 
 def any_of(condition: Any) -> bool:
@@ -78,20 +96,20 @@ def warm_plant(model: Shown, samples: Samples, load: Load) -> Numbers:
     """Return the plant at the temperatures of the samples, and at their duty."""
     plant = model.plant(load)
     if any_of(plant.heat.C_w > 0.0):
-        plant = cast("Numbers", _at_temperature(plant, samples.winding, samples.housing))
-    return cast("Numbers", _at_duty(plant, samples.duty)) if _digital(plant) else plant
+        plant = cast("Numbers", _laws(samples).at_temperature(plant, samples.winding, samples.housing))
+    return cast("Numbers", _laws(samples).at_duty(plant, samples.duty)) if _digital(plant) else plant
 
 
 def electrical_of(plant: Numbers, samples: Samples, drive: Pieces) -> Electrical:
     """Return what happens electrically; each array broadcasts to shape (n,). `plant` is at their temperatures."""
-    return _shown(plant, samples, _electrical(*_circuit(plant, samples, drive)))
+    return _shown(plant, samples, _laws(samples).electrical(*_circuit(plant, samples, drive)))
 
 
 def _shown(plant: Numbers, samples: Samples, found: Electrical) -> Electrical:
     """Return what happens electrically with voltage and current of the supply before the duty of the bridge."""
     if not _digital(plant):
         return found
-    share = _share_of(plant.bridge, samples.duty)
+    share = _laws(samples).share_of(plant.bridge, samples.duty)
     return found._replace(bus_voltage=found.bus_voltage / share, supply_current=found.supply_current * share)
 
 
@@ -103,13 +121,14 @@ def _circuit(plant: Numbers, samples: Samples, drive: Pieces) -> tuple[Numbers, 
     """Return what the electrical side is asked with; fields that do not count are not looked at."""
     i = samples.current if any_of(plant.motor.L > 0.0) else 0.0
     if not any_of(plant.source.V > 0.0):
-        return plant, drive(samples.time), samples.angle, samples.speed, i
+        u = drive(samples.time)
+        return plant, float(u) if _alone(samples) else u, samples.angle, samples.speed, i
     if not _digital(plant) and any_of(heeds_silence(plant.bridge)):
-        off = off_now if of_numbers(samples) else _off_now
-        plant = plant._replace(bridge=cast("Any", off)(plant.bridge, samples.silent))
+        plant = plant._replace(bridge=_laws(samples).off_now(plant.bridge, samples.silent))
     shared = getattr(samples, "bus", None)
     if shared is not None:
-        plant = _on_bus(plant, shared * _share_of(plant.bridge, samples.duty) if _digital(plant) else shared)
+        share = _laws(samples).share_of(plant.bridge, samples.duty) if _digital(plant) else 1.0
+        plant = _laws(samples).on_bus(plant, shared * share)
     w = motor_speed_of(plant, samples)
     return plant, samples.drive * plant.source.V, 0.0, w, i
 
@@ -127,7 +146,7 @@ def motor_speed_of(plant: Numbers, samples: Samples) -> Array:
 def torques_of(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Torques:
     """Return all torques that act at the output shaft; each array broadcasts to shape (n,)."""
     plant, w = warm_plant(model, samples, load), samples.speed
-    i = _armature_current(*_circuit(plant, samples, drive))
+    i = _laws(samples).armature_current(*_circuit(plant, samples, drive))
     external = load.external_torque(samples.time, samples.angle)
     mode: Any = Mode(0, cast("Any", samples.contact), RIGID, FREE, 0)
     if not any_of(plant.play.half != 0.0) and not any_of(plant.elastic.k != 0.0):
@@ -150,23 +169,24 @@ def _reduction(model: Shown) -> float:
 def _electrical_signal(name: str) -> Callable[[Shown, Samples, Pieces, Load], Array]:
     def compute(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
         plant, u, q, w, i = _circuit(warm_plant(model, samples, load), samples, drive)
-        if of_numbers(samples) and not _digital(plant):
-            return cast("Array", getattr(observe.electrical(plant, u, q, w, i), name))
-        values = getattr(_shown(plant, samples, _electrical(plant, u, q, w, i)), name)
+        values = getattr(_shown(plant, samples, _laws(samples).electrical(plant, u, q, w, i)), name)
+        if _alone(samples):
+            return values  # type: ignore[no-any-return]
         return np.broadcast_to(values, np.broadcast_shapes(np.shape(values), np.shape(w)))
     return compute
 
 
 def _current(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
     plant = warm_plant(model, samples, load)
-    current: Array = _armature_current(*_circuit(plant, samples, drive))
-    return current / _on_share_of(plant.bridge, samples.duty) if _digital(plant) else current
+    current: Array = _laws(samples).armature_current(*_circuit(plant, samples, drive))
+    return current / _laws(samples).on_share_of(plant.bridge, samples.duty) if _digital(plant) else current
 
 
 def _motor_torque(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:
     plant = warm_plant(model, samples, load)
     k_a = plant.motor.K / _reduction(model)
-    return np.asarray(physics.electromagnetic_torque(_armature_current(*_circuit(plant, samples, drive)), k_a))
+    i = _laws(samples).armature_current(*_circuit(plant, samples, drive))
+    return np.asarray(physics.electromagnetic_torque(i, k_a))
 
 
 def _feedback(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time as clock
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -13,12 +14,16 @@ from servotwin.bench.flash import firmware_file
 from servotwin.errors import BenchError
 
 _SLICE = 16_000  # cycles between two looks at the wire: 1 ms
+_LEAST = 1_600  # cycles that pass where nobody would wait: who asks again and again gets on
 _FULL = 1024
 _REFERENCES = {0: "external", 1: "supply", 3: "internal"}  # bits REFS1 and REFS0 of ADMUX
 
 
 class EmulatedBackend:
     """The firmware on an emulated ATmega328P. Its time goes on while somebody reads, as fast as the computer can.
+
+    Each conversion sees the voltages of the instant at which it is held, each pulse is what the compare unit makes, to
+    the cycle. Each opening switches a new board on, whose pins find the plant as the last one has left it.
 
     Parameters
     ----------
@@ -30,6 +35,8 @@ class EmulatedBackend:
         Of the converter, other than `REFERENCES` [V].
     firmware : path, optional
         Another one than the package's.
+    real_time : bool
+        Whether it waits where it is faster than the clock on the wall.
 
     Examples
     --------
@@ -43,20 +50,23 @@ class EmulatedBackend:
 
     def __init__(self, plant: Plant | None = None, *, paper: bool = False,
                  references: Mapping[str, float] | None = None,
-                 firmware: str | os.PathLike[str] | None = None) -> None:
+                 firmware: str | os.PathLike[str] | None = None, real_time: bool = False) -> None:
         self._plant: Plant = plant or StillPins()
         self._paper = paper
         self._volts = {**REFERENCES, **(references or {})}
         self._firmware = firmware_file() if firmware is None else Path(firmware)
+        self._real_time, self._wall = real_time, 0.0
         self._board: Microcontroller | None = None
+        self._before = 0  # cycles of the boards before this one
         self._display = Display()
         self._heard = bytearray()
         self.light: list[tuple[float, int]] = []
+        """When the light went on (1) and off (0) [s]."""
 
     @property
     def time(self) -> float:
-        """How long the board has been on [s]."""
-        return self._running.cycle * CYCLE
+        """How long boards have been on since it was opened first [s]."""
+        return self._at(0 if self._board is None else self._board.cycle)
 
     @property
     def lines(self) -> Sequence[str]:
@@ -79,9 +89,11 @@ class EmulatedBackend:
         if self._board is not None:
             raise BenchError(self.name, "it is open already")
         self._board = Microcontroller(self._firmware, Pins(
-            pulse=self._pulse, light=lambda cycle, level: self.light.append((cycle * CYCLE, level)),
-            display=self._display.write, convert=self._count, reset=self._reset))
+            pulse=self._pulse, light=lambda cycle, level: self.light.append((self._at(cycle), level)),
+            display=lambda half: self._display.write(half), convert=self._count, reset=self._reset))
+        self._display = Display()
         self._heard.clear()
+        self._wall = clock.monotonic() - self.time
         if self._paper:
             self._board.pull("B", 0, 0)
 
@@ -92,9 +104,11 @@ class EmulatedBackend:
     def read(self, timeout: float) -> bytes:
         """Return what has come; let time go on until something has, or the timeout is over."""
         board = self._running
-        until = board.cycle + round(timeout * FREQUENCY)
+        until = board.cycle + max(round(timeout * FREQUENCY), _LEAST)
         while not self._heard and board.cycle < until:
             self._heard += board.go(min(until, board.cycle + _SLICE))
+            if self._real_time:
+                clock.sleep(max(self._wall + self.time - clock.monotonic(), 0.0))
         data = bytes(self._heard)
         self._heard.clear()
         return data
@@ -103,7 +117,9 @@ class EmulatedBackend:
         """Switch the board off."""
         if self._board is not None:
             self._board.close()
+            self._before += self._board.cycle
             self._board = None
+            self._plant.fall(self.time)
 
     def poke(self, address: int, data: bytes) -> None:
         """Put bytes into the board's SRAM."""
@@ -115,16 +131,23 @@ class EmulatedBackend:
             raise BenchError(self.name, "it is not open")
         return self._board
 
+    def look(self, address: int, size: int) -> bytes:
+        """Return bytes of the board's registers and SRAM."""
+        return self._running.look(address, size)
+
+    def _at(self, cycle: int) -> float:
+        return (self._before + cycle) * CYCLE
+
     def _pulse(self, cycle: int, level: int) -> None:
-        (self._plant.rise if level else self._plant.fall)(cycle * CYCLE)
+        (self._plant.rise if level else self._plant.fall)(self._at(cycle))
 
     def _count(self, cycle: int, channel: int, reference: int) -> int:
-        volts = self._plant.voltage(_CHANNELS[channel], cycle * CYCLE) if channel < len(_CHANNELS) else 0.0
+        volts = self._plant.voltage(_CHANNELS[channel], self._at(cycle)) if channel < len(_CHANNELS) else 0.0
         full = self._volts[_REFERENCES.get(reference, "internal")]
         return min(max(int(_FULL * volts / full), 0), _FULL - 1)
 
     def _reset(self) -> None:
-        self._display = Display()
+        """Nothing: the display keeps what it shows while the board starts anew."""
 
 
 _CHANNELS = ("tap", "shunt", "supply", "command")

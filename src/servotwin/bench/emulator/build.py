@@ -12,6 +12,7 @@ from pathlib import Path
 from servotwin.errors import BenchError
 from servotwin.simulation.compile.storage import cache_folder, key_of
 
+_SOURCES = ("harness.c", "pipes.h", "foresight.h")
 LIBRARIES = ("-lsimavr", "-lelf")
 _COMPILERS = ("cc", "gcc", "clang")
 _PACKAGES = "sudo apt install gcc libsimavr-dev libelf-dev"
@@ -25,15 +26,15 @@ def harness() -> Path:
     BenchError
         If there is no C compiler, or simavr is not installed.
     """
-    with as_file(files("servotwin.bench.emulator") / "harness.c") as source:
-        text = source.read_text(encoding="utf-8")
-        name = f"harness-{key_of(text, *LIBRARIES)}"
+    with as_file(files("servotwin.bench.emulator")) as folder:
+        texts = [(folder / name).read_text(encoding="utf-8") for name in _SOURCES]
+        name = f"harness-{key_of(*texts, *LIBRARIES)}"
         try:
-            return _kept(cache_folder(), name, source)
-        except OSError as error:
-            if isinstance(error, BenchError):
-                raise
-            return _kept(Path(tempfile.mkdtemp(prefix="servotwin-")), name, source)
+            return _kept(cache_folder(), name, folder / _SOURCES[0])
+        except BenchError:
+            raise
+        except OSError:
+            return _kept(Path(tempfile.mkdtemp(prefix="servotwin-")), name, folder / _SOURCES[0])
 
 
 def _kept(folder: Path, name: str, source: Path) -> Path:

@@ -5,7 +5,7 @@
  *
  * Numbers are little-endian. Commands, each a letter and its arguments:
  *     g until u64              go on to this cycle; ends with an event h
- *     v count u16              answer to an event A: what the converter has found
+ *     v number u8, counts u16  answer to an event A: what the converter finds at each of its instants
  *     w length u16, bytes      onto the wire to the board, one after the other as fast as it carries them
  *     p address u16, value u8  poke into registers or SRAM
  *     m address u16, count u8  look at registers or SRAM; answered by an event m
@@ -14,7 +14,8 @@
  *     P level                  the pulse's pin has changed
  *     L level                  the light's pin has changed
  *     D rs << 4 | nibble       half a byte to the display, as E falls
- *     A channel, reference     a voltage is held; the host owes a count, by the end of the conversion
+ *     A reference, bytes       a voltage is held; the host owes counts, by the end of the conversion: the one of now and
+ *                              those that are foreseen, as cycle u64, channel u8 each
  *     T, bytes                 from the board onto the wire
  *     O                        a byte to the board was lost: three wait unread, which is what the chip has room for
  *     m, bytes                 what a look has found
@@ -22,8 +23,6 @@
  *     h                        there we are
  *     x                        the program has crashed, or sleeps for ever
  */
-#include <errno.h>
-#include <poll.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,6 +36,9 @@
 #include <simavr/avr_uart.h>
 #include <simavr/sim_avr.h>
 #include <simavr/sim_hex.h>
+
+#include "foresight.h"
+#include "pipes.h"
 
 #define FREQUENCY 16000000
 #define RESOLUTION 1023  /* the converter of simavr multiplies by this and divides by the reference [mV] */
@@ -55,7 +57,7 @@
 #define DISPLAY_RS 0x04
 #define BITS_OF_BYTE 10  /* 8N1 */
 #define UNREAD 3         /* bytes that the chip has room for, the one in its shift register too */
-#define ROOM 65536
+#define QUEUE 65536       /* bytes on their way to the board, a power of two */
 
 static avr_t *avr;
 static avr_uart_t *uart;
@@ -70,68 +72,9 @@ static uint16_t count;
 static uint8_t display;
 static void (*chip_reset)(avr_t *);
 
-/* what goes out */
-
-static uint8_t out[ROOM], told[4096];
-static size_t filled, said;
-static uint64_t said_at;
-
-static void flush(void) {
-    size_t done = 0;
-    while (done < filled) {
-        ssize_t n = write(3, out + done, filled - done);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) _exit(0); /* nobody listens any more */
-        done += (size_t)n;
-    }
-    filled = 0;
-}
-
-static void event(uint64_t cycle, char kind, uint8_t a, uint16_t b, const uint8_t *bytes, size_t length) {
-    if (filled + 12 + length > ROOM) flush();
-    memcpy(out + filled, &cycle, 8);
-    out[filled + 8] = (uint8_t)kind;
-    out[filled + 9] = a;
-    memcpy(out + filled + 10, &b, 2);
-    if (length) memcpy(out + filled + 12, bytes, length);
-    filled += 12 + length;
-}
-
-static void tell_wire(void) {
-    if (said) event(said_at, 'T', 0, (uint16_t)said, told, said);
-    said = 0;
-}
-
-/* what comes in */
-
-static uint8_t in[4096];
-static size_t held, taken;
-static pid_t parent;
-
-static uint8_t next_byte(void) {
-    while (taken == held) {
-        struct pollfd wait = {.fd = 0, .events = POLLIN};
-        int ready = poll(&wait, 1, 1000);
-        if (ready == 0 && getppid() != parent) _exit(0); /* another process may still hold the pipe */
-        if (ready <= 0) continue;
-        ssize_t n = read(0, in, sizeof in);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) _exit(0);
-        held = (size_t)n;
-        taken = 0;
-    }
-    return in[taken++];
-}
-
-static uint64_t number(int bytes) {
-    uint64_t value = 0;
-    for (int k = 0; k < bytes; k++) value |= (uint64_t)next_byte() << 8 * k;
-    return value;
-}
-
 /* the wire to the board: a byte begins as the one before ends */
 
-static uint8_t coming[ROOM];
+static uint8_t coming[QUEUE];
 static size_t first, last;
 
 static void eight_bits(void) {
@@ -144,7 +87,7 @@ static avr_cycle_count_t feed(avr_t *a, avr_cycle_count_t when, void *unused) {
     if (first == last) return 0;
     eight_bits();
     unsigned waiting = (unsigned)(uart->input.write - uart->input.read + 64) % 64;
-    uint8_t byte = coming[first++ % ROOM];
+    uint8_t byte = coming[first++ % QUEUE];
     if (waiting >= UNREAD) event(when, 'O', 0, 0, NULL, 0);
     else avr_raise_irq(uart->io.irq + UART_IRQ_INPUT, byte);
     return when + uart->cycles_per_byte;
@@ -155,7 +98,7 @@ static void to_board(void) {
     size_t length = number(2);
     while (length--) {
         uint8_t byte = next_byte();
-        if (last - first < ROOM) coming[last++ % ROOM] = byte;
+        if (last - first < QUEUE) coming[last++ % QUEUE] = byte;
     }
     if (idle && first != last) avr_cycle_timer_register(avr, 1, feed, NULL);
 }
@@ -173,6 +116,7 @@ static void from_board(avr_irq_t *irq, uint32_t value, void *unused) {
 static void set(int bit, int level, uint64_t cycle) {
     if (levels[bit] == level) return;
     levels[bit] = level;
+    if (bit == PULSE) forget(); /* what the servo does from here on is another thing */
     event(cycle, bit == PULSE ? 'P' : 'L', (uint8_t)level, 0, NULL, 0);
 }
 
@@ -204,12 +148,32 @@ static void on_display(avr_irq_t *irq, uint32_t value, void *unused) {
 
 static void obey(void);
 
+static uint64_t next_match(void) {
+    uint64_t match = timer1->tov_base + timer1->comp[0].comp_cycles;
+    return match > avr->cycle ? match : match + timer1->tov_cycles;
+}
+
 static avr_cycle_count_t on_hold(avr_t *a, avr_cycle_count_t when, void *unused) {
     (void)a, (void)unused;
-    event(when, 'A', (uint8_t)channel, avr->data[ADMUX] >> 6, NULL, 0);
+    struct asked now = {when, (uint8_t)channel, avr->data[ADMUX] >> 6};
+    if (is_foreseen(now, &count)) return 0;
+    uint8_t list[9 * AHEAD];
+    unsigned n = foresee(next_match());
+    for (unsigned k = 0; k < n; k++) {
+        memcpy(list + 9 * k, &foreseen[k].cycle, 8);
+        list[9 * k + 8] = foreseen[k].channel;
+    }
+    event(when, 'A', now.reference, (uint16_t)(9 * n), list, 9 * n);
     flush();
     owed = 1;
     return 0;
+}
+
+static void take_counts(void) {
+    unsigned n = (unsigned)number(1);
+    for (unsigned k = 0; k < n && k < AHEAD; k++) answers[k] = (uint16_t)number(2);
+    count = answers[0];
+    owed = 0;
 }
 
 static avr_cycle_count_t on_end(avr_t *a, avr_cycle_count_t when, void *unused) {
@@ -259,6 +223,7 @@ static void on_reset(avr_t *a) {
     set(LIGHT, 0, avr->cycle);
     first = last;
     owed = 0;
+    forget();
     event(avr->cycle, 'R', 0, 0, NULL, 0);
     if (running) running = 2; /* the timer that stops us is gone */
 }
@@ -307,7 +272,7 @@ static void go(void) {
 static void obey(void) {
     switch (next_byte()) {
     case 'g': go(); break;
-    case 'v': count = (uint16_t)number(2), owed = 0; break;
+    case 'v': take_counts(); break;
     case 'w': to_board(); break;
     case 'p': {
         uint64_t address = number(2), value = number(1);
@@ -343,13 +308,11 @@ static void *part(const char *kind, char name) { /* the chip's own record of one
 }
 
 int main(int argc, char **argv) {
-    parent = getppid();
+    open_pipes();
     if (argc != 2) {
         fprintf(stderr, "harness: give a hex file\n");
         return 2;
     }
-    dup2(1, 3); /* libraries may print; events go where they do not */
-    dup2(2, 1);
     avr_global_logger_set(quiet);
     uint32_t size = 0, start = 0;
     uint8_t *code = read_ihex_file(argv[1], &size, &start);

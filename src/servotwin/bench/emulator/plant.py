@@ -2,27 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from servotwin.bench.recording.wiring import Wiring
 from servotwin.errors import InputError
-from servotwin.models import Model
-from servotwin.physics import feedback_voltage
-from servotwin.signals import Signal, pulse_train
+from servotwin.models.base import PULSE_RANGE
+from servotwin.models.digital import DigitalServo
+from servotwin.models.switched import SwitchedServo
+from servotwin.physics.pieces import Piece, Pieces
+from servotwin.signals import Signal
 from servotwin.simulation import Simulator, State
+from servotwin.simulation.simulator import simulated
+from servotwin.simulation.times import times_asked
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from numpy.typing import ArrayLike
 
     from servotwin.loads import Load, Part
+    from servotwin.models import Model
+    from servotwin.simulation import Result
 
 _NEVER = 1e9  # s
-_LONGEST = 0.0029  # s; no servo takes such a pulse, and the firmware makes none that is longer by much
-_TAP = (0.42, 0.59)  # V/rad, V: of a servo that tells none; about those of the paper's bench (Table II), assumed
+_ENDLESS = 1e3  # s; no servo takes such a pulse
+_GLITCH = 62.5e-9  # s, a cycle of the board: the shortest pulse that there is
+_CENTRE = 1.5e-3  # s; where it stands before its first pulse: the usual centre, assumed
+_SIGNALS = {"tap": "feedback_voltage", "shunt": "supply_current", "supply": "bus_voltage"}
 _FRONTS = {"tap": (1.0, 0.0), "shunt": (1.0, 0.0), "supply": (0.25, 0.0), "command": (1.0, 0.0)}
 
 
@@ -57,7 +65,8 @@ class ServoOnPins:
 
     A rising edge does not tell how wide its pulse will be, and no servo knows: it decides when the pulse has ended
     (physics of the pulse servo). So whatever is asked for within a pulse is computed ahead with a pulse that is still
-    high, and once more from the rising edge when the falling one has come.
+    high, the longest that it takes, and once more from the rising edge when the falling one has come. A servo in
+    silence is thus awake while a pulse is high of which it shows only then that it is too long.
 
     Parameters
     ----------
@@ -69,7 +78,7 @@ class ServoOnPins:
     command : Signal, optional
         Command voltage of mode "paper"; 0 V unless given.
     output_angle : float, optional
-        Where it begins [rad]; the middle of its travel or pulses unless given.
+        Where it begins [rad]; at rest where 1.5 ms asks for unless given.
     noise : float
         At each pin, one standard deviation [V].
     seed : int
@@ -95,62 +104,103 @@ class ServoOnPins:
     def __init__(self, model: Model, load: Load | Part | None = None, *, fronts: Mapping[str, Front] | None = None,
                  command: Signal | None = None, output_angle: float | None = None, noise: float = 0.0,
                  seed: int = 0) -> None:
-        if "pulse_width" not in model.signals or not hasattr(model, "edges"):
-            raise InputError("model on the bench", got=type(model).__name__, allowed="a servo that takes pulses")
+        if not isinstance(model, SwitchedServo) or (isinstance(model, DigitalServo) and model.takes_goals):
+            raise InputError("model on the bench", got=type(model).__name__,
+                             allowed="PulseServo, PulseServoInductive, or a DigitalServo that takes pulses")
         if not (is_finite(noise) and noise >= 0.0):
             raise InputError("noise at the pins", got=noise, allowed="a number of at least 0 [V]")
         self.model, self._simulator = model, Simulator(model, load, seed)
         self._fronts = {**{name: Front(*one) for name, one in _FRONTS.items()}, **(fronts or {})}
-        self._command, self._noise, self._rng = command, noise, np.random.default_rng(seed)
-        silent = pulse_train([_NEVER], [1.5e-3], unit="s")
-        self._tap = _tap_of(model)
-        self._signal = silent
+        self._voltage, self._noise, self._rng = command, noise, np.random.default_rng(seed)
+        self._longest = model.value_or("electronics.pulse_width_max", PULSE_RANGE[1])
+        self._command = _train([(_NEVER, _CENTRE)])
+        self._width = _CENTRE  # of the pulse that has risen last, or what it is taken for while it is high
         start = None if output_angle is None else {"output_angle": output_angle}
-        self._state: State = self._simulator.initial(silent, start)  # at the last edge
-        self._high: Signal | None = None  # while a pulse is high: one that does not end
-        self._rose = 0.0
-        self._seen: State = self._state
+        self._before = self._state = self._simulator.initial(self._command, start)  # at the last edge, and now
+        self._start = self._state["output_angle"]
+        self._high = False
         self.edges: list[tuple[float, float]] = []
+        """Rising edge and width of each pulse that has ended [s]."""
+
+    @property
+    def time(self) -> float:
+        """How far the servo is [s]."""
+        return self._state.time
 
     def rise(self, time: float) -> None:
         """Take the rising edge of a pulse [s]."""
-        self._state = self._seen = self._simulator.advance(self._state, time, self._signal)
-        self._rose, self._high = time, pulse_train([time], [_LONGEST], unit="s")
+        if self._high:
+            return
+        if time < self._state.time:  # it was asked for what would have been
+            self._state = self._simulator.advance(self._before, time, self._command)
+        self._before, self._high = self.state(time), True
+        self._tell(self._longest)
 
     def fall(self, time: float) -> None:
         """Take the falling edge of a pulse [s]."""
-        if self._high is None:
+        if not self._high:
             return
-        width = time - self._rose
-        self.edges.append((self._rose, width))
-        self._signal, self._high = pulse_train([self._rose], [width], unit="s"), None
-        self._state = self._seen = self._simulator.advance(self._state, time, self._signal)
+        self._tell(max(time - self._before.time, _GLITCH))
+        now = max(time, self._before.time + _GLITCH)
+        self._state, self._high = self._simulator.advance(self._before, now, self._command), False
+        self.edges.append((self._before.time, self._width))
 
     def state(self, time: float) -> State:
-        """Return the state at a time, as it is if no edge comes before it, not before the last edge [s]."""
-        before = self._seen if time >= self._seen.time else self._state
-        self._seen = self._simulator.advance(before, time, self._signal if self._high is None else self._high)
-        return self._seen
+        """Return the state at a time [s] after the last edge, as it is if no other edge comes before it."""
+        if time < self._state.time:
+            self._state = self._before
+        elif time == self._state.time:
+            return self._state
+        if self._high and time - self._before.time > self._longest and self._width < _ENDLESS:
+            # Longer than the servo takes, so it counts as none, wherever it ends
+            self._tell(_ENDLESS)
+            self._state = self._simulator.advance(self._before, self._state.time, self._command)
+        self._state = self._simulator.advance(self._state, time, self._command)
+        return self._state
 
     def voltage(self, channel: str, time: float) -> float:
-        """Return the voltage at the pin of a channel [V]."""
+        """Return the voltage at the pin of a channel at a time after the last edge, if no other comes before it [V]."""
         front = self._fronts[channel]
         noise = self._noise * float(self._rng.standard_normal()) if self._noise else 0.0
         return front.gain * self._value(channel, time) + front.offset + noise
 
+    def truth(self, output_times: ArrayLike | None = None) -> Result:
+        """Simulate anew, from the start until now, what the pulses so far have done.
+
+        Parameters
+        ----------
+        output_times : array_like, optional
+            Each millisecond unless given [s].
+
+        Raises
+        ------
+        InputError
+            If no time has passed.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> plant = ServoOnPins(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+        >>> plant.rise(0.001)
+        >>> plant.fall(0.003)
+        >>> round(float(plant.truth([0.002])["output_angle"][0] - plant.truth([0.0])["output_angle"][0]), 6)
+        0.0
+        """
+        pulses = [*self.edges, *([(self._before.time, self._width)] if self._high else [])]
+        return simulated(self._simulator, _train(pulses or [(_NEVER, _CENTRE)]), self.time,
+                         times_asked(self.time, None, output_times), {"output_angle": self._start})
+
     def _value(self, channel: str, time: float) -> float:
         if channel == "command":
-            return 0.0 if self._command is None else float(self._command(time))
-        state = self.state(time)
-        if channel == "tap":
-            return self._tap(state)
-        name = "supply_current" if channel == "shunt" else "bus_voltage"
-        command = self._signal if self._high is None else self._high
-        return self._simulator.observe(state, name, command)
+            return 0.0 if self._voltage is None else float(self._voltage(time))
+        return self._simulator.observe(self.state(time), _SIGNALS[channel], self._command)
+
+    def _tell(self, width: float) -> None:
+        """Take a width for that of the pulse that has risen [s]."""
+        self._width, self._command = width, _train([(self._before.time, width)])
 
 
-def _tap_of(model: Model) -> Callable[[State], float]:
-    """Return how the tap shows the angle: by the servo's potentiometer, or one that is assumed."""
-    gain, offset = (model.servo.get(f"potentiometer.{name}") for name in ("feedback_gain", "feedback_offset"))
-    p, b_o = (float(gain), float(offset)) if is_finite(gain) and is_finite(offset) else _TAP
-    return lambda state: float(feedback_voltage(state["output_angle"], p, b_o))
+def _train(pulses: Sequence[tuple[float, float]]) -> Signal:
+    """Return rising edges and widths [s] as a command, without the checks for hands that write some."""
+    edges = tuple(rise for rise, _ in pulses)
+    return Signal(pieces=Pieces(tuple(Piece(*one) for one in pulses)), unit="s", initial=pulses[0][1], edges=edges)

@@ -7,7 +7,7 @@ import subprocess
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from struct import Struct
+from struct import Struct, pack
 from typing import IO, NamedTuple
 
 from servotwin.bench.emulator.build import harness
@@ -19,7 +19,8 @@ CYCLE = 1.0 / FREQUENCY
 """Of its clock [s]."""
 
 _HEAD = Struct("<QBBH")
-_GO, _ANSWER, _POKE, _LOOK = Struct("<cQ"), Struct("<cH"), Struct("<cHB"), Struct("<cHB")
+_GO, _WIRE, _POKE, _LOOK, _COUNTS = (Struct(f"<c{fields}") for fields in ("Q", "H", "HB", "HB", "B"))
+_HELD = Struct("<QB")
 _MOST = 65536  # bytes of one read, of one message
 _PATIENCE = 2.0  # s for a process to end by itself
 _BACKLOG = 4096  # bytes of one order, so that neither side waits for the other with both pipes full
@@ -37,7 +38,8 @@ class Pins(NamedTuple):
     display : callable
         Half a byte as E falls, with RS as bit 4.
     convert : callable
-        (cycle, channel, reference bits) of a voltage that is held; returns what the converter finds.
+        (cycle, channel, reference bits) of a voltage that is held; returns what the converter finds. May be asked
+        for instants to come, which come so if there is no edge of the pulse before them.
     reset : callable
         The board has been reset by itself.
     """
@@ -104,7 +106,7 @@ class Microcontroller:
         """Put bytes onto the wire to the board."""
         for k in range(0, len(data), _BACKLOG):
             part = data[k:k + _BACKLOG]
-            self._order(_ANSWER.pack(b"w", len(part)) + part)
+            self._order(_WIRE.pack(b"w", len(part)) + part)
 
     def poke(self, address: int, data: bytes) -> None:
         """Put bytes into registers or SRAM, addressed as the program does."""
@@ -153,16 +155,16 @@ class Microcontroller:
             data, at = data + more, 0
             while len(data) - at >= _HEAD.size:
                 cycle, kind, a, b = unpack(data, at)
-                if kind == 65:  # A
-                    self._order(_ANSWER.pack(b"v", pins.convert(cycle, a, b)))
-                elif kind == 80:  # P
+                if kind == 80:  # P
                     pins.pulse(cycle, a)
-                elif kind == 84 or kind == 109:  # T, m
+                elif kind == 65 or kind == 84 or kind == 109:  # A, T, m
                     if len(data) - at < _HEAD.size + b:
                         break
                     at += b
                     text = data[at + _HEAD.size - b:at + _HEAD.size]
-                    if kind == 84:
+                    if kind == 65:
+                        self._convert(text, a)
+                    elif kind == 84:
                         self._heard += text
                     else:
                         self._looked = text
@@ -172,6 +174,10 @@ class Microcontroller:
                 ends = ends or kind == last
                 self.cycle = cycle if kind == 104 else self.cycle
             data = data[at:]
+
+    def _convert(self, asked: bytes, reference: int) -> None:
+        counts = [self._pins.convert(cycle, channel, reference) for cycle, channel in _HELD.iter_unpack(asked)]
+        self._order(_COUNTS.pack(b"v", len(counts)) + pack(f"<{len(counts)}H", *counts))
 
     def _seldom(self, cycle: int, kind: int, a: int) -> None:
         if kind == 76:  # L
@@ -183,7 +189,7 @@ class Microcontroller:
         elif kind == 82:  # R
             self._pins.reset()
         elif kind == 120:  # x
-            raise BenchError("emulator", f"the program has crashed after {cycle * CYCLE:.6f} s")
+            raise BenchError("emulator", f"the program has crashed, or sleeps for ever, after {cycle * CYCLE:.6f} s")
 
     def _dead(self) -> BenchError:
         try:
