@@ -152,11 +152,11 @@ class Bus:
 
     def limp(self) -> None:
         """Switch all torque off, several times; never raises."""
-        for one in self.servos.values() or ():
-            one.torque = False
-        register = next((one.family.registers["Torque_Enable"] for one in self.servos.values()), None)
-        if register is None:
+        if not self.servos:
             return
+        for servo in self.servos.values():
+            servo.torque = False
+        register = next(iter(self.servos.values())).family.registers["Torque_Enable"]
         for _ in range(_TRIES):
             with contextlib.suppress(Exception):
                 self.wire.write_all(register.address, dict.fromkeys(self.servos, register.encode(0)))

@@ -62,7 +62,8 @@ class SdkWire:
         How long an answer may be late beyond its time on the wire [s].
     """
 
-    def __init__(self, backend: Backend, dialect: Dialect, *, baud: int = 1_000_000, patience: float = PATIENCE) -> None:
+    def __init__(self, backend: Backend, dialect: Dialect, *, baud: int = 1_000_000,
+                 patience: float = PATIENCE) -> None:
         self.port = BusPort(backend, baud, patience)
         self._dialect = dialect
 
@@ -153,7 +154,7 @@ class SdkWire:
         found: dict[int, Answer] = {}
         self._last_error = 0
         for _ in range(len(servos) + _LISTEN):
-            if len(found) == len(servos) or (self.port.isPacketTimeout()):
+            if len(found) == len(servos) or self.port.isPacketTimeout():
                 break
             try:
                 packet, result = self._dialect.receive(self.port)
