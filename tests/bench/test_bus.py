@@ -1,5 +1,6 @@
-"""Recording from bus servos: what the peers on a pseudo-terminal are, do and are told is what rows and registers say."""
+"""Recording from bus servos: what the peers on a pseudo-terminal do and are told is what rows and registers say."""
 
+import itertools
 import math
 import random
 import sys
@@ -7,11 +8,11 @@ import time
 
 import numpy as np
 import pytest
-from bench import bus_peers as peers
 from hypothesis import given
 from hypothesis import strategies as some
 
 import servotwin as st
+from bench import bus_peers as peers
 from servotwin.bench.backends import SerialBackend
 from servotwin.bench.bus import MODELS, Bus, BusRig, columns_of, rig_of, scan, wire_of
 from servotwin.bench.bus import registers as tables
@@ -28,6 +29,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminal
 KINDS = [peers.STS, peers.X330, peers.XL430, peers.AX12]
 NAMES = ["sts", "x330", "xl430", "ax12"]
 ALL_KINDS = pytest.mark.parametrize("kind", KINDS, ids=NAMES)
+DIALECTS = pytest.mark.parametrize("kind", peers.KINDS.values(), ids=peers.KINDS)
 STILL = peers.Reading(angle=-0.5, speed=-2.0, duty=-0.25, current=-0.13, voltage=7.3, temperature=315.15)
 BACK = peers.Reading(angle=0.7, speed=1.5, duty=0.5, current=0.26, voltage=8.1, temperature=299.15)
 
@@ -59,7 +61,7 @@ def written(peer, address, servo=1):
 # --- who is there ---------------------------------------------------------------------------------------------------
 
 
-@ALL_KINDS
+@DIALECTS
 def test_a_scan_finds_every_servo_with_its_model_and_writes_nothing(kind):
     with peers.Bus(kind, [1, 2, 17], peers.Ramp(3)) as peer:
         found = scan(peer.port)
@@ -101,36 +103,34 @@ def test_a_model_that_is_not_known_is_found_and_not_recorded():
 # --- registers ------------------------------------------------------------------------------------------------------
 
 
-@ALL_KINDS
-def test_all_registers_come_as_the_servo_has_them_and_make_its_firmware(kind):
-    setters = {"feetech-sts": (st.feetech_sts, "feetech-sts3215-7v4", "P_Coefficient", 21, 1),
-               "dynamixel-x": (st.dynamixel_x, {"x330": "dynamixel-xl330-m288"}.get(
-                   NAMES[KINDS.index(kind)], "dynamixel-xl430-w250"), "Position_P_Gain", 84, 2),
-               "dynamixel-ax": (st.dynamixel_ax, "dynamixel-ax-12a", "CW_Compliance_Slope", 28, 1)}
+GAINS = [
+    (peers.STS, st.feetech_sts, "feetech-sts3215-7v4", {"P_Coefficient": (21, 1)}),
+    (peers.X330, st.dynamixel_x, "dynamixel-xl330-m288", {"Position_P_Gain": (84, 2)}),
+    (peers.XL430, st.dynamixel_x, "dynamixel-xl430-w250", {"Position_P_Gain": (84, 2)}),
+    (peers.AX12, st.dynamixel_ax, "dynamixel-ax-12a",
+     {"CW_Compliance_Slope": (28, 1), "CCW_Compliance_Slope": (29, 1)}),
+]
+
+
+@pytest.mark.parametrize(("kind", "setter", "servo", "gains"), GAINS, ids=NAMES)
+def test_all_registers_come_as_the_servo_has_them_and_make_its_firmware(kind, setter, servo, gains):
     with peers.Bus(kind, [4], peers.Ramp(1)) as peer:
-        gain = 64
-        family = MODELS[kind.protocol, kind.number].family
-        setter, servo, name, address, size = setters[family.name]
-        peer.servos[4].put(address, gain.to_bytes(size, "little"))
-        if name.startswith("CW"):
-            peer.servos[4].put(address + 1, bytes([gain]))
+        for address, size in gains.values():
+            peer.servos[4].put(address, (64).to_bytes(size, "little"))
+        memory = bytes(peer.servos[4].memory)
         rig = rig_on(peer, 4)
         facts = rig.facts()
         rig.close()
-        memory = bytes(peer.servos[4].memory)
-    raw = facts["registers"]
-    assert set(raw) == set(family.registers)
-    assert raw["ID"] == 4
-    assert raw["Model_Number"] == kind.number
-    assert raw[name] == gain
-    for address, (value, size) in kind.factory.items():
-        known = [one for one, where in family.registers.items() if (where.address, where.size) == (address, size)]
-        if known and address not in (31, 84, 28, 29):
-            assert [raw[one] for one in known] == [value], known
-    assert len(memory) >= max(one.address + one.size for one in family.registers.values())
-    made = setter(raw, servo=servo)
-    assert made.firmware == setter({name: gain, **({"CCW_Compliance_Slope": gain} if name.startswith("CW") else {})},
-                                   servo=servo).firmware or made.firmware.proportional_gain is not None
+    raw, table = facts["registers"], MODELS[kind.protocol, kind.number].family.registers
+    assert set(raw) == set(table)
+    assert (raw["ID"], raw["Model_Number"]) == (4, kind.number)
+    for name, register in table.items():
+        if register.sign_bit is None and not register.signed and not name.startswith("Present"):
+            there = memory[register.address:register.address + register.size]
+            assert raw[name] == int.from_bytes(there, "little"), name
+    gained = setter(raw, servo=servo).firmware.proportional_gain
+    assert gained == pytest.approx(setter(dict.fromkeys(gains, 64), servo=servo).firmware.proportional_gain)
+    assert gained != pytest.approx(setter({}, servo=servo).firmware.proportional_gain)
 
 
 def test_an_offset_below_zero_is_read_as_such():
@@ -147,7 +147,7 @@ TABLES = {"sts": tables.STS, "x330": tables.X330, "x": tables.X, "x without curr
 @pytest.mark.parametrize("table", TABLES.values(), ids=TABLES)
 def test_no_two_registers_overlap(table):
     spans = sorted((one.address, one.address + one.size) for one in table.values())
-    assert all(before[1] <= after[0] for before, after in zip(spans, spans[1:], strict=False))
+    assert all(before[1] <= after[0] for before, after in itertools.pairwise(spans))
 
 
 @given(some.sampled_from([one for table in TABLES.values() for one in table.values()]), some.data())
@@ -191,7 +191,7 @@ def test_a_speed_in_coarse_steps_is_read_as_the_servo_is_set():
     assert family.columns(values)[1].scale == pytest.approx(50.0 * family.columns({"Phase": 12})[1].scale)
 
 
-@ALL_KINDS
+@DIALECTS
 def test_a_row_has_the_angle_of_its_time(kind):
     with peers.Bus(kind, [1], peers.Ramp(1, speed=4.0)) as peer:
         rig = rig_on(peer)
@@ -215,9 +215,9 @@ def test_a_row_has_the_angle_of_its_time(kind):
 # --- orders ---------------------------------------------------------------------------------------------------------
 
 
-@ALL_KINDS
+@DIALECTS
 def test_goals_reach_the_servo_in_counts_and_repeat_every_frame(kind):
-    address, size, unit, sign = kind.goal
+    address, _, unit, sign = kind.goal
     with peers.Bus(kind, [1], peers.Ramp(1)) as peer:
         rig = rig_on(peer)
         rig.approach(0.0)
@@ -230,7 +230,7 @@ def test_goals_reach_the_servo_in_counts_and_repeat_every_frame(kind):
     assert len(rows["time_s"]) == 20
 
 
-@ALL_KINDS
+@DIALECTS
 def test_a_hold_without_a_value_is_torque_off_and_comes_back_to_the_new_goal(kind):
     with peers.Bus(kind, [1], peers.Ramp(1)) as peer:
         rig = rig_on(peer)
@@ -248,7 +248,7 @@ def test_a_hold_without_a_value_is_torque_off_and_comes_back_to_the_new_goal(kin
     assert not np.isnan(rows["command_angle_deg"]).any()
 
 
-@ALL_KINDS
+@DIALECTS
 def test_a_servo_goes_to_its_first_angle_slowly_and_from_where_it_is(kind):
     with peers.Bus(kind, [1], peers.Ramp(1, speed=50.0)) as peer:
         peer.servos[1].plant.angle[0] = -0.5
@@ -276,7 +276,7 @@ def test_experiments_become_ticks():
 # --- cables and other trouble -----------------------------------------------------------------------------------------
 
 
-@ALL_KINDS
+@DIALECTS
 def test_limp_is_torque_off(kind):
     with peers.Bus(kind, [1, 2], peers.Ramp(2)) as peer:
         bus = bus_on(peer)
@@ -287,7 +287,7 @@ def test_limp_is_torque_off(kind):
         bus.close()
 
 
-@ALL_KINDS
+@DIALECTS
 def test_a_cable_that_is_pulled_ends_the_run_in_one_line_and_keeps_the_rows(kind):
     with peers.Bus(kind, [1], peers.Ramp(1)) as peer:
         rig = rig_on(peer)
@@ -305,7 +305,7 @@ def test_a_cable_that_is_pulled_ends_the_run_in_one_line_and_keeps_the_rows(kind
     assert not any(math.isnan(x) for row in rows for x in row)
 
 
-@ALL_KINDS
+@DIALECTS
 def test_a_servo_that_falls_silent_ends_the_run_and_the_others_go_limp(kind):
     with peers.Bus(kind, [1, 2], peers.Ramp(2)) as peer:
         bus = bus_on(peer)
@@ -323,7 +323,7 @@ def test_a_servo_that_falls_silent_ends_the_run_and_the_others_go_limp(kind):
         bus.close()
 
 
-@ALL_KINDS
+@DIALECTS
 @pytest.mark.parametrize("harm", ["lost", "flipped", "none"])
 def test_damaged_answers_are_gaps_and_never_rows(kind, harm):
     draw = random.Random(1)
@@ -336,10 +336,10 @@ def test_damaged_answers_are_gaps_and_never_rows(kind, harm):
             frame[:place] + bytes([frame[place] ^ 1 << draw.randrange(8)]) + frame[place + 1:])
 
     with peers.Bus(kind, [1], peers.Fixed(STILL)) as peer:
-        rig = rig_on(peer)
-        rig.approach(0.0)
+        rig = rig_on(peer, rate=200.0)
+        list(rig.run(run_of((0.01, 0.0))))  # torque is on
         peer.harm = hurt
-        rows = by_column(rig, list(rig.run(run_of((1.5, 0.0), frame_period=0.05))))
+        rows = by_column(rig, list(rig.run(run_of((0.6, 0.0), frame_period=0.05))))
         peer.harm = lambda frame: frame
         rig.close()
         facts = rig.facts()
@@ -465,7 +465,7 @@ def test_ticks_do_not_drift_and_those_that_were_missed_are_counted():
                 time.sleep(0.0525)  # whoever takes the rows is slow once
         late = rig.facts()["late_ticks"]
         rig.close()
-    assert late >= 10
+    assert late >= 9  # whole ones of 52.5 ms, the one in which it was slow apart
     assert len(times) + late == 200
     phase = np.array(times) * 200.0 % 1.0
     assert np.median(np.minimum(phase, 1.0 - phase)) < 0.3
@@ -479,7 +479,8 @@ def test_a_recorded_log_is_read_with_its_registers(tmp_path):
     with peers.Bus(peers.STS, [5], peers.Ramp(1)) as peer:
         rig = rig_of(peer.port, scan(peer.port)[0])
         rig.open()
-        record(rig, run_of((0.1, 0.0), (0.2, 0.5), (0.05, None)), tmp_path / "run.csv", limits, About(servo="sts"))
+        record(rig, run_of((0.1, 0.0), (0.2, 0.5), (0.05, None)), tmp_path / "run.csv", limits=limits,
+               about=About(servo="sts"))
         rig.close()
         assert not peer.servos[5].torque
     log, = st.read_logs(tmp_path / "run.csv")
@@ -500,11 +501,12 @@ def test_a_log_of_simulated_servos_is_what_their_model_does(tmp_path):
     with peers.Bus(peers.X330, [1], fleet) as peer:
         fleet.then = time.perf_counter()
         rig = rig_on(peer)
-        record(rig, run_of((0.2, 0.0), (0.6, 0.6), (0.6, -0.3)), tmp_path / "run.csv", limits, About(servo=name))
+        record(rig, run_of((0.2, 0.0), (0.6, 0.6), (0.6, -0.3)), tmp_path / "run.csv", limits=limits,
+               about=About(servo=name))
         rig.close()
     log, = st.read_logs(tmp_path / "run.csv")
     model = st.DigitalServo(st.load_servo(name))
-    again = st.simulate(model, log.signal, duration=float(log.time[-1] + 0.01), output_times=log.time)
+    again = st.simulate(model, log.signal(), duration=float(log.time[-1] + 0.01), output_times=log.time)
     moved = np.ptp(log.measured["output_angle"])
     off = np.abs(again["output_angle"] - log.measured["output_angle"])
     assert moved > 0.8
@@ -526,7 +528,7 @@ def test_what_cannot_be_is_refused_in_one_line():
             Bus(SerialBackend(peer.port, 1), "feetec", [1])
         with pytest.raises(InputError, match=r"at most \d+ Hz for 1 servos at 57600"):
             rig_on(peer, rate=300.0, baud=57_600)
-        with pytest.raises(BenchError, match="servo 8 .*does not answer"):
+        with pytest.raises(BenchError, match=r"servo 8 .*does not answer"):
             rig_on(peer, 8)
         with pytest.raises(InputError, match="ids"):
             scan(peer.port, ids=[300])
