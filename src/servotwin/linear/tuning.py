@@ -47,8 +47,9 @@ class Tuning:
     model : Model
         The servo with that gain; as it is where the gain is that of a loop around it.
     settings : mapping of str to float
-        Registers by name and value; `firmware` parameters where the servo has no registers; "outer_gain", the part of
-        the error that a loop around a pulse servo makes good in a frame.
+        Registers by name and value; `firmware` parameters where the servo has no register for P, an AX-12A too, whose
+        P follows from compliance slopes in seven steps; "outer_gain", the part of the error that a loop around a pulse
+        servo makes good in a frame.
     margins : Margins
         Of the loop with that gain, friction and deadband apart.
     overshoot : float
