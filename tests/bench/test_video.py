@@ -141,8 +141,17 @@ def test_the_middle_of_the_mark_need_not_be_on_the_axis(tmp_path):
 def test_signs_and_zeros(clip, filmed):
     flipped, moved = read_clip(clip, flip=True), read_clip(clip, zero=0.2, flip=True)
     np.testing.assert_allclose(flipped.angle, -filmed.angle, atol=1e-12)
-    np.testing.assert_allclose(moved.angle, 0.2 - filmed.angle, atol=1e-12)
-    assert filmed.angle[np.searchsorted(TIMES, 0.7)] > 0.6  # counter-clockwise as the camera sees it
+    np.testing.assert_allclose(moved.angle, 0.2 - (filmed.angle - filmed.angle[0]), atol=1e-12)
+    assert (filmed.angle - filmed.angle[0])[np.searchsorted(TIMES, 0.7)] > 0.6  # counter-clockwise
+
+
+def test_clips_of_one_camera_have_one_zero(tmp_path):
+    """Wherever the horn was in the first picture: a fit has one offset for all its logs."""
+    first, second = (read_clip(film(tmp_path / "clip.mp4", Scene(side=80.0), lambda time, a=a: a + moves(time),
+                                    TIMES[:24]), instant="none").angle.mean() for a in (0.1, 1.1))
+    assert np.degrees(second - first) == pytest.approx(np.degrees(1.0), abs=0.2)
+    assert read_clip(film(tmp_path / "flat.mp4", Scene(side=80.0, tilt=0.0), lambda time: -0.35, TIMES[:6]),
+                     instant="none").angle[0] == pytest.approx(0.0, abs=2e-3)  # the plane is turned by 0.35 rad
 
 
 def test_turns_are_counted(tmp_path):

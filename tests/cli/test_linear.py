@@ -46,9 +46,10 @@ def test_files(cli, tmp_path):
 
 @pytest.mark.slow
 def test_tuning(cli):
-    found = cli("linear", SERVO, "--load", "inertia=5e-3", "--tune", "--phase-margin", "50deg", "--json").data
-    alone = st.linear.tune(st.PulseServo(st.load_servo(SERVO)), st.loads.Inertia(5e-3),
-                           phase_margin=math.radians(50.0))
+    found = cli("linear", SERVO, "--load", "inertia=5e-3", "--tune", "--phase-margin", "50deg", "--frame", "10ms",
+                "--json").data
+    often = st.load_servo(SERVO).replace({"electronics.frame_period": 0.01})
+    alone = st.linear.tune(st.PulseServo(often), st.loads.Inertia(5e-3), phase_margin=math.radians(50.0))
     assert found["settings"] == alone.settings
     assert found["stiffness"] == alone.stiffness
     said = cli("linear", SERVO, "--load", "inertia=5e-3", "--tune", "--phase-margin", "50deg").out
@@ -66,6 +67,12 @@ def test_what_has_no_linear_loop_still_has_sines(cli):
 @pytest.mark.parametrize(("words", "text"), [
     (("nothing",), "unknown servo"), ((SERVO, "--tune"), "nothing to tune for"),
     ((SERVO, "--tune", "--overshoot", "ten"), "per cent"), ((SERVO, "--phase-margin", "50deg"), "together with --tune"),
+    ((SERVO, "--step", "5deg"), "together with --tune"), ((SERVO, "--derivative"), "together with --tune"),
+    ((SERVO, "--tune", "--amplitude", "5deg"), "without --tune"),
+    ((SERVO, "--tune", "--angle", "90deg"), "without --tune"),
+    ((SERVO, "--tune", "--overshoot", "10%", "--frame", "20ms,10ms"), "one frame period"),
+    ((SERVO, "--tune", "--overshoot", "10%", "--derivative"), "has no D"),
+    (("feetech-sts3215-12v", "--tune", "--overshoot", "10%", "--frame", "10ms"), "have frames"),
     ((SERVO, "--tune", "--phase-margin", "50"), "units rad, deg"), ((SERVO, "--amplitude", "-1deg"), "--amplitude"),
     ((SERVO, "--amplitude", "200deg"), "travel"), ((SERVO, "--frame", "0ms"), "--frame"),
     ((SERVO, "--frame", "1ms"), "less than a frame of 1000 us"), ((SERVO, "--model", "dc-motor"), "model"),

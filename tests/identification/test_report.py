@@ -12,6 +12,7 @@ import servotwin as st
 from cli import fit_logs
 from servotwin.errors import OutputExistsError
 from servotwin.identification import identify
+from servotwin.identification.fitting.point import SHARED
 from servotwin.identification.fitting.verdict import Cause
 from servotwin.identification.fitting.words import Unidentifiable
 from servotwin.identification.report import page as report
@@ -221,3 +222,9 @@ def test_lines_have_the_digits_that_the_interval_allows(fit):
 ])
 def test_figures(value, within, text):
     assert figure_in(value, "mN m/A", "torque per current", within=within) == text
+
+
+@pytest.mark.parametrize("name", SHARED)
+def test_every_effect_of_the_rig_that_all_logs_share_can_be_shown(name):
+    """A fit whose pulses came at another period than the log said ended without its page."""
+    assert dimension_of_free(name) in ("time", "angle")

@@ -82,6 +82,10 @@ def test_the_equivalent_system_answers_alike(servo):
     (lambda s: st.linear.linearise(st.DCMotor(s), amplitude=0.1), "model to linearise"),
     (lambda s: st.linear.linearise(st.BoundedServo(s), amplitude=math.nan), "amplitude"),
     (lambda s: st.linear.linearise(st.BoundedServo(s), amplitude=0.1, angle=7.0), "travel"),
+    (lambda s: st.linear.linearise(st.BoundedServo(s), amplitude=2.0), "travel"),
+    (lambda s: st.linear.linearise(st.PulseServo(s), amplitude=0.3, angle=3.2), "travel"),
+    (lambda s: st.linear.linearise(st.PulseServo(s.replace({"electronics.pulse_width_max": 1.6e-3})), amplitude=0.8),
+     "the pulses accepted"),
     (lambda s: st.linear.linearise(st.BoundedServo(s), st.loads.Recorded([0.0, 1.0], [0.0, 0.1]), amplitude=0.1),
      "recorded"),
     (lambda s: st.linear.linearise(st.BoundedServo(s), amplitude=0.1).response([0.0]), "frequency")])

@@ -63,8 +63,9 @@ def video(
                                         "8 for 240 pictures a second that play at 30.", rich_help_panel=_TIME)] = 1.0,
     mark: Annotated[int, typer.Option("--id", metavar="ID", help="Of the mark on the horn.",
                                       rich_help_panel=_ZERO)] = 0,
-    zero: Annotated[str | None, typer.Option(metavar="ANGLE", help="Angle in the first picture, such as 12deg (default:"
-                                             " 0, or by the mark on the case).", rich_help_panel=_ZERO)] = None,
+    zero: Annotated[str | None, typer.Option(metavar="ANGLE", help=(
+        "Angle in the first picture, such as 12deg (default: counted from the mark on the case, else from the "
+        "picture's horizontal)."), rich_help_panel=_ZERO)] = None,
     flip: Annotated[bool, typer.Option("--flip", help="Count clockwise, as the camera sees it, as positive.",
                                        rich_help_panel=_ZERO)] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.",
@@ -145,7 +146,7 @@ def _show(filmed: Filmed, remarks: list[str], files: list[str], *, commanded: bo
                  f"{facts['longest_interval_s'] * 1e3:.1f} ms apart"),
         ("mark", f"{facts['mark']}, {facts['side_px']:.0f} pixels wide, seen in {facts['seen']} pictures, tilted by "
                  f"{facts['tilt_deg']:.0f} deg"),
-        ("angle", f"standard error {facts['angle_std_deg']:.3f} deg at rest; counted {facts['turned']}"),
+        ("angle", f"standard error {facts['angle_std_deg']:.3f} deg at rest; {facts['turned']}, from {facts['zero']}"),
         ("time 0", f"{filmed.instant.kind}, at {filmed.instant.time:.4f} s of the clip, standard error "
                    f"{1e3 * filmed.instant.error:.1f} ms")]
     rows += [("remark", one) for one in remarks]

@@ -29,7 +29,7 @@ def linear(
         rich_help_panel=_VIEW)] = None,
     frame: Annotated[list[str] | None, typer.Option(
         metavar="TIME", help="Frame periods to compare, such as 20ms,10ms,3ms (default: 20, 10 and 5 ms of a pulse "
-        "servo).", rich_help_panel=_VIEW)] = None,
+        "servo); with --tune the one to tune for.", rich_help_panel=_VIEW)] = None,
     angle: Annotated[str | None, typer.Option(
         metavar="ANGLE", help="About which it moves (default: the middle of its travel).",
         rich_help_panel=_VIEW)] = None,
@@ -40,8 +40,8 @@ def linear(
         metavar="ANGLE", help="Wanted phase margin, at least, such as 50deg.", rich_help_panel=_TUNE)] = None,
     overshoot: Annotated[str | None, typer.Option(
         metavar="PERCENT", help="Wanted overshoot of a simulated step, such as 10%.", rich_help_panel=_TUNE)] = None,
-    step: Annotated[str, typer.Option(
-        metavar="ANGLE", help="Size of that step.", rich_help_panel=_TUNE)] = "10deg",
+    step: Annotated[str | None, typer.Option(
+        metavar="ANGLE", help="Size of that step (default: 10deg).", rich_help_panel=_TUNE)] = None,
     derivative: Annotated[bool, typer.Option(
         "--derivative", help="Look for D too.", rich_help_panel=_TUNE)] = False,
     load: Annotated[list[str] | None, typer.Option(
@@ -73,13 +73,15 @@ def linear(
 
     chosen = model_of(servo, model, change or [], _MODELS, register or [])
     hangs = load_from(load or [], chosen)
-    wanted = words.wanted(tune=tune, phase_margin=phase_margin, overshoot=overshoot, step=step, derivative=derivative)
-    asked = words.asked(chosen, amplitude, frame, angle)
+    words.check_together({"--amplitude": amplitude, "--angle": angle, "--phase-margin": phase_margin,
+                          "--overshoot": overshoot, "--step": step, "--derivative": derivative or None}, tune=tune)
     targets = _targets({"--out": out, "--plot": plot, "--csv": csv}, servo, tune=tune, force=force)
-    if wanted is not None:
+    if tune:
+        wanted = words.wanted(phase_margin=phase_margin, overshoot=overshoot, step=step, frame=frame,
+                              derivative=derivative)
         _tune(chosen, hangs, wanted, as_json=as_json)
         return
-    found = _computed(chosen, hangs, asked)
+    found = _computed(chosen, hangs, words.asked(chosen, amplitude, frame, angle))
     _write(found, targets, force=force)
     facts = words.facts(found) | {"files": [str(target.path) for target in targets]}
     if as_json:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _AMPLITUDES = ("1deg", "5deg", "20deg")
 _FRAMES = ("20ms", "10ms", "5ms")
+_NOT_TUNED = ("--amplitude", "--angle")
 LOOP_HEAD = ("decides every", "slowest pole", "damping", "gain margin", "phase margin", "may come later by",
              "crossover")
 SINE_HEAD = ("sines of", "bandwidth", "at the lowest frequency", "not a sine by", "sticks")
@@ -36,32 +37,56 @@ def asked(model: Model, amplitude: Sequence[str] | None, frame: Sequence[str] | 
             "angle": None if angle is None else quantity("--angle", angle, "angle")}
 
 
-def wanted(*, tune: bool, phase_margin: str | None, overshoot: str | None, step: str,
-           derivative: bool) -> dict[str, Any] | None:
-    """Return the arguments of `tune` out of the words of the options; None where no gain is looked for.
+def check_together(options: Mapping[str, Any], *, tune: bool) -> None:
+    """Raise InputError if an option of --tune is given without it, or one that it does not read beside it.
+
+    Parameters
+    ----------
+    options : mapping of str to object
+        By name; None where one is not given.
+    tune : bool
+
+    Examples
+    --------
+    >>> check_together({"--phase-margin": "50deg", "--angle": None}, tune=True)
+    """
+    for option, value in options.items():
+        if value is not None and (option in _NOT_TUNED) == tune:
+            raise InputError(option, got=", ".join(value) if isinstance(value, list) else value,
+                             allowed="without --tune, whose --step is about the middle of the travel" if tune
+                             else "together with --tune")
+
+
+def wanted(*, phase_margin: str | None, overshoot: str | None, step: str | None, frame: Sequence[str] | None,
+           derivative: bool) -> dict[str, Any]:
+    """Return the arguments of `tune` out of the words of the options.
 
     Raises
     ------
     InputError
-        If an option of --tune stands without it, or none or both of what may be wanted.
+        If none or both of what may be wanted are given, or several frame periods.
 
     Examples
     --------
-    >>> wanted(tune=True, phase_margin=None, overshoot="10%", step="5 deg", derivative=False)["overshoot"]
-    0.1
+    >>> wanted(phase_margin=None, overshoot="10%", step="5 deg", frame=["10ms"], derivative=False)["frame_period"]
+    0.01
     """
-    if not tune:
-        given = {"--phase-margin": phase_margin, "--overshoot": overshoot, "--derivative": derivative or None}
-        for option, value in given.items():
-            if value is not None:
-                raise InputError(option, got=value, allowed="together with --tune")
-        return None
     if (phase_margin is None) == (overshoot is None):
         raise InputError("--tune", got="both --phase-margin and --overshoot" if overshoot else "nothing to tune for",
                          allowed="--phase-margin ANGLE or --overshoot PERCENT")
-    return {"phase_margin": None if phase_margin is None else quantity("--phase-margin", phase_margin, "angle"),
-            "overshoot": None if overshoot is None else _share(overshoot), "derivative": derivative,
-            "step": quantity("--step", step, "angle", positive=True)}
+    frames = _split(frame or ())
+    if len(frames) > 1:
+        raise InputError("--frame", got=", ".join(frames), allowed="one frame period beside --tune")
+    found: dict[str, Any] = {"derivative": derivative}
+    if phase_margin is not None:
+        found["phase_margin"] = quantity("--phase-margin", phase_margin, "angle")
+    if overshoot is not None:
+        found["overshoot"] = _share(overshoot)
+    if step is not None:
+        found["step"] = quantity("--step", step, "angle", positive=True)
+    if frames:
+        found["frame_period"] = quantity("--frame", frames[0], "time", positive=True)
+    return found
 
 
 def _share(text: str) -> float:

@@ -61,7 +61,7 @@ class DeadbandCompensation(_Sided):
     controller : Controller
         Commands an angle.
     half_width : float or ndarray
-        h; `tuning.lag` computes it [rad].
+        h; `tuning.lag_angle` computes it [rad].
     least_speed : float or ndarray
         Of a reference that moves; below it the side stays as it was [rad/s].
 

@@ -25,7 +25,7 @@ class ComputedTorque:
     inverse : ServoInverse
         Its own numbers. Friction counts at the speed of the reference: at the measured one it would chatter.
     bandwidth : float or ndarray
-        ω; `tuning.bandwidth` computes it [rad/s].
+        ω; `bandwidth` of `tuning.rates` [rad/s].
     damping_ratio : float
         ζ [1].
     load_torque : callable, optional

@@ -146,10 +146,11 @@ class ServoInverse:
 
         f = s (F + abs(K_m τ_m + K_e τ)), s = tanh(N k q̇), of which the motor's τ_m = moved + f is one part itself.
         """
-        s = np.tanh(self.friction_slope * speed)
-        F = np.where(s >= 0.0, self.coulomb_torque_forward, self.coulomb_torque_backward)
-        through = self.motor_share * (moved + s * F) + self.external_share * external_torque
-        return s * (F + np.abs(through) / (1.0 - self.motor_share * s * np.sign(through)))
+        s, K_m = np.tanh(self.friction_slope * speed), self.motor_share
+        dry = physics.smoothed_coulomb_torque(speed, self.coulomb_torque_forward, self.coulomb_torque_backward,
+                                              self.friction_slope)
+        through = K_m * (moved + dry) + self.external_share * external_torque
+        return dry + s * np.abs(through) / (1.0 - K_m * s * np.sign(through))
 
     def command_angle(self, armature_voltage: Any, angle: Any, speed: Any = 0.0) -> Any:
         """Return the angle to ask for so that the servo's own loop, at this angle [rad], gives this voltage [V].

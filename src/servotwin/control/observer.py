@@ -42,7 +42,7 @@ class DisturbanceObserver:
     inverse : ServoInverse
         Its own numbers; dry friction does not count.
     filter_rate : float
-        g; `tuning.bandwidth` computes it [rad/s].
+        g; `observer_rate` of `tuning.rates` [rad/s].
 
     Raises
     ------

@@ -10,6 +10,7 @@ import numpy as np
 
 from servotwin.control.controller import Measured
 from servotwin.control.inverse import ServoInverse, inverse_of
+from servotwin.control.sensors import Readings
 from servotwin.control.wires import Wire, wire_of
 from servotwin.errors import InputError
 from servotwin.loads import as_load
@@ -151,8 +152,7 @@ class SimulatedServo:
             self._signal, {"output_angle": float(angle)} if "output_angle" in self._state_names else None)
         self._sent: list[tuple[float, float]] = [(0.0, rest)]
         self._coming: deque[tuple[float, float]] = deque()
-        self._seen: list[deque[tuple[float, Mapping[str, Any]]]] = [deque() for _ in self._sensors]
-        self._draws = np.random.default_rng(self._seed)
+        self._readings = Readings(self._sensors, self._seed)
         self._record = Record([], [])
 
     @property
@@ -161,14 +161,7 @@ class SimulatedServo:
 
     def measure(self) -> Measured:
         """Return what the sensors show now."""
-        found: dict[str, Any] = {"time": self.time}
-        for sensor, seen in zip(self._sensors, self._seen, strict=True):
-            draw = self._draws.standard_normal() if getattr(sensor, "noise", 0.0) else 0.0
-            seen.append((self.time, sensor.shown(self._true(sensor.signal), draw)))
-            while len(seen) > 1 and seen[1][0] <= self.time - sensor.delay + 1e-12:
-                seen.popleft()
-            found.update(seen[0][1])
-        return found
+        return self._readings.at(self.time, self._true)
 
     def _true(self, name: str) -> float:
         state, model = self._state, self._simulator.model

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from servotwin.control.controller import clipped
+from servotwin.control.controller import Measured, clipped
 from servotwin.errors import InputError
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from servotwin.parameters import Servo
+
+_SAME = 1e-9  # s, as near as sums of steps come to a time
 
 
 class Sensor(Protocol):
@@ -132,6 +135,40 @@ class Tap:
         count = self.reference_voltage / 2**self.bits
         v_o = _stepped(clipped(value + self.noise * draw, 0.0, self.reference_voltage - count), count)
         return {"feedback_voltage": v_o, "output_angle": (v_o - self.feedback_offset) / self.feedback_gain}
+
+
+class Readings:
+    """What sensors show as time goes on, each as old as its delay says, with noise that is drawn once for all of them.
+
+    Parameters
+    ----------
+    sensors : sequence of Sensor
+    seed : int
+        Of the noise.
+    servos : int, optional
+        How many servos each sensor looks at, where values are arrays (n,); values are numbers unless given.
+
+    Examples
+    --------
+    >>> late = Readings([Encoder(count=0.0, delay=0.1)], seed=0)
+    >>> [late.at(t, lambda name: 10.0 * t)["output_angle"] for t in (0.0, 0.1, 0.2)]
+    [0.0, 0.0, 1.0]
+    """
+
+    def __init__(self, sensors: Sequence[Sensor], seed: int, servos: int | None = None) -> None:
+        self._sensors, self._servos, self._draws = tuple(sensors), servos, np.random.default_rng(seed)
+        self._seen: list[deque[tuple[float, Mapping[str, Any]]]] = [deque() for _ in self._sensors]
+
+    def at(self, time: float, true: Callable[[str], Any]) -> Measured:
+        """Return what all show at a time [s], not before the last one, and that time; `true` gives a signal by name."""
+        found: dict[str, Any] = {"time": time}
+        for sensor, seen in zip(self._sensors, self._seen, strict=True):
+            draw = self._draws.standard_normal(self._servos) if getattr(sensor, "noise", 0.0) else 0.0
+            seen.append((time, sensor.shown(true(sensor.signal), draw)))
+            while len(seen) > 1 and seen[1][0] <= time - sensor.delay + _SAME:
+                seen.popleft()
+            found.update(seen[0][1])
+        return found
 
 
 def _stepped(value: Any, count: float) -> Any:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from servotwin import physics
 from servotwin.control.controller import ANGLE, VOLTAGE
 from servotwin.errors import InputError
 from servotwin.models import DCMotor, DigitalServo, GearedMotor, Model
@@ -85,7 +86,7 @@ def _pulses(model: SwitchedServo, believed: Servo, resolution: float) -> Wire:
     longest = min(model.value_or("electronics.pulse_width_max", math.inf), 0.999 * frame)
 
     def width(q: float) -> float:
-        t = T_0 + slope * (p * q + b_o)
+        t = physics.pulse_width_from_feedback(physics.feedback_voltage(q, p, b_o), slope, T_0)
         return _within(resolution * round(t / resolution) if resolution > 0.0 else t, shortest, longest)
 
     return Wire(takes=ANGLE, unit="s", carried=width, at_rest=width, frame=frame,

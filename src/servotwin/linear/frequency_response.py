@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin import signals
 from servotwin.errors import InputError
-from servotwin.linear.loops import INPUT_UNITS, input_name, is_motor, slowest_decay
+from servotwin.linear.loops import INPUT_UNITS, check_size, input_name, is_motor, slowest_decay
 from servotwin.linear.response import FrequencyResponse
 from servotwin.linear.transfer_function import check_model
 from servotwin.loads import as_load
@@ -143,7 +143,7 @@ def frequency_response(model: Model, frequencies: ArrayLike, *, amplitude: Array
     name = input_name(model, input) if input else "armature_voltage" if is_motor(model) else "command_angle"
     centre = _mean(model, name, mean)
     for size in sizes.tolist():
-        _check_size(model, name, centre, size)
+        check_size(model, name, centre, size)
     task = _Task(model, as_load(load), name, centre, output or model.layout[0], seed)
     parts = [_at(task, w, sizes) for w in omega.tolist()]
     response, distortion, change = (np.stack([part[k] for part in parts], axis=1) for k in range(3))
@@ -257,20 +257,3 @@ def _mean(model: Model, name: str, mean: float | None) -> float:
         return 0.0
     drive = model.command(signals.constant(mid_travel(model), unit="rad")).table[0].value
     return float(model.command_signal(name, np.array([drive]))[0])
-
-
-def _check_size(model: Model, name: str, mean: float, size: float) -> None:
-    """Raise InputError if the sine leaves the travel, or asks for pulses that the servo refuses."""
-    if is_motor(model):
-        return
-    ends = np.array([model.command(signals.constant(value, unit=INPUT_UNITS[name])).table[0].value
-                     for value in (mean - size, mean + size)])
-    for signal, limits, what in (
-            ("command_angle", ("stops.lower_angle", "stops.upper_angle"), "the travel"),
-            ("pulse_width", ("electronics.pulse_width_min", "electronics.pulse_width_max"), "the pulses accepted")):
-        reached = np.sort(model.command_signal(signal, ends))
-        low, high = model.value_or(limits[0], -math.inf), model.value_or(limits[1], math.inf)
-        if reached[0] < low - 1e-9 or reached[1] > high + 1e-9:
-            raise InputError(
-                f"amplitude {size:g} about {mean:g}", got=f"{signal} {reached[0]:.6g} to {reached[1]:.6g}",
-                allowed=f"{low:.6g} to {high:.6g}, {what} of {model.servo.name} (SI)")

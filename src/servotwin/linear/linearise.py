@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin import signals
 from servotwin.errors import InputError
 from servotwin.linear.balance import Balance, Turn
+from servotwin.linear.loops import check_size
 from servotwin.linear.transfer_function import check_model
 from servotwin.loads import as_load
 from servotwin.models import AveragedServo, AveragedServoInductive, BoundedServo, PulseServo, mid_travel
@@ -156,22 +156,22 @@ def linearise(model: Model, load: Load | Part | None = None, *, amplitude: float
     Raises
     ------
     InputError
-        If the model is another, a number is not possible, or the load changes with time.
+        If the model is another, a number is not possible, the sine leaves the travel or asks for pulses that the servo
+        refuses, or the load changes with time.
     """
     check_model(model, None, linear=False)
-    if isinstance(model, PulseServo):
-        model = model.averaged()
-    if not isinstance(model, AveragedServo | AveragedServoInductive | BoundedServo):
+    mean = model.averaged() if isinstance(model, PulseServo) else model
+    if not isinstance(mean, AveragedServo | AveragedServoInductive | BoundedServo):
         raise InputError("model to linearise", got=model, allowed="a mean-voltage servo, or a PulseServo for its mean; "
                          "transfer_function and sampled take the others")
     if not (is_finite(amplitude) and amplitude > 0.0):
         raise InputError("amplitude", got=amplitude, allowed="a finite positive number [rad]")
     centre = mid_travel(model) if angle is None else angle
-    model.command(signals.constant(centre, unit="rad"))  # says what is wrong with it
+    check_size(model, "command_angle", centre, amplitude)
     load = as_load(load)
     if load.recorded:
         raise InputError("load to linearise", got="a torque recorded over time", allowed="one that stays as it is")
-    return Linearised(model=model, load=load, angle=float(centre), amplitude=float(amplitude))
+    return Linearised(model=mean, load=load, angle=float(centre), amplitude=float(amplitude))
 
 
 def _checked(frequencies: ArrayLike) -> list[float]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.errors import UnknownNameError
+from servotwin import signals
+from servotwin.errors import InputError, UnknownNameError
 from servotwin.linear.plant import Plant, plant_of
 from servotwin.models import DCMotor, GearedMotor, Model, PulseServo, PulseServoInductive
 
@@ -101,3 +103,20 @@ def input_gain(model: Model, name: str) -> float:
     zero, one = model.command_signal(name, np.array([0.0, 1.0]))  # the conversion is a straight line
     pulsed = isinstance(model, PulseServo | PulseServoInductive)  # they follow a width, which stands for a voltage
     return 1.0 / float(one - zero) / (model.value("electronics.one_shot_slope") if pulsed else 1.0)
+
+
+def check_size(model: Model, name: str, mean: float, size: float) -> None:
+    """Raise InputError if a sine of this input leaves the travel, or asks for pulses that the servo refuses."""
+    if is_motor(model):
+        return
+    ends = np.array([model.command(signals.constant(value, unit=INPUT_UNITS[name])).table[0].value
+                     for value in (mean - size, mean + size)])
+    for signal, limits, what in (
+            ("command_angle", ("stops.lower_angle", "stops.upper_angle"), "the travel"),
+            ("pulse_width", ("electronics.pulse_width_min", "electronics.pulse_width_max"), "the pulses accepted")):
+        reached = np.sort(model.command_signal(signal, ends))
+        low, high = model.value_or(limits[0], -math.inf), model.value_or(limits[1], math.inf)
+        if reached[0] < low - 1e-9 or reached[1] > high + 1e-9:
+            raise InputError(
+                f"amplitude {size:g} about {mean:g}", got=f"{signal} {reached[0]:.6g} to {reached[1]:.6g}",
+                allowed=f"{low:.6g} to {high:.6g}, {what} of {model.servo.name} (SI)")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,8 @@ from servotwin.models import (
 )
 
 if TYPE_CHECKING:
+    import control
+
     from servotwin.linear.response import FrequencyResponse
     from servotwin.loads import Load, Part
 
@@ -130,13 +133,13 @@ def overview(model: Model, load: Load | Part | None = None, *, amplitudes: Seque
                          allowed=f"none: {type(model).__name__} has no frames that decide")
     loops = _loops(model, load, angle, frame_periods) if has_frames or isinstance(model, DigitalServo) else {}
     mean = None if isinstance(model, DigitalServo) else _mean(model, load, angle)
-    omega = _frequencies(mean or next(iter(loops.values()), None), model)
+    omega = _frequencies(model, mean, next(iter(loops.values()), None))
     simulated = frequency_response(model, omega, amplitude=amplitudes, mean=angle, input="command_angle", load=load)
     reference = simulated.bandwidth(reference=1.0)
     sines = tuple(_sines(model, load, size, angle, omega, float(width))
                   for size, width in zip(simulated.amplitude.tolist(), reference, strict=True))
-    return Overview(model=model, load=load, frequency=omega, mean=None if mean is None else mean.response(omega),
-                    natural=None if mean is None else mean.natural, loops=loops, simulated=simulated, sines=sines)
+    return Overview(model=model, load=load, frequency=omega, mean=None if mean is None else _response(mean, omega),
+                    natural=None if mean is None else _natural(mean), loops=loops, simulated=simulated, sines=sines)
 
 
 def _loops(model: Model, load: Load, angle: float | None, frame_periods: Sequence[float]) -> dict[float, SampledServo]:
@@ -153,36 +156,36 @@ def _loops(model: Model, load: Load, angle: float | None, frame_periods: Sequenc
         return {own.period: own} | {T: sampled(model, load, angle=angle, frame_period=T) for T in frame_periods}
 
 
-class _Mean:
-    """The loop of the mean voltage."""
-
-    def __init__(self, model: Model, load: Load, angle: float | None) -> None:
-        self._system = state_space(model, load, input="command_angle", angle=angle)["output_angle", "command_angle"]
-
-    def response(self, omega: Array) -> Complex:
-        return np.asarray(self._system(1j * omega), np.complex128).reshape(np.shape(omega))
-
-    @property
-    def natural(self) -> tuple[float, float]:
-        frequencies, damping, _ = self._system.damp()
-        k = int(np.argmin(frequencies))
-        return float(frequencies[k]), float(damping[k])
-
-
-def _mean(model: Model, load: Load, angle: float | None) -> _Mean:
+def _mean(model: Model, load: Load, angle: float | None) -> control.StateSpace:
+    """Return the loop of the mean voltage."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the sampled loop says the same
-        return _Mean(model, load, angle)
+        system: Any = state_space(model, load, input="command_angle", angle=angle)["output_angle", "command_angle"]
+    return system
 
 
-def _frequencies(loop: _Mean | SampledServo | None, model: Model) -> Array:
-    """Return frequencies about the bandwidth of a loop, or where servos usually have theirs [rad/s]."""
-    if loop is None:
+def _response(system: control.StateSpace, omega: Array) -> Complex:
+    return np.asarray(system(1j * omega), np.complex128).reshape(np.shape(omega))
+
+
+def _natural(system: control.StateSpace) -> tuple[float, float]:
+    frequencies, damping, _ = system.damp()
+    k = int(np.argmin(frequencies))
+    return float(frequencies[k]), float(damping[k])
+
+
+def _frequencies(model: Model, mean: control.StateSpace | None, loop: SampledServo | None) -> Array:
+    """Return frequencies about the bandwidth of the mean or the loop, or where servos usually have theirs [rad/s]."""
+    seen: Callable[[Array], Complex]
+    if mean is not None:
+        seen, most = partial(_response, mean), 1e4
+    elif loop is not None:
+        seen, most = loop.response, loop.half_rate
+    else:
         return np.geomspace(*_USUAL, _POINTS)
     top = math.inf if not isinstance(model, PulseServo | PulseServoInductive) else math.pi / model.frame_period
-    most = loop.half_rate if isinstance(loop, SampledServo) else 1e4
     fine = np.geomspace(1e-2, most * (1.0 - 1e-9), 2000)
-    below = np.flatnonzero(np.abs(loop.response(fine)) < math.sqrt(0.5))
+    below = np.flatnonzero(np.abs(seen(fine)) < math.sqrt(0.5))
     bandwidth = float(fine[below[0]]) if below.size else float(fine[-1]) / _SPAN[1]
     return np.geomspace(_SPAN[0] * bandwidth, min(_SPAN[1] * bandwidth, _LAST * top), _POINTS)
 

@@ -16,6 +16,7 @@ from servotwin.linear.bursts import Bursts
 from servotwin.linear.gains import Gain, gains_of
 from servotwin.linear.outer_loop import OuterLoop, stepped
 from servotwin.linear.sampled import Margins, SampledServo, sampled
+from servotwin.linear.transfer_function import check_model
 from servotwin.loads import as_load
 from servotwin.models import DigitalServo, PulseServo, PulseServoInductive, mid_travel
 from servotwin.simulation import simulate_many
@@ -46,8 +47,9 @@ class Tuning:
     model : Model
         The servo with that gain; as it is where the gain is that of a loop around it.
     settings : mapping of str to float
-        Registers by name and value; `firmware` parameters where the servo has no registers; "outer_gain", the part of
-        the error that a loop around a pulse servo makes good in a frame.
+        Registers by name and value; `firmware` parameters where the servo has no register for P, an AX-12A too, whose
+        P follows from compliance slopes in seven steps; "outer_gain", the part of the error that a loop around a pulse
+        servo makes good in a frame.
     margins : Margins
         Of the loop with that gain, friction and deadband apart.
     overshoot : float
@@ -80,7 +82,8 @@ class _Task(NamedTuple):
 
 
 def tune(model: Model, load: Load | Part | None = None, *, overshoot: float | None = None,
-         phase_margin: float | None = None, derivative: bool = False, step: float = _STEP) -> Tuning:
+         phase_margin: float | None = None, derivative: bool = False, step: float = _STEP,
+         frame_period: float | None = None) -> Tuning:
     """Find the largest gain that gives a wanted overshoot, or leaves a wanted phase margin.
 
     Of a digital servo that is P of its program; of a pulse servo, whose own gain is soldered, that of an integrator
@@ -99,6 +102,8 @@ def tune(model: Model, load: Load | Part | None = None, *, overshoot: float | No
         Whether D of a digital servo is looked for too.
     step : float
         Size of the simulated step, about the middle of the travel [rad].
+    frame_period : float, optional
+        T_f of a pulse servo [s]; the servo's own unless given.
 
     Raises
     ------
@@ -116,6 +121,11 @@ def tune(model: Model, load: Load | Part | None = None, *, overshoot: float | No
     if not isinstance(model, DigitalServo | PulseServo | PulseServoInductive):
         raise InputError("model to tune", got=model, allowed="a digital servo, for its P, or a pulse servo, for a loop "
                          "around it")
+    check_model(model, frame_period, linear=False)
+    if derivative and not isinstance(model, DigitalServo):
+        raise InputError("derivative", got=model, allowed="a digital servo: the loop around a pulse servo has no D")
+    if frame_period is not None:
+        model = type(model)(model.servo.replace({"electronics.frame_period": frame_period}))
     _check(overshoot, phase_margin, step)
     task = _Task(model, as_load(load), step)
     with warnings.catch_warnings():

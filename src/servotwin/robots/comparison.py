@@ -167,11 +167,9 @@ def _read_by(servo: Servo, fidelity: str) -> Servo:
     """Return a servo with those numbers of motor, gear and bridge that count in a fidelity."""
     if fidelity == "pulse":
         return servo
-    kept = BoundedServo.requires + BoundedServo.optional + PulseServo.requires + PulseServo.optional
-    read = set(BoundedServo.requires + BoundedServo.optional)
-    gone = {name: None for name in servo.names() if name in kept and name not in read
-            and name not in PulseServo.requires and not name.startswith("electronics.")}
-    found = servo.replace(gone)
+    unread = set(PulseServo.optional) - set(BoundedServo.requires + BoundedServo.optional)
+    found = servo.replace({name: None for name in servo.names() if name in unread
+                           and not name.startswith("electronics.")})
     if fidelity == "bounded":
         return found
     supply = {"supply.open_circuit_voltage": _FREE * servo.get("supply.open_circuit_voltage"),  # type: ignore[operator]

@@ -6,7 +6,6 @@ All angles here are those of the servos' shafts, as their controllers see them; 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.control import Measured, Reference, Sensor, ServoInverse
+from servotwin.control.sensors import Readings
 from servotwin.control.wires import wire_of
 from servotwin.errors import InputError
 from servotwin.robots.drive import ServoDrive
@@ -25,7 +25,6 @@ from servotwin.robots.run import begin
 from servotwin.robots.told import told
 
 Array = NDArray[np.float64]
-_SAME = 1e-9  # s
 _SOON = 1e-3  # of a step
 
 
@@ -75,8 +74,7 @@ class DrivePort:
         self.data = load_mujoco().MjData(self.drive.model)
         begin(self.drive, self.data, self.motion, self._mounts, -self._settle)
         self.poses: list[Array] = []
-        self._draws = np.random.default_rng(self._seed)
-        self._seen: list[deque[tuple[float, Mapping[str, Any]]]] = [deque() for _ in self._sensors]
+        self._readings = Readings(self._sensors, self._seed, len(self._zero))
 
     @property
     def takes(self) -> str:
@@ -110,14 +108,7 @@ class DrivePort:
 
     def measure(self) -> Measured:
         """Return what the sensors show now, arrays (n,)."""
-        found: dict[str, Any] = {"time": self.time}
-        for sensor, seen in zip(self._sensors, self._seen, strict=True):
-            draw = self._draws.standard_normal(len(self._zero)) if getattr(sensor, "noise", 0.0) else 0.0
-            seen.append((self.time, sensor.shown(self._true(sensor.signal), draw)))
-            while len(seen) > 1 and seen[1][0] <= self.time - sensor.delay + _SAME:
-                seen.popleft()
-            found.update(seen[0][1])
-        return found
+        return self._readings.at(self.time, self._true)
 
     def _true(self, name: str) -> Array:
         if name == "output_angle":  # before the first tick servos show nothing yet

@@ -136,7 +136,23 @@ class Steering(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plain:
+class _Through:
+    """Commands angles through the servos' own loops, every `period` [s] where frames are not longer, blindly."""
+
+    period: float = 0.02
+
+    bare = False
+
+    def sensors(self, mounts: Mapping[str, Mount]) -> tuple[Sensor, ...]:
+        """None."""
+        return ()
+
+    def _every(self, known: Known) -> float:
+        return max(known.frame, self.period)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plain(_Through):
     """Sends each servo where it has to be: what a program without a controller does.
 
     Parameters
@@ -145,21 +161,13 @@ class Plain:
         Of its commands, where frames are not longer [s].
     """
 
-    period: float = 0.02
-
-    bare = False
-
-    def sensors(self, mounts: Mapping[str, Mount]) -> tuple[Sensor, ...]:
-        """None."""
-        return ()
-
     def controller(self, known: Known) -> Controller:
         """Return the controller."""
-        return PlainCommand(period=max(known.frame, self.period))
+        return PlainCommand(period=self._every(known))
 
 
 @dataclass(frozen=True, kw_only=True)
-class BeyondDeadband:
+class BeyondDeadband(_Through):
     """Asks each servo for so much more as its deadband and friction swallow; no sensor.
 
     Parameters
@@ -168,23 +176,14 @@ class BeyondDeadband:
         Of its commands, where frames are not longer [s].
     """
 
-    period: float = 0.02
-
-    bare = False
-
-    def sensors(self, mounts: Mapping[str, Mount]) -> tuple[Sensor, ...]:
-        """None."""
-        return ()
-
     def controller(self, known: Known) -> Controller:
         """Return the controller."""
         swallowed = tuning.lag_angle(known.loaded, speed=known.speed, frame=known.frame)
-        return DeadbandCompensation(controller=PlainCommand(period=max(known.frame, self.period)),
-                                    half_width=swallowed)
+        return DeadbandCompensation(controller=PlainCommand(period=self._every(known)), half_width=swallowed)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ahead:
+class Ahead(_Through):
     """Asks each servo for so much more that its own loop gives the voltage that the arm takes, by (40); no sensor.
 
     Parameters
@@ -195,16 +194,10 @@ class Ahead:
 
     period: float = 0.005
 
-    bare = False
-
-    def sensors(self, mounts: Mapping[str, Mount]) -> tuple[Sensor, ...]:
-        """None."""
-        return ()
-
     def controller(self, known: Known) -> Controller:
         """Return the controller."""
         return AheadOfServo(inverse=known.inverse, controller=Feedforward(
-            period=max(known.frame, self.period), inverse=known.inverse, load_torque=known.body))
+            period=self._every(known), inverse=known.inverse, load_torque=known.body))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ from servotwin.bench.backends.backend import Backend
 from servotwin.bench.bus.goals import Goals, goal_of
 from servotwin.bench.bus.port import BITS
 from servotwin.bench.bus.scan import wire_of
+from servotwin.bench.bus.sdk_wire import PATIENCE
 from servotwin.bench.bus.servo import BusServo, opened
 from servotwin.bench.bus.ticks import Ticks
 from servotwin.bench.bus.wire import Answer, BusWire
@@ -19,7 +20,7 @@ from servotwin.bench.recording.experiment import Experiment
 from servotwin.errors import BenchError, InputError
 
 _MOST_RATE = 1000.0  # Hz
-_SILENCE = 0.5  # s without an answer after which a servo counts as gone
+_SILENCE, _MISSES = 0.5, 5  # s and questions without an answer after which a servo counts as gone
 _TRIES = 3
 _APPROACH = math.radians(60.0)  # rad/s, assumed: slow enough for a hand to get away
 _APPROACH_RATE, _SETTLE, _STILL, _STILL_COUNTS = 50.0, 5.0, 0.2, 1  # Hz, s, s, counts
@@ -54,6 +55,8 @@ class Bus:
         Rows in a second [Hz].
     baud : int
         Speed of the wire, for how long packets last; that of the backend is its own matter [bit/s].
+    patience : float
+        How long an answer may be late beyond its time on the wire; rows wait for so long for one that is lost [s].
 
     Raises
     ------
@@ -62,13 +65,13 @@ class Bus:
     """
 
     def __init__(self, backend: Backend, protocol: str, ids: Sequence[int], *, rate: float = 100.0,
-                 baud: int = 1_000_000) -> None:
+                 baud: int = 1_000_000, patience: float = PATIENCE) -> None:
         if not (isinstance(rate, int | float) and 0.0 < rate <= _MOST_RATE):
             raise InputError("rate", got=rate, allowed=f"more than 0 and at most {_MOST_RATE:g} Hz")
         if not ids or len(set(ids)) != len(ids):
             raise InputError("ids of servos", got=list(ids), allowed="at least one, each once")
         self.protocol, self.rate, self.baud = protocol, float(rate), baud
-        self.wire: BusWire = wire_of(protocol, backend, baud=baud)
+        self.wire: BusWire = wire_of(protocol, backend, baud=baud, patience=patience)
         self.ids = tuple(ids)
         self.servos: dict[int, BusServo] = {}
         self.events: list[BusEvent] = []
@@ -152,11 +155,11 @@ class Bus:
 
     def limp(self) -> None:
         """Switch all torque off, several times; never raises."""
-        for one in self.servos.values() or ():
-            one.torque = False
-        register = next((one.family.registers["Torque_Enable"] for one in self.servos.values()), None)
-        if register is None:
+        if not self.servos:
             return
+        for servo in self.servos.values():
+            servo.torque = False
+        register = next(iter(self.servos.values())).family.registers["Torque_Enable"]
         for _ in range(_TRIES):
             with contextlib.suppress(Exception):
                 self.wire.write_all(register.address, dict.fromkeys(self.servos, register.encode(0)))
@@ -177,7 +180,8 @@ class Bus:
         answers = self.wire.read_all(ids, address, size)
         now = time.perf_counter()
         for one in ids:
-            if not self.servos[one].heard(answers.get(one), now) > _SILENCE:
+            silence = self.servos[one].heard(answers.get(one), now)
+            if silence <= _SILENCE or self.servos[one].misses < _MISSES:
                 continue
             raise BenchError(f"servo {one} at {self.wire.name}", f"it has not answered for {_SILENCE:g} s")
         return answers

@@ -9,6 +9,7 @@ from servotwin.bench.backends.backend import Backend
 from servotwin.bench.backends.serial_port import SerialBackend
 from servotwin.bench.bus.bus import Bus
 from servotwin.bench.bus.scan import FoundServo
+from servotwin.bench.bus.sdk_wire import PATIENCE
 from servotwin.bench.recording.experiment import Experiment
 
 
@@ -25,6 +26,8 @@ class BusRig:
         Rows in a second [Hz].
     baud : int
         Speed of the wire [bit/s].
+    patience : float
+        How long an answer may be late beyond its time on the wire; rows wait for so long for one that is lost [s].
 
     Raises
     ------
@@ -35,8 +38,8 @@ class BusRig:
     kind = "angle"
 
     def __init__(self, backend: Backend, protocol: str, id: int, *, rate: float = 100.0,
-                 baud: int = 1_000_000) -> None:
-        self.bus = Bus(backend, protocol, [id], rate=rate, baud=baud)
+                 baud: int = 1_000_000, patience: float = PATIENCE) -> None:
+        self.bus = Bus(backend, protocol, [id], rate=rate, baud=baud, patience=patience)
         self.id = id
 
     @property

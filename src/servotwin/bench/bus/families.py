@@ -132,8 +132,8 @@ def _one(name: str, registers: Table, count: float, middle: int, rpm: float) -> 
     return BusFamily(
         name=name, protocol="dynamixel-1", registers=registers, block=(36, 8), count=count, middle=middle,
         speed=Channel("output_speed_deg_per_s", "Present_Speed", rpm * _RPM),
-        channels=(Channel("present_load", "Present_Load", 1.0 / 1023.0), Channel("bus_voltage_V", "Present_Voltage", 0.1),
-                  _heat("Present_Temperature")),
+        channels=(Channel("present_load", "Present_Load", 1.0 / 1023.0),
+                  Channel("bus_voltage_V", "Present_Voltage", 0.1), _heat("Present_Temperature")),
         errors={1: "voltage", 2: "angle limit", 4: "heat", 8: "range", 16: "checksum", 32: "overload",
                 64: "instruction"},
         source="e-manual, protocol 1")

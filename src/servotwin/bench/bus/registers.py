@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from servotwin.parameters.registers import dynamixel_one, dynamixel_x, feetech
+from servotwin.parameters.registers.dynamixel_one import AX_REGISTERS, MX_REGISTERS
+from servotwin.parameters.registers.dynamixel_x import REGISTERS as X_REGISTERS
+from servotwin.parameters.registers.feetech import REGISTERS as STS_REGISTERS
 from servotwin.parameters.registers.table import Register
 
 _CHUNK = 32  # bytes of one read of many registers
@@ -30,7 +32,7 @@ class BusRegister(NamedTuple):
 
     Examples
     --------
-    >>> BusRegister(60, 2, sign_bit=10).decode(bytes([0x64, 0x04])), BusRegister(126, 2, signed=True).decode(b"\\xff\\xff")
+    >>> BusRegister(60, 2, sign_bit=10).decode([0x64, 0x04]), BusRegister(126, 2, signed=True).decode([0xff, 0xff])
     (-100, -1)
     >>> BusRegister(42, 2, sign_bit=15).encode(-5).hex()
     '0580'
@@ -95,7 +97,7 @@ def _table(known: Mapping[str, Register], sizes: Mapping[int, str], signed: Mapp
             for name, one in known.items() if name not in leave}
 
 
-STS = _table(feetech.REGISTERS, {2: (
+STS = _table(STS_REGISTERS, {2: (
     "Model_Number Min_Position_Limit Max_Position_Limit Max_Torque_Limit Protection_Current Homing_Offset "
     "Goal_Position Goal_Time Goal_Velocity Torque_Limit Present_Position Present_Velocity Present_Load "
     "Present_Current Goal_Position_2")}, {
@@ -115,13 +117,13 @@ _X_SIGNED: dict[str, int | None] = dict.fromkeys((
     "Present_Load", "Present_Velocity", "Present_Position", "Velocity_Trajectory", "Position_Trajectory"))
 _OF_CURRENT = ("Current_Limit", "Goal_Current", "Present_Current")
 
-X330 = _table(dynamixel_x.REGISTERS, _X_SIZES, _X_SIGNED, ("Present_Load",))
+X330 = _table(X_REGISTERS, _X_SIZES, _X_SIGNED, ("Present_Load",))
 """Dynamixel XL330 and XC330."""
 
-X = _table(dynamixel_x.REGISTERS, _X_SIZES, _X_SIGNED, ("Present_Load", "PWM_Slope"))
+X = _table(X_REGISTERS, _X_SIZES, _X_SIGNED, ("Present_Load", "PWM_Slope"))
 """Dynamixel X with a current sensor, and MX-64 and MX-106 with protocol 2."""
 
-X_WITHOUT_CURRENT = _table(dynamixel_x.REGISTERS, _X_SIZES, _X_SIGNED, (*_OF_CURRENT, "PWM_Slope"))
+X_WITHOUT_CURRENT = _table(X_REGISTERS, _X_SIZES, _X_SIGNED, (*_OF_CURRENT, "PWM_Slope"))
 """Dynamixel XL430 and XC430, and MX-28 with protocol 2."""
 
 _ONE_SIZES = {2: (
@@ -129,9 +131,9 @@ _ONE_SIZES = {2: (
     "Present_Speed Present_Load Punch Multi_Turn_Offset Realtime_Tick Current Goal_Torque")}
 _ONE_SIGNED: dict[str, int | None] = {"Present_Speed": 10, "Present_Load": 10}
 
-MX = _table(dynamixel_one.MX_REGISTERS, _ONE_SIZES, {
+MX = _table(MX_REGISTERS, _ONE_SIZES, {
     **_ONE_SIGNED, "Goal_Position": None, "Present_Position": None, "Multi_Turn_Offset": None})
 """Dynamixel MX with protocol 1."""
 
-AX = _table(dynamixel_one.AX_REGISTERS, _ONE_SIZES, _ONE_SIGNED)
+AX = _table(AX_REGISTERS, _ONE_SIZES, _ONE_SIGNED)
 """Dynamixel AX."""

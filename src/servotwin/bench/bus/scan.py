@@ -10,7 +10,7 @@ from servotwin.bench.backends.serial_port import SerialBackend
 from servotwin.bench.bus.dynamixel import dynamixel_wire
 from servotwin.bench.bus.families import MODEL_NUMBER_AT, MODELS, BusModel
 from servotwin.bench.bus.feetech import feetech_wire
-from servotwin.bench.bus.sdk_wire import SdkWire
+from servotwin.bench.bus.sdk_wire import PATIENCE, SdkWire
 from servotwin.bench.bus.wire import BusWire
 from servotwin.errors import BenchError, InputError, UnknownNameError
 
@@ -49,8 +49,8 @@ class FoundServo(NamedTuple):
     baud: int
 
 
-def wire_of(protocol: str, backend: Backend, *, baud: int = 1_000_000) -> BusWire:
-    """Return a wire of a protocol on a backend.
+def wire_of(protocol: str, backend: Backend, *, baud: int = 1_000_000, patience: float = PATIENCE) -> BusWire:
+    """Return a wire of a protocol on a backend; answers may be late by `patience` [s].
 
     Raises
     ------
@@ -61,7 +61,7 @@ def wire_of(protocol: str, backend: Backend, *, baud: int = 1_000_000) -> BusWir
     """
     if protocol not in _WIRES:
         raise UnknownNameError("protocol of bus servos", str(protocol), _WIRES)
-    return _WIRES[protocol](backend, baud=baud)
+    return _WIRES[protocol](backend, baud=baud, patience=patience)
 
 
 def scan(port: str, *, bauds: Sequence[int] = BAUDS, ids: Iterable[int] = IDS, thorough: bool = False,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ from servotwin.bench.bus.wire import Answer
 from servotwin.errors import BenchError
 
 PATIENCE = 0.02  # s: a USB adapter may keep what has come for 16 ms
-_TRIES = 4
+_TRIES = 4  # of a question to one servo
 _LISTEN = 4  # packets too many, damaged or of others, that are passed over
 _BROKEN = (IndexError, TypeError, ValueError)  # what the packages raise on damaged packets
 
@@ -62,7 +62,8 @@ class SdkWire:
         How long an answer may be late beyond its time on the wire [s].
     """
 
-    def __init__(self, backend: Backend, dialect: Dialect, *, baud: int = 1_000_000, patience: float = PATIENCE) -> None:
+    def __init__(self, backend: Backend, dialect: Dialect, *, baud: int = 1_000_000,
+                 patience: float = PATIENCE) -> None:
         self.port = BusPort(backend, baud, patience)
         self._dialect = dialect
 
@@ -93,11 +94,10 @@ class SdkWire:
     def read(self, servo: int, address: int, size: int) -> Answer:
         """Ask a servo for a block of its registers."""
         error = 0
-        for _ in range(_TRIES):
-            self._dialect.handler.readTx(self._ready(), servo, address, size)
-            answers = self._hear([servo], size)
-            if servo in answers:
-                return answers[servo]
+        for _ in self._tries():
+            found = self._asked(servo, address, size)
+            if servo in found:
+                return found[servo]
             error = self._last_error
         raise BenchError(f"servo {servo} at {self.name}", f"it refuses to tell its registers from {address} on"
                          if error & self._dialect.refused else "it does not answer")
@@ -109,23 +109,27 @@ class SdkWire:
             return self._hear(servos, size)
         found: dict[int, Answer] = {}
         for servo in servos:
-            self._dialect.handler.readTx(self._ready(), servo, address, size)
-            found |= self._hear([servo], size)
+            found |= self._asked(servo, address, size)
         return found
 
     def write(self, servo: int, address: int, data: bytes) -> None:
         """Write into a servo's registers, and see that it arrived."""
-        for _ in range(_TRIES):
+        refused = False
+        for _ in self._tries():
             try:
                 result, error = self._dialect.handler.writeTxRx(self._ready(), servo, address, len(data), list(data))
             except _BROKEN:
                 continue
-            if result == 0 and not error & self._dialect.refused:
+            refused = result == 0
+            if refused and not error & self._dialect.refused:
                 return
             # it may be set to answer questions only
-            if result != 0 and self.read(servo, address, len(data)).data == data:
-                return
-        raise BenchError(f"servo {servo} at {self.name}", f"it refuses what is written into register {address}")
+            if not refused and servo in (found := self._asked(servo, address, len(data))):
+                if found[servo].data == data:
+                    return
+                refused = True
+        raise BenchError(f"servo {servo} at {self.name}", f"it does not take what is written into register {address}"
+                         if refused else "it does not answer")
 
     def write_all(self, address: int, data: Mapping[int, bytes]) -> None:
         """Write into several servos' registers at the same instant."""
@@ -141,6 +145,20 @@ class SdkWire:
 
     _last_error = 0
 
+    def _tries(self) -> Iterator[int]:
+        """Yield some times, with more patience each: this machine may be what is slow."""
+        usual = self.port.patience
+        try:
+            for k in range(_TRIES):
+                self.port.patience = usual * 2**k
+                yield k
+        finally:
+            self.port.patience = usual
+
+    def _asked(self, servo: int, address: int, size: int) -> dict[int, Answer]:
+        self._dialect.handler.readTx(self._ready(), servo, address, size)
+        return self._hear([servo], size)
+
     def _ready(self) -> BusPort:
         self.port.is_using = False  # the packages leave it set behind an error
         return self.port
@@ -153,7 +171,7 @@ class SdkWire:
         found: dict[int, Answer] = {}
         self._last_error = 0
         for _ in range(len(servos) + _LISTEN):
-            if len(found) == len(servos) or (self.port.isPacketTimeout()):
+            if len(found) == len(servos) or self.port.isPacketTimeout():
                 break
             try:
                 packet, result = self._dialect.receive(self.port)

@@ -47,6 +47,7 @@ class BusServo:
         """Forget what belongs to a run."""
         self.order: tuple[int, int] = (-1, -1)
         self.error, self.lost, self.tripped = 0, 0, False
+        self.misses = 0  # since its last answer
         self._heard: float | None = None
 
     @property
@@ -61,6 +62,7 @@ class BusServo:
 
     def heard(self, answer: Answer | None, now: float) -> float:
         """Note whether it answered; return for how long it has not [s]."""
+        self.misses = 0 if answer is not None else self.misses + 1
         if answer is not None or self._heard is None:
             self._heard = now
         return now - self._heard

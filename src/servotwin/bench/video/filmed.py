@@ -75,9 +75,12 @@ def read_clip(path: str | Path, *, mark: int = HORN, instant: str | float = JUMP
               flip: bool = False, zero: float | None = None, slow: float = 1.0) -> Filmed:
     """Return the angle of the mark in a clip.
 
+    Angles count from where the mark's arrow points to the right in the picture, which is the same in all clips of a
+    camera that is not touched; from that of a mark with id 1 on the case, if there is one; or as `zero` says. A fit has
+    one offset for all its logs.
+
     The camera's tilt is found from all pictures at once, see `servotwin.bench.video.plane`; neither its focal length
-    nor the size of the mark has to be known. A mark with id 1 on the case, if there is one, is what angles count from,
-    and what a camera that moves is told by.
+    nor the size of the mark has to be known. A mark on the case is also what a camera that moves is told by.
 
     Parameters
     ----------
@@ -91,7 +94,7 @@ def read_clip(path: str | Path, *, mark: int = HORN, instant: str | float = JUMP
     flip : bool
         Count clockwise as positive.
     zero : float, optional
-        Angle at the first picture [rad]; 0 unless given, or what the mark on the case says.
+        Angle in the first picture [rad].
     slow : float
         By how much the clip plays slower than what it shows: 8 for 240 pictures a second that play at 30.
 
@@ -125,6 +128,8 @@ def read_clip(path: str | Path, *, mark: int = HORN, instant: str | float = JUMP
     error = float(np.median(plane.angle_std))
     found = _instant(instant, lights, time, angle, error, plane, horn[there])
     facts = {**_clip_facts(clip, seen, time, slow), **_mark_facts(plane, mark, side, angle, error, moved),
+             "zero": "the first picture" if zero is not None else "the mark on the case" if np.isfinite(moved) else
+             "the picture's horizontal",
              "turned": "clockwise" if flip else "counter-clockwise, as the camera sees it",
              "instant": {"kind": found.kind, "clip_time_s": found.time, "std_s": found.error}}
     return Filmed(time=time - found.time, angle=angle, angle_std=error, instant=found, facts=facts,
@@ -152,11 +157,11 @@ def _zeroed(angle: NDArray[np.float64], plane: Plane, case: NDArray[np.float64] 
             flip: bool) -> NDArray[np.float64]:
     """Return angles that count from what was asked for."""
     first = angle[np.flatnonzero(np.isfinite(angle))[0]]
-    if zero is not None or case is None:
-        return np.asarray(angle - first + (0.0 if zero is None else -zero if flip else zero))
-    usual = float(plane.direction(np.nanmedian(case, axis=0)[None])[0])
-    turns = 2.0 * np.pi * np.round((first - usual) / (2.0 * np.pi))
-    return np.asarray(angle - usual - turns)
+    if zero is not None:
+        return np.asarray(angle - first + (-zero if flip else zero))
+    level = plane.level if case is None else float(plane.direction(np.nanmedian(case, axis=0)[None])[0])
+    turns = 2.0 * np.pi * np.round((first - level) / (2.0 * np.pi))
+    return np.asarray(angle - level - turns)
 
 
 def _instant(asked: str | float, lights: Lights | None, time: NDArray[np.float64], angle: NDArray[np.float64],
@@ -184,9 +189,7 @@ def _clip_facts(clip: Clip, seen: _Seen, time: NDArray[np.float64], slow: float)
 def _mark_facts(plane: Plane, mark: int, side: float, angle: NDArray[np.float64], error: float, moved: float,
                 ) -> dict[str, Any]:
     # at the axis, a plane that is tilted by t looks shorter by cos t one way
-    h = plane.homography
-    local = (h[:2, :2] - np.outer(h[:2, 2] / h[2, 2], h[2, :2])) / h[2, 2]
-    widths = np.linalg.svd(local, compute_uv=False)
+    widths = np.linalg.svd(plane.local, compute_uv=False)
     return {"mark": mark, "dictionary": DICTIONARY, "side_px": round(side, 2),
             "tilt_deg": round(float(np.degrees(np.arccos(widths[1] / widths[0]))), 1),
             "seen": int(np.isfinite(angle).sum()), "corner_residual_px": round(float(np.median(plane.residual)), 4),

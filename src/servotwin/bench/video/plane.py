@@ -48,6 +48,18 @@ class Plane:
         """Return how marks in this plane, or in a parallel one near it, are turned: corners (n, 4, 2) to (n,) [rad]."""
         return turned(mapped(inverse(self.homography), corners))
 
+    @property
+    def local(self) -> NDArray[np.float64]:
+        """What the homography is near the axis: the derivative there, shape (2, 2) [pixels per side]."""
+        h = self.homography
+        return np.asarray((h[:2, :2] - np.outer(h[:2, 2] / h[2, 2], h[2, :2])) / h[2, 2])
+
+    @property
+    def level(self) -> float:
+        """How a mark is turned whose arrow points to the right in the picture [rad]."""
+        along = np.linalg.solve(self.local, [1.0, 0.0])
+        return float(np.arctan2(along[1], along[0]))
+
 
 def fit_plane(corners: NDArray[np.float64]) -> Plane:
     """Return the plane, the axis and the angles of a mark by nonlinear least squares.

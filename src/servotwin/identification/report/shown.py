@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 _LUMPED = {"output_torque_constant": "torque per current", "output_inertia": "inertia",
            "output_coulomb_torque": "torque"}
-_NUISANCE = {"delay": "time", "angle_offset": "angle", "angle_sag": "angle"}
+_NUISANCE = {"delay": "time", "angle_offset": "angle", "angle_sag": "angle", "frame_period": "time"}
 _PER = {"angle_sag": "/V"}  # after the unit of the dimension
 _SENSOR = {"output_angle": "angle", "feedback_voltage": "voltage", "armature_current": "current",
            "supply_current": "current"}
