@@ -152,41 +152,6 @@ def instants(asked, scans, zero):
     return np.array([[near[scan, k] for k in range(4)] for scan in range(len(scans))])
 
 
-class Saw:
-    """Pins whose voltage tells the time."""
-
-    def rise(self, moment):
-        pass
-
-    def fall(self, moment):
-        pass
-
-    def voltage(self, channel, moment):
-        return moment % 2.0
-
-
-@pytest.mark.parametrize("seconds", [60, pytest.param(600, marks=pytest.mark.slow)])
-def test_a_stream_has_no_gap(seconds):
-    wire, board, messages = opened(Saw())
-    board.order("stream", mask=15, rate=2, reference=0)
-    board.order("pulse", width=3000, period=40000)
-    until, ask = wire.time + seconds, wire.time
-    while wire.time < until:
-        board.take(0.05)
-        if wire.time >= ask:
-            board.order("ask")
-            ask += 0.5
-    status = board.order("ask")
-    board.close()
-    scans = scans_of(messages)
-    ticks = np.round(np.array([time for time, _ in scans]) / TICK).astype(np.int64)
-    assert set(np.diff(ticks)) == {2000}
-    assert len(scans) >= 1000 * seconds - 50
-    assert (status["dropped"], status["late"], status["bad"], board.splitter.bad) == (0, 0, 0, 0)
-    counts = np.array([counts[0] for _, counts in scans])
-    assert set(np.diff(counts)) <= {0, 1, counts.min() - counts.max()}  # a millisecond is 0.4 counts
-
-
 def test_the_display_shows_what_the_board_reads(servo):
     _, wire, board, messages = servo
     board.order("stream", mask=15, rate=2, reference=0)
