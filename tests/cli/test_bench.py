@@ -12,6 +12,8 @@ import pytest
 import servotwin as st
 from bench_wires import BoardOnTerminal
 from servotwin.bench.backends import MockBackend
+from servotwin.bench.emulator.build import harness
+from servotwin.errors import BenchError
 
 pytest.importorskip("serial")
 LIMITS = ("--range", "1000us:2000us", "--voltage", "6V", "--current-limit", "2A")
@@ -84,6 +86,14 @@ WRONG = [
     (("rehearse", "hitec-hs-755hb", "--mock", "--noise", "-1V", *LIMITS, "--out", "runs"), "noise"),
     (("rehearse", "hitec-hs-755hb", "--mock", "--model", "bounded", *LIMITS, "--out", "runs"), "bounded"),
     (("rehearse", "no-such-servo", "--mock", *LIMITS, "--out", "runs"), "no-such-servo"),
+    (("rehearse", "hitec-hs-755hb", *LIMITS), "--pty"),
+    (("rehearse", "hitec-hs-755hb", "--pty", "--out", "runs"), "--out"),
+    (("record", "x", "--bus", "can", "--port", "p", *LIMITS, "--out", "runs"), "--range"),
+    (("record", "x", "--bus", "can", "--port", "p", "--range", "-60deg:60deg", *LIMITS[2:], "--out", "runs"), "can"),
+    (("record", "x", "--bus", "feetech", "--port", "/dev/ttyNONE", "--range", "-60deg:60deg", *LIMITS[2:], "--out",
+      "runs"), "no such port"),
+    (("marker", "--out", "mark.txt"), "mark.txt"),
+    (("video", "none.mp4", "--out", "filmed.csv"), "none.mp4"),
     (("flash", "--port", "p", "--board", "mega"), "mega"),
     (("paper", "--out", "bench.csv"), "bench.csv"),
 ]
@@ -161,3 +171,22 @@ def test_whatever_ends_a_recorder_keeps_its_rows_and_stops_the_pulses(board, tmp
                 time.sleep(0.01)
             assert board.board._now - start < 2_200_000
         assert not pulsing(board)
+
+
+def test_an_emulated_board_can_be_talked_to_by_any_program(cli, child_environment):
+    try:
+        harness()
+    except BenchError as error:
+        pytest.skip(str(error))
+    process = subprocess.Popen([sys.executable, "-m", "servotwin", "bench", "rehearse", "hitec-hs-755hb", "--pty"],
+                               env=child_environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        port = next(word for word in process.stdout.readline().split() if word.startswith("/dev/")).rstrip(",")
+        seen = cli("bench", "check", "--port", port, "--json")
+        assert seen.code == 0, seen.err
+        assert seen.data["channels"]["supply"]["value"] == pytest.approx(6.0, abs=0.05)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(10) == 130
+    finally:
+        process.kill()
+        process.communicate()

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from servotwin.models import Model
 
 
-def rehearsal_rig(model: Model, load: Load, wiring: Wiring, *, rate: str = "fast", mock: bool = False,
-                  noise: float = 1e-3, seed: int = 0) -> tuple[AnalogRig, str]:
-    """Return a rig with a simulated servo on it, and what is to be said of it, mostly nothing.
+def rehearsal_board(model: Model, load: Load, wiring: Wiring, *, mock: bool = False, noise: float = 1e-3,
+                    seed: int = 0, real_time: bool = False) -> tuple[Backend, str]:
+    """Return a board with a simulated servo on it, and what is to be said of it, mostly nothing.
 
     Parameters
     ----------
@@ -28,12 +28,13 @@ def rehearsal_rig(model: Model, load: Load, wiring: Wiring, *, rate: str = "fast
     load : Load
     wiring : Wiring
         Its numbers are taken for true: the emulated pins are wired so.
-    rate : {"fast", "frame"}
     mock : bool
         A board in Python instead of the firmware. It is taken, and said, where simavr is not installed.
     noise : float
         At each pin, one standard deviation [V].
     seed : int
+    real_time : bool
+        Whether it goes no faster than the clock on the wall; a mock cannot.
 
     Raises
     ------
@@ -47,7 +48,23 @@ def rehearsal_rig(model: Model, load: Load, wiring: Wiring, *, rate: str = "fast
         try:
             harness()
         except BenchError as error:
+            if real_time:
+                raise
             mock, remark = True, f"a mock of the board is used instead of its firmware: {error.problem}"
-    backend: Backend = (MockBackend(plant, references=references) if mock
-                        else EmulatedBackend(plant, references=references))
+    if mock:
+        return MockBackend(plant, references=references), remark
+    return EmulatedBackend(plant, references=references, real_time=real_time), remark
+
+
+def rehearsal_rig(model: Model, load: Load, wiring: Wiring, *, rate: str = "fast", mock: bool = False,
+                  noise: float = 1e-3, seed: int = 0) -> tuple[AnalogRig, str]:
+    """Return a rig with a simulated servo on it, and what is to be said of it; arguments as of `rehearsal_board`.
+
+    Parameters
+    ----------
+    model, load, wiring, mock, noise, seed
+        As of `rehearsal_board`.
+    rate : {"fast", "frame"}
+    """
+    backend, remark = rehearsal_board(model, load, wiring, mock=mock, noise=noise, seed=seed)
     return AnalogRig(backend, wiring, rate=rate), remark

@@ -13,11 +13,15 @@ import typer
 
 from servotwin.cli import bench_options as words
 from servotwin.cli import shared_options as shared
-from servotwin.cli.terminal import emit_json, show, table
+from servotwin.cli.terminal import emit, emit_json, show, table
 
 if TYPE_CHECKING:
-    from servotwin.bench.recording import About, Experiment, Limits, Recorded, Rig
+    from servotwin.bench.recording import About, Experiment, Limits, Recorded, Rig, Wiring
+    from servotwin.loads import Load
+    from servotwin.models import Model
 
+_FIDELITIES = ("pulse", "pulse-inductive", "digital")
+_SLICE = 0.1  # s
 _BUSES = ("feetech", "dynamixel")
 _NEXT = "servotwin fit {folder} --servo {servo}"
 
@@ -76,7 +80,11 @@ def record(
 
 def rehearse(
     servo: shared.ServoArgument,
-    out: words.OutOption,
+    out: Annotated[Path | None, typer.Option(
+        metavar="FOLDER", help="Folder for the logs, made if it is not there.", rich_help_panel=shared.OUTPUT)] = None,
+    pty: Annotated[bool, typer.Option(
+        "--pty", help="Offer the board as a serial port in real time, for any program, until Ctrl-C.",
+        rich_help_panel=words.BENCH)] = False,
     model: Annotated[str | None, typer.Option(
         metavar="MODEL", help="pulse, pulse-inductive or digital (default: by the kind of the servo).",
         rich_help_panel=words.BENCH)] = None,
@@ -106,11 +114,20 @@ def rehearse(
     from servotwin.bench.rehearsal import rehearsal_rig
     from servotwin.cli.load_words import load_from
     from servotwin.cli.model_words import model_of
+    from servotwin.errors import InputError
     from servotwin.units.quantities import quantity
 
+    if (out is None) is not pty or (pty and mock):
+        raise InputError("--pty" if pty else "rehearse",
+                         got=("with --mock" if mock else "with --out") if pty else "neither --out nor --pty",
+                         allowed="--out FOLDER for logs, or --pty alone for a port")
+    if out is None:
+        board = model_of(servo, model, change or [], _FIDELITIES)
+        _offered(board, load_from(load or [], board), words.wiring_from(wiring),
+                 noise=quantity("--noise", noise, "voltage"), seed=seed)
+        return
     limits = words.limits_from("pulse_width", span, voltage, current_limit)
-    whole = model_of(servo, model, [*(change or []), f"supply.open_circuit_voltage={limits.voltage}V"],
-                     ("pulse", "pulse-inductive", "digital"))
+    whole = model_of(servo, model, [*(change or []), f"supply.open_circuit_voltage={limits.voltage}V"], _FIDELITIES)
     about = words.about_from(f"{servo} (emulated)", "CC0-1.0", "", "no real servo: the firmware of the bench under "
                              "simavr, beside a simulated servo", load)
     made = _experiments(experiment, limits, servo, load, duration, words.seconds("--frame-period", frame_period), seed)
@@ -121,6 +138,18 @@ def rehearse(
         warnings.warn(remark, stacklevel=2)
     found = _recorded(_Job(rig, made, paths, limits, about, force))
     _report(found, out, servo, rig, as_json=as_json)
+
+
+def _offered(model: Model, load: Load, wiring: Wiring, *, noise: float, seed: int) -> None:
+    """Let any program talk to the board, until Ctrl-C."""
+    from servotwin.bench.emulator.terminal import Terminal
+    from servotwin.bench.rehearsal import rehearsal_board
+
+    board, _ = rehearsal_board(model, load, wiring, noise=noise, seed=seed, real_time=True)
+    with Terminal(board) as terminal:
+        emit(f"the board is at {terminal.port}, until Ctrl-C; try servotwin bench check --port {terminal.port}")
+        while True:
+            terminal.serve(_SLICE)
 
 
 def _bus_rig(family: str, port: str, identity: int | None, baud: int | None, period: float) -> Rig:
