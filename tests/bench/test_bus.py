@@ -220,7 +220,7 @@ def test_a_row_has_the_angle_of_its_time(kind):
         rig = rig_on(peer)
         rig.approach(0.0)
         peer.servos[1].truth.clear()
-        rows = by_column(rig, list(rig.run(run_of((0.05, 0.0), (0.4, 1.0), (0.4, -1.0)))))
+        rows = by_column(rig, list(rig.run(run_of((0.05, 0.0), (0.2, 1.0), (0.3, -1.0)))))
         rig.close()
         truth = peer.servos[1].truth
     times = np.array([one[0] for one in truth])
@@ -232,7 +232,7 @@ def test_a_row_has_the_angle_of_its_time(kind):
     then = np.interp(rows["time_s"] + start, times, angles)
     count = math.degrees(kind.outputs["angle"][2])
     assert np.median(np.abs(rows["output_angle_deg"] - then)) < count
-    assert rows["output_angle_deg"].min() < -20.0 < 20.0 < rows["output_angle_deg"].max()
+    assert rows["output_angle_deg"].min() < -10.0 < 20.0 < rows["output_angle_deg"].max()
 
 
 # --- orders ---------------------------------------------------------------------------------------------------------
@@ -331,7 +331,7 @@ def test_a_cable_that_is_pulled_ends_the_run_in_one_line_and_keeps_the_rows(kind
 @DIALECTS
 def test_a_servo_that_falls_silent_ends_the_run_and_the_others_go_limp(kind):
     with peers.Bus(kind, [1, 2], peers.Ramp(2)) as peer:
-        bus = bus_on(peer, patience=0.03)
+        bus = bus_on(peer, patience=0.02)
         rows = []
         began = math.nan
         with pytest.raises(BenchError, match=r"servo 2 .*has not answered for 0\.5 s"):  # noqa: PT012
@@ -347,12 +347,12 @@ def test_a_servo_that_falls_silent_ends_the_run_and_the_others_go_limp(kind):
 
 
 @DIALECTS
-@pytest.mark.parametrize("harm", ["lost", "flipped", "none"])
+@pytest.mark.parametrize("harm", ["lost", "flipped"])
 def test_damaged_answers_are_gaps_and_never_rows(kind, harm):
     draw = random.Random(1)
 
     def hurt(frame):
-        if draw.random() > 0.1 or harm == "none":
+        if draw.random() > 0.1:
             return frame
         place = draw.randrange(len(frame))
         return frame[:place] + frame[place + 1:] if harm == "lost" else (
@@ -371,7 +371,7 @@ def test_damaged_answers_are_gaps_and_never_rows(kind, harm):
     assert angle[~gaps] == pytest.approx(math.degrees(STILL.angle), abs=math.degrees(kind.outputs["angle"][2]))
     assert facts["lost_answers"] == gaps.sum()
     assert (~gaps).sum() > 0.5 * gaps.size
-    assert gaps.any() or harm == "none"
+    assert gaps.any()
     assert np.all(np.diff(rows["time_s"]) > 0.0)
     assert not np.isnan(rows["time_s"]).any()
     assert not np.isnan(rows["torque_on"]).any()
@@ -451,7 +451,7 @@ def test_torque_that_a_servo_takes_itself_stays_off_and_is_said():
 def test_a_servo_that_acknowledges_nothing_is_told_all_the_same():
     with peers.Bus(peers.STS, [1], peers.Ramp(1)) as peer:
         peer.harm = lambda frame: b"" if len(frame) == 6 else frame
-        rig = rig_on(peer)
+        rig = rig_on(peer, patience=0.1)
         rig.approach(0.1)
         assert peer.servos[1].torque
         rig.close()
