@@ -64,17 +64,22 @@ class Ramp:
 
 
 class Fleet:
-    """Simulated servos in real time, all of a catalog's kind."""
+    """Simulated servos, all of a catalog's kind: in real time, or a `step` [s] for each question to all."""
 
-    def __init__(self, name, count):
+    def __init__(self, name, count, step=None):
+        self.step = step
         self.sims = st.VectorSimulator(st.DigitalServo(st.load_servo(name)), lanes=count, threads=1)
         self.sims.reset(command_angle=0.0)
         self.goals, self.on = np.zeros(count), np.ones(count, bool)
         self.sims.advance(1e-3, command_angle=self.goals)
         self.then = time.perf_counter()
 
+    def tick(self):
+        if self.step:
+            self.sims.advance(self.step, command_angle=self.goals)
+
     def look(self, k, now, goal, torque):
-        if now > self.then:
+        if now > self.then and not self.step:
             self.sims.advance(now - self.then, command_angle=self.goals)
             self.then = now
         self.goals[k] = goal
@@ -258,7 +263,7 @@ class Bus:
     """Servos behind a pseudo-terminal, in a thread of their own."""
 
     def __init__(self, kind, ids, plant, baud=None):
-        self.kind, self.baud = kind, baud
+        self.kind, self.plant, self.baud = kind, plant, baud
         self.frames = Two if kind.protocol == "dynamixel-2" else One
         self.servos = {identity: Servo(kind, identity, k, plant) for k, identity in enumerate(ids)}
         self.rejected = 0  # frames with a wrong checksum
@@ -314,6 +319,8 @@ class Bus:
                 self._say(one, self.frames.hello(one))
         elif instruction in (READ, SYNC_READ):
             address, size = (int.from_bytes(words[a * wide:(a + 1) * wide], "little") for a in (0, 1))
+            if instruction == SYNC_READ and hasattr(self.plant, "tick"):
+                self.plant.tick()
             asked = all_of if instruction == READ else [
                 self.servos[one] for one in words[2 * wide:] if one in self.servos]
             for one in asked:
@@ -335,6 +342,7 @@ class Bus:
     def _write(self, servo, address, data):
         servo.look()  # it was where it was under the old orders until now
         servo.put(address, data)
+        servo.look()  # and goes on under these
         self.written.append((time.perf_counter(), servo.id, address, bytes(data)))
 
     def _say(self, servo, data):

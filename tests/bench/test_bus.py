@@ -87,7 +87,7 @@ def written(peer, address, servo=1):
 @DIALECTS
 def test_a_scan_finds_every_servo_with_its_model_and_writes_nothing(kind):
     with peers.Bus(kind, [1, 2, 17], peers.Ramp(3)) as peer:
-        found = scan(peer.port, ids=[1, 2, 5, 17])
+        found = scan(peer.port, ids=[1, 2, 5, 17], patience=0.3)
     assert [(one.id, one.protocol, one.number) for one in found] == [
         (1, kind.protocol, kind.number), (2, kind.protocol, kind.number), (17, kind.protocol, kind.number)]
     assert all(one.model is MODELS[kind.protocol, kind.number] and one.baud == 1_000_000 for one in found)
@@ -220,7 +220,7 @@ def test_a_row_has_the_angle_of_its_time(kind):
         rig = rig_on(peer)
         rig.approach(0.0)
         peer.servos[1].truth.clear()
-        rows = by_column(rig, list(rig.run(run_of((0.05, 0.0), (0.4, 1.0), (0.4, -1.0)))))
+        rows = by_column(rig, list(rig.run(run_of((0.05, 0.0), (0.2, 1.0), (0.3, -1.0)))))
         rig.close()
         truth = peer.servos[1].truth
     times = np.array([one[0] for one in truth])
@@ -232,7 +232,7 @@ def test_a_row_has_the_angle_of_its_time(kind):
     then = np.interp(rows["time_s"] + start, times, angles)
     count = math.degrees(kind.outputs["angle"][2])
     assert np.median(np.abs(rows["output_angle_deg"] - then)) < count
-    assert rows["output_angle_deg"].min() < -20.0 < 20.0 < rows["output_angle_deg"].max()
+    assert rows["output_angle_deg"].min() < -10.0 < 20.0 < rows["output_angle_deg"].max()
 
 
 # --- orders ---------------------------------------------------------------------------------------------------------
@@ -331,7 +331,7 @@ def test_a_cable_that_is_pulled_ends_the_run_in_one_line_and_keeps_the_rows(kind
 @DIALECTS
 def test_a_servo_that_falls_silent_ends_the_run_and_the_others_go_limp(kind):
     with peers.Bus(kind, [1, 2], peers.Ramp(2)) as peer:
-        bus = bus_on(peer, patience=0.05)
+        bus = bus_on(peer, patience=0.02)
         rows = []
         began = math.nan
         with pytest.raises(BenchError, match=r"servo 2 .*has not answered for 0\.5 s"):  # noqa: PT012
@@ -347,12 +347,12 @@ def test_a_servo_that_falls_silent_ends_the_run_and_the_others_go_limp(kind):
 
 
 @DIALECTS
-@pytest.mark.parametrize("harm", ["lost", "flipped", "none"])
+@pytest.mark.parametrize("harm", ["lost", "flipped"])
 def test_damaged_answers_are_gaps_and_never_rows(kind, harm):
     draw = random.Random(1)
 
     def hurt(frame):
-        if draw.random() > 0.1 or harm == "none":
+        if draw.random() > 0.1:
             return frame
         place = draw.randrange(len(frame))
         return frame[:place] + frame[place + 1:] if harm == "lost" else (
@@ -371,7 +371,7 @@ def test_damaged_answers_are_gaps_and_never_rows(kind, harm):
     assert angle[~gaps] == pytest.approx(math.degrees(STILL.angle), abs=math.degrees(kind.outputs["angle"][2]))
     assert facts["lost_answers"] == gaps.sum()
     assert (~gaps).sum() > 0.5 * gaps.size
-    assert gaps.any() or harm == "none"
+    assert gaps.any()
     assert np.all(np.diff(rows["time_s"]) > 0.0)
     assert not np.isnan(rows["time_s"]).any()
     assert not np.isnan(rows["torque_on"]).any()
@@ -451,7 +451,7 @@ def test_torque_that_a_servo_takes_itself_stays_off_and_is_said():
 def test_a_servo_that_acknowledges_nothing_is_told_all_the_same():
     with peers.Bus(peers.STS, [1], peers.Ramp(1)) as peer:
         peer.harm = lambda frame: b"" if len(frame) == 6 else frame
-        rig = rig_on(peer)
+        rig = rig_on(peer, patience=0.1)
         rig.approach(0.1)
         assert peer.servos[1].torque
         rig.close()
@@ -501,7 +501,7 @@ def test_ticks_do_not_drift_and_those_that_were_missed_are_counted(real_ticks):
 def test_a_recorded_log_is_read_with_its_registers(tmp_path):
     limits = Limits(kind="angle", low=-1.0, high=1.0, voltage=7.4, current=1.0)
     with peers.Bus(peers.STS, [5], peers.Ramp(1)) as peer:
-        rig = rig_of(peer.port, scan(peer.port, ids=[5])[0])
+        rig = rig_of(peer.port, scan(peer.port, ids=[5], patience=0.3)[0])
         rig.open()
         record(rig, run_of((0.1, 0.0), (0.2, 0.5), (0.05, None)), tmp_path / "run.csv", limits=limits,
                about=About(servo="sts"))
@@ -517,25 +517,24 @@ def test_a_recorded_log_is_read_with_its_registers(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_log_of_simulated_servos_is_what_their_model_does(tmp_path):
-    name = "dynamixel-xl330-m288"
-    limits = Limits(kind="angle", low=-1.0, high=1.0, voltage=5.0, current=3.0)
-    fleet = peers.Fleet(name, 1)
-    fleet.look(0, time.perf_counter(), 0.0, True)
-    with peers.Bus(peers.X330, [1], fleet) as peer:
-        fleet.then = time.perf_counter()
-        rig = rig_on(peer)
-        record(rig, run_of((0.2, 0.0), (0.6, 0.6), (0.6, -0.3)), tmp_path / "run.csv", limits=limits,
-               about=About(servo=name))
-        rig.close()
-    log, = st.read_logs(tmp_path / "run.csv")
+@pytest.mark.parametrize(("kind", "name"), [(peers.STS, "feetech-sts3215-7v4"), (peers.X330, "dynamixel-xl330-m288")],
+                         ids=["sts", "x330"])
+def test_six_recorded_servos_do_what_their_model_does_with_these_commands(kind, name):
+    ids, step = range(1, 7), 0.01
+    with peers.Bus(kind, ids, peers.Fleet(name, 6, step)) as peer:
+        bus = bus_on(peer, rate=1.0 / step)
+        ends = {one: 0.15 * one for one in ids}
+        rows = list(bus.run({one: run_of((0.1, 0.0), (0.4, end), (0.3, -end)) for one, end in ends.items()}))
+        bus.close()
     model = st.DigitalServo(st.load_servo(name))
-    again = st.simulate(model, log.signal(), duration=float(log.time[-1] + 0.01), output_times=log.time)
-    moved = np.ptp(log.measured["output_angle"])
-    off = np.abs(again["output_angle"] - log.measured["output_angle"])
-    assert moved > 0.8
-    assert np.median(off) < 2.0 * peers.TURN
-    assert np.percentile(off, 75) < 0.06  # a few ms at full speed
+    # the first tick of the plant comes with the first question; what a row commands is heard after it
+    times = 1e-3 + step * np.arange(1, len(rows) + 1)
+    for one in (1, 6):
+        own = np.radians(np.array([row[one][1:3] for row in rows]))
+        command = st.signals.samples(np.r_[0.0, times], np.r_[0.0, own[:, 0]], unit="rad", hold="previous")
+        again = st.simulate(model, command, duration=float(times[-1]), output_times=times)["output_angle"]
+        assert own[:, 1] == pytest.approx(again, abs=1.01 * peers.TURN)
+        assert np.ptp(own[:, 1]) > 0.9 * ends[one]
 
 
 # --- bad input ------------------------------------------------------------------------------------------------------

@@ -65,7 +65,7 @@ def wire_of(protocol: str, backend: Backend, *, baud: int = 1_000_000, patience:
 
 
 def scan(port: str, *, bauds: Sequence[int] = BAUDS, ids: Iterable[int] = IDS, thorough: bool = False,
-         connect: Callable[[str, int], Backend] = SerialBackend) -> list[FoundServo]:
+         patience: float = PATIENCE, connect: Callable[[str, int], Backend] = SerialBackend) -> list[FoundServo]:
     """Return the servos on a port; nothing is written into them.
 
     Parameters
@@ -78,6 +78,8 @@ def scan(port: str, *, bauds: Sequence[int] = BAUDS, ids: Iterable[int] = IDS, t
         Of servos that have to be asked one by one, 0 to 253.
     thorough : bool
         Try all speeds.
+    patience : float
+        How long each servo that is asked by itself has to answer [s].
     connect : callable
         From port and speed to a backend.
 
@@ -96,7 +98,7 @@ def scan(port: str, *, bauds: Sequence[int] = BAUDS, ids: Iterable[int] = IDS, t
         backend = connect(port, baud)
         backend.open()
         try:
-            found += [*_twos(backend, baud), *_others(backend, baud, asked)]
+            found += [*_twos(backend, baud), *_others(backend, baud, asked, patience)]
         finally:
             backend.close()
         if found and not thorough:
@@ -125,9 +127,9 @@ def _twos(backend: Backend, baud: int) -> list[FoundServo]:
             for one, number in wire.ping(range(253)).items()]
 
 
-def _others(backend: Backend, baud: int, ids: Sequence[int]) -> list[FoundServo]:
+def _others(backend: Backend, baud: int, ids: Sequence[int], patience: float) -> list[FoundServo]:
     """Return servos whose packets look alike: what lies where the id has to be tells Feetech and Dynamixel apart."""
-    wire = feetech_wire(backend, baud=baud)
+    wire = feetech_wire(backend, baud=baud, patience=patience)
     made = []
     for one in wire.ping(ids):
         head = wire.read(one, 0, _HEAD).data
