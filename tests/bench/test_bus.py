@@ -19,7 +19,7 @@ from servotwin.bench.bus import registers as tables
 from servotwin.bench.bus.goals import Goals
 from servotwin.bench.bus.servo import BusServo
 from servotwin.bench.bus.ticks import Ticks
-from servotwin.bench.recording import About, Experiment, Hold, Limits, record
+from servotwin.bench.recording import About, Experiment, Hold, Limits, record, record_bus
 from servotwin.errors import BenchError, InputError, MissingExtraError, UnknownNameError
 
 pytest.importorskip("serial", reason="needs pyserial, of the extra bench")
@@ -604,3 +604,31 @@ def test_a_missing_package_is_named(monkeypatch, module, package, protocol):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(MissingExtraError, match=rf"{package} .*servotwin\[bench\]"):
         wire_of(protocol, SerialBackend("x", 1))
+
+
+def test_servos_that_are_recorded_together_have_a_log_each(tmp_path):
+    readings = peers.Fixed(STILL, BACK)
+    with peers.Bus(peers.STS, [3, 5], readings) as peer:
+        bus = bus_on(peer)
+        paths = {3: tmp_path / "run_3.csv", 5: tmp_path / "run_5.csv"}
+        about = {one: About(servo=f"servo {one}") for one in paths}
+        limits = Limits(kind="angle", low=-1.0, high=1.0, voltage=7.4, current=1.0)
+        found = record_bus(bus, run_of((0.3, 0.2)), paths, limits=limits, about=about)
+        bus.close()
+    assert [log.name for log in st.read_logs(tmp_path)] == ["run_3", "run_5"]
+    assert {one: log.rows for one, log in found.items()} == dict.fromkeys(paths, 30)
+    for path, seen in zip(paths.values(), (STILL, BACK), strict=True):
+        log, = st.read_logs(path)
+        assert log.measured["output_angle"][3] == pytest.approx(seen.angle, abs=2e-3)
+        assert log.measured["bus_voltage"][3] == pytest.approx(seen.voltage, abs=0.06)
+
+
+def test_the_current_of_the_motor_ends_a_run_where_no_other_is_measured(tmp_path):
+    strong = STILL._replace(current=-1.6)
+    with peers.Bus(peers.STS, [1], peers.Fixed(strong)) as peer:
+        rig = rig_on(peer)
+        limits = Limits(kind="angle", low=-1.0, high=1.0, voltage=7.4, current=1.0)
+        with pytest.raises(BenchError, match=r"limit of 1 A; \d+ rows are kept"):
+            record(rig, run_of((2.0, 0.2)), tmp_path / "run.csv", limits=limits, about=About(servo="strong"))
+        rig.close()
+    assert len(st.read_logs(tmp_path / "run.csv")[0]) < 60

@@ -10,6 +10,7 @@ import time
 import pytest
 
 import servotwin as st
+from bench import bus_peers
 from bench_wires import BoardOnTerminal
 from servotwin.bench.backends import MockBackend
 from servotwin.bench.emulator.build import harness
@@ -190,3 +191,15 @@ def test_an_emulated_board_can_be_talked_to_by_any_program(cli, child_environmen
     finally:
         process.kill()
         process.communicate()
+
+
+def test_servos_of_a_bus_are_recorded_at_once(cli):
+    pytest.importorskip("scservo_sdk")
+    with bus_peers.Bus(bus_peers.STS, [1, 2], bus_peers.Ramp(2)) as peer:
+        words = ("bench", "record", "feetech-sts3215-7v4", "--bus", "feetech", "--port", peer.port, "--baud", "1000000",
+                 "-e", "hold", "--duration", "0.4", "--range", "-10deg:10deg", *LIMITS[2:])
+        ended = cli(*words, "--frame-period", "10ms", "--id", "1", "--id", "2", "--out", "runs")
+        assert ended.code == 0, ended.err
+        assert {log.name for log in st.read_logs("runs")} == {"hold_1", "hold_2"}
+        assert "no answer from servo 7" in cli(*words, "--id", "7", "--out", "more").error
+        assert "--id says which" in cli(*words, "--out", "more").error

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,13 +14,13 @@ from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit, emit_json, show, table
 
 if TYPE_CHECKING:
-    from servotwin.bench.recording import About, Experiment, Limits, Recorded, Rig, Wiring
+    from servotwin.bench.recording import Experiment, Limits, Recorded, Wiring
+    from servotwin.cli.bench_jobs import Job
     from servotwin.loads import Load
     from servotwin.models import Model
 
 _FIDELITIES = ("pulse", "pulse-inductive", "digital")
 _SLICE = 0.1  # s
-_BUSES = ("feetech", "dynamixel")
 _NEXT = "servotwin fit {folder} --servo {servo}"
 
 
@@ -34,9 +32,9 @@ def record(
     bus: Annotated[str | None, typer.Option(
         metavar="FAMILY", help="Bus servos at a USB adapter instead of a board: feetech or dynamixel.",
         rich_help_panel=words.BENCH)] = None,
-    identity: Annotated[int | None, typer.Option(
-        "--id", metavar="NUMBER", help="Of the servo on the bus; the only one that answers unless given.",
-        rich_help_panel=words.BENCH)] = None,
+    identity: Annotated[list[int] | None, typer.Option(
+        "--id", metavar="NUMBER", help="Of a servo on the bus, repeatable: all move at once, and each has its log; the "
+        "only one that answers unless given.", rich_help_panel=words.BENCH)] = None,
     baud: Annotated[int | None, typer.Option(
         metavar="BIT/S", help="Of the bus; found unless given.", rich_help_panel=words.BENCH)] = None,
     wiring: words.WiringOption = None,
@@ -56,26 +54,29 @@ def record(
     as_json: shared.JsonOption = False,
 ) -> None:
     """Record experiments."""
+    from servotwin.cli.bench_jobs import Files, OneServo, SeveralServos, bus_of, recorded
     from servotwin.errors import InputError
 
     kind = "pulse_width" if bus is None else "angle"
-    if bus is None and (identity is not None or baud is not None):
-        raise InputError("--baud" if identity is None else "--id", got="no --bus",
+    if bus is None and (identity or baud is not None):
+        raise InputError("--id" if identity else "--baud", got="no --bus",
                          allowed="with --bus feetech or dynamixel")
     limits = words.limits_from(kind, span, voltage, current_limit)
     about = words.about_from(servo, licence, author, note, load)
-    made = _experiments(experiment, limits, servo, load, duration, words.seconds("--frame-period", frame_period), seed)
-    paths = _paths(out, made, force=force)
-    rig: Rig
+    period = words.seconds("--frame-period", frame_period)
+    made = _experiments(experiment, limits, servo, load, duration, period, seed)
+    files = Files(out, limits, about, force)
+    files.check(made, identity or [])
+    job: Job
     if bus is None:
         from servotwin.bench.backends import SerialBackend
         from servotwin.bench.recording import AnalogRig
 
-        rig = AnalogRig(SerialBackend(words.port_from(port)), words.wiring_from(wiring), rate=rate)
+        job = OneServo(AnalogRig(SerialBackend(words.port_from(port)), words.wiring_from(wiring), rate=rate), files)
     else:
-        rig = _bus_rig(bus, words.port_from(port), identity, baud, words.seconds("--frame-period", frame_period))
-    found = _recorded(_Job(rig, made, paths, limits, about, force))
-    _report(found, out, servo, rig, as_json=as_json)
+        job = SeveralServos(bus_of(bus, words.port_from(port), identity or [], baud, period), files)
+    files.make()
+    _report(recorded(job, made), out, servo, job, as_json=as_json)
 
 
 def rehearse(
@@ -112,6 +113,7 @@ def rehearse(
 ) -> None:
     """Record experiments from an emulated bench."""
     from servotwin.bench.rehearsal import rehearsal_rig
+    from servotwin.cli.bench_jobs import Files, OneServo, recorded
     from servotwin.cli.load_words import load_from
     from servotwin.cli.model_words import model_of
     from servotwin.errors import InputError
@@ -131,13 +133,15 @@ def rehearse(
     about = words.about_from(f"{servo} (emulated)", "CC0-1.0", "", "no real servo: the firmware of the bench under "
                              "simavr, beside a simulated servo", load)
     made = _experiments(experiment, limits, servo, load, duration, words.seconds("--frame-period", frame_period), seed)
-    paths = _paths(out, made, force=force)
+    files = Files(out, limits, about, force)
+    files.check(made, [])
     rig, remark = rehearsal_rig(whole, load_from(load or [], whole), words.wiring_from(wiring), rate=rate, mock=mock,
                                 noise=quantity("--noise", noise, "voltage"), seed=seed)
     if remark:
         warnings.warn(remark, stacklevel=2)
-    found = _recorded(_Job(rig, made, paths, limits, about, force))
-    _report(found, out, servo, rig, as_json=as_json)
+    files.make()
+    job = OneServo(rig, files)
+    _report(recorded(job, made), out, servo, job, as_json=as_json)
 
 
 def _offered(model: Model, load: Load, wiring: Wiring, *, noise: float, seed: int) -> None:
@@ -150,37 +154,6 @@ def _offered(model: Model, load: Load, wiring: Wiring, *, noise: float, seed: in
         emit(f"the board is at {terminal.port}, until Ctrl-C; try servotwin bench check --port {terminal.port}")
         while True:
             terminal.serve(_SLICE)
-
-
-def _bus_rig(family: str, port: str, identity: int | None, baud: int | None, period: float) -> Rig:
-    """Return the servo with this number, or the only one that answers."""
-    from servotwin.bench.bus import BAUDS, IDS, rig_of, scan
-    from servotwin.cli.terminal import patience
-    from servotwin.errors import BenchError, UnknownNameError
-
-    if family not in _BUSES:
-        raise UnknownNameError("bus", family, _BUSES)
-    with patience("looking for servos"):
-        found = [one for one in scan(port, bauds=BAUDS if baud is None else [baud],
-                                     ids=IDS if identity is None else [identity])
-                 if one.protocol.startswith(family) and identity in (None, one.id)]
-    if len(found) != 1:
-        names = [f"{one.id} ({one.model.name if one.model else one.number})" for one in found]
-        raise BenchError(f"port {port}", f"{', '.join(names)}; --id says which one" if names
-                         else "no servo answers (power, wiring, --baud?)")
-    return rig_of(port, found[0], rate=1.0 / period)
-
-
-@dataclass(frozen=True)
-class _Job:
-    """What is to be recorded, and where."""
-
-    rig: Rig
-    made: Sequence[Experiment]
-    paths: Sequence[Path]
-    limits: Limits
-    about: About
-    force: bool
 
 
 def _experiments(names: str, limits: Limits, servo: str, load: list[str] | None, duration: float,
@@ -215,48 +188,8 @@ def _advised(limits: Limits, servo: str, frame_period: float) -> Experiment:
                       conditions={"advised": f"{best.motion}, {best.load}"})
 
 
-def _paths(out: Path, made: Sequence[Experiment], *, force: bool) -> list[Path]:
-    """Return a file for each experiment, none of which is there."""
-    from servotwin.errors import OutputError, OutputExistsError
-
-    if out.exists() and not out.is_dir():
-        raise OutputError(f"--out {out} is no folder")
-    paths = [out / f"{one.name}.csv" for one in made]
-    for path in paths:
-        if path.exists() and not force:
-            raise OutputExistsError(path)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"--out {out} cannot be made ({error.strerror})") from None
-    return paths
-
-
-def _recorded(job: _Job) -> list[Recorded]:
-    """Record all; Ctrl-C ends the one under way, whose rows are kept, and lets the servo go."""
-    from servotwin.bench.recording import record as one_record
-    from servotwin.cli.bench_live import live_plot
-    from servotwin.cli.interrupts import finishing
-    from servotwin.parameters.output_file import undone
-
-    found = []
-    with contextlib.closing(job.rig), undone(job.rig.limp), finishing() as check:
-        job.rig.open()
-        for one, path in zip(job.made, job.paths, strict=True):
-            with live_plot(one.name) as watch:
-
-                def look(row: Any, watch: Any = watch) -> None:
-                    check()
-                    watch(row)
-
-                found.append(one_record(job.rig, one, path, limits=job.limits, about=job.about, watch=look,
-                                        overwrite=job.force))
-            check()
-    return found
-
-
-def _report(found: Sequence[Recorded], out: Path, servo: str, rig: Rig, *, as_json: bool) -> None:
-    facts = rig.facts()
+def _report(found: Sequence[Recorded], out: Path, servo: str, job: Job, *, as_json: bool) -> None:
+    facts = job.facts()
     if as_json:
         emit_json({"logs": [{"path": str(one.path), "rows": one.rows, "seconds": one.duration} for one in found],
                    "rig": facts})

@@ -5,9 +5,10 @@ from servotwin.bench.recording.calibrate import Calibration, calibrated
 from servotwin.bench.recording.experiment import Experiment, Hold
 from servotwin.bench.recording.experiments import EXPERIMENTS, experiments, of_log
 from servotwin.bench.recording.limits import Limits
-from servotwin.bench.recording.recorder import About, Recorded, record
+from servotwin.bench.recording.recorder import About, Recorded, record, record_bus, watched_current
 from servotwin.bench.recording.rig import Rig
 from servotwin.bench.recording.wiring import Wiring, load_wiring, nominal_wiring
 
 __all__ = ["EXPERIMENTS", "About", "AnalogRig", "Calibration", "Experiment", "Hold", "Limits", "Recorded", "Rig",
-           "Wiring", "calibrated", "experiments", "load_wiring", "nominal_wiring", "of_log", "record"]
+           "Wiring", "calibrated", "experiments", "load_wiring", "nominal_wiring", "of_log", "record", "record_bus",
+           "watched_current"]

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 from servotwin.bench.recording.experiment import Experiment
 from servotwin.bench.recording.limits import CurrentGuard, Limits
@@ -17,7 +18,12 @@ from servotwin.errors import BenchError, OutputError, OutputExistsError
 from servotwin.logs.json_file import write_json
 from servotwin.logs.sidecar import FORMAT, sidecar_path
 
-_CURRENT = "supply_current_A"
+if TYPE_CHECKING:
+    from servotwin.bench.bus import Bus
+
+Watch = Callable[[Mapping[str, float]], None]
+T = TypeVar("T")
+_CURRENTS = ("supply_current_A", "armature_current_A")  # a motor's is not the supply's, but where there is no other
 _FRAME_PERIOD, _VOLTAGE = "electronics.frame_period", "supply.open_circuit_voltage"
 
 
@@ -63,7 +69,7 @@ class Recorded:
 
 
 def record(rig: Rig, experiment: Experiment, path: str | Path, *, limits: Limits, about: About,
-           watch: Callable[[Mapping[str, float]], None] | None = None, overwrite: bool = False) -> Recorded:
+           watch: Watch | None = None, overwrite: bool = False) -> Recorded:
     """Run an experiment and write its log as it comes.
 
     Every row is on its way to the disk before the next one is asked for: what is cut off is what was not measured yet,
@@ -92,53 +98,156 @@ def record(rig: Rig, experiment: Experiment, path: str | Path, *, limits: Limits
     BenchError
         If the wire is cut or the current is too large; says how many rows are kept.
     """
-    path = Path(path)
-    limits.check(experiment)
-    _check(path, overwrite=overwrite)
-    about_it = _sidecar(rig, experiment, limits, about)
-    columns = tuple(rig.columns)
-    guard, rows, last = CurrentGuard(limits.current), 0, 0.0
-    try:
+    log = _Log(Path(path), tuple(rig.columns), experiment, limits, about, rig.facts, watch)
+    with _recording([log], rig.limp, overwrite=overwrite):
         rig.approach(experiment.holds[0].value or 0.0)
-        with _file(path, overwrite=overwrite) as file:
-            write_json(sidecar_path(path), about_it, overwrite=True)
-            file.write(",".join(columns) + "\n")
-            run = rig.run(experiment)
-            try:
-                for row in run:
-                    file.write(",".join(map(_cell, row)) + "\n")
-                    rows, last = rows + 1, row[0]
-                    if _CURRENT in columns:
-                        guard.look(row[0], row[columns.index(_CURRENT)])
-                    if watch is not None:
-                        watch(dict(zip(columns, row, strict=True)))
-            finally:
-                _close(run)
+        log.begin(overwrite=overwrite)
+        with _closed(rig.run(experiment)) as run:
+            for row in run:
+                log.add(row)
+    return log.recorded
+
+
+def record_bus(bus: Bus, experiment: Experiment, paths: Mapping[int, str | Path], *, limits: Limits,
+               about: Mapping[int, About], watch: Watch | None = None, overwrite: bool = False) -> dict[int, Recorded]:
+    """Run an experiment on several servos of a bus at once, and write a log of each.
+
+    Parameters
+    ----------
+    bus : Bus
+        Open.
+    experiment : Experiment
+        Of angles; all servos do the same.
+    paths, about : mapping of int to path, About
+        By the servo's id; those that are there take part.
+    limits, watch, overwrite
+        As of `record`; `watch` sees the rows of the first servo.
+
+    Raises
+    ------
+    InputError, OutputExistsError, OutputError, BenchError
+        As `record`.
+    """
+    from servotwin.bench.bus import columns_of
+
+    logs = {one: _Log(Path(path), columns_of(bus, one), experiment, limits, about[one], partial(bus.facts, one),
+                      watch if one == next(iter(paths)) else None) for one, path in paths.items()}
+    with _recording(logs.values(), bus.limp, overwrite=overwrite):
+        bus.approach(dict.fromkeys(logs, experiment.holds[0].value or 0.0))
+        for log in logs.values():
+            log.begin(overwrite=overwrite)
+        with _closed(bus.run(dict.fromkeys(logs, experiment))) as run:
+            for rows in run:
+                for one, log in logs.items():
+                    log.add(rows[one])
+    return {one: log.recorded for one, log in logs.items()}
+
+
+def watched_current(columns: Sequence[str]) -> str | None:
+    """Return the column whose mean the current limit holds for, None where no current is measured.
+
+    Examples
+    --------
+    >>> watched_current(["time_s", "armature_current_A"]), watched_current(["time_s"])
+    ('armature_current_A', None)
+    """
+    return next((name for name in _CURRENTS if name in columns), None)
+
+
+class _Log:
+    """A log that is being written."""
+
+    def __init__(self, path: Path, columns: Sequence[str], experiment: Experiment, limits: Limits, about: About,
+                 facts: Callable[[], Mapping[str, Any]], watch: Watch | None) -> None:
+        limits.check(experiment)
+        self.path, self.columns, self._experiment = path, tuple(columns), experiment
+        self._facts, self._watch = facts, watch
+        self._said = _sidecar(path.stem, facts(), experiment, limits, about)
+        self._guard, watched = CurrentGuard(limits.current), watched_current(self.columns)
+        self._current = None if watched is None else self.columns.index(watched)
+        self._file: IO[str] | None = None
+        self._rows, self._last = 0, 0.0
+
+    @property
+    def recorded(self) -> Recorded:
+        """What there is of it."""
+        return Recorded(self.path, self._rows, self._last)
+
+    def begin(self, *, overwrite: bool) -> None:
+        """Make the files; each line goes to the system at once."""
+        try:
+            self._file = self.path.open("w" if overwrite else "x", encoding="utf-8", newline="", buffering=1)
+            self._file.write(",".join(self.columns) + "\n")
+        except FileExistsError:
+            raise OutputExistsError(self.path) from None
+        except OSError as error:
+            raise OutputError(f"{self.path} cannot be written ({error.strerror})") from None
+        write_json(sidecar_path(self.path), self._said, overwrite=True)
+
+    def add(self, row: Sequence[float]) -> None:
+        """Write a row, and look at it."""
+        try:
+            if self._file is not None:
+                self._file.write(",".join(map(_cell, row)) + "\n")
+        except OSError as error:
+            raise OutputError(f"{self.path} cannot be written ({error.strerror})") from None
+        self._rows, self._last = self._rows + 1, row[0]
+        if self._current is not None:
+            self._guard.look(row[0], abs(row[self._current]))
+        if self._watch is not None:
+            self._watch(dict(zip(self.columns, row, strict=True)))
+
+    def end(self) -> None:
+        """Close the file and say in the sidecar what there is."""
+        if self._file is not None:
+            with contextlib.suppress(OSError):
+                self._file.close()
+            one = self._experiment
+            self._said["recorded"] |= {**self._facts(), "rows": self._rows, "seconds": self._last,
+                                       "complete": self._last >= one.duration - 2.0 * one.frame_period}
+            write_json(sidecar_path(self.path), self._said, overwrite=True)
+
+
+@contextlib.contextmanager
+def _recording(logs: Collection[_Log], limp: Callable[[], None], *, overwrite: bool) -> Iterator[None]:
+    """Check that the files may be made; let the servo go at the end, and close them, whatever happens."""
+    for log in logs:
+        _check(log.path, overwrite=overwrite)
+    try:
+        yield
     except BenchError as error:
-        kept = f"; {rows} rows are kept in {path}" if rows else ""
-        raise BenchError(error.what, f"{error.problem}{kept}") from None
+        kept = [f"{log.recorded.rows} rows are kept in {log.path}" for log in logs if log.recorded.rows]
+        raise BenchError(error.what, "; ".join([error.problem, *kept])) from None
     finally:
-        rig.limp()
-        if rows:
-            about_it["recorded"] |= {**rig.facts(), "rows": rows, "seconds": last,
-                                     "complete": last >= experiment.duration - 2.0 * experiment.frame_period}
-            write_json(sidecar_path(path), about_it, overwrite=True)
-    return Recorded(path, rows, last)
+        limp()
+        for log in logs:
+            log.end()
 
 
-def _sidecar(rig: Rig, experiment: Experiment, limits: Limits, about: About) -> dict[str, Any]:
+@contextlib.contextmanager
+def _closed(run: Iterator[T]) -> Iterator[Iterator[T]]:
+    """Leave a run when it is left."""
+    try:
+        yield run
+    finally:
+        close = getattr(run, "close", None)
+        if close is not None:
+            close()
+
+
+def _sidecar(name: str, facts: Mapping[str, Any], experiment: Experiment, limits: Limits, about: About) -> dict[str, Any]:
     parameters = {_VOLTAGE: limits.voltage}
     if experiment.kind == "pulse_width":
         parameters[_FRAME_PERIOD] = experiment.frame_period
     said = {
-        "format": FORMAT, "name": experiment.name, "motion": experiment.motion, "source": f"bench, {about.servo}",
+        "format": FORMAT, "name": name, "motion": experiment.motion,
         "conditions": {**experiment.conditions, "voltage_V": limits.voltage}, "load": dict(about.load),
         "parameters": parameters,
         "recorded": {
             "servo": about.servo, "author": about.author, "licence": about.licence, "note": about.note,
             "date": datetime.now(UTC).isoformat(timespec="seconds"), "complete": False,
             "limits": {"low": limits.low, "high": limits.high, "voltage_V": limits.voltage,
-                       "current_A": limits.current}, **rig.facts()}}
+                       "current_A": limits.current}, **facts}}
     return {key: value for key, value in said.items() if value}
 
 
@@ -148,26 +257,6 @@ def _check(path: Path, *, overwrite: bool) -> None:
     for file in (path, sidecar_path(path)):
         if file.exists() and not overwrite:
             raise OutputExistsError(file)
-
-
-@contextlib.contextmanager
-def _file(path: Path, *, overwrite: bool) -> Iterator[IO[str]]:
-    """Open the log so that each line goes to the system at once."""
-    try:
-        with path.open("w" if overwrite else "x", encoding="utf-8", newline="", buffering=1) as file:
-            yield file
-    except FileExistsError:
-        raise OutputExistsError(path) from None
-    except BenchError:
-        raise
-    except OSError as error:
-        raise OutputError(f"{path} cannot be written ({error.strerror})") from None
-
-
-def _close(run: Iterator[Sequence[float]]) -> None:
-    close = getattr(run, "close", None)
-    if close is not None:
-        close()
 
 
 def _cell(value: float) -> str:

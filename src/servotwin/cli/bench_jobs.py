@@ -1,0 +1,170 @@
+"""What `servotwin bench record` does with one servo at a board, or several on a bus."""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from servotwin.bench.bus import Bus
+    from servotwin.bench.recording import About, AnalogRig, Experiment, Limits, Recorded
+    from servotwin.bench.recording.recorder import Watch
+
+_BUSES = ("feetech", "dynamixel")
+
+
+def bus_of(family: str, port: str, ids: Sequence[int], baud: int | None, period: float) -> Bus:
+    """Return the bus with the servos of these numbers, or with the only one that answers."""
+    from servotwin.bench.backends import SerialBackend
+    from servotwin.bench.bus import BAUDS, IDS, Bus, scan
+    from servotwin.cli.terminal import patience
+    from servotwin.errors import BenchError, UnknownNameError
+
+    if family not in _BUSES:
+        raise UnknownNameError("bus", family, _BUSES)
+    with patience("looking for servos"):
+        found = [one for one in scan(port, bauds=BAUDS if baud is None else [baud], ids=ids or IDS)
+                 if one.protocol.startswith(family) and (not ids or one.id in ids)]
+    missing = [str(one) for one in ids if one not in [servo.id for servo in found]]
+    if not found or missing or (not ids and len(found) > 1):
+        names = ", ".join(f"{one.id} ({one.model.name if one.model else one.number})" for one in found)
+        raise BenchError(f"port {port}", f"no answer from servo {', '.join(missing)}" if missing
+                         else f"{names}; --id says which" if names else "no servo answers (power, wiring, --baud?)")
+    first = found[0]
+    return Bus(SerialBackend(port, first.baud), first.protocol, [one.id for one in found], rate=1.0 / period,
+               baud=first.baud)
+
+
+@dataclass(frozen=True)
+class Files:
+    """Where logs go, and what they say of themselves."""
+
+    out: Path
+    limits: Limits
+    about: About
+    force: bool
+
+    def path(self, one: Experiment, servo: int | None = None) -> Path:
+        """Return the log of an experiment, and of one of several servos."""
+        return self.out / f"{one.name}{'' if servo is None else f'_{servo}'}.csv"
+
+    def check(self, made: Sequence[Experiment], ids: Sequence[int]) -> None:
+        """See that nothing is there yet."""
+        from servotwin.errors import OutputError, OutputExistsError
+
+        if self.out.exists() and not self.out.is_dir():
+            raise OutputError(f"--out {self.out} is no folder")
+        for path in (self.path(one, servo) for one in made for servo in (ids if len(ids) > 1 else [None])):
+            if path.exists() and not self.force:
+                raise OutputExistsError(path)
+
+    def make(self) -> None:
+        """Make the folder."""
+        from servotwin.errors import OutputError
+
+        try:
+            self.out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"--out {self.out} cannot be made ({error.strerror})") from None
+
+
+class Job(Protocol):
+    """A bench that is recorded from."""
+
+    def open(self) -> str:
+        """Take the wire; return what is to be said of it, mostly nothing."""
+
+    def limp(self) -> None:
+        """Let all servos go."""
+
+    def close(self) -> None:
+        """Give the wire back."""
+
+    def facts(self) -> Mapping[str, Any]:
+        """Return what is known of the bench."""
+
+    def record(self, one: Experiment, watch: Watch) -> list[Recorded]:
+        """Run an experiment; return its logs."""
+
+
+class OneServo:
+    """A rig."""
+
+    def __init__(self, rig: AnalogRig, files: Files) -> None:
+        self._rig, self._files = rig, files
+        self.limp, self.close, self.facts = rig.limp, rig.close, rig.facts
+
+    def open(self) -> str:
+        """Take the wire."""
+        self._rig.open()
+        return _unwatched(self._rig.columns)
+
+    def record(self, one: Experiment, watch: Watch) -> list[Recorded]:
+        """Run an experiment."""
+        from servotwin.bench.recording import record
+
+        files = self._files
+        return [record(self._rig, one, files.path(one), limits=files.limits, about=files.about, watch=watch,
+                       overwrite=files.force)]
+
+
+class SeveralServos:
+    """Servos on a bus."""
+
+    def __init__(self, bus: Bus, files: Files) -> None:
+        self._bus, self._files = bus, files
+        self.limp, self.close = bus.limp, bus.close
+
+    def open(self) -> str:
+        """Take the wire."""
+        from servotwin.bench.bus import columns_of
+
+        self._bus.open()
+        return next(filter(None, (_unwatched(columns_of(self._bus, one)) for one in self._bus.ids)), "")
+
+    def facts(self) -> Mapping[str, Any]:
+        """Return what is known of each servo and its wire."""
+        return {str(one): self._bus.facts(one) for one in self._bus.ids}
+
+    def record(self, one: Experiment, watch: Watch) -> list[Recorded]:
+        """Run an experiment."""
+        from servotwin.bench.recording import record_bus
+
+        files, ids = self._files, self._bus.ids
+        paths = {servo: files.path(one, servo if len(ids) > 1 else None) for servo in ids}
+        about = {servo: replace(files.about, servo=f"{files.about.servo}, id {servo}") for servo in ids}
+        return list(record_bus(self._bus, one, paths, limits=files.limits, about=about, watch=watch,
+                               overwrite=files.force).values())
+
+
+def _unwatched(columns: Sequence[str]) -> str:
+    from servotwin.bench.recording import watched_current
+
+    return "" if watched_current(columns) else "no current is measured here: --current-limit cannot end a run"
+
+
+def recorded(job: Job, made: Sequence[Experiment]) -> list[Recorded]:
+    """Record all; Ctrl-C ends the one under way, whose rows are kept, and lets the servo go."""
+    from servotwin.cli.bench_live import live_plot
+    from servotwin.cli.interrupts import finishing
+    from servotwin.parameters.output_file import undone
+
+    found: list[Recorded] = []
+    with contextlib.closing(job), undone(job.limp), finishing() as check:
+        remark = job.open()
+        if remark:
+            warnings.warn(remark, stacklevel=2)
+        for one in made:
+            with live_plot(one.name) as watch:
+
+                def look(row: Any, watch: Any = watch) -> None:
+                    check()
+                    watch(row)
+
+                found += job.record(one, look)
+            check()
+    return found
