@@ -168,8 +168,8 @@ def api(module: str) -> str:
 
 def protocol_messages() -> str:
     """The messages of the bench's wire."""
-    rows = [(f"`{kind.name}`", f"0x{kind.number:02x}", kind.sender, f"`{kind.answer}`" if kind.answer else "", kind.text)
-            for kind in protocol().kinds.values()]
+    rows = [(f"`{kind.name}`", f"0x{kind.number:02x}", kind.sender, f"`{kind.answer}`" if kind.answer else "",
+             kind.text) for kind in protocol().kinds.values()]
     return markdown(("message", "kind", "from", "answer", "what for"), rows)
 
 

@@ -235,7 +235,8 @@ def _closed(run: Iterator[T]) -> Iterator[Iterator[T]]:
             close()
 
 
-def _sidecar(name: str, facts: Mapping[str, Any], experiment: Experiment, limits: Limits, about: About) -> dict[str, Any]:
+def _sidecar(name: str, facts: Mapping[str, Any], experiment: Experiment, limits: Limits,
+             about: About) -> dict[str, Any]:
     parameters = {_VOLTAGE: limits.voltage}
     if experiment.kind == "pulse_width":
         parameters[_FRAME_PERIOD] = experiment.frame_period
