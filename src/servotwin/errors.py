@@ -185,6 +185,10 @@ class BenchError(ServotwinError, OSError):
         self.problem = problem
         super().__init__(f"{what}: {problem}")
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by the constructor's own arguments."""
+        return (type(self), (self.what, self.problem))
+
     def __str__(self) -> str:
         """Return one line."""
         return "".join(c if c.isprintable() else repr(c)[1:-1] for c in f"{self.what}: {self.problem}")

@@ -14,7 +14,8 @@ EXAMPLES = [
     errors.ServoFileError("a.toml", "wrong unit", table="motor", key="rotor_inertia", got="V", allowed="kg m2"),
     errors.UnknownNameError("servo", "hs755", ["hs-755", "sg90"]), errors.CommandError("step(at)", got=float("inf")),
     errors.LoadError("load.inertia", got=-1.0), errors.OutputExistsError("run.csv"), errors.OutputError("no room"),
-    errors.MissingExtraError("pandas", "data"), errors.SimulationError("DIVERGED", 0.5, "not finite"),
+    errors.BenchError("port /dev/ttyUSB0", "the cable is gone"), errors.MissingExtraError("pandas", "data"),
+    errors.SimulationError("DIVERGED", 0.5, "not finite"),
 ]
 
 
@@ -35,7 +36,7 @@ def test_a_trip_loses_nothing(error, trip):
 
 @pytest.mark.parametrize(("error", "builtin"), [
     (errors.InputError, ValueError), (errors.UnknownNameError, KeyError), (errors.UnknownNameError, errors.InputError),
-    (errors.MissingExtraError, ImportError), (errors.SimulationError, RuntimeError),
+    (errors.BenchError, OSError), (errors.MissingExtraError, ImportError), (errors.SimulationError, RuntimeError),
     (errors.ServoFileError, errors.InputError), (errors.CommandError, errors.InputError),
     (errors.LoadError, errors.InputError), (errors.OutputExistsError, errors.InputError),
 ])
