@@ -1,7 +1,9 @@
 """Servos that together use every law of the engine, plainly and as lanes of a batch whose kernels are not compiled.
 
-Run as a script in a process of its own: `one_law_runs.py out.npz` keeps all signals of both, and tells the names of the
-laws that each case has called; `one_law_runs.py out.npz tiles coasting` runs these cases alone.
+Run as a script in a process of its own, it keeps all signals and tells which laws each case has called plainly:
+`one_law_runs.py out.npz derived` runs all cases that there are batches of, both ways; `one_law_runs.py out.npz plain
+tiles coasting` these cases, plainly alone; `one_law_runs.py out.npz compiled loaded` this one, its kernels compiled;
+and `one_law_runs.py out.npz laws drive_time` calls laws by themselves, compiled.
 """
 
 import json
@@ -14,6 +16,8 @@ from functools import partial
 import numpy as np
 
 ON_A_BUS = "on a bus"
+POINTS = 40  # at which a law is compared with itself, compiled
+TICKS, TICK = 15, 7e-3  # s
 SECONDS = 0.11  # five frames: a drive, its end, plugging back
 PULSES = {"electronics.back_emf_injection": 0.01, "electronics.supply_coupling": 0.02, "potentiometer.noise": 1e-3,
           "electronics.stretcher_time_constant": 0.02, "electronics.minimum_drive_time": 2e-4,
@@ -71,52 +75,56 @@ def cases(st):
     }
 
 
-def signals_of(st, name, compiled=False):
-    """Return all signals and the energy of a case, "plain/…" and "batch/…"."""
-    found = {}
+def signals_of(st, name, how):
+    """Return all signals and the energy of a case, "plain/…" and "batch/…", and the laws that the former called."""
     if name == ON_A_BUS:
-        return on_a_bus(st, *cases(st)["tiles that measure"][:3])
+        return on_a_bus(st, *cases(st)["tiles that measure"][:3], how)
     model, command, load, batched = cases(st)[name]
-    plain = st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005, seed=0)
-    for signal in model.available:
-        found[f"plain/{name}/{signal}"] = plain[signal]
-    found[f"plain/{name}/energy"] = np.array(astuple(plain.energy))
-    if batched and not (compiled and name == "sprung"):  # its kernels take minutes
+    found, laws = called_laws(partial(plainly, st, name, model, command, load, batched))
+    if batched and how != "plain":
         R = model.value("motor.armature_resistance")
         batch = st.simulate_many(model, command, duration=SECONDS, load=load, output_step=0.005,
                                  outputs=model.available,
                                  parameters={"motor.armature_resistance": [R, 1.01 * R, 1.02 * R]})
+        sims = st.VectorSimulator(model, 2, load=load, threads=1)
+        sims.reset(pulse_width=700e-6)
+        for _ in range(TICKS):
+            sims.advance(TICK, pulse_width=1200e-6)
         for signal in model.available:
             found[f"batch/{name}/{signal}"] = batch[signal][0]
-        found |= ticks(st, name, model, load)
+            found[f"batch/{name}, ticks/{signal}"] = sims[signal][:1]
+    return found, laws
+
+
+def plainly(st, name, model, command, load, ticks):
+    """Return all signals and the energy of a case, run as it stands, and all signals after some ticks."""
+    plain = st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005, seed=0)
+    found = {f"plain/{name}/{signal}": plain[signal] for signal in model.available}
+    found[f"plain/{name}/energy"] = np.array(astuple(plain.energy))
+    if ticks:
+        sim, command = st.Simulator(model, load), st.signals.constant(1200.0, unit="us")
+        state = sim.initial(st.signals.constant(700.0, unit="us"))
+        for k in range(TICKS):
+            state = sim.advance(state, (k + 1) * TICK, command)
+        found |= {f"plain/{name}, ticks/{signal}": np.array([sim.observe(state, signal, command)])
+                  for signal in model.available}
     return found
 
 
-def ticks(st, name, model, load):
-    """Return all signals after some ticks of one servo, and of the same one among several."""
-    sim, sims = st.Simulator(model, load), st.VectorSimulator(model, 2, load=load, threads=1)
-    command = st.signals.constant(1200.0, unit="us")
-    sims.reset(pulse_width=700e-6)
-    state = sim.initial(st.signals.constant(700.0, unit="us"))
-    for k in range(15):
-        sims.advance(7e-3, pulse_width=1200e-6)
-        state = sim.advance(state, (k + 1) * 7e-3, command)
-    return {f"{kind}/{name}, ticks/{signal}": np.array([value]) for signal in model.available for kind, value in (
-        ("plain", sim.observe(state, signal, command)), ("batch", sims[signal][0]))}
-
-
-def on_a_bus(st, model, command, load):
-    """Return all signals of a servo alone on a stiff bus, as a batch of the plain one.
+def on_a_bus(st, model, command, load, how):
+    """Return all signals of a servo alone on a stiff bus, as a batch of the plain one, and the laws of the latter.
 
     Behind a soft one a servo's circuit is a loop through the source, and that of several a balance of currents: a law
     of currents that is 1 % off makes two different things of these.
     """
     model = type(model)(model.servo.replace({"supply.internal_resistance": 0.0}))
     supply = st.Supply(open_circuit_voltage=model.value("supply.open_circuit_voltage"))
-    fleet = st.simulate_bus({"alone": (model, command, load)}, supply=supply, duration=SECONDS, output_step=0.005)
-    plain = st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005)
-    return {f"{kind}/on a bus/{signal}": result[signal] for signal in model.available
-            for kind, result in (("plain", plain), ("batch", fleet["alone"]))}
+    plain, laws = called_laws(lambda: st.simulate(model, command, duration=SECONDS, load=load, output_step=0.005))
+    found = {f"plain/{ON_A_BUS}/{signal}": plain[signal] for signal in model.available}
+    if how != "plain":
+        fleet = st.simulate_bus({"alone": (model, command, load)}, supply=supply, duration=SECONDS, output_step=0.005)
+        found |= {f"batch/{ON_A_BUS}/{signal}": fleet["alone"][signal] for signal in model.available}
+    return found, laws
 
 
 def without_compiler():
@@ -161,18 +169,45 @@ def called_laws(run):
         sys.setprofile(None)
 
 
+def laws_compiled(names):
+    """Return what laws give for random numbers, "plain/…" and "batch/…": as they are, and as kernels have them."""
+    import inspect
+
+    from servotwin import physics
+    from servotwin.simulation.compile import Recipe, kernels
+
+    laws = {name: inspect.unwrap(getattr(physics, name)) for name in names}
+    compiled = kernels(Recipe("laws", tuple(f"{law.__module__}:{law.__name__}" for law in laws.values()), vector=True))
+    rng, found = np.random.default_rng(5), {}
+    for name, law in laws.items():
+        kinds = {key: parameter.annotation for key, parameter in inspect.signature(law).parameters.items()}
+        results = []
+        while len(results) < POINTS:
+            given = {key: bool(x > 0.0) if kinds[key] == "bool" else float(x)
+                     for key, x in zip(kinds, rng.uniform(-3.0, 3.0, len(kinds)), strict=True)}
+            try:
+                results.append((law(**given), getattr(compiled, law.__name__)(**given)))
+            except (ArithmeticError, ValueError):  # numbers for which the law says nothing
+                continue
+        found[f"plain/laws/{name}"], found[f"batch/laws/{name}"] = (
+            np.array(each, dtype=np.float64) for each in zip(*results, strict=True))
+    return found
+
+
 if __name__ == "__main__":
     warnings.simplefilter("ignore")  # np.float64 says when it divides by 0, which compiled code does not
     import servotwin
 
-    out, *wanted = sys.argv[1:]
-    compiled = wanted == ["compiled"]
-    if not compiled:
+    out, how, *wanted = sys.argv[1:]
+    if how == "derived":
         without_compiler()
     found, laws = {}, {}
-    for name in [*cases(servotwin), ON_A_BUS]:
-        if compiled or not wanted or name in wanted:
-            signals, names = called_laws(partial(signals_of, servotwin, name, compiled))
+    if how == "laws":
+        found = laws_compiled(wanted)
+    else:
+        known = cases(servotwin)
+        for name in wanted or [*(name for name, case in known.items() if how == "plain" or case[-1]), ON_A_BUS]:
+            signals, names = signals_of(servotwin, name, how)
             found |= signals
             laws[name] = sorted(names)
     np.savez(out, **found)
