@@ -63,12 +63,12 @@ class VibrationStudy:
 
 def run_vibration(servo: Servo, rows: Sequence[TableRow]) -> VibrationStudy:
     """Return the experiment for a servo on the bench; `rows` are those of its pulses on a supply that does not sag."""
-    everywhere = [[_stand(servo, rows, k, *CIRCUITS[name][1:]) for k in range(len(rows))]
-                  for name in ("common", "separate")]
-    circuits = {name: _stand(servo, rows, SHOWN_ROW, control, resistance)
+    everywhere = {name: tuple(_stand(servo, rows, k, *CIRCUITS[name][1:]) for k in range(len(rows)))
+                  for name in ("common", "separate")}
+    circuits = {name: everywhere[name][SHOWN_ROW] if name in everywhere
+                else _stand(servo, rows, SHOWN_ROW, control, resistance)
                 for name, (_, control, resistance) in CIRCUITS.items()}
-    return VibrationStudy(target=rows[SHOWN_ROW].target_angle, circuits=circuits, common=tuple(everywhere[0]),
-                          separate=tuple(everywhere[1]))
+    return VibrationStudy(target=rows[SHOWN_ROW].target_angle, circuits=circuits, **everywhere)
 
 
 def _stand(servo: Servo, rows: Sequence[TableRow], k: int, control: ControlSupply, resistance: float) -> Stand:
