@@ -23,6 +23,7 @@ LAWS = {name: inspect.unwrap(function) for name, function in PUBLIC.items() if h
 ENGINE = sorted(set(PUBLIC) - set(physics.ANALYSIS))
 SCALED = [name for name in ENGINE if name in LAWS and inspect.signature(LAWS[name]).return_annotation != "bool"]
 FEW = ("drive_time",)
+HIDDEN = ("braking_distance",)  # by 1 % of the others, at the few ticks that a batch sees
 # Where lanes go side by side no potentiometer has play, so that its law is not asked; and the voltage of a bus is what
 # the currents of all balance at, while that of a servo's own supply follows from its one current
 REPEATED = {"play": "tiles", "source_voltage": "on a bus", "supply_current": "on a bus"}
@@ -129,13 +130,14 @@ def _check(found, before, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in SCALED if name not in (*FEW, *REPEATED)])
+@pytest.mark.parametrize("name", [name for name in SCALED if name not in (*FEW, *HIDDEN, *REPEATED)])
 def test_a_law_that_changes_changes_the_plain_engine(runs, name):
     callers = [case for case in runs.callers(name) if name not in FOLLOWED or not case.startswith("averaged")]
     _check(runs.scaled([name], "plain", *callers)[0], runs.before, name)
 
 
-@pytest.mark.parametrize("name", [*FEW, *(pytest.param(name, marks=pytest.mark.slow) for name in REPEATED)])
+@pytest.mark.parametrize("name", [*FEW, *(pytest.param(name, marks=pytest.mark.slow)
+                                           for name in (*HIDDEN, *REPEATED))])
 def test_a_law_that_changes_changes_all_paths_alike(runs, name):
     callers = runs.callers(name)
     found, _ = runs.scaled([name], "derived", *(callers[k * len(callers) // MOST] for k in range(MOST))
