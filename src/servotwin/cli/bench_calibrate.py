@@ -62,7 +62,7 @@ def calibrate(
             raise InputError(option, got=f"calibrate {what}", allowed="calibrate angle alone")
     if what != "angle" and wiring is None:
         raise InputError("--wiring", got="none", allowed="the file that takes what is measured, new or not")
-    if meter is None and not sys.stdin.isatty():
+    if meter is None and not (sys.stdin and sys.stdin.isatty()):
         raise InputError("--meter", got="none", allowed="its values, where nobody can be asked")
     base = words.wiring_from(wiring if wiring is not None and wiring.exists() else None)
     if what == "angle":

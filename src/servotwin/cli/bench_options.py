@@ -79,7 +79,7 @@ def limits_from(kind: str, span: str | None, voltage: str | None, current: str |
 
     said = {"range": span, "voltage": voltage, "current": current}
     missing = [name for name, value in said.items() if value is None]
-    if missing and not sys.stdin.isatty():
+    if missing and not (sys.stdin and sys.stdin.isatty()):
         raise InputError("before anything moves", got="no " + ", ".join(_ASKED[name][0] for name in missing),
                          allowed="all of --range, --voltage and --current-limit")
     for name in missing:
