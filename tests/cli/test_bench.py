@@ -58,6 +58,15 @@ def test_record_makes_logs_that_can_be_read(cli, board):
     assert any(not log.sent.all() for log in logs)
 
 
+@pytest.mark.parametrize(("voltage", "current", "said"), [
+    ("6V", "2A", ""), ("7V", "2A", "reads 6.00 V, and --voltage says 7 V"), ("6V", "3A", "ends at 2.5 A")])
+def test_wires_that_say_otherwise_than_the_user_are_told(cli, board, voltage, current, said):
+    ended = cli("bench", "record", "x", "--port", board.port, "-e", "hold", "--duration", "0.2", *LIMITS[:2],
+                "--voltage", voltage, "--current-limit", current, "--out", "runs")
+    assert ended.code == 0
+    assert (said in ended.err) if said else ended.err == ""
+
+
 def test_calibrations_go_into_the_wiring_and_are_used(cli, board):
     ended = cli("bench", "calibrate", "supply", "--port", board.port, "--wiring", "bench.toml", "--meter",
                 "6.1V,6.11V,6.13V", "--json")

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from servotwin.bench.recording.recorder import Watch
 
 _BUSES = ("feetech", "dynamixel")
+_LOOK, _END = 0.1, 1023  # s over which the supply is read; the last count
+_ALIKE = 0.05  # of the voltage: divider and meter of 1 % each, and rounding; assumed
 
 
 def bus_of(family: str, port: str, ids: Sequence[int], baud: int | None, period: float) -> Bus:
@@ -101,7 +103,22 @@ class OneServo:
     def open(self) -> str:
         """Take the wire."""
         self._rig.open()
-        return _unwatched(self._rig.columns)
+        return _unwatched(self._rig.columns) or self._otherwise()
+
+    def _otherwise(self) -> str:
+        """Return what the wires say otherwise than the user: of the supply, or of the largest current they can show."""
+        import statistics
+
+        wiring, limits = self._rig.wiring, self._files.limits
+        most = wiring.value("shunt", _END)
+        if "shunt" in wiring.channels and limits.current >= most:
+            return f"--current-limit {limits.current:g} A cannot end a run: the shunt's channel ends at {most:.3g} A"
+        if "supply" in wiring.channels:
+            seen = wiring.value("supply", statistics.fmean(self._rig.measure(_LOOK)["supply"]))
+            if abs(seen - limits.voltage) > _ALIKE * limits.voltage:
+                return (f"the supply reads {seen:.2f} V, and --voltage says {limits.voltage:g} V, which the logs will "
+                        "say too")
+        return ""
 
     def record(self, one: Experiment, watch: Watch) -> list[Recorded]:
         """Run an experiment."""
