@@ -3,6 +3,7 @@
 import itertools
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -284,3 +285,11 @@ def test_a_wrong_wiring_names_file_and_key(tmp_path, text):
     with pytest.raises(InputError, match=r"bench\.toml") as caught:
         load_wiring(file)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("channel", "value"), [("tap", 1.1), ("supply", 6.3), ("shunt", 0.7), ("command", 1.9)])
+def test_what_a_pin_shows_is_read_back_whatever_the_wires_are(channel, value):
+    crooked = {"tap_ratio": 1.3, "supply_ratio": 4.4, "shunt_gain": 0.8, "shunt_zero": 0.12, "reference_voltage": 2.47}
+    wiring = Wiring(**{name: replace(getattr(Wiring(), name), value=number) for name, number in crooked.items()})
+    count = wiring.pin(channel, value) / 2.47 * 1024 - 0.5
+    assert wiring.value(channel, count) == pytest.approx(value, rel=1e-12)
