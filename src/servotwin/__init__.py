@@ -27,7 +27,7 @@ _LAZY = {
                      "validate"), "identification"),
 }
 _MODULES = ("bench", "control", "datasheet", "errors", "identification", "linear", "loads", "logs", "models",
-            "parameters", "physics", "plotting", "robots", "signals", "simulation", "studies", "units")
+            "parameters", "physics", "plotting", "robots", "signals", "simulation", "studies", "units", "web")
 
 __all__ = ["__version__", *_LAZY, *_MODULES]
 

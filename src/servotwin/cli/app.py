@@ -18,6 +18,7 @@ from servotwin.cli.simulate import simulate
 from servotwin.cli.sweep import sweep
 from servotwin.cli.terminal import emit, emit_help
 from servotwin.cli.validate import validate
+from servotwin.cli.web import web
 
 app = typer.Typer(
     name="servotwin", add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="rich",
@@ -66,6 +67,10 @@ app.command("fit", help="Find the parameters of a servo, with intervals, from it
                    "Example: servotwin fit --advise --servo hitec-hs-755hb")(fit)
 app.command("validate", help="Compare a servo with logs, and say how far it is off.",
             epilog="Example: servotwin validate my-servo.toml new-runs/ --max-error 3deg --report check.html")(validate)
+app.command("web", help="Open the bench in a browser: turn a servo, and watch its pulses, currents and angles.",
+            epilog="Example: servotwin web hitec-hs-755hb\n\n"
+                   "Example: servotwin web --lesson deadband\n\n"
+                   "Example: servotwin web --host 0.0.0.0 --class")(web)
 app.add_typer(catalog, name="catalog")
 app.add_typer(robot, name="robot")
 app.add_typer(bench, name="bench")

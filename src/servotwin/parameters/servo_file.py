@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,7 +39,32 @@ def read_servo_file(path: Path, name: str | None = None) -> Servo:
         If the file cannot be read or holds something wrong: names file, table, key, got and allowed.
     """
     label = name or (str(path) if "\0" not in str(path) else repr(str(path)))
-    content = _read_toml(path, label)
+    return _servo_of(_read_toml(lambda: path.read_text(encoding="utf-8-sig"), label), label)
+
+
+def read_servo_text(text: str, name: str) -> Servo:
+    """Return the servo that the text of a servo file describes.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        How errors call it.
+
+    Raises
+    ------
+    ServoFileError
+        As of `read_servo_file`.
+
+    Examples
+    --------
+    >>> read_servo_text('name = "mine"', "a text").name
+    'mine'
+    """
+    return _servo_of(_read_toml(lambda: text.removeprefix("\ufeff"), name), name)
+
+
+def _servo_of(content: dict[str, Any], label: str) -> Servo:
     for key in content:
         if key not in _TOP_KEYS:
             near = UnknownNameError("table or key", key, _TOP_KEYS)
@@ -66,9 +91,9 @@ def read_servo_file(path: Path, name: str | None = None) -> Servo:
         raise ServoFileError(label, f"{error.what} is not possible", got=error.got, allowed=error.allowed) from None
 
 
-def _read_toml(path: Path, label: str) -> dict[str, Any]:
+def _read_toml(read: Callable[[], str], label: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))  # editors on Windows may put a mark in front
+        return tomllib.loads(read())
     except FileNotFoundError:
         raise ServoFileError(label, "no such file") from None
     except IsADirectoryError:
@@ -161,10 +186,23 @@ def _converted(value: Any, unit: str, dimension: str) -> Any:
         return math.inf if value > 0 else -math.inf
 
 
+def servo_text(servo: Servo) -> str:
+    """Return the text of a servo file, in SI.
+
+    Examples
+    --------
+    >>> print(servo_text(Servo(name="mine")))
+    name = "mine"
+    title = ""
+    <BLANKLINE>
+    """
+    return _document(servo).as_string()
+
+
 def write_servo_file(servo: Servo, path: Path, *, overwrite: bool = False) -> None:
     """Write a servo file in SI; a failure leaves what was there untouched."""
     try:
-        content = _document(servo).as_string().encode()
+        content = servo_text(servo).encode()
     except UnicodeEncodeError:
         raise OutputError(f"{path} cannot be written (a text of the servo is not valid Unicode)") from None
     write_file(path, content, overwrite=overwrite)

@@ -104,6 +104,27 @@ class Signal:
         if not all(a < b for a, b in pairwise(times)):  # nan too
             raise CommandError("silences", got=self.silences, allowed="spans (start, end), one after the other [s]")
 
+    def delayed(self, by: float) -> Signal:
+        """Return it later by a time [s], or earlier; what it was just before the start stays.
+
+        Raises
+        ------
+        CommandError
+            If the time is not finite.
+
+        Examples
+        --------
+        >>> from servotwin.signals import sine
+        >>> round(float(sine(mean=0.0, amplitude=1.0, frequency=1.0, unit="rad").delayed(2.0)(2.25)), 12)
+        1.0
+        """
+        if not units.is_finite(by):
+            raise CommandError("delayed(by)", got=by, allowed="a finite number [s]")
+        rows = tuple(piece._replace(start=piece.start + by) for piece in self.pieces.table)
+        return replace(self, pieces=type(self.pieces)(rows),
+                       edges=None if self.edges is None else tuple(edge + by for edge in self.edges),
+                       silences=tuple((start + by, end + by) for start, end in self.silences))
+
     def framed(self, period: float, until: float) -> Signal:
         """Return it with its pulses one by one, those of regular frames in no silence; itself where it has no silence.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +34,23 @@ def save_csv(path: str | Path, signals: Mapping[str, NDArray[np.float64]], si_un
     OutputError
         If it cannot be written.
     """
+    write_file(path, lambda file: write_csv(file, signals, si_units), overwrite=overwrite)
+
+
+def write_csv(out: Path | TextIO, signals: Mapping[str, NDArray[np.float64]], si_units: Mapping[str, str]) -> None:
+    """Write signals of one length to a file or a stream of text.
+
+    Examples
+    --------
+    >>> import io
+    >>> out = io.StringIO()
+    >>> write_csv(out, {"output_angle": np.array([np.pi])}, {"output_angle": "rad"})
+    >>> out.getvalue().split()
+    ['output_angle_deg', '180']
+    """
     shown = shown_columns(signals, si_units)
-    table = np.column_stack(list(shown.values()))
-    write_file(path, lambda file: np.savetxt(file, table, fmt="%.12g", delimiter=",", header=",".join(shown),
-                                             comments="", encoding="utf-8"), overwrite=overwrite)
+    np.savetxt(out, np.column_stack(list(shown.values())), fmt="%.12g", delimiter=",", header=",".join(shown),
+               comments="", encoding="utf-8")
 
 
 def shown_columns(signals: Mapping[str, NDArray[Any]], si_units: Mapping[str, str]) -> dict[str, NDArray[Any]]:

@@ -221,6 +221,19 @@ class Simulator:
         memory = with_bodies(state.memory, own._numbers.play.half, own._numbers.elastic.k > 0.0)
         return replace(state, changes=changes, places=own.model.states, memory=memory)
 
+    def of(self, state: State) -> Simulator:
+        """Return the simulator with whose numbers a state goes on: this one, unless `changed` gave it others.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> sim = st.Simulator(st.PulseServo(st.load_servo("hitec-hs-755hb")))
+        >>> state = sim.initial(st.signals.constant(90.0, unit="deg"))
+        >>> sim.of(sim.changed(state, parameters={"load.torque": 0.1})).load.torque
+        0.1
+        """
+        return self._with(state.changes)
+
     def _with(self, changes: tuple[tuple[str, Any], ...]) -> Simulator:
         """Return the simulator of the servo and load with these numbers."""
         if not changes:

@@ -141,7 +141,7 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
             kinds &= ~(1 << guards.CREEPS)
         s, kind, y = events.first_event(m, kinds, 0.0, m.length)
         if kind < 0 or s > end - t0:
-            kind, y = -1, motion.state(m, end - t0)
+            kind, y = -1, motion.state(m, m.length if end == step_end else end - t0)  # not a rounding before its end
     else:
         s, kind, y = events.first_event(m, kinds, point.time - t0, end - t0)
     if kind < 0:

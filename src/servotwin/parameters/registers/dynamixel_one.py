@@ -97,7 +97,7 @@ def dynamixel_mx(registers: Mapping[str, int], *, servo: str | Path | Servo) -> 
     >>> round(knee.firmware.proportional_gain, 4)
     2.5465
     """
-    return set_registers(_MX, registers, servo)
+    return set_registers(MX, registers, servo)
 
 
 def dynamixel_ax(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
@@ -129,7 +129,7 @@ def dynamixel_ax(registers: Mapping[str, int], *, servo: str | Path | Servo) -> 
     >>> round(dynamixel_ax(soft, servo="dynamixel-ax-12a").firmware.proportional_gain, 3)
     2.957
     """
-    return set_registers(_AX, registers, servo)
+    return set_registers(AX, registers, servo)
 
 
 def _check_limits(label: str, last: int, raw: Raw) -> None:
@@ -186,7 +186,7 @@ def _slope(raw: Raw) -> int:
 
 _MX_GAIN = 4.0 / math.pi  # duty per rad and unit of the manual's K_p = P/8
 _AX_COUNT = 300.0 / 1023.0 * _DEG
-_MX = Family(
+MX = Family(
     label="Dynamixel MX", reference="e-manual of the MX series, protocol 1", registers=MX_REGISTERS,
     settings=(
         Setting("proportional_gain", lambda raw, _: raw["P_Gain"] / (2.0 * math.pi), ("P_Gain",),
@@ -201,7 +201,7 @@ _MX = Family(
         *_shared(2.0 * math.pi / 4096.0, 4095, 0.114 * _RPM)),
     other_names=_OTHER_NAMES, copied={"Torque_Limit": "Max_Torque"},
     check=lambda raw: _check_limits("Dynamixel MX", 4095, raw))
-_AX = Family(
+AX = Family(
     label="Dynamixel AX", reference="e-manual of the AX series", registers=AX_REGISTERS,
     settings=(
         Setting("proportional_gain", lambda raw, _: (1.0 - raw["Punch"] / 1023.0) / (_slope(raw) * 0.29326 * _DEG),

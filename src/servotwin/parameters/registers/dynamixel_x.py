@@ -137,11 +137,19 @@ def dynamixel_x(registers: Mapping[str, int], *, servo: str | Path | Servo) -> S
     """
     base = servo if isinstance(servo, Servo) else load_servo(servo)
     number = registers.get("Model_Number", 0) if isinstance(registers, Mapping) else 0
-    variant = _BY_NUMBER.get(number) or next(
-        (found for name, found in _BY_NAME.items() if name in base.name.lower()), _X)
+    variant = _BY_NUMBER.get(number) or _variant_of(base)
     if "PWM_Slope" in registers and base.supply.open_circuit_voltage is None:
         raise ParameterError(f"register PWM_Slope of Dynamixel X for {base.name!r}, whose supply voltage is not given")
     return set_registers(_family(variant), registers, base)
+
+
+def family_of(servo: Servo) -> Family:
+    """Return the registers of a servo of this series, by its name."""
+    return _family(_variant_of(servo))
+
+
+def _variant_of(servo: Servo) -> _Variant:
+    return next((found for name, found in _BY_NAME.items() if name in servo.name.lower()), _X)
 
 
 def _family(variant: _Variant) -> Family:

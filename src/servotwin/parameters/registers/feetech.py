@@ -127,7 +127,12 @@ def feetech_sts(registers: Mapping[str, int], *, servo: str | Path | Servo) -> S
     'Feetech STS firmware: register P_Coefficient (21) = '
     """
     base = servo if isinstance(servo, Servo) else load_servo(servo)
-    return set_registers(_family(_STS3250 if "3250" in base.name else _Variant()), registers, base)
+    return set_registers(family_of(base), registers, base)
+
+
+def family_of(servo: Servo) -> Family:
+    """Return the registers of a servo of this series."""
+    return _family(_STS3250 if "3250" in servo.name else _Variant())
 
 
 def _family(variant: _Variant) -> Family:

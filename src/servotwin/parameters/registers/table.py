@@ -217,6 +217,31 @@ def _is_own(family: Family, servo: Servo) -> bool:
     return any(_family_of(text) for text in sources)
 
 
+def written(family: Family, servo: Servo) -> dict[str, int]:
+    """Return the raw values of all registers of a servo of a family: what its numbers were made of, else the factory's.
+
+    Examples
+    --------
+    >>> from servotwin.parameters.registers.feetech import family_of
+    >>> servo = load_servo("feetech-sts3215-12v")
+    >>> written(family_of(servo), servo)["P_Coefficient"]
+    32
+    """
+    raw = {name: register.factory for name, register in family.registers.items()}
+    return raw | {name: value for name, value in _written(servo).items() if name in raw}
+
+
+def family_label(servo: Servo) -> str | None:
+    """Return the label of the family whose registers a servo has; None of a servo without.
+
+    Examples
+    --------
+    >>> family_label(load_servo("feetech-sts3215-12v"))
+    'Feetech STS'
+    """
+    return next((label for text in _of_firmware(servo) if (label := _family_of(text))), None)
+
+
 def _family_of(source: str) -> str:
     """Return the family that a source names; empty where it names none."""
     label, found, _ = source.partition(" firmware: ")

@@ -1,0 +1,1 @@
+"""Lessons at the bench, and a servo whose numbers are hidden."""

@@ -1,0 +1,8 @@
+"""The bench behind the page, without any network: a text of its state, and servos that go on under it in time."""
+
+from servotwin.web.live.live_bench import LiveBench, Push, ServoPush
+from servotwin.web.live.replay import Replayed, replay
+from servotwin.web.live.scene import Scene, read_fragment, read_scene
+from servotwin.web.live.scene_servo import SceneServo
+
+__all__ = ["LiveBench", "Push", "Replayed", "Scene", "SceneServo", "ServoPush", "read_fragment", "read_scene", "replay"]

@@ -1,0 +1,106 @@
+"""What leaves the bench as files: a table of its signals, a servo file, a script that repeats it, its scene."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, NamedTuple
+
+from servotwin.errors import InputError
+from servotwin.parameters.servo_file import servo_text
+from servotwin.simulation.files import write_csv
+from servotwin.web.live.replay import replay
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from servotwin.models import Model
+    from servotwin.web.live.scene import Scene
+
+KINDS = ("csv", "script", "servo", "scene")
+"""Kinds of files."""
+_STEP = 1e-3  # s
+_SCRIPT = '''"""{title}: what was done at the bench, once more.
+
+It needs servotwin and nothing else: python {name}
+"""
+
+import math
+
+import servotwin as st
+
+SCENE = r\'\'\'
+{text}\'\'\'
+
+run = st.web.replay(SCENE)
+for name, seen in zip(run.names, run.signals, strict=True):
+    print(f"{{name}}: {{math.degrees(seen['output_angle'][-1]):.9f}} deg after {{seen['time'][-1]:.6f}} s")
+'''
+
+
+class File(NamedTuple):
+    """A file that a page offers: its name, what it is, and its text."""
+
+    name: str
+    type: str
+    text: str
+
+
+def exported(kind: str, scene: Scene, models: tuple[Model, ...], servo: int = 0,
+             progress: Callable[[float], object] | None = None) -> File:
+    """Return a file.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    scene : Scene
+        As it is now.
+    models : tuple of Model
+        With their numbers of now.
+    servo : int
+        Of which, for "csv" and "servo".
+    progress : callable, optional
+        Is told the share that is done.
+
+    Raises
+    ------
+    InputError
+        If there is no such file.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.web.live import SceneServo
+    >>> scene = st.web.Scene(servos=(SceneServo(id="hitec-hs-755hb"),), end=0.1)
+    >>> exported("csv", scene, ()).text[:20]
+    'time_s,command_volta'
+    """
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError("export", got=kind, allowed=", ".join(KINDS))
+    if isinstance(servo, bool) or not isinstance(servo, int) or not 0 <= servo < len(scene.servos):
+        raise InputError("servo of an export", got=servo, allowed=f"a whole number from 0 to {len(scene.servos) - 1}")
+    if kind == "servo":
+        if scene.servos[servo].mystery is not None:
+            raise InputError("servo file of a mystery servo", allowed="none: find out what it is")
+        return File(f"{models[servo].servo.name}.toml", "application/toml", servo_text(models[servo].servo))
+    if kind == "scene":
+        return File("bench.toml", "application/toml", scene.text())
+    if kind == "script":
+        return File("bench.py", "text/x-python", script(scene))
+    return File("bench.csv", "text/csv", _table(scene, servo, progress))
+
+
+def script(scene: Scene) -> str:
+    """Return a Python script that repeats a scene and prints where its servos stand at its end."""
+    text = scene.text()
+    if "'''" in text:
+        raise InputError("script of this bench", got="three quotes in a name", allowed="texts without them")
+    title = (scene.name or "A bench").replace("\\", "/").replace('"', "'")
+    return _SCRIPT.format(title=title, name="bench.py", text=text)
+
+
+def _table(scene: Scene, servo: int, progress: Callable[[float], object] | None) -> str:
+    run = replay(scene, output_step=_STEP, switches=False, progress=progress)
+    out = io.StringIO()
+    write_csv(out, run[servo], run.units)
+    return out.getvalue()

@@ -1,0 +1,221 @@
+"""A servo as the page's controls know it: each parameter with unit, range, meaning and source; travel, registers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+from servotwin.datasheet.loop import loop_of
+from servotwin.errors import ServotwinError
+from servotwin.models import DigitalServo
+from servotwin.models.base import PULSE_RANGE
+from servotwin.models.outputs import SIGNALS
+from servotwin.parameters import GROUPS
+from servotwin.simulation.sight import names_of
+from servotwin.units import factor, si_unit
+from servotwin.web.live.live_bench import load_of
+from servotwin.web.live.registers import register_facts
+from servotwin.web.live.scene_servo import SERVO_MODELS, model_named
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from servotwin.models import Model
+    from servotwin.parameters import Servo
+    from servotwin.web.live.scene import Scene
+
+_SHOWN = {"time": "us", "angle": "deg", "inertia": "g cm2", "inductance": "mH", "torque per current": "mN m/A"}
+"""Units in which people read some dimensions; SI else."""
+_WIDE = 4.0  # times the value: where a slider ends of which nothing else is known; assumed
+_GEAR_DENSITY = 1400.0  # kg/m³ of a servo with motor and gear: 40 g in 40 x 20 x 36 mm, a standard size; assumed
+_SHAPE = (40.0, 20.0, 36.0)  # length to width to height of standard servos [mm]; assumed for all
+_STANDARD_MASS = 0.04  # kg; assumed where a sheet prints none
+
+LOADS = (
+    ("load.inertia", "J_L", "inertia", "moment of inertia that turns with the shaft", 0.0, 5e-3),
+    ("load.viscous_friction", "B_L", "torque per speed", "damping of the load", 0.0, 0.05),
+    ("load.torque", "", "torque", "constant torque; positive pushes towards smaller angles", -2.0, 2.0),
+    ("load.coulomb_torque", "", "torque", "dry friction of the load", 0.0, 0.5),
+    ("load.pendulum.mass", "m", "mass", "mass at the end of an arm", 0.0, 2.0),
+    ("load.pendulum.length", "l", "length", "length of the arm", 0.01, 0.5),
+    ("load.pendulum.hanging_angle", "", "angle", "angle at which the arm hangs down", -math.pi, math.pi),
+)
+"""What hangs on the shaft: name, symbol, dimension, meaning, and ends of its slider (SI; assumed)."""
+
+
+def facts_of(model: Model, scene: Scene, registers: Servo | None = None) -> dict[str, Any]:
+    """Return what the page knows of a servo, as plain values.
+
+    Parameters
+    ----------
+    model : Model
+        With its numbers of now.
+    scene : Scene
+        Says what hangs on the shaft.
+    registers : Servo, optional
+        Of which the registers are; the model's unless given.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.web.live import Scene, SceneServo
+    >>> scene = Scene(servos=(SceneServo(id="hitec-hs-755hb"),))
+    >>> facts = facts_of(st.PulseServo(st.load_servo("hitec-hs-755hb")), scene)
+    >>> facts["pulse_us"], [round(end) for end in facts["travel_deg"]], facts["models"][:2]
+    ([300.0, 2700.0], [-15, 195], ['AveragedServo', 'AveragedServoInductive'])
+    """
+    servo = model.servo
+    names = names_of(model, load_of(scene))
+    return {
+        "id": servo.name, "title": servo.title or servo.name, "kind": servo.kind, "model": type(model).__name__,
+        "models": models_of(servo), "signals": {name: {"unit": SIGNALS[name].unit, "meaning": SIGNALS[name].meaning}
+                                                for name in names},
+        "parameters": parameters_of(model), "travel_deg": travel_of(model), "pulse_us": _pulses_of(model),
+        "voltage": _voltages_of(model), "horn": size_of(servo), "registers": register_facts(registers or servo),
+        "loop": _loop_of(model)}
+
+
+def load_facts(scene: Scene, changed: Mapping[str, float] | None = None) -> list[dict[str, Any]]:
+    """Return the controls of what hangs on the shafts.
+
+    Parameters
+    ----------
+    scene : Scene
+    changed : mapping, optional
+        Numbers that are others by now, by dotted name (SI).
+
+    Examples
+    --------
+    >>> from servotwin.web.live import Scene, SceneServo
+    >>> load_facts(Scene(servos=(SceneServo(id="hitec-hs-755hb"),), load={"torque": 0.1}))[2]["value"]
+    0.1
+    """
+    load = load_of(scene)
+    found = []
+    for name, symbol, dimension, meaning, low, high in LOADS:
+        part, key = (load.pendulum, name.rpartition(".")[2]) if "pendulum" in name else (load, name.partition(".")[2])
+        found.append(_control(name, symbol, dimension, meaning, getattr(part, key), low, high))
+    return [one | {"value": (changed or {}).get(one["name"], one["value"])} for one in found]
+
+
+def parameters_of(model: Model) -> list[dict[str, Any]]:
+    """Return all parameters that a servo can have, those that it lacks with the value None."""
+    servo, read = model.servo, {*model.requires, *model.optional}
+    found = []
+    for group, kind in GROUPS.items():
+        for one in fields(kind):
+            name, of = f"{group}.{one.name}", one.metadata
+            value = servo.get(name)
+            known = servo.source(name) if value is not None else None
+            choices = list(of["rule"]) if isinstance(of["rule"], tuple) else None
+            low, high = (None, None) if choices or of["rule"] == "table" else _range(value, of["rule"], known)
+            found.append({
+                **_control(name, of["symbol"], of["dimension"], of["meaning"], value, low, high),
+                "origin": known.origin if known else None, "source": known.source if known else None,
+                "spread": known.spread if known else "", "rule": "one of" if choices else of["rule"],
+                "choices": choices, "read": name in read})
+    return found
+
+
+def travel_of(model: Model) -> list[float]:
+    """Return the lowest and highest angle that commands may ask for [deg]."""
+    servo, ends = model.servo, []
+    takes_goals = isinstance(model, DigitalServo) and model.takes_goals
+    for stop, goal, usual in (("stops.lower_angle", "firmware.lower_goal", -math.pi),
+                              ("stops.upper_angle", "firmware.upper_goal", math.pi)):
+        found = [float(value) for name in (stop, *((goal,) if takes_goals else ()))
+                 if isinstance(value := servo.get(name), float)]
+        if not found and not takes_goals:  # as far as its pulses go
+            width = _pulses_of(model)
+            found = [] if width is None else [_angle_of(model, 1e-6 * width[usual > 0.0], usual)]
+        ends.append((max if usual < 0.0 else min)(found, default=usual))
+    return [math.degrees(end) for end in sorted(ends)]
+
+
+def models_of(servo: Servo) -> list[str]:
+    """Return the names of the models that can be built of a servo."""
+    found = []
+    for name in SERVO_MODELS:
+        try:
+            model_named(name)(servo)
+        except ServotwinError:
+            continue
+        found.append(name)
+    return found
+
+
+def size_of(servo: Servo) -> dict[str, float]:
+    """Return how large a servo is drawn: from its mass, by the density and shape of a standard servo (assumed)."""
+    printed: Any = servo.sheet.get("mass")
+    mass = _STANDARD_MASS
+    if isinstance(printed, dict) and isinstance(printed.get("value"), int | float):
+        mass = float(printed["value"]) * factor(str(printed.get("unit", "g")), "mass")
+    scale = (mass / _GEAR_DENSITY / math.prod(side * 1e-3 for side in _SHAPE)) ** (1.0 / 3.0)
+    length, width, height = (scale * side * 1e-3 for side in _SHAPE)
+    return {"length_m": length, "width_m": width, "height_m": height, "horn_m": 0.5 * length, "mass_kg": mass}
+
+
+def _control(name: str, symbol: str, dimension: str, meaning: str, value: Any, low: float | None,
+             high: float | None) -> dict[str, Any]:
+    unit = "" if dimension == "word" else si_unit(dimension)
+    shown = unit if dimension == "word" else _SHOWN.get(dimension, unit)
+    return {"name": name, "symbol": symbol, "unit": unit, "dimension": dimension, "meaning": meaning,
+            "value": list(value) if isinstance(value, tuple) else value, "low": low, "high": high,
+            "shown": {"unit": shown, "factor": 1.0 if not unit else factor(shown, dimension)}}
+
+
+def _range(value: Any, rule: str, known: Any) -> tuple[float | None, float | None]:
+    """Return the ends of a slider: what the record states as range, wider where it says how sure it is."""
+    if value is None:
+        return None, None
+    if known.lower is not None or known.upper is not None:
+        low, high = (value if end is None else end for end in (known.lower, known.upper))
+        low, high = (min(low, 0.5 * value), max(high, 2.0 * value)) if value > 0.0 else (low, high)
+    elif known.std:
+        low, high = value - 10.0 * known.std, value + 10.0 * known.std
+    else:
+        low, high = sorted((value / _WIDE, value * _WIDE)) if value else (0.0, 1.0)
+    floor = {"a number of at least 1": 1.0, "a number of at least 0": 0.0, "a positive number": 1e-3 * abs(value)}
+    low = max(low, floor.get(rule, low))
+    return (max(low, 0.0), min(high, 1.0)) if rule == "a number from 0 to 1" else (low, high)
+
+
+def _pulses_of(model: Model) -> list[float] | None:
+    """Return the shortest and longest pulse [µs]; None of a servo that takes none."""
+    if "pulse_width" not in model.available:
+        return None
+    return [1e6 * model.value_or(f"electronics.pulse_width_{end}", usual)
+            for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True)]
+
+
+def _voltages_of(model: Model) -> list[float] | None:
+    """Return the command voltages of the shortest and the longest pulse, but of at least 0 [V]; None without."""
+    gain = model.servo.get("electronics.voltage_to_pulse_gain")
+    pulses = _pulses_of(model)
+    if "command_voltage" not in model.available or pulses is None or not isinstance(gain, float):
+        return None
+    offset = model.value_or("electronics.command_pulse_offset", 0.0)
+    return [max((1e-6 * width - offset) / gain, 0.0) for width in pulses]
+
+
+def _angle_of(model: Model, width: float, usual: float) -> float:
+    import numpy as np
+
+    if "command_angle" not in model.available:
+        return usual
+    drive = model.command(_constant(width)).table[0].value
+    return float(model.command_signal("command_angle", np.float64(drive)))  # type: ignore[arg-type]
+
+
+def _constant(width: float) -> Any:
+    from servotwin import signals
+
+    return signals.constant(width, unit="s")
+
+
+def _loop_of(model: Model) -> dict[str, float] | None:
+    loop = loop_of(model)
+    if loop is None:
+        return None
+    return {"stiffness_nm_per_rad": loop.stiffness, "cap_error_rad": loop.cap_error, "cap_torque_nm": loop.cap_torque}

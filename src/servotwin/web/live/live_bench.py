@@ -1,0 +1,312 @@
+"""A bench that goes on in time: servos under one transmitter, what was done to them, and what shows of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin import loads
+from servotwin.errors import InputError
+from servotwin.models import mid_travel
+from servotwin.simulation.lane_loads import LOAD_NAMES
+from servotwin.units import is_finite
+from servotwin.web.live.actions import Action, checked
+from servotwin.web.live.scene import LONGEST, MOST_ACTIONS, Scene
+from servotwin.web.live.scene_servo import family_of, with_registers
+from servotwin.web.live.station import Row, Station
+from servotwin.web.live.told import taken
+from servotwin.web.live.transmitter import Transmitter
+
+if TYPE_CHECKING:
+    from servotwin.loads import Load
+    from servotwin.models import Model
+    from servotwin.parameters import Servo
+
+_ARM = 0.1  # m, of a scene that gives none
+_WHOLE = ("command", "push", "torque")  # of these the last at an instant is all that counts
+
+
+class ServoPush(NamedTuple):
+    """What shows of a servo: rows by `columns`, and edges and widths [s] of its pulses, width 0 of a lost one."""
+
+    columns: tuple[str, ...]
+    points: list[Row]
+    pulses: list[tuple[float, float]]
+
+
+class Push(NamedTuple):
+    """What shows of a stretch of time up to `time` [s]; events are (time, kind, servo)."""
+
+    time: float
+    servos: tuple[ServoPush, ...]
+    events: list[tuple[float, str, int]]
+
+
+class LiveBench:
+    """Servos that go on side by side under the same commands.
+
+    What a scene says was done is done at its times; what is done with `do` meanwhile comes beside.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds, if a servo, a load or the first command is not possible.
+
+    Examples
+    --------
+    >>> from servotwin.web.live import SceneServo
+    >>> bench = LiveBench(Scene(servos=(SceneServo(id="hitec-hs-755hb"),)))
+    >>> _ = bench.do("command", {"shape": "hold", "unit": "us", "value": 1800.0})
+    >>> push = bench.advance(0.5, 100.0)
+    >>> push.time, len(push.servos[0].pulses), [action.kind for action in bench.scene().actions]
+    (0.5, 25, ['command', 'command'])
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self.models = tuple(servo.built() for servo in scene.servos)
+        load, first = load_of(scene), _first_command(scene, self.models)
+        self._stations = [Station(model, load, first, scene.seed + k) for k, model in enumerate(self.models)]
+        self._sender = Transmitter(scene.frame_rate, scene.seed)
+        self._written: list[dict[str, int]] = [{} for _ in self.models]  # into registers
+        self._done: list[Action] = []
+        self._todo = list(scene.actions)
+        self.time = 0.0
+        """[s]"""
+        self.load_numbers: dict[str, float] = {}
+        """What was changed of loads since the start, by dotted name (SI)."""
+        if not any(action.kind == "command" and action.time == 0.0 for action in self._todo):
+            self._todo.insert(0, Action(0.0, "command", first))
+        self._catch_up()
+        self.rows: list[Row] = [station.now() for station in self._stations]
+        """The latest row of each servo."""
+
+    @property
+    def columns(self) -> tuple[tuple[str, ...], ...]:
+        """Names of what rows have, of each servo."""
+        return tuple(station.columns for station in self._stations)
+
+    @property
+    def frame_rate(self) -> float:
+        """Of the transmitter [Hz]."""
+        return self._sender.rate
+
+    @property
+    def now_models(self) -> tuple[Model, ...]:
+        """The models with their numbers of now."""
+        return tuple(station.model for station in self._stations)
+
+    @property
+    def next_edge(self) -> float:
+        """When the next frame begins [s]."""
+        return self._sender.next_edge
+
+    def register_servo(self, servo: int) -> Servo:
+        """Return a servo as it was at the start, with all registers that were written since."""
+        base = self.models[servo].servo
+        return with_registers(base, self._written[servo]) if self._written[servo] else base
+
+    def scene(self) -> Scene:
+        """Return the scene as it is now: what was done so far, and what was still to be done."""
+        return replace(self._scene, end=self.time, actions=(*self._done, *self._todo))
+
+    def show(self, view: dict[str, Any]) -> None:
+        """Keep what a page wants to be remembered of itself, as `checked_view` returns it."""
+        self._scene = replace(self._scene, view=view)
+
+    def do(self, kind: str, value: Any, servo: int | None = None) -> Action:
+        """Do something now; it is kept with its time.
+
+        Parameters
+        ----------
+        kind : str
+            One of `servotwin.web.live.actions.KINDS`.
+        value : object
+            What the kind takes.
+        servo : int, optional
+            To which servo; to all that it fits unless given.
+
+        Raises
+        ------
+        InputError
+            Or one of its kinds; nothing has changed then.
+        """
+        action = checked(self.time, kind, value, servo, len(self._stations))
+        if len(self._done) + len(self._todo) >= MOST_ACTIONS:
+            raise InputError("record of the bench", got=f"{MOST_ACTIONS} actions", allowed="no more: start it anew")
+        self._act(action)
+        return action
+
+    def advance(self, until: float, points_per_second: float, *, switches: bool = True) -> Push:
+        """Go on to a time; return what shows on the way.
+
+        Parameters
+        ----------
+        until : float
+            Not before the bench's time [s].
+        points_per_second : float
+            How often to look [Hz].
+        switches : bool
+            Whether there is a point just before and one just after a bridge switches, too.
+
+        Raises
+        ------
+        SimulationError
+            If a servo cannot go on.
+        """
+        if not (is_finite(until) and self.time <= until <= LONGEST):
+            raise InputError("advance(until)", got=until, allowed=f"a time from {self.time:g} to {LONGEST:g} s")
+        rows: list[list[Row]] = [[] for _ in self._stations]
+        pulses: list[list[tuple[float, float]]] = [[] for _ in self._stations]
+        events: list[tuple[float, str, int]] = []
+        while self.time < until:
+            end = self._sender.snapped(min(until, self._todo[0].time) if self._todo else until)
+            if end <= self.time:
+                break
+            self._go_on(end, points_per_second, switches, rows, pulses, events)
+            self._catch_up()
+        return Push(self.time, tuple(map(ServoPush, self.columns, rows, pulses)), events)
+
+    def _go_on(self, until: float, rate: float, switches: bool, rows: list[list[Row]],
+               pulses: list[list[tuple[float, float]]], events: list[tuple[float, str, int]]) -> None:
+        if until > self.time:
+            edges, times = self._sender.until(until), looks(self.time, until, rate)
+            for k, station in enumerate(self._stations):
+                pulses[k] += station.told.hear(edges)
+                seen = station.advance(until, times, switches=switches)
+                rows[k] += seen.rows
+                self.rows[k] = rows[k][-1] if rows[k] else self.rows[k]
+                events += [(time, kind, k) for time, kind in seen.events]
+            self.time = until
+
+    def _catch_up(self) -> None:
+        """Do what the scene says was done by now."""
+        while self._todo and self._todo[0].time <= self.time:
+            self._act(self._todo.pop(0))
+
+    def _act(self, action: Action) -> None:
+        """Do something to all servos that it fits, or to none; keep it."""
+        put = _WAYS[action.kind](self, action)
+        for one in put:
+            one()
+        last = self._done[-1] if len(self._done) > 1 else None  # the first says where all begins
+        if last is not None and action.kind in _WHOLE and (last.time, last.kind, last.servo) == (
+                action.time, action.kind, action.servo):
+            self._done.pop()  # a slider that is dragged while time stands
+        self._done.append(action)
+
+    def _those(self, action: Action) -> list[Station]:
+        return self._stations if action.servo is None else [self._stations[action.servo]]
+
+    def _command(self, action: Action) -> list[Callable[[], object]]:
+        found = [(one, taken(one.model, action.value, action.time)) for one in self._those(action)]
+        return [partial(one.told.put, command) for one, command in found]
+
+    def _set(self, action: Action) -> list[Callable[[], object]]:
+        found = [(one, own) for one in self._those(action) if (own := numbers_for(one.model, action.value))]
+        if not found:
+            raise InputError(", ".join(action.value), got="no servo here reads it", allowed="what a model here reads")
+        changes = [(one, one.changed(own)) for one, own in found]
+        loads_set = {name: value for name, value in action.value.items() if name in LOAD_NAMES}
+        return [*(partial(one.put, change) for one, change in changes), partial(self.load_numbers.update, loads_set)]
+
+    def _register(self, action: Action) -> list[Callable[[], object]]:
+        those = [k for k in range(len(self._stations)) if action.servo in (None, k)
+                 and (action.servo == k or family_of(self.models[k].servo) is not None)]
+        if not those:
+            raise InputError(", ".join(action.value), got="no bus servo", allowed="registers of a bus servo")
+        put: list[Callable[[], object]] = []
+        for k in those:
+            written = {**self._written[k], **action.value}
+            before, after = self.register_servo(k), with_registers(self.models[k].servo, written)
+            own = {name: after.get(name) for name in dict.fromkeys((*before.names(), *after.names()))
+                   if before.get(name) != after.get(name)}
+            put += [partial(self._stations[k].put, self._stations[k].changed(own))] if own else []
+            put.append(partial(self._written[k].update, action.value))
+        return put
+
+    def _push(self, action: Action) -> list[Callable[[], object]]:
+        return [partial(setattr, one, "push", action.value) for one in self._those(action)]
+
+    def _frames(self, action: Action) -> list[Callable[[], object]]:
+        def put() -> None:
+            if "rate" in action.value:
+                self._sender.tune(action.value["rate"])
+            self._sender.lost = action.value.get("lost", self._sender.lost)
+        if any(one.told.widest * action.value.get("rate", 0.0) >= 1.0 for one in self._stations):
+            raise InputError("frame rate", got=f"{action.value['rate']:g} Hz", allowed="frames that a pulse fits into")
+        return [put]
+
+    def _torque(self, action: Action) -> list[Callable[[], object]]:
+        those = [one for one in self._those(action) if action.servo is not None or "duty" in one.columns]
+        if not those:
+            raise InputError("torque", got=action.value, allowed="nothing: no servo here has such a switch")
+        changes = [(one, one.changed(None, action.value)) for one in those]
+        return [partial(one.put, change) for one, change in changes]
+
+
+_WAYS: dict[str, Callable[[LiveBench, Action], list[Callable[[], object]]]] = {
+    "command": LiveBench._command, "set": LiveBench._set, "push": LiveBench._push, "frames": LiveBench._frames,
+    "register": LiveBench._register, "torque": LiveBench._torque}
+
+
+def looks(start: float, until: float, rate: float) -> list[float]:
+    """Return the times of a regular grid after `start`, and `until` itself [s]; `rate` is in Hz.
+
+    Examples
+    --------
+    >>> looks(0.0, 0.25, 10.0)
+    [0.1, 0.2, 0.25]
+    """
+    first, last = math.floor(start * rate) + 1, math.ceil(until * rate)
+    return [k / rate for k in range(first, last) if start < k / rate < until] + [until]
+
+
+def load_of(scene: Scene) -> Load:
+    """Return what hangs on each shaft: always all of it, so that each number can change while time goes on.
+
+    Raises
+    ------
+    LoadError
+        If a number is out of its range.
+
+    Examples
+    --------
+    >>> from servotwin.web.live import SceneServo
+    >>> load_of(Scene(servos=(SceneServo(id="hitec-hs-755hb"),), load={"mass": 0.2})).pendulum.mass
+    0.2
+    """
+    own: dict[str, Any] = dict(scene.load)
+    arm = loads.Pendulum(mass=own.pop("mass", 0.0), length=own.pop("arm", _ARM),
+                         hanging_angle=own.pop("hanging_angle", 0.0))
+    return loads.Load(**own) + arm
+
+
+def numbers_for(model: Model, values: dict[str, Any]) -> dict[str, Any]:
+    """Return those of some numbers that a model, or its load, reads.
+
+    Raises
+    ------
+    UnknownNameError
+        If no servo has a parameter of this name.
+    """
+    read = {*model.requires, *model.optional, *LOAD_NAMES}
+    for name in values:
+        if name not in LOAD_NAMES:
+            model.servo.get(name)
+    return {name: value for name, value in values.items() if name in read}
+
+
+def _first_command(scene: Scene, models: Sequence[Model]) -> dict[str, Any]:
+    """Return the command at t = 0: what the scene says, or the middle of the travel."""
+    for action in scene.actions:
+        if action.kind == "command" and action.time == 0.0 and action.servo is None:
+            return dict(action.value)
+    return {"shape": "hold", "unit": "deg", "value": round(math.degrees(mid_travel(models[0])), 3)}

@@ -1,0 +1,219 @@
+"""The one text of a bench's state: what is saved, what a link carries, and what a script repeats."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import re
+import tomllib
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+from servotwin.errors import InputError, UnknownNameError
+from servotwin.units import is_finite
+from servotwin.web.live.actions import RATES, Action, action_of
+from servotwin.web.live.scene_servo import SceneServo, read_scene_servo
+from servotwin.web.live.toml_text import toml_line, toml_value
+
+FORMAT = 1
+MOST_SERVOS = 6
+LONGEST_TEXT = 16_000_000  # characters
+MOST_ACTIONS = 100_000
+LONGEST = 1e6  # s
+_MOST_VIEW = 4000  # characters
+_TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", "load", "view", "lesson")
+LOAD_FIELDS = ("inertia", "viscous_friction", "torque", "coulomb_torque", "mass", "arm", "hanging_angle")
+"""What a load can have: [kg m²], [N m s/rad], [N m], [N m], [kg], [m], [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A bench: its servos, what hangs on them, and all that was done from t = 0 on.
+
+    Parameters
+    ----------
+    servos : tuple of SceneServo
+        One to six.
+    name : str
+        For people.
+    seed : int
+        Of all noise, and of which frames are lost.
+    frame_rate : float
+        Of the transmitter at the start [Hz].
+    end : float
+        How far its time went [s].
+    load : mapping of str to float
+        Of each servo alike, by `LOAD_FIELDS`.
+    actions : tuple of Action
+        In the order of their times.
+    view : mapping
+        What the page alone knows.
+    lesson : mapping
+        What a lesson says; empty for a bench that is none.
+
+    Examples
+    --------
+    >>> scene = Scene(servos=(SceneServo(id="hitec-hs-755hb", model="PulseServo"),), seed=3)
+    >>> read_scene(scene.text()) == scene, read_fragment(scene.fragment()) == scene
+    (True, True)
+    """
+
+    servos: tuple[SceneServo, ...]
+    name: str = ""
+    seed: int = 0
+    frame_rate: float = 50.0
+    end: float = 0.0
+    load: Mapping[str, float] = field(default_factory=dict)
+    actions: tuple[Action, ...] = ()
+    view: Mapping[str, Any] = field(default_factory=dict)
+    lesson: Mapping[str, Any] = field(default_factory=dict)
+
+    def text(self) -> str:
+        """Return the text, in TOML; `read_scene` gives an equal scene."""
+        lines = [toml_line("format", FORMAT), *([toml_line("name", self.name)] if self.name else []),
+                 toml_line("seed", self.seed), toml_line("frame_rate", self.frame_rate), toml_line("end", self.end)]
+        if self.actions:
+            lines += ["actions = [", *(f"  {toml_value(action.row())}," for action in self.actions), "]"]
+        for servo in self.servos:
+            lines += ["", "[[servo]]", *servo.lines()]
+        for key in ("load", "view", "lesson"):
+            table = getattr(self, key)
+            if table:
+                lines += ["", f"[{key}]", *(toml_line(name, value) for name, value in table.items())]
+        return "\n".join(lines) + "\n"
+
+    def fragment(self) -> str:
+        """Return the text packed for the part of a link after its #."""
+        return base64.urlsafe_b64encode(zlib.compress(self.text().encode(), 9)).decode().rstrip("=")
+
+
+def read_fragment(fragment: str) -> Scene:
+    """Return the scene that a link carries.
+
+    Raises
+    ------
+    InputError
+        If it carries none.
+    """
+    try:
+        packed = base64.urlsafe_b64decode(fragment + "=" * (-len(fragment) % 4))
+        unpacking = zlib.decompressobj()
+        text = unpacking.decompress(packed, LONGEST_TEXT)
+        if unpacking.unconsumed_tail or not unpacking.eof:
+            raise InputError("link", got="a text that is too long or cut", allowed="a whole link of a bench")
+        return read_scene(text.decode())
+    except (binascii.Error, zlib.error, UnicodeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError("link", got="something that does not unpack", allowed="a whole link of a bench") from None
+
+
+def read_scene(text: str) -> Scene:
+    """Return the scene that a text describes.
+
+    Raises
+    ------
+    InputError
+        Or one of its kinds: in one line, what is wrong, got and allowed.
+    """
+    if len(text) > LONGEST_TEXT:
+        raise InputError("scene", got=f"{len(text)} characters", allowed=f"at most {LONGEST_TEXT}")
+    content = _content(text)
+    for key in content:
+        if key not in _TOP:
+            raise UnknownNameError("key of a scene", key, _TOP)
+    if content.get("format") != FORMAT:
+        raise InputError("format of a scene", got=content.get("format"), allowed=f"{FORMAT}")
+    servos = content.get("servo")
+    if not isinstance(servos, list) or not 1 <= len(servos) <= MOST_SERVOS:
+        raise InputError("servos of a scene", got=servos if not isinstance(servos, list) else len(servos),
+                         allowed=f"1 to {MOST_SERVOS} tables [[servo]]")
+    actions = content.get("actions", [])
+    if not isinstance(actions, list) or len(actions) > MOST_ACTIONS:
+        raise InputError("actions of a scene", got=len(actions) if isinstance(actions, list) else actions,
+                         allowed=f"a list of at most {MOST_ACTIONS}")
+    done = tuple(action_of(row, len(servos)) for row in actions)
+    if any(b.time < a.time for a, b in pairwise(done)):
+        raise InputError("actions of a scene", got="times that go back", allowed="the order of their times")
+    return Scene(
+        servos=tuple(read_scene_servo(servo) for servo in servos), name=_word(content, "name"),
+        seed=_seed(content), frame_rate=_number(content, "frame_rate", 50.0, *RATES),
+        end=_number(content, "end", 0.0, 0.0, LONGEST), load=_numbers(content, "load", LOAD_FIELDS),
+        actions=done, view=_view(content), lesson=_table(content, "lesson"))
+
+
+def checked_view(view: Any) -> dict[str, Any]:
+    """Return what a page wants to be remembered of itself.
+
+    Raises
+    ------
+    InputError
+        If it is no table of words, numbers and truths, or too much.
+
+    Examples
+    --------
+    >>> checked_view({"window": 5.0})
+    {'window': 5.0}
+    """
+    if not isinstance(view, Mapping) or not all(
+            isinstance(name, str) and re.fullmatch(r"[\w.-]{1,60}", name)
+            and (isinstance(one, bool | str) or is_finite(one)) for name, one in view.items()):
+        raise InputError("view", got=type(view).__name__, allowed="a table of words, numbers, true and false")
+    if sum(len(name) + len(str(one)) for name, one in view.items()) > _MOST_VIEW:
+        raise InputError("view", got="more than that", allowed=f"{_MOST_VIEW} characters in all")
+    return dict(view)
+
+
+def _content(text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text.removeprefix("\ufeff"))
+    except RecursionError:
+        raise InputError("scene", got="tables nested too deeply", allowed="the text of a bench, in TOML") from None
+    except ValueError as error:
+        raise InputError(f"scene: not valid TOML: {error}") from None
+
+
+def _word(content: Mapping[str, Any], key: str) -> str:
+    value = content.get(key, "")
+    if not isinstance(value, str) or len(value) > 200:
+        raise InputError(f"{key} of a scene", got=value, allowed="a text of at most 200 characters")
+    return value
+
+
+def _seed(content: Mapping[str, Any]) -> int:
+    value = content.get("seed", 0)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**53:
+        raise InputError("seed of a scene", got=value, allowed="a whole number of at least 0")
+    return value
+
+
+def _number(content: Mapping[str, Any], key: str, usual: float, low: float, high: float) -> float:
+    value = content.get(key, usual)
+    if not (is_finite(value) and low <= value <= high):
+        raise InputError(f"{key} of a scene", got=value, allowed=f"a number from {low:g} to {high:g}")
+    return float(value)
+
+
+def _table(content: Mapping[str, Any], key: str) -> dict[str, Any]:
+    value = content.get(key, {})
+    if not isinstance(value, dict):
+        raise InputError(f"{key} of a scene", got=value, allowed=f"a table [{key}]")
+    return value
+
+
+def _numbers(content: Mapping[str, Any], key: str, names: tuple[str, ...]) -> dict[str, float]:
+    found = {}
+    for name, value in _table(content, key).items():
+        if name not in names:
+            raise UnknownNameError(f"{key} of a scene", name, names)
+        if not is_finite(value):
+            raise InputError(f"{key}.{name} of a scene", got=value, allowed="a finite number in SI")
+        found[name] = float(value)
+    return found
+
+
+def _view(content: Mapping[str, Any]) -> dict[str, Any]:
+    return checked_view(_table(content, "view"))

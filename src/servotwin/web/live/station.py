@@ -1,0 +1,131 @@
+"""A servo at the bench with a supply of its own: its model, where it stands, what it is told, what shows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.simulation import Simulator
+from servotwin.simulation.engine import Record, Segment, State
+from servotwin.simulation.sight import Sight
+from servotwin.simulation.sight import switches as switch_times
+from servotwin.web.live.told import Taken, Told
+
+if TYPE_CHECKING:
+    from servotwin.loads import Load
+    from servotwin.models import Model
+
+Row = tuple[float, ...]
+_DULL = ("drive ", "current ", "zone", "pulse edge")  # how the names of events begin that come many times a second
+
+
+class Seen(NamedTuple):
+    """What shows of a stretch of time: rows of (time, signals), and (time, kind) of events."""
+
+    rows: list[Row]
+    events: list[tuple[float, str]]
+
+
+class Station:
+    """A servo that goes on by itself.
+
+    Parameters
+    ----------
+    model : Model
+    load : Load
+    command : mapping
+        The first.
+    seed : int
+        Of its noise.
+
+    Raises
+    ------
+    CommandError
+        If the model does not take the command.
+    """
+
+    def __init__(self, model: Model, load: Load, command: Mapping[str, Any], seed: int) -> None:
+        self._simulator = Simulator(model, load, seed)
+        self.told = Told(model, command)
+        self._state = self._simulator.initial(self.told.signal)
+        self._sight = Sight(model, load)
+        self._last: Segment | None = None
+        self.push = 0.0  # N m, by hand
+
+    @property
+    def model(self) -> Model:
+        """The model with its numbers of now."""
+        return self._simulator.of(self._state).model
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Names of the signals in rows, `time` first."""
+        return ("time", *self._sight.names)
+
+    def changed(self, parameters: Mapping[str, Any] | None, torque_enable: bool | None = None) -> Change:
+        """Return what it is with other numbers, or its torque on or off, ready to be `put`.
+
+        Raises
+        ------
+        InputError
+            Or one of its kinds, if that is not possible.
+        """
+        state = self._simulator.changed(self._state, parameters=parameters, torque_enable=torque_enable)
+        model = self._simulator.of(state).model
+        return Change(state, self.told.fits(model), model)
+
+    def put(self, change: Change) -> None:
+        """Go on with other numbers."""
+        self._state = change.state
+        self.told.put(change.command)
+        self._sight = Sight(change.model, self._simulator.of(change.state).load)
+
+    def advance(self, until: float, times: Sequence[float], *, switches: bool = True) -> Seen:
+        """Go on to a time [s]; return what shows at `times` on the way, and, if asked for, where the bridge switches.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot go on.
+        """
+        record, command = Record([], []), self.told.signal
+        own = self._simulator.of(self._state)
+        plan = own.plan(command, self.push)
+        self._state = self._simulator.recorded(self._state, until, command, record, external_torque=self.push)
+        segments = record.segments
+        if not segments:
+            return Seen([], [])
+        known = segments if self._last is None else [self._last, *segments]
+        seen = self._sight.points(plan, segments, with_switches(times, switch_times(known) if switches else []))
+        self._last = segments[-1]
+        return Seen(seen, lively(record.events))
+
+    def now(self) -> Row:
+        """Return the row of the present instant."""
+        names, value = self._sight.names, self._simulator.observe
+        return (self._state.time, *(value(self._state, name, self.told.signal, external_torque=self.push)
+                                    for name in names))
+
+
+class Change(NamedTuple):
+    """A servo with other numbers: its state, its command as it follows it then, and its model."""
+
+    state: State
+    command: Taken
+    model: Model
+
+
+def with_switches(times: Sequence[float], switched: Sequence[float]) -> list[float]:
+    """Return times in order, those of switches twice: just before and just after.
+
+    Examples
+    --------
+    >>> with_switches([0.1, 0.2], [0.15, 0.2])
+    [0.1, 0.15, 0.15, 0.2, 0.2]
+    """
+    return sorted([*(time for time in times if time not in set(switched)), *switched, *switched])
+
+
+def lively(events: Sequence[tuple[float, str, float]]) -> list[tuple[float, str]]:
+    """Return time [s] and kind of the events that do not come with every pulse."""
+    return [(time, kind) for time, kind, _ in events if not kind.startswith(_DULL)]

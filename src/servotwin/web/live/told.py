@@ -1,0 +1,110 @@
+"""What a servo is told: a command, which a servo of pulses hears once a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.models import DigitalServo
+from servotwin.models.switched import SwitchedServo
+from servotwin.physics.pieces import Piece, Pieces
+from servotwin.signals import Signal
+from servotwin.web.live.commands import command_signal
+
+if TYPE_CHECKING:
+    from servotwin.models import Model
+    from servotwin.web.live.transmitter import FrameEdge
+
+_NEVER = 1e9  # s
+
+
+class Taken(NamedTuple):
+    """A command that a model takes: as it was given, and as the model follows it."""
+
+    shape: Signal
+    drive: Pieces
+
+
+class Told:
+    """What a servo is told: a command, which a servo of pulses hears once a frame, and others as it goes.
+
+    Parameters
+    ----------
+    model : Model
+    command : mapping
+        The first, as `checked_command` returns it; it begins at t = 0.
+
+    Raises
+    ------
+    CommandError
+        If the model does not take it.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> from servotwin.web.live.transmitter import Transmitter
+    >>> hold = {"shape": "hold", "unit": "us", "value": 1500.0}
+    >>> told = Told(st.PulseServo(st.load_servo("hitec-hs-755hb")), hold)
+    >>> told.hear(Transmitter(50.0, 0).until(0.03)), told.signal.edges
+    ([(0.0, 0.0015), (0.02, 0.0015)], (0.0, 0.02))
+    """
+
+    def __init__(self, model: Model, command: Mapping[str, Any]) -> None:
+        self.pulsed = isinstance(model, SwitchedServo) and not (isinstance(model, DigitalServo) and model.takes_goals)
+        self._taken = taken(model, command, 0.0)
+        self.signal = self._silence() if self.pulsed else self._taken.shape
+        """What the model follows now."""
+
+    @property
+    def widest(self) -> float:
+        """The longest pulse that the command may ask for [s]; 0 where there are none."""
+        return self._taken.drive.extremes[1] if self.pulsed else 0.0
+
+    def put(self, command: Taken) -> None:
+        """Follow another command from its start on, or from the next frame on."""
+        self._taken = command
+        if not self.pulsed:
+            self.signal = command.shape
+
+    def fits(self, model: Model) -> Taken:
+        """Return the present command for a model with other numbers, for which it may stand for other pulses.
+
+        Raises
+        ------
+        CommandError
+            If that model does not take it.
+        """
+        return Taken(self._taken.shape, model.command(self._taken.shape))
+
+    def hear(self, edges: Sequence[FrameEdge]) -> list[tuple[float, float]]:
+        """Take the frames of the time that comes; return edges and widths of their pulses [s], width 0 if lost."""
+        if not self.pulsed:
+            return []
+        pulses = [(edge.time, float(self._taken.drive(edge.time)) if edge.sent else 0.0) for edge in edges]
+        sent = [pulse for pulse in pulses if pulse[1] > 0.0]
+        if sent:
+            rows = self.signal.pieces.table
+            before = [(rows[-1].start, rows[-1].value)] if rows[-1].start < sent[0][0] else []
+            self.signal = _train([*before, *sent])
+        return pulses
+
+    def _silence(self) -> Signal:
+        """Return a train before its first pulse: the servo stands where the command asks for just before t = 0."""
+        return _train([(_NEVER, float(self._taken.drive(0.0)))])
+
+
+def taken(model: Model, command: Mapping[str, Any], time: float) -> Taken:
+    """Return a command from a time on [s] as a model follows it.
+
+    Raises
+    ------
+    CommandError
+        If the model does not take it.
+    """
+    shape = command_signal(command, time)
+    return Taken(shape, model.command(shape))
+
+
+def _train(pulses: Sequence[tuple[float, float]]) -> Signal:
+    return Signal(pieces=Pieces(tuple(Piece(edge, width) for edge, width in pulses)), unit="s", initial=pulses[0][1],
+                  edges=tuple(edge for edge, _ in pulses))

@@ -1,0 +1,187 @@
+// The bench as the page knows it: what it is, what it has shown, and how to do something at it.
+
+import { History } from "./history.js";
+
+const AGAIN = [500, 1000, 2000, 4000, 8000]; // ms until the next attempt
+
+/** @typedef {{n: number, m: number, columns: string[]}} Part */
+/** @typedef {{t: number, pace: number, speed: number|string, running: boolean, behind: boolean, replaying: number|null,
+ *             lcd: Record<string, number|null>[], events: [number, string, number][], servos: Part[]}} Header */
+
+export class Bench extends EventTarget {
+  constructor() {
+    super();
+    /** @type {any[]} what is known of each servo */
+    this.facts = [];
+    /** @type {any[]} */
+    this.loads = [];
+    /** @type {any} */
+    this.hello = {};
+    /** @type {any} */
+    this.state = {};
+    /** @type {History[]} */
+    this.history = [];
+    /** @type {Header|null} */
+    this.header = null;
+    this.time = 0;
+    this.scene = "";
+    /** @type {Map<number, {done: (found: any) => void, failed: (error: Error) => void}>} */
+    this.waiting = new Map();
+    this.number = 0;
+    this.attempt = 0;
+    this.kept = ""; // the text of the bench, to go on with after the line was cut
+    /** @type {WebSocket|null} */
+    this.socket = null;
+  }
+
+  get role() { return this.hello.role ?? "own"; }
+  get running() { return this.header ? this.header.running : Boolean(this.state.running); }
+
+  open() {
+    const link = new URL("/live", location.href);
+    link.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    link.search = location.search;
+    const socket = new WebSocket(link);
+    socket.binaryType = "arraybuffer";
+    this.socket = socket;
+    socket.onmessage = (event) => (typeof event.data === "string"
+      ? this.told(JSON.parse(event.data)) : this.pushed(event.data));
+    socket.onclose = (event) => this.closed(event);
+  }
+
+  /**
+   * Do something now.
+   * @param {string} kind
+   * @param {any} value
+   * @param {number|null} [servo]
+   * @returns {Promise<any>}
+   */
+  do(kind, value, servo = null) { return this.ask({ do: kind, value, servo }); }
+
+  /**
+   * Say something, and wait for the answer.
+   * @param {Record<string, any>} message
+   * @returns {Promise<any>}
+   */
+  ask(message) {
+    this.number += 1;
+    const id = this.number;
+    const answer = new Promise((done, failed) => this.waiting.set(id, { done, failed }));
+    if (this.socket && this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ ...message, id }));
+    else this.answered(id, null, "the bench is not connected");
+    return answer;
+  }
+
+  /**
+   * Say something; what is wrong with it is shown as a notice.
+   * @param {Record<string, any>} message
+   * @returns {Promise<any>}
+   */
+  async tell(message) {
+    try {
+      return await this.ask(message);
+    } catch (error) {
+      this.notice(error instanceof Error ? error.message : String(error));
+      return null;
+    }
+  }
+
+  /** @param {string} line */
+  notice(line) { this.emit("said", line); }
+
+  /** @param {string} name @param {any} [detail] */
+  emit(name, detail = null) { this.dispatchEvent(new CustomEvent(name, { detail })); }
+
+  /** @param {string} name @param {(detail: any) => void} listener */
+  on(name, listener) { this.addEventListener(name, (event) => listener(/** @type {CustomEvent} */ (event).detail)); }
+
+  /** @param {any} message */
+  told(message) {
+    if ("hello" in message) this.greeted(message.hello);
+    else if ("scene" in message) this.began(message.scene);
+    else if ("changed" in message) {
+      for (const facts of message.changed) this.facts[facts.servo] = facts;
+      this.loads = message.loads;
+      this.emit("changed");
+    } else if ("done" in message) this.answered(message.done, message, null);
+    else if ("refused" in message) this.answered(message.refused, null, message.message);
+    else if ("said" in message) this.notice(message.said);
+    else if ("full" in message) { this.full = message.full; this.notice(message.full); }
+    for (const word of ["fit", "log"]) if (word in message) this.emit(word, message[word]);
+  }
+
+  /** @param {any} hello */
+  greeted(hello) {
+    this.hello = hello;
+    const again = this.attempt > 0;
+    this.attempt = 0;
+    this.emit("hello", hello);
+    const packed = location.hash.slice(1);
+    if (hello.role === "watcher") return;
+    if (again && this.kept) this.tell({ scene: this.kept });
+    else if (packed.startsWith("lesson=")) this.tell({ lesson: decodeURIComponent(packed.slice(7)) });
+    else if (packed.startsWith("mystery=")) this.tell({ mystery: Number(packed.slice(8)) });
+    else if (packed) this.tell({ fragment: packed });
+  }
+
+  /** @param {any} state */
+  began(state) {
+    this.state = state;
+    this.scene = state.scene;
+    this.facts = state.servos;
+    this.loads = state.loads;
+    this.history = state.servos.map((/** @type {any} */ one) => new History(one.columns));
+    this.header = null;
+    this.time = 0;
+    this.emit("scene", state);
+  }
+
+  /** @param {ArrayBuffer} data */
+  pushed(data) {
+    const length = new DataView(data).getUint32(0, true);
+    /** @type {Header} */
+    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+    let at = Math.ceil((4 + length) / 8) * 8;
+    if (header.servos.length !== this.history.length) return;
+    header.servos.forEach((part, k) => {
+      const rows = new Float64Array(data, at, part.n * part.columns.length);
+      at += rows.byteLength;
+      const pulses = new Float64Array(data, at, 2 * part.m);
+      at += pulses.byteLength;
+      if (this.history[k].width !== part.columns.length) this.history[k] = new History(part.columns);
+      this.history[k].add(rows, pulses);
+    });
+    this.header = header;
+    this.time = header.t;
+    this.emit("push", header);
+  }
+
+  /** @param {number|null} id @param {any} found @param {string|null} wrong */
+  answered(id, found, wrong) {
+    const waits = id === null ? undefined : this.waiting.get(id);
+    if (!waits) { if (wrong) this.notice(wrong); return; }
+    this.waiting.delete(/** @type {number} */ (id));
+    if (wrong) waits.failed(new Error(wrong));
+    else waits.done(found);
+  }
+
+  /** @param {CloseEvent} event */
+  closed(event) {
+    for (const { failed } of this.waiting.values()) failed(new Error("the line to the bench was cut"));
+    this.waiting.clear();
+    this.emit("closed");
+    if (event.code === 4003 || event.code === 4403) { this.emit("locked", event.reason); return; }
+    const wait = AGAIN[Math.min(this.attempt, AGAIN.length - 1)];
+    this.attempt += 1;
+    if (!this.full) this.notice(`the line to the bench was cut; trying again in ${wait / 1000} s`);
+    setTimeout(() => this.open(), this.full ? 8000 : wait);
+    this.full = "";
+  }
+
+  /** Keep the text of the bench, for when the line is cut. */
+  async keep() {
+    if (this.role === "watcher" || !this.socket || this.socket.readyState !== WebSocket.OPEN) return;
+    const found = await this.tell({ text: true });
+    if (found) this.kept = found.text;
+  }
+}

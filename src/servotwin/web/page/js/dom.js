@@ -1,0 +1,93 @@
+// Small helpers to build the page.
+
+/**
+ * Make an element.
+ * @template {keyof HTMLElementTagNameMap} K
+ * @param {K} tag
+ * @param {Record<string, any>} [attributes] listeners begin with "on"; "text" is its text
+ * @param {...(Node|string|null)} children
+ * @returns {HTMLElementTagNameMap[K]}
+ */
+export function el(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  dress(made, attributes);
+  made.append(...children.filter((child) => child !== null));
+  return made;
+}
+
+/**
+ * Make an element of a drawing.
+ * @param {string} tag
+ * @param {Record<string, any>} [attributes]
+ * @param {...Node} children
+ * @returns {SVGElement}
+ */
+export function svg(tag, attributes = {}, ...children) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  dress(made, attributes);
+  made.append(...children);
+  return made;
+}
+
+/**
+ * @param {Element} made
+ * @param {Record<string, any>} attributes
+ */
+function dress(made, attributes) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (name === "text") made.textContent = String(value);
+    else if (name === "value" && "value" in made) made.value = value;
+    else made.setAttribute(name, value === true ? "" : String(value));
+  }
+}
+
+let count = 0;
+
+/** @returns {string} an id that nothing else has */
+export function unique() {
+  count += 1;
+  return `e${count}`;
+}
+
+/**
+ * Make a panel of the side: a heading that opens it.
+ * @param {HTMLElement} root
+ * @param {string} title
+ * @param {boolean} [open]
+ * @returns {HTMLElement} what it holds
+ */
+export function panel(root, title, open = false) {
+  const body = el("div", { class: "body" });
+  root.append(el("details", { open }, el("summary", {}, el("h2", { text: title })), body));
+  return body;
+}
+
+/**
+ * Make a labelled choice.
+ * @param {string} label
+ * @param {[string, string][]} options value and text
+ * @param {(value: string) => void} chosen
+ * @returns {{row: HTMLElement, select: HTMLSelectElement}}
+ */
+export function choice(label, options, chosen) {
+  const id = unique();
+  const select = el("select", { id, onchange: () => chosen(select.value) },
+    ...options.map(([value, text]) => el("option", { value, text })));
+  return { row: el("div", { class: "row" }, el("label", { for: id, text: label }), select), select };
+}
+
+/**
+ * Call something at most once a frame.
+ * @param {() => void} draw
+ * @returns {() => void}
+ */
+export function onceAFrame(draw) {
+  let waits = false;
+  return () => {
+    if (waits) return;
+    waits = true;
+    requestAnimationFrame(() => { waits = false; draw(); });
+  };
+}

@@ -1,0 +1,57 @@
+// The page: every panel is a file.
+
+import { Bench } from "./bench.js";
+import { el } from "./dom.js";
+import * as catalog from "./catalog.js";
+import * as classroom from "./classroom.js";
+import * as clock from "./clock.js";
+import * as command from "./command.js";
+import * as controls from "./controls.js";
+import * as exports from "./exports.js";
+import * as horn from "./horn.js";
+import * as lcd from "./lcd.js";
+import * as lessons from "./lessons.js";
+import * as mystery from "./mystery.js";
+import * as parameters from "./parameters.js";
+import * as registers from "./registers.js";
+import * as scope from "./scope.js";
+import * as summary from "./summary.js";
+import * as theme from "./theme.js";
+import * as traces from "./traces.js";
+
+const SIDE = /** @type {[string, {mount: (root: HTMLElement, bench: Bench) => void}][]} */ ([
+  ["command", command], ["load", controls], ["registers", registers], ["any", parameters], ["servos", catalog],
+  ["lessons", lessons], ["mystery", mystery], ["files", exports]]);
+const INSTRUMENTS = /** @type {[string, {mount: (root: HTMLElement, bench: Bench) => void}][]} */ ([
+  ["horn", horn], ["lcd", lcd], ["scope", scope], ["traces", traces], ["words", summary]]);
+
+/** @param {string} id @returns {HTMLElement} */
+const place = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+
+const bench = new Bench();
+clock.mount(place("clock"), bench);
+theme.mount(place("theme"), bench);
+classroom.mount(place("instruments"), bench);
+for (const [name, one] of INSTRUMENTS) {
+  const section = el("section", { class: `panel ${name}-panel` });
+  place("instruments").append(section);
+  one.mount(section, bench);
+}
+for (const [name, one] of SIDE) {
+  const section = el("section", { class: `side ${name}` });
+  place("controls").append(section);
+  one.mount(section, bench);
+}
+
+const notice = place("notice");
+let quiet = 0;
+bench.on("said", (line) => {
+  notice.hidden = false;
+  notice.textContent = line;
+  clearTimeout(quiet);
+  quiet = window.setTimeout(() => { notice.hidden = true; }, 8000);
+});
+bench.on("scene", () => document.body.classList.add("ready"));
+setInterval(() => { if (bench.header?.running) bench.keep(); }, 5000);
+bench.open();
+Object.assign(window, { bench });

@@ -1,0 +1,44 @@
+// A servo whose numbers are hidden: measure, fit or guess, and compare.
+
+import { el, panel, unique } from "./dom.js";
+import { plain, printed } from "./units.js";
+
+/** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
+export function mount(root, bench) {
+  const body = panel(root, "Mystery servo");
+  const id = unique();
+  const seed = el("input", { type: "number", id, min: 0, step: 1, value: 7 });
+  const place = el("div");
+  body.append(el("p", { text: "Some of its numbers are hidden behind a seed. Measure it, and find out." }),
+    el("div", { class: "row" }, el("label", { for: id, text: "Seed" }), seed, el("button", { text: "Begin", onclick: () => {
+      history.replaceState(null, "", `${location.pathname}${location.search}#mystery=${seed.value}`);
+      bench.tell({ mystery: Number(seed.value) });
+    } })), place);
+
+  bench.on("scene", (state) => {
+    const unknowns = state.unknowns ?? [];
+    place.replaceChildren();
+    if (!unknowns.length) return;
+    /** @type {HTMLDetailsElement} */ (body.parentElement).open = true;
+    const said = el("div", { "aria-live": "polite" });
+    const fields = unknowns.map((/** @type {any} */ one) => {
+      const field = unique();
+      const input = el("input", { type: "number", id: field, step: "any" });
+      return { one, input, row: el("div", { class: "card" }, el("label", { for: field }, el("code", { text: one.name })),
+        el("span", { class: "typed" }, input, el("span", { class: "unit", text: printed(one.unit) })),
+        el("p", { class: "soft", text: `${one.meaning}, between ${plain(one.low, 3)} and ${plain(one.high, 3)} ${printed(one.unit)}` })) };
+    });
+    place.append(...fields.map((/** @type {any} */ field) => field.row), el("button", { class: "primary", text: "Compare with the truth",
+      onclick: async () => {
+        const guess = Object.fromEntries(fields.filter((/** @type {any} */ field) => field.input.value !== "")
+          .map((/** @type {any} */ field) => [field.one.name, Number(field.input.value)]));
+        const found = await bench.tell({ guess });
+        if (found) {
+          said.replaceChildren(el("table", {}, el("caption", { text: "Your guess and the truth" }), el("tbody", {},
+            ...found.compared.map((/** @type {any} */ row) => el("tr", {}, el("th", { scope: "row", text: row.name }),
+              el("td", { text: row.guess === null ? "–" : plain(row.guess) }), el("td", { text: row.truth === null ? "?" : plain(row.truth) }),
+              el("td", { text: row.error === null ? "" : `${(100 * row.error).toFixed(1)} %` }), el("td", { text: row.said }))))));
+        }
+      } }), said);
+  });
+}

@@ -1,0 +1,53 @@
+// The registers of a bus servo by the maker's names, and what they mean at the shaft.
+
+import { el, panel, unique } from "./dom.js";
+import { plain, printed } from "./units.js";
+
+const FIRST = ["P_Coefficient", "D_Coefficient", "I_Coefficient", "Torque_Limit", "Max_Torque_Limit", "Goal_Velocity",
+  "Acceleration", "Position_P_Gain", "Position_D_Gain", "Position_I_Gain", "Goal_PWM", "Profile_Velocity",
+  "Profile_Acceleration", "P_Gain", "D_Gain", "I_Gain", "CW_Compliance_Slope", "CCW_Compliance_Slope"];
+
+/** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
+export function mount(root, bench) {
+  const body = panel(root, "Registers");
+
+  const show = () => {
+    const those = bench.facts.map((facts, k) => ({ facts, k })).filter(({ facts }) => facts.registers || facts.loop);
+    root.hidden = !those.length;
+    body.replaceChildren(...those.map(({ facts, k }) => servo(facts, k)));
+  };
+
+  /** @param {any} facts @param {number} k */
+  const servo = (facts, k) => {
+    const loop = facts.loop;
+    const rows = [...(facts.registers ?? [])].sort((a, b) => rank(a.name) - rank(b.name));
+    return el("div", {}, bench.facts.length > 1 ? el("h3", { text: `${k + 1}: ${facts.title}` }) : null,
+      loop ? el("p", { class: "stiffness" }, "The loop is a spring of ", el("strong", {
+        text: `${plain(loop.stiffness_nm_per_rad, 3)} N m/rad` }), ` up to ${plain(loop.cap_torque_nm, 3)} N m at an error of ${
+        plain((loop.cap_error_rad * 180) / Math.PI, 3)}°.`) : null,
+      el("label", { class: "tick" }, el("input", { type: "checkbox", checked: true, onchange: (/** @type {any} */ event) =>
+        bench.tell({ do: "torque", value: event.target.checked, servo: k }) }), " torque is on"),
+      ...rows.map((one) => register(facts, one, k)));
+  };
+
+  /** @param {any} facts @param {any} one @param {number} k */
+  const register = (facts, one, k) => {
+    const id = unique();
+    const numbers = one.numbers.map((/** @type {string} */ name) => facts.parameters.find((/** @type {any} */ p) => p.name === name))
+      .filter((/** @type {any} */ p) => p && typeof p.value === "number")
+      .map((/** @type {any} */ p) => `${p.symbol || p.meaning} = ${plain(p.value / p.shown.factor)} ${printed(p.shown.unit)}`);
+    const input = el("input", { type: "number", id, min: one.low, max: one.high, step: 1, value: one.value,
+      onchange: () => bench.tell({ do: "register", value: { [one.name]: Number(input.value) }, servo: k }) });
+    return el("div", { class: "card" }, el("label", { for: id }, el("code", { text: one.name }), ` (${one.address})`), input,
+      el("p", { class: "soft", text: `${one.low} to ${one.high}${numbers.length ? `; ${numbers.join(", ")}` : ""}` }));
+  };
+
+  bench.on("scene", show);
+  bench.on("changed", () => { if (!body.contains(document.activeElement) || document.activeElement?.tagName !== "INPUT") show(); });
+}
+
+/** @param {string} name @returns {number} */
+function rank(name) {
+  const at = FIRST.indexOf(name);
+  return at < 0 ? FIRST.length : at;
+}

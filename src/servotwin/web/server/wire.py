@@ -1,0 +1,139 @@
+"""What goes over the wire: messages in JSON, and pushes as a header with numbers behind it."""
+
+from __future__ import annotations
+
+import json
+import math
+from array import array
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+from servotwin.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from servotwin.web.live import Push
+
+VERSION = 1
+_BYTES = 8  # of a number
+_DEEPEST = 6  # tables in tables of a message
+_LONGEST_LINE = 300  # characters of what is told
+
+
+def message_of(text: object) -> dict[str, Any]:
+    """Return a message that a page sent.
+
+    Raises
+    ------
+    InputError
+        If it is none: no JSON object, or numbers that are not finite.
+
+    Examples
+    --------
+    >>> message_of('{"run": true, "id": 3}')
+    {'run': True, 'id': 3}
+    """
+    if not isinstance(text, str):
+        raise InputError("message", got="bytes", allowed="text: one object in JSON")
+    try:
+        found = json.loads(text, parse_constant=_refused)
+    except RecursionError:
+        raise InputError("message", got="tables nested too deeply", allowed="one object in JSON") from None
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError("message", got=text[:60], allowed="one object in JSON") from None
+    if not isinstance(found, dict):
+        raise InputError("message", got=text[:60], allowed="one object in JSON")
+    _check_depth(found, _DEEPEST)
+    return found
+
+
+def id_of(message: Mapping[str, Any]) -> int | None:
+    """Return the number by which a page knows its message; None without.
+
+    Examples
+    --------
+    >>> id_of({"id": 7}), id_of({"id": "seven"})
+    (7, None)
+    """
+    number = message.get("id")
+    return number if isinstance(number, int) and not isinstance(number, bool) and abs(number) < 2**53 else None
+
+
+def text_of(message: Mapping[str, Any]) -> str:
+    """Return a message to a page; what is no finite number becomes null.
+
+    Examples
+    --------
+    >>> text_of({"time": float("nan")})
+    '{"time":null}'
+    """
+    try:
+        return json.dumps(message, separators=(",", ":"), allow_nan=False)
+    except ValueError:
+        return json.dumps(_finite(message), separators=(",", ":"))
+
+
+def packed(header: Mapping[str, Any], push: Push) -> bytes:
+    """Return a push as bytes: length of its header, header, zeros up to a multiple of 8, then numbers.
+
+    Parameters
+    ----------
+    header : mapping
+        What is told beside.
+    push : Push
+
+    Examples
+    --------
+    >>> from servotwin.web.live import Push, ServoPush
+    >>> data = packed({}, Push(0.5, (ServoPush(("time", "output_angle"), [(0.5, 1.25)], [(0.0, 1.5e-3)]),), []))
+    >>> len(data) % 8, data[-32:-24] == array("d", [0.5]).tobytes()
+    (0, True)
+    """
+    whole = {"t": push.time, **header, "events": push.events,
+             "servos": [{"n": len(one.points), "m": len(one.pulses), "columns": one.columns} for one in push.servos]}
+    text = text_of(whole).encode()
+    numbers = array("d")
+    for one in push.servos:
+        numbers.extend(chain.from_iterable(one.points))
+        numbers.extend(chain.from_iterable(one.pulses))
+    if array("H", [1]).tobytes()[0] == 0:  # a machine that keeps numbers the other way round
+        numbers.byteswap()
+    gap = -(4 + len(text)) % _BYTES
+    return b"".join([len(text).to_bytes(4, "little"), text, bytes(gap), numbers.tobytes()])
+
+
+def line_of(error: Exception) -> str:
+    """Return what to tell of an error, in one line.
+
+    Examples
+    --------
+    >>> line_of(InputError("speed", got=0, allowed="more"))
+    'speed: got 0, allowed: more'
+    """
+    line = " ".join(str(error).split())
+    return line if len(line) <= _LONGEST_LINE else f"{line[:_LONGEST_LINE]} ..."
+
+
+def _refused(word: str) -> Any:
+    raise InputError("message", got=word, allowed="finite numbers")
+
+
+def _check_depth(value: Any, left: int) -> None:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError("message", got=value, allowed="finite numbers")
+    if isinstance(value, dict | list):
+        if left == 0:
+            raise InputError("message", got="tables nested too deeply", allowed=f"at most {_DEEPEST} deep")
+        for one in value.values() if isinstance(value, dict) else value:
+            _check_depth(one, left - 1)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
