@@ -12,21 +12,15 @@ import numpy as np
 
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model
-from servotwin.models.engine import shared_source
-from servotwin.models.engine.modes import Vector
-from servotwin.models.engine.records import object_of
-from servotwin.models.engine.seats import Mate
-from servotwin.models.engine.step import at_pulses
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
-from servotwin.models.terms import duty
-from servotwin.models.terms.bridge import coasts
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.signals import Signal
 from servotwin.simulation import bus_run, files, frames
 from servotwin.simulation.bus_rows import events_of, segments_of
 from servotwin.simulation.bus_supply import MODEL_NAMES, MODELS, check_rigid, check_supply, on_supply, source_of
+from servotwin.simulation.bus_voltage import BusVoltage
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Plan
 from servotwin.simulation.oddities import warn_of
@@ -257,7 +251,7 @@ def simulate_bus(servos: Mapping[str, Sequence[Any]], *, supply: Supply, duratio
     ended = duration if status.ok else rows.ended
     motions, events = segments_of(plans, rows), events_of(plans, rows)
     alone = [Trajectory(own) for own in motions]
-    bus = _BusVoltage(source, plans, alone)
+    bus = _AllAlong(source, plans, alone)
     results = {
         name: Result(model=sims[name].model, command=command, load=sims[name].load, drive=sims[name].drive(command),
                      time=times, trajectory=Trajectory(own, bus), events=happened, status=status, ended=ended,
@@ -287,7 +281,7 @@ def _checked(servos: Mapping[str, Sequence[Any]], supply: Supply, duration: floa
 
 
 @dataclass(frozen=True, eq=False)
-class _BusVoltage:
+class _AllAlong:
     """The voltage of the bus at any time, from the states of all servos."""
 
     source: Source
@@ -296,29 +290,14 @@ class _BusVoltage:
 
     def __call__(self, time: Array) -> Array:
         samples = [trajectory.at(time) for trajectory in self.trajectories]
-        return np.array([self._at(samples, k) for k in range(len(time))])
+        bus = BusVoltage(self.source, len(self.plans))
+        return np.array([self._at(bus, samples, k) for k in range(len(time))])
 
-    def _at(self, samples: Sequence[Samples], k: int) -> float:
-        connected = 0
+    def _at(self, bus: BusVoltage, samples: Sequence[Samples], k: int) -> float:
+        bus.begin()
         for plan, s in zip(self.plans, samples, strict=True):
             y = (s.angle[k], s.speed[k], s.current[k], s.winding[k], s.housing[k], s.motor_angle[k], s.motor_speed[k])
             if not np.isfinite(y[0]):  # after the run has ended
                 return math.nan
-            connected += self._connect(plan, y, s, k, connected)
-        return shared_source.put_in_zones(self.source, self._mates, connected, self.source.V)[1]
-
-    def _connect(self, plan: Plan, y: Vector, s: Samples, k: int, place: int) -> int:
-        """Let a servo take its place among those whose motors are connected to the bus; return 1 if it is."""
-        drive, now = float(s.drive[k]), 0.0 if s.duty is None else float(s.duty[k])
-        numbers = duty.at_duty(plan.numbers, now) if plan.digital else at_pulses(plan.numbers, int(s.silent[k]))
-        if drive == 0.0 and not (coasts(numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
-            return 0
-        mate = self._mates[place]
-        mate.numbers = shared_source.on_stiff_source(numbers, drive == 0.0)
-        mate.sign = shared_source.part_on_bus(drive, numbers.bridge, now, y)
-        mate.returns, mate.y = int(drive == 0.0), y
-        return 1
-
-    @cached_property
-    def _mates(self) -> list[Any]:
-        return [object_of(Mate) for _ in self.plans]
+            bus.connect(plan, y, float(s.drive[k]), 0.0 if s.duty is None else float(s.duty[k]), int(s.silent[k]))
+        return bus.volts()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine import bus, controller, crew, tape
 from servotwin.models.engine.buses import Buses, Tables
-from servotwin.models.engine.memory import Memory, origin_of, resumed
+from servotwin.models.engine.memory import Memory, forgotten, origin_of, resumed
 from servotwin.models.engine.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
 from servotwin.models.engine.seats import ROOM, Mate, Seat, Shared, put_shared
 from servotwin.models.engine.step import DIVERGED
@@ -58,14 +58,18 @@ def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration
     recipe = recipe_of(any(digital), any(not_plain(plan.numbers) for plan in plans))
     work = duration * sum(1.0 / (plan.firmware.T_c if plan.digital else plan.chip.frame_period) for plan in plans)
     compiled = len(digital) == 1 and _worth_it(recipe, work)  # no kernel has servos with a program beside others
-    way: _Compiled | _Plainly = (_Compiled if compiled else _Plainly)(recipe, plans, states, source)
-    written = tape_of(len(plans))
+    way = _Compiled(recipe, plans, states, source) if compiled else Plainly(plans, states, source)
+    return taped(way, duration, tape_of(len(plans)))
+
+
+def taped(way: _Compiled | Plainly, until: float, written: Tape) -> Rows:
+    """Let servos go on to a time [s], by a tape that is read whenever it is full; return what that leaves behind."""
     found: list[list[Array]] = []
     count, status, when = 0, bus.PAUSED, 0.0
     while status == bus.PAUSED:
         written.used[:] = 0
         try:
-            status, when = way.go_on(duration, written)
+            status, when = way.go_on(until, written)
         except ArithmeticError:  # numbers beyond what a float holds
             status, when = DIVERGED, float(written.motions[:written.used[0], tape.UNTIL].max(initial=when))
         part = [rows[:used].copy() for rows, used in zip(written[:3], written.used.tolist(), strict=True)]
@@ -120,23 +124,41 @@ def begun(plan: Plan, state: State) -> Memory:
     return memory
 
 
-class _Plainly:
-    """Servos on one source that run in plain Python."""
+class Plainly:
+    """Servos on one source that run in plain Python.
 
-    def __init__(self, recipe: Recipe, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
-        self._inputs = [plan.inputs for plan in plans]
-        self._memories = [begun(plan, state) for plan, state in zip(plans, states, strict=True)]
+    Parameters
+    ----------
+    plans, states : sequence of Plan, of State
+        Of the servos, in the same order.
+    source : Source
+        That they share.
+    """
+
+    def __init__(self, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
         self._joined, self._shared = [-1 for _ in plans], object_of(Shared)
         put_shared(self._shared, at_start(source))
         self._seats, self._mates = ([object_of(kind) for _ in range(n * len(plans))] for kind, n in (
             (Seat, 1), (Mate, 2)))
+        self.begin(plans, states)
+
+    def begin(self, plans: Sequence[Plan], states: Sequence[State]) -> None:
+        """Take up what servos are told and remember; what they are in together goes on."""
+        self._inputs = [plan.inputs for plan in plans]
+        self.memories = [begun(plan, state) for plan, state in zip(plans, states, strict=True)]
         for seat, plan in zip(self._seats, plans, strict=True):
             crew.sit(seat, plan.numbers, plan.chip, plan.inputs)
 
+    def break_up(self, source: Source) -> None:
+        """Let nobody move together, and every motion begin anew: numbers of a servo, or the source, are others now."""
+        self.memories = [forgotten(memory) for memory in self.memories]
+        self._joined = [-1 for _ in self._joined]
+        put_shared(self._shared, at_start(source))
+
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
         """Go on to a time [s]; return a status and when."""
-        ends = [until - origin_of(memory) for memory in self._memories]
-        return bus.through(self._inputs, self._memories, ends, self._joined, self._shared, self._seats, self._mates,
+        ends = [until - origin_of(memory) for memory in self.memories]
+        return bus.through(self._inputs, self.memories, ends, self._joined, self._shared, self._seats, self._mates,
                            written)
 
 
