@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.models.engine.modes import Vector
     from servotwin.models.engine.motion import Motion
+    from servotwin.models.terms.numbers import Numbers
     from servotwin.simulation.engine import Plan, Segment
 
 Row = tuple[float, ...]
@@ -76,6 +77,7 @@ class Sight:
         self._pick: Callable[[Any], Row] = itemgetter(*map(_FOUND.index, self.names))
         self._commands = tuple(name if name in self.names else None for name in _COMMANDS)
         self._commanded: tuple[float, Row] = (math.nan, ())
+        self._observed: tuple[Any, Any] = ((), None)  # at rest nothing changes from one time to the next
         self._prepared: tuple[Motion | None, Motion | None] = (None, None)
 
     def seen(self, plan: Plan, segment: Segment, time: float, bus_voltage: float | None = None) -> Row:
@@ -92,7 +94,7 @@ class Sight:
             Of a supply that several servos share [V]; the servo's own supply unless given.
         """
         time = min(max(time, segment.start), segment.end)
-        y, m = self._state(segment.motion, time - segment.anchor), segment.motion
+        y, m = self.state(segment, time), segment.motion
         local = time - segment.origin
         u, tau = piece_value(m.u, local), piece_value(m.tau, local)
         try:
@@ -102,15 +104,9 @@ class Sight:
             else:
                 numbers = warm(numbers, y)
             wiper = wiper_at(numbers.sensor, segment.wiper, y[0])
-            shown = observed(numbers, plan.curve, m.mode, u, tau, y, wiper, segment.drive, segment.error)
-            if duty.present(numbers.bridge):
-                told = _Told(segment.duty, segment.goal, segment.reference, segment.trip)
-                shown = told_by(numbers.bridge, told, shown)
+            shown = self._shown(numbers, (plan.curve, m.mode, u, tau, y, wiper, segment.drive, segment.error), segment)
         except (ArithmeticError, ValueError):  # numbers beyond what a float holds
             shown = Observed(*(math.nan,) * len(Observed._fields))
-        N = self._reduction
-        shown = shown._replace(motor_angle=N * shown.motor_angle, motor_speed=N * shown.motor_speed,
-                               motor_torque=shown.motor_torque / N)
         return self._pick((*shown, y[0], y[1], *self._command(plan, time)))
 
     def points(self, plan: Plan, segments: Sequence[Segment], times: Sequence[float],
@@ -131,8 +127,24 @@ class Sight:
         volts = bus_voltages or (None,) * len(times)
         return [(t, *self.seen(plan, segments[k], t, V)) for t, k, V in zip(times, places, volts, strict=True)]
 
-    def _state(self, m: Motion, age: float) -> Vector:
-        """Return the state of a motion, which is prepared once, and only where it has to be."""
+    def _shown(self, numbers: Numbers, instant: tuple[Any, ...], segment: Segment) -> Observed:
+        """Return all signals, those of the motor at its own shaft; once where nothing differs from the time before."""
+        told = _Told(segment.duty, segment.goal, segment.reference, segment.trip)
+        key = (numbers, instant, told)
+        if key != self._observed[0]:
+            shown, N = observed(numbers, *instant), self._reduction
+            if duty.present(numbers.bridge):
+                shown = told_by(numbers.bridge, told, shown)
+            self._observed = (key, shown._replace(
+                motor_angle=N * shown.motor_angle, motor_speed=N * shown.motor_speed,
+                motor_torque=shown.motor_torque / N))
+        found: Observed = self._observed[1]
+        return found
+
+    def state(self, segment: Segment, time: float) -> Vector:
+        """Return where a servo stands in a segment at a time [s]; a motion is prepared once, and only where needed."""
+        m = segment.motion
+        age = min(max(time, segment.start), segment.end) - segment.anchor
         if motion.is_step(m) and not m.has_dense and age != 0.0 and m.t0 + age < m.t0 + m.length:
             if self._prepared[0] is not m:
                 self._prepared = (m, motion.prepared(m))

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin import loads
 from servotwin.errors import InputError
 from servotwin.models import mid_travel
+from servotwin.simulation.bus_supply import OF_BUS
 from servotwin.simulation.lane_loads import LOAD_NAMES
 from servotwin.units import is_finite
 from servotwin.web.live.actions import Action, checked
 from servotwin.web.live.scene import LONGEST, MOST_ACTIONS, Scene
 from servotwin.web.live.scene_servo import family_of, with_registers
-from servotwin.web.live.station import Row, Station
+from servotwin.web.live.shared_supply import SharedSupply, hung
+from servotwin.web.live.station import Row, Seen, Station
 from servotwin.web.live.told import taken
 from servotwin.web.live.transmitter import Transmitter
 
@@ -71,9 +73,11 @@ class LiveBench:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self.models = tuple(servo.built() for servo in scene.servos)
-        load, first = load_of(scene), _first_command(scene, self.models)
+        models, load = tuple(servo.built() for servo in scene.servos), load_of(scene)
+        self.models = hung(models, load, scene.supply) if scene.supply else models
+        first = _first_command(scene, self.models)
         self._stations = [Station(model, load, first, scene.seed + k) for k, model in enumerate(self.models)]
+        self._supply = SharedSupply(self._stations) if scene.supply else None
         self._sender = Transmitter(scene.frame_rate, scene.seed)
         self._written: list[dict[str, int]] = [{} for _ in self.models]  # into registers
         self._done: list[Action] = []
@@ -180,11 +184,16 @@ class LiveBench:
             edges, times = self._sender.until(until), looks(self.time, until, rate)
             for k, station in enumerate(self._stations):
                 pulses[k] += station.told.hear(edges)
-                seen = station.advance(until, times, switches=switches)
+            for k, seen in enumerate(self._seen(until, times, switches)):
                 rows[k] += seen.rows
                 self.rows[k] = rows[k][-1] if rows[k] else self.rows[k]
                 events += [(time, kind, k) for time, kind in seen.events]
             self.time = until
+
+    def _seen(self, until: float, times: Sequence[float], switches: bool) -> list[Seen]:
+        if self._supply is not None:
+            return self._supply.advance(until, times, switches=switches)
+        return [station.advance(until, times, switches=switches) for station in self._stations]
 
     def _catch_up(self) -> None:
         """Do what the scene says was done by now."""
@@ -210,7 +219,9 @@ class LiveBench:
         return [partial(one.told.put, command) for one, command in found]
 
     def _set(self, action: Action) -> list[Callable[[], object]]:
-        found = [(one, own) for one in self._those(action) if (own := numbers_for(one.model, action.value))]
+        shared = self._supply is not None and any(name in OF_BUS for name in action.value)
+        those = self._stations if shared else self._those(action)
+        found = [(one, own) for one in those if (own := numbers_for(one.model, action.value))]
         if not found:
             raise InputError(", ".join(action.value), got="no servo here reads it", allowed="what a model here reads")
         changes = [(one, one.changed(own)) for one, own in found]

@@ -24,9 +24,11 @@ LONGEST_TEXT = 16_000_000  # characters
 MOST_ACTIONS = 100_000
 LONGEST = 1e6  # s
 _MOST_VIEW = 4000  # characters
-_TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", "load", "view", "lesson")
+_TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", "load", "supply", "view", "lesson")
 LOAD_FIELDS = ("inertia", "viscous_friction", "torque", "coulomb_torque", "mass", "arm", "hanging_angle")
 """What a load can have: [kg m²], [N m s/rad], [N m], [N m], [kg], [m], [rad]."""
+SUPPLY_FIELDS = ("open_circuit_voltage", "internal_resistance", "current_limit")
+"""What a supply that all share can have: [V], [ohm], [A]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +49,8 @@ class Scene:
         How far its time went [s].
     load : mapping of str to float
         Of each servo alike, by `LOAD_FIELDS`.
+    supply : mapping of str to float
+        That all servos share, by `SUPPLY_FIELDS`; empty: each has its own.
     actions : tuple of Action
         In the order of their times.
     view : mapping
@@ -67,6 +71,7 @@ class Scene:
     frame_rate: float = 50.0
     end: float = 0.0
     load: Mapping[str, float] = field(default_factory=dict)
+    supply: Mapping[str, float] = field(default_factory=dict)
     actions: tuple[Action, ...] = ()
     view: Mapping[str, Any] = field(default_factory=dict)
     lesson: Mapping[str, Any] = field(default_factory=dict)
@@ -79,7 +84,7 @@ class Scene:
             lines += ["actions = [", *(f"  {toml_value(action.row())}," for action in self.actions), "]"]
         for servo in self.servos:
             lines += ["", "[[servo]]", *servo.lines()]
-        for key in ("load", "view", "lesson"):
+        for key in ("load", "supply", "view", "lesson"):
             table = getattr(self, key)
             if table:
                 lines += ["", f"[{key}]", *(toml_line(name, value) for name, value in table.items())]
@@ -142,6 +147,7 @@ def read_scene(text: str) -> Scene:
         servos=tuple(read_scene_servo(servo) for servo in servos), name=_word(content, "name"),
         seed=_seed(content), frame_rate=_number(content, "frame_rate", 50.0, *RATES),
         end=_number(content, "end", 0.0, 0.0, LONGEST), load=_numbers(content, "load", LOAD_FIELDS),
+        supply=_numbers(content, "supply", SUPPLY_FIELDS),
         actions=done, view=_view(content), lesson=_table(content, "lesson"))
 
 

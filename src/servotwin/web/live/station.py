@@ -1,4 +1,4 @@
-"""A servo at the bench with a supply of its own: its model, where it stands, what it is told, what shows of it."""
+"""A servo at the bench: its model, where it stands, what it is told, what shows of it."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.simulation import Simulator
-from servotwin.simulation.engine import Record, Segment, State
-from servotwin.simulation.sight import Sight
+from servotwin.simulation.engine import Event, Plan, Record, Segment, State
+from servotwin.simulation.sight import Sight, places_of
 from servotwin.simulation.sight import switches as switch_times
 from servotwin.web.live.told import Taken, Told
 
 if TYPE_CHECKING:
     from servotwin.loads import Load
     from servotwin.models import Model
+    from servotwin.models.engine.modes import Vector
 
 Row = tuple[float, ...]
 _DULL = ("drive ", "current ", "zone", "pulse edge")  # how the names of events begin that come many times a second
@@ -47,7 +48,8 @@ class Station:
     def __init__(self, model: Model, load: Load, command: Mapping[str, Any], seed: int) -> None:
         self._simulator = Simulator(model, load, seed)
         self.told = Told(model, command)
-        self._state = self._simulator.initial(self.told.signal)
+        self.state = self._simulator.initial(self.told.signal)
+        """Everything that it remembers."""
         self._sight = Sight(model, load)
         self._last: Segment | None = None
         self.push = 0.0  # N m, by hand
@@ -55,7 +57,7 @@ class Station:
     @property
     def model(self) -> Model:
         """The model with its numbers of now."""
-        return self._simulator.of(self._state).model
+        return self._simulator.of(self.state).model
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -70,13 +72,13 @@ class Station:
         InputError
             Or one of its kinds, if that is not possible.
         """
-        state = self._simulator.changed(self._state, parameters=parameters, torque_enable=torque_enable)
+        state = self._simulator.changed(self.state, parameters=parameters, torque_enable=torque_enable)
         model = self._simulator.of(state).model
         return Change(state, self.told.fits(model), model)
 
     def put(self, change: Change) -> None:
         """Go on with other numbers."""
-        self._state = change.state
+        self.state = change.state
         self.told.put(change.command)
         self._sight = Sight(change.model, self._simulator.of(change.state).load)
 
@@ -88,22 +90,37 @@ class Station:
         SimulationError
             If it cannot go on.
         """
-        record, command = Record([], []), self.told.signal
-        own = self._simulator.of(self._state)
-        plan = own.plan(command, self.push)
-        self._state = self._simulator.recorded(self._state, until, command, record, external_torque=self.push)
-        segments = record.segments
+        record, plan = Record([], []), self.plan
+        self.state = self._simulator.recorded(self.state, until, self.told.signal, record, external_torque=self.push)
+        looked = with_switches(times, self.switched(record.segments) if switches else [])
+        return self.seen(plan, record.segments, record.events, looked)
+
+    @property
+    def plan(self) -> Plan:
+        """What the engine needs for what it is told now."""
+        return self._simulator.of(self.state).plan(self.told.signal, self.push)
+
+    def switched(self, segments: Sequence[Segment]) -> list[float]:
+        """Return when its bridge switches in segments that follow those that were seen [s]."""
+        return switch_times(segments if self._last is None else [self._last, *segments])
+
+    def states(self, segments: Sequence[Segment], times: Sequence[float]) -> list[tuple[Segment, Vector]]:
+        """Return in which segment it is, and where it stands, at some times [s], as `seen` takes them."""
+        return [(segments[k], self._sight.state(segments[k], t))
+                for t, k in zip(times, places_of(segments, times), strict=True)]
+
+    def seen(self, plan: Plan, segments: Sequence[Segment], events: Sequence[Event], times: Sequence[float],
+             bus_voltages: Sequence[float] | None = None) -> Seen:
+        """Return what shows of segments at times [s], under the voltages of a shared supply, if it has one [V]."""
         if not segments:
             return Seen([], [])
-        known = segments if self._last is None else [self._last, *segments]
-        seen = self._sight.points(plan, segments, with_switches(times, switch_times(known) if switches else []))
         self._last = segments[-1]
-        return Seen(seen, lively(record.events))
+        return Seen(self._sight.points(plan, segments, times, bus_voltages), lively(events))
 
     def now(self) -> Row:
         """Return the row of the present instant."""
         names, value = self._sight.names, self._simulator.observe
-        return (self._state.time, *(value(self._state, name, self.told.signal, external_torque=self.push)
+        return (self.state.time, *(value(self.state, name, self.told.signal, external_torque=self.push)
                                     for name in names))
 
 
