@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 _RENAMED = {"atanh": "arctanh", "asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2",
             "pow": "power", "fabs": "abs"}
 _BUILTINS = {"abs": "np.abs", "min": "np.minimum", "max": "np.maximum"}
+_PLAIN = {float, int, bool, np.float64}
 _NO_ARGUMENTS = ast.arguments([], [], None, [], [], None, [])
 _COMPARED = (ast.Eq, ast.NotEq, ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 
@@ -46,6 +47,8 @@ def array_form(law: Callable[..., Any], home: str = "servotwin.physics") -> Call
     """
     @wraps(law)
     def over_arrays(*args: Any, **more: Any) -> Any:
+        if not more and _PLAIN.issuperset(map(type, args)):  # as it is called most often
+            return law(*args)
         if any(x is None for x in (*args, *more.values())):  # None says: as if it were not given
             defaults = {name: p.default for name, p in inspect.signature(law).parameters.items()}
             given = dict(zip(defaults, args, strict=False)) | more
