@@ -55,6 +55,30 @@ def test_a_servo_that_coasts_runs_past_its_command():
     assert degrees(run, 1, 2.0, 3.4).max() > 123.0
 
 
+def test_vibration_ends_when_the_knob_has_its_own_supply():
+    run = run_of("vibration", 7.0)
+    shaken, still = degrees(run, 0, 1.5, 4.0), degrees(run, 0, 6.0, 7.0)
+    assert np.ptp(shaken) > 1.0
+    assert abs(np.diff(np.sign(np.diff(shaken[::5])))).sum() > 20  # it goes on turning round
+    assert shaken.max() < 85.0
+    assert still.mean() == pytest.approx(90.0, abs=2.0)
+    assert np.ptp(still) < 0.5
+
+
+def test_brown_out_comes_where_two_start_at_once():
+    run = run_of("brown-out", 7.5)
+    alone, both, mended = ([degrees(run, k, *span).mean() for k in (0, 1)] for span in
+                           ((1.7, 2.0), (4.7, 5.0), (7.2, 7.5)))
+    time = run[0]["time"]
+    np.testing.assert_allclose(run[0]["bus_voltage"], run[1]["bus_voltage"], rtol=1e-12)
+    assert alone[0] > 25.0
+    assert alone[1] == pytest.approx(-30.0, abs=1.5)
+    assert max(both) < -25.0
+    assert min(mended) > 25.0
+    tripped = [[time[run[k]["trip"] > 0.0].min(), time[run[k]["trip"] > 0.0].max()] for k in (0, 1)]
+    assert np.all((np.array(tripped) > 3.5) & (np.array(tripped) < 4.0))  # for moments: nobody sees it later
+
+
 def test_play_lets_the_horn_move_while_the_motor_stands():
     run = run_of("play", 5.9)
     assert np.ptp(degrees(run, 0, 1.0, 5.9)) < 0.1

@@ -13,7 +13,7 @@ from servotwin.web.live.scene import read_scene
 if TYPE_CHECKING:
     from servotwin.web.live.scene import Scene
 
-_ORDER = ("deadband", "droop", "frames", "brake-or-coast", "play", "p-gain")
+_ORDER = ("deadband", "droop", "frames", "brake-or-coast", "vibration", "brown-out", "play", "p-gain")
 _TEXTS = ("title", "question", "answer")
 SENTENCES = 3
 """How many a lesson says of what to look at."""

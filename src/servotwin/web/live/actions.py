@@ -1,4 +1,4 @@
-"""What can be done at a bench while time goes on: command, numbers, a push by hand, frames, registers, torque."""
+"""What can be done at a bench while time goes on: command, numbers, a push, frames, registers, torque, control circuit."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from servotwin.errors import InputError
 from servotwin.units import is_finite
 from servotwin.web.live.commands import checked_command
+from servotwin.web.live.control_circuit import checked_control
 
 _MOST_PUSH = 1e3  # N m: beyond any servo
 RATES = (1.0, 2000.0)
@@ -89,7 +90,7 @@ def checked(time: float, kind: Any, value: Any, servo: Any, servos: int) -> Acti
         raise InputError("kind of action", got=kind, allowed=", ".join(_CHECKS))
     if servo is not None and (isinstance(servo, bool) or not isinstance(servo, int) or not 0 <= servo < servos):
         raise InputError("servo of an action", got=servo, allowed=f"a whole number from 0 to {servos - 1}")
-    if servo is not None and kind == "frames":
+    if servo is not None and kind in ("frames", "control"):
         raise InputError("servo of an action", got=servo, allowed="none: all servos hear one transmitter")
     return Action(time, kind, _CHECKS[kind](value), servo)
 
@@ -137,6 +138,6 @@ def _torque(value: Any) -> bool:
 
 
 _CHECKS = {"command": checked_command, "set": _numbers, "push": _push, "frames": _frames, "register": _registers,
-           "torque": _torque}
+           "torque": _torque, "control": checked_control}
 KINDS = tuple(_CHECKS)
 """Kinds of actions."""

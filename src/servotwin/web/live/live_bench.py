@@ -8,26 +8,22 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin import loads
 from servotwin.errors import InputError
-from servotwin.models import mid_travel
 from servotwin.simulation.bus_supply import OF_BUS
 from servotwin.simulation.lane_loads import LOAD_NAMES
 from servotwin.units import is_finite
 from servotwin.web.live.actions import Action, checked
+from servotwin.web.live.beginning import first_commands, first_of, load_of, models_of
 from servotwin.web.live.scene import LONGEST, MOST_ACTIONS, Scene
 from servotwin.web.live.scene_servo import family_of, with_registers
-from servotwin.web.live.shared_supply import SharedSupply, hung
+from servotwin.web.live.shared_supply import SharedSupply
 from servotwin.web.live.station import Row, Seen, Station
-from servotwin.web.live.told import taken
 from servotwin.web.live.transmitter import Transmitter
 
 if TYPE_CHECKING:
-    from servotwin.loads import Load
     from servotwin.models import Model
     from servotwin.parameters import Servo
 
-_ARM = 0.1  # m, of a scene that gives none
 _WHOLE = ("command", "push", "torque")  # of these the last at an instant is all that counts
 
 
@@ -73,21 +69,20 @@ class LiveBench:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        models, load = tuple(servo.built() for servo in scene.servos), load_of(scene)
-        self.models = hung(models, load, scene.supply) if scene.supply else models
-        first = _first_command(scene, self.models)
-        self._stations = [Station(model, load, first, scene.seed + k) for k, model in enumerate(self.models)]
+        self.models, load = models_of(scene), load_of(scene)
+        self._todo = [*first_commands(scene, self.models), *scene.actions]
+        self._stations = [Station(model, load, first_of(self._todo, k), scene.seed + k, scene.control)
+                          for k, model in enumerate(self.models)]
+        self._begun = self._first_ones()
         self._supply = SharedSupply(self._stations) if scene.supply else None
         self._sender = Transmitter(scene.frame_rate, scene.seed)
+        self._check_rate(scene.frame_rate)
         self._written: list[dict[str, int]] = [{} for _ in self.models]  # into registers
         self._done: list[Action] = []
-        self._todo = list(scene.actions)
         self.time = 0.0
         """[s]"""
         self.load_numbers: dict[str, float] = {}
         """What was changed of loads since the start, by dotted name (SI)."""
-        if not any(action.kind == "command" and action.time == 0.0 for action in self._todo):
-            self._todo.insert(0, Action(0.0, "command", first))
         self._catch_up()
         self.rows: list[Row] = [station.now() for station in self._stations]
         """The latest row of each servo."""
@@ -172,9 +167,11 @@ class LiveBench:
         events: list[tuple[float, str, int]] = []
         while self.time < until:
             end = self._sender.snapped(min(until, self._todo[0].time) if self._todo else until)
+            end = min(end, *self._looks())
             if end <= self.time:
                 break
             self._go_on(end, points_per_second, switches, rows, pulses, events)
+            self._look()
             self._catch_up()
         return Push(self.time, tuple(map(ServoPush, self.columns, rows, pulses)), events)
 
@@ -189,6 +186,18 @@ class LiveBench:
                 self.rows[k] = rows[k][-1] if rows[k] else self.rows[k]
                 events += [(time, kind, k) for time, kind in seen.events]
             self.time = until
+
+    def _looks(self) -> list[float]:
+        """Return when the control circuit of each station looks at its command next [s]; inf without one."""
+        return [math.inf if one.told.control is None else
+                self._sender.snapped(one.told.control.next_look(self._sender.next_edge)) for one in self._stations]
+
+    def _look(self) -> None:
+        """Let the control circuits look whose time it is."""
+        for station, when, columns, row in zip(self._stations, self._looks(), self.columns, self.rows, strict=True):
+            if when <= self.time:
+                full = station.model.value("supply.open_circuit_voltage")
+                station.told.look(self.time, row[columns.index("bus_voltage")], full)
 
     def _seen(self, until: float, times: Sequence[float], switches: bool) -> list[Seen]:
         if self._supply is not None:
@@ -205,17 +214,27 @@ class LiveBench:
         put = _WAYS[action.kind](self, action)
         for one in put:
             one()
-        last = self._done[-1] if len(self._done) > 1 else None  # the first says where all begins
+        last = self._done[-1] if len(self._done) > self._begun else None
         if last is not None and action.kind in _WHOLE and (last.time, last.kind, last.servo) == (
                 action.time, action.kind, action.servo):
             self._done.pop()  # a slider that is dragged while time stands
         self._done.append(action)
 
+    def _first_ones(self) -> int:
+        """Return how many actions at the front say where all servos begin."""
+        left = set(range(len(self.models)))
+        for n, action in enumerate(self._todo):
+            if not left:
+                return n
+            if action.kind == "command":
+                left -= set(left) if action.servo is None else {action.servo}
+        return len(self._todo)
+
     def _those(self, action: Action) -> list[Station]:
         return self._stations if action.servo is None else [self._stations[action.servo]]
 
     def _command(self, action: Action) -> list[Callable[[], object]]:
-        found = [(one, taken(one.model, action.value, action.time)) for one in self._those(action)]
+        found = [(one, one.told.takes(one.model, action.value, action.time)) for one in self._those(action)]
         return [partial(one.told.put, command) for one, command in found]
 
     def _set(self, action: Action) -> list[Callable[[], object]]:
@@ -251,9 +270,18 @@ class LiveBench:
             if "rate" in action.value:
                 self._sender.tune(action.value["rate"])
             self._sender.lost = action.value.get("lost", self._sender.lost)
-        if any(one.told.widest * action.value.get("rate", 0.0) >= 1.0 for one in self._stations):
-            raise InputError("frame rate", got=f"{action.value['rate']:g} Hz", allowed="frames that a pulse fits into")
+        self._check_rate(action.value.get("rate", 0.0))
         return [put]
+
+    def _check_rate(self, rate: float) -> None:
+        if any(one.told.widest * rate >= 1.0 for one in self._stations):
+            raise InputError("frame rate", got=f"{rate:g} Hz", allowed="frames that a pulse fits into")
+
+    def _control(self, action: Action) -> list[Callable[[], object]]:
+        those = [one.told.control for one in self._stations if one.told.control is not None]
+        if not those:
+            raise InputError("control circuit", got=", ".join(action.value), allowed="a bench that has one")
+        return [partial(one.numbers.update, action.value) for one in those]
 
     def _torque(self, action: Action) -> list[Callable[[], object]]:
         those = [one for one in self._those(action) if action.servo is not None or "duty" in one.columns]
@@ -265,7 +293,8 @@ class LiveBench:
 
 _WAYS: dict[str, Callable[[LiveBench, Action], list[Callable[[], object]]]] = {
     "command": LiveBench._command, "set": LiveBench._set, "push": LiveBench._push, "frames": LiveBench._frames,
-    "register": LiveBench._register, "torque": LiveBench._torque}
+    "register": LiveBench._register, "torque": LiveBench._torque,
+    "control": LiveBench._control}
 
 
 def looks(start: float, until: float, rate: float) -> list[float]:
@@ -278,26 +307,6 @@ def looks(start: float, until: float, rate: float) -> list[float]:
     """
     first, last = math.floor(start * rate) + 1, math.ceil(until * rate)
     return [k / rate for k in range(first, last) if start < k / rate < until] + [until]
-
-
-def load_of(scene: Scene) -> Load:
-    """Return what hangs on each shaft: always all of it, so that each number can change while time goes on.
-
-    Raises
-    ------
-    LoadError
-        If a number is out of its range.
-
-    Examples
-    --------
-    >>> from servotwin.web.live import SceneServo
-    >>> load_of(Scene(servos=(SceneServo(id="hitec-hs-755hb"),), load={"mass": 0.2})).pendulum.mass
-    0.2
-    """
-    own: dict[str, Any] = dict(scene.load)
-    arm = loads.Pendulum(mass=own.pop("mass", 0.0), length=own.pop("arm", _ARM),
-                         hanging_angle=own.pop("hanging_angle", 0.0))
-    return loads.Load(**own) + arm
 
 
 def numbers_for(model: Model, values: dict[str, Any]) -> dict[str, Any]:
@@ -313,11 +322,3 @@ def numbers_for(model: Model, values: dict[str, Any]) -> dict[str, Any]:
         if name not in LOAD_NAMES:
             model.servo.get(name)
     return {name: value for name, value in values.items() if name in read}
-
-
-def _first_command(scene: Scene, models: Sequence[Model]) -> dict[str, Any]:
-    """Return the command at t = 0: what the scene says, or the middle of the travel."""
-    for action in scene.actions:
-        if action.kind == "command" and action.time == 0.0 and action.servo is None:
-            return dict(action.value)
-    return {"shape": "hold", "unit": "deg", "value": round(math.degrees(mid_travel(models[0])), 3)}

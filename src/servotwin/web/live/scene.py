@@ -15,6 +15,7 @@ from typing import Any
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.units import is_finite
 from servotwin.web.live.actions import RATES, Action, action_of
+from servotwin.web.live.control_circuit import checked_control
 from servotwin.web.live.scene_servo import SceneServo, read_scene_servo
 from servotwin.web.live.toml_text import toml_line, toml_value
 
@@ -24,7 +25,7 @@ LONGEST_TEXT = 16_000_000  # characters
 MOST_ACTIONS = 100_000
 LONGEST = 1e6  # s
 _MOST_VIEW = 4000  # characters
-_TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", "load", "supply", "view", "lesson")
+_TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", "load", "supply", "control", "view", "lesson")
 LOAD_FIELDS = ("inertia", "viscous_friction", "torque", "coulomb_torque", "mass", "arm", "hanging_angle")
 """What a load can have: [kg m²], [N m s/rad], [N m], [N m], [kg], [m], [rad]."""
 SUPPLY_FIELDS = ("open_circuit_voltage", "internal_resistance", "current_limit")
@@ -53,6 +54,8 @@ class Scene:
         That all servos share, by `SUPPLY_FIELDS`; empty: each has its own.
     actions : tuple of Action
         In the order of their times.
+    control : mapping of str to float
+        Of the control circuit that makes the pulses, by `control_circuit.CONTROL_FIELDS`; empty: pulses are exact.
     view : mapping
         What the page alone knows.
     lesson : mapping
@@ -73,6 +76,7 @@ class Scene:
     load: Mapping[str, float] = field(default_factory=dict)
     supply: Mapping[str, float] = field(default_factory=dict)
     actions: tuple[Action, ...] = ()
+    control: Mapping[str, float] = field(default_factory=dict)
     view: Mapping[str, Any] = field(default_factory=dict)
     lesson: Mapping[str, Any] = field(default_factory=dict)
 
@@ -84,7 +88,7 @@ class Scene:
             lines += ["actions = [", *(f"  {toml_value(action.row())}," for action in self.actions), "]"]
         for servo in self.servos:
             lines += ["", "[[servo]]", *servo.lines()]
-        for key in ("load", "supply", "view", "lesson"):
+        for key in ("load", "supply", "control", "view", "lesson"):
             table = getattr(self, key)
             if table:
                 lines += ["", f"[{key}]", *(toml_line(name, value) for name, value in table.items())]
@@ -148,6 +152,7 @@ def read_scene(text: str) -> Scene:
         seed=_seed(content), frame_rate=_number(content, "frame_rate", 50.0, *RATES),
         end=_number(content, "end", 0.0, 0.0, LONGEST), load=_numbers(content, "load", LOAD_FIELDS),
         supply=_numbers(content, "supply", SUPPLY_FIELDS),
+        control=checked_control(content["control"]) if "control" in content else {},
         actions=done, view=_view(content), lesson=_table(content, "lesson"))
 
 

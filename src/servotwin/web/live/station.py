@@ -38,6 +38,8 @@ class Station:
         The first.
     seed : int
         Of its noise.
+    control : mapping, optional
+        Of the control circuit that makes its pulses, if there is one.
 
     Raises
     ------
@@ -45,9 +47,10 @@ class Station:
         If the model does not take the command.
     """
 
-    def __init__(self, model: Model, load: Load, command: Mapping[str, Any], seed: int) -> None:
+    def __init__(self, model: Model, load: Load, command: Mapping[str, Any], seed: int,
+                 control: Mapping[str, float] | None = None) -> None:
         self._simulator = Simulator(model, load, seed)
-        self.told = Told(model, command)
+        self.told = Told(model, command, control)
         self.state = self._simulator.initial(self.told.signal)
         """Everything that it remembers."""
         self._sight = Sight(model, load)

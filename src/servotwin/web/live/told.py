@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from servotwin.errors import InputError
 from servotwin.models import DigitalServo
 from servotwin.models.switched import SwitchedServo
 from servotwin.physics.pieces import Piece, Pieces
 from servotwin.signals import Signal
 from servotwin.web.live.commands import command_signal
+from servotwin.web.live.control_circuit import ControlCircuit
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -33,6 +35,8 @@ class Told:
     model : Model
     command : mapping
         The first, as `checked_command` returns it; it begins at t = 0.
+    control : mapping, optional
+        Of the control circuit that makes the pulses; they are those that the model makes of the command unless given.
 
     Raises
     ------
@@ -49,16 +53,34 @@ class Told:
     ([(0.0, 0.0015), (0.02, 0.0015)], (0.0, 0.02))
     """
 
-    def __init__(self, model: Model, command: Mapping[str, Any]) -> None:
+    def __init__(self, model: Model, command: Mapping[str, Any], control: Mapping[str, float] | None = None) -> None:
         self.pulsed = isinstance(model, SwitchedServo) and not (isinstance(model, DigitalServo) and model.takes_goals)
-        self._taken = taken(model, command, 0.0)
+        if control and not self.pulsed:
+            raise InputError("model at a control circuit", got=type(model).__name__, allowed="one of pulses")
+        self.control: ControlCircuit | None = None
+        """What makes its pulses; None: they are as the command says."""
+        self._taken = _taken(model, command, 0.0, controlled=bool(control))
+        if control:
+            self.control = ControlCircuit(control, float(self._taken.shape(0.0)))
         self.signal = self._silence() if self.pulsed else self._taken.shape
         """What the model follows now."""
 
     @property
     def widest(self) -> float:
-        """The longest pulse that the command may ask for [s]; 0 where there are none."""
+        """The longest pulse that the command may ask for, and what has to follow it [s]; 0 where there are none."""
+        if self.control is not None:
+            return self.control.longest
         return self._taken.drive.extremes[1] if self.pulsed else 0.0
+
+    def takes(self, model: Model, command: Mapping[str, Any], time: float) -> Taken:
+        """Return a command from a time on [s] as a model follows it.
+
+        Raises
+        ------
+        CommandError, InputError
+            If the model, or the control circuit, does not take it.
+        """
+        return _taken(model, command, time, controlled=self.control is not None)
 
     def put(self, command: Taken) -> None:
         """Follow another command from its start on, or from the next frame on."""
@@ -76,11 +98,23 @@ class Told:
         """
         return Taken(self._taken.shape, model.command(self._taken.shape))
 
+    def look(self, time: float, bus_voltage: float, full: float) -> None:
+        """Let its control circuit read the command at a time [s], off a supply that has a voltage of a full one [V].
+
+        Raises
+        ------
+        InputError
+            If nothing is left of its reference.
+        """
+        if self.control is not None:
+            self.control.look(float(self._taken.shape(time)), 1.0 - bus_voltage / full)
+
     def hear(self, edges: Sequence[FrameEdge]) -> list[tuple[float, float]]:
         """Take the frames of the time that comes; return edges and widths of their pulses [s], width 0 if lost."""
         if not self.pulsed:
             return []
-        pulses = [(edge.time, float(self._taken.drive(edge.time)) if edge.sent else 0.0) for edge in edges]
+        made = [(edge, self._width(edge.time)) for edge in edges]
+        pulses = [(edge.time, width if edge.sent else 0.0) for edge, width in made]
         sent = [pulse for pulse in pulses if pulse[1] > 0.0]
         if sent:
             rows = self.signal.pieces.table
@@ -88,20 +122,19 @@ class Told:
             self.signal = _train([*before, *sent])
         return pulses
 
+    def _width(self, edge: float) -> float:
+        return float(self._taken.drive(edge)) if self.control is None else self.control.send(edge)
+
     def _silence(self) -> Signal:
         """Return a train before its first pulse: the servo stands where the command asks for just before t = 0."""
-        return _train([(_NEVER, float(self._taken.drive(0.0)))])
+        first = float(self._taken.drive(0.0)) if self.control is None else self.control.width
+        return _train([(_NEVER, first)])
 
 
-def taken(model: Model, command: Mapping[str, Any], time: float) -> Taken:
-    """Return a command from a time on [s] as a model follows it.
-
-    Raises
-    ------
-    CommandError
-        If the model does not take it.
-    """
+def _taken(model: Model, command: Mapping[str, Any], time: float, *, controlled: bool) -> Taken:
     shape = command_signal(command, time)
+    if controlled and shape.unit != "V":
+        raise InputError("unit of a command to a control circuit", got=command["unit"], allowed="V")
     return Taken(shape, model.command(shape))
 
 

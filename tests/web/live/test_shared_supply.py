@@ -1,0 +1,125 @@
+"""Servos of a bench on one supply do what `simulate_bus` and `VectorSimulator` say of them, however time is cut."""
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from servotwin.errors import InputError
+from servotwin.web.live import LiveBench, read_scene
+
+SUPPLY = {"open_circuit_voltage": 6.0, "internal_resistance": 0.5}
+ANALOG, DIGITAL = "hitec-hs-755hb", "towerpro-mg996r"
+CASES = [([(ANALOG, "PulseServo", "")] * 2, {}), ([(ANALOG, "PulseServo", "")] * 2, {"current_limit": 1.0}),
+         ([(ANALOG, "PulseServo", '"electronics.off_state" = "coast"'), (ANALOG, "PulseServoInductive", ""),
+           (ANALOG, "PulseServo", '"electronics.supply_coupling" = 0.01')], {}),
+         ([(DIGITAL, "DigitalServo", "")] * 2, {}), ([(ANALOG, "PulseServo", ""), (DIGITAL, "DigitalServo", "")], {})]
+
+
+def scene_text(servos, supply, more: str = "") -> str:
+    lines = ["format = 1", "seed = 5", more]
+    for name, model, parameters in servos:
+        lines += ["[[servo]]", f'id = "{name}"', f'model = "{model}"', f"parameters = {{{parameters}}}"]
+    volts = (f"{key} = {value}" for key, value in supply.items())
+    return "\n".join([*lines, "[load]", "inertia = 2e-4", "[supply]", *volts])
+
+
+def gone_on(bench: LiveBench, end: float, pace: random.Random) -> list[list[tuple[float, float]]]:
+    """Let a bench go on in pieces; return the pulses of each servo."""
+    pulses = [[] for _ in bench.models]
+    while bench.time < end:
+        push = bench.advance(min(end, bench.time + pace.choice([1e-5, 7e-4, 1 / 60, 0.02, 0.13])), 100.0)
+        for own, seen in zip(pulses, push.servos, strict=True):
+            own += seen.pulses
+    return pulses
+
+
+def angles(bench: LiveBench) -> list[float]:
+    return [row[names.index("output_angle")] for row, names in zip(bench.rows, bench.columns, strict=True)]
+
+
+@pytest.mark.parametrize(("servos", "more"), CASES)
+def test_they_do_what_a_fleet_does(servos, more):
+    supply = SUPPLY | more
+    bench = LiveBench(read_scene(scene_text(servos, supply)))
+    bench.do("command", {"shape": "hold", "unit": "us", "value": 1400.0})
+    bench.do("command", {"shape": "step", "unit": "us", "low": 1400.0, "high": 1800.0, "period": 0.5})
+    pulses = gone_on(bench, 1.0, random.Random(3))
+    fleet = st.simulate_bus(
+        {str(k): (getattr(st, model)(st.load_servo(name).replace(dict(_read(parameters)))),
+                  st.signals.pulse_train(*zip(*pulses[k], strict=True), unit="s"), _load())
+         for k, (name, model, parameters) in enumerate(servos)},
+        supply=st.Supply(**supply), duration=1.0, seed=5,
+        initial={str(k): {"output_angle": first} for k, first in enumerate(angles(LiveBench(bench.scene())))})
+    expected = [fleet[name]["output_angle"][-1] for name in fleet]
+    np.testing.assert_allclose(angles(bench), expected, atol=1e-9)
+    assert fleet.bus_voltage.min() < 5.5
+    volts = bench.rows[0][bench.columns[0].index("bus_voltage")]
+    assert volts == pytest.approx(float(fleet.bus_voltage[-1]), abs=1e-9)
+
+
+def _load():
+    return st.loads.Inertia(2e-4) + st.loads.Pendulum(mass=0.0, length=0.1)
+
+
+def _read(parameters: str) -> dict:
+    import tomllib
+
+    return tomllib.loads(f"x = {{{parameters}}}")["x"]
+
+
+def test_numbers_pushes_and_the_supply_change_as_time_goes_on():
+    changes = [(0.2, "push", 0.2), (0.3, "set", {"load.inertia": 4e-4}), (0.4, "set", {"electronics.deadband": 2e-5}),
+               (0.5, "push", -0.1), (0.62, "set", {"friction.coulomb_torque_forward": 4e-4})]
+    bench, pace = LiveBench(read_scene(scene_text([(ANALOG, "PulseServo", "")] * 2, SUPPLY))), random.Random(4)
+    model = st.PulseServo(st.load_servo(ANALOG))
+    lanes = st.VectorSimulator(model, lanes=2, load=_load(), bus=st.Supply(**SUPPLY), seed=5)
+    lanes.reset(pulse_width=1.4e-3, output_angle=np.array(angles(bench)))
+    torque, number = 0.0, {}
+    bench.do("command", {"shape": "hold", "unit": "us", "value": 1400.0})
+    for frame in range(50):
+        time, width = frame / 50.0, 1.4e-3 if frame < 5 else 1.8e-3 if frame < 30 else 1.5e-3
+        gone_on(bench, time, pace)
+        if frame in (5, 30):
+            bench.do("command", {"shape": "hold", "unit": "us", "value": 1e6 * width})
+        for when, kind, value in changes:
+            if math.isclose(when, time):
+                bench.do(kind, value)
+                torque = value if kind == "push" else torque
+                number |= value if kind == "set" else {}
+        if number:
+            lanes.set(parameters=number)
+        lanes.advance(0.02, pulse_width=width, external_torque=torque)
+    gone_on(bench, 1.0, pace)
+    np.testing.assert_allclose(angles(bench), lanes["output_angle"], atol=1e-9)
+    bench.do("set", {"supply.internal_resistance": 3.0}, 1)  # the supply is one: it changes for both
+    assert [one.servo.get("supply.internal_resistance") for one in bench.now_models] == [3.0, 3.0]
+
+
+def test_how_time_is_cut_changes_nothing():
+    def run(pace: random.Random) -> list[float]:
+        bench = LiveBench(read_scene(scene_text([(ANALOG, "PulseServo", "")] * 3, SUPPLY)))
+        for end, kind, value, servo in (
+                (0.1, "command", {"shape": "hold", "unit": "us", "value": 1700.0}, None), (0.31, "push", 0.3, 0),
+                (0.377, "set", {"supply.internal_resistance": 1.1}, None), (0.4, "set", {"gear.backlash": 0.01}, 1),
+                (0.5003, "command", {"shape": "sine", "unit": "us", "mean": 1500.0, "amplitude": 200.0,
+                                     "frequency": 2.0}, 2), (0.9, "push", 0.0, 0)):
+            gone_on(bench, end, pace)
+            bench.do(kind, value, servo)
+        gone_on(bench, 1.3, pace)
+        return angles(bench)
+
+    np.testing.assert_allclose(run(random.Random(1)), run(random.Random(2)), atol=1e-9)
+
+
+@pytest.mark.parametrize(("servos", "supply", "what"), [
+    ([(ANALOG, "BoundedServo", "")], SUPPLY, "model of servo 1"),
+    ([(ANALOG, "PulseServo", '"gear.stiffness" = 40.0')], SUPPLY, "servo 1 on a shared supply"),
+    ([(ANALOG, "PulseServo", "")], {"internal_resistance": 0.5}, "supply of a scene"),
+    ([(ANALOG, "PulseServo", "")], SUPPLY | {"volts": 6.0}, "supply of a scene"),
+    ([(ANALOG, "PulseServo", "")], SUPPLY | {"internal_resistance": -1.0}, "internal_resistance")])
+def test_what_cannot_share_is_told(servos, supply, what):
+    with pytest.raises(InputError, match=what):
+        LiveBench(read_scene(scene_text(servos, supply)))
