@@ -1,4 +1,4 @@
-"""What can be done at a bench while time goes on: command, numbers, a push, frames, registers, torque, control circuit."""
+"""What can be done at a bench: command, numbers, a push, frames, registers, torque, the control circuit."""
 
 from __future__ import annotations
 

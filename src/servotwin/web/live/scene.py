@@ -25,7 +25,8 @@ LONGEST_TEXT = 16_000_000  # characters
 MOST_ACTIONS = 100_000
 LONGEST = 1e6  # s
 _MOST_VIEW = 4000  # characters
-_TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", "load", "supply", "control", "view", "lesson")
+_TABLES = ("load", "supply", "control", "view", "lesson")
+_TOP = ("format", "name", "seed", "frame_rate", "end", "actions", "servo", *_TABLES)
 LOAD_FIELDS = ("inertia", "viscous_friction", "torque", "coulomb_torque", "mass", "arm", "hanging_angle")
 """What a load can have: [kg m²], [N m s/rad], [N m], [N m], [kg], [m], [rad]."""
 SUPPLY_FIELDS = ("open_circuit_voltage", "internal_resistance", "current_limit")
@@ -88,7 +89,7 @@ class Scene:
             lines += ["actions = [", *(f"  {toml_value(action.row())}," for action in self.actions), "]"]
         for servo in self.servos:
             lines += ["", "[[servo]]", *servo.lines()]
-        for key in ("load", "supply", "control", "view", "lesson"):
+        for key in _TABLES:
             table = getattr(self, key)
             if table:
                 lines += ["", f"[{key}]", *(toml_line(name, value) for name, value in table.items())]
