@@ -13,6 +13,7 @@ import typer
 from servotwin.cli import log_reading
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, patience, show
+from servotwin.logs.reading import reading_facts
 
 if TYPE_CHECKING:
     from servotwin.cli.outputs import Target
@@ -322,7 +323,7 @@ def _report(found: _Found, files: list[str], *, as_json: bool) -> None:
     from servotwin.cli import fit_show
 
     if as_json:
-        more: dict[str, Any] = {"reading": log_reading.facts([trace.log for trace in found.fit.traces])}
+        more: dict[str, Any] = {"reading": reading_facts([trace.log for trace in found.fit.traces])}
         if found.ladder is not None:
             more["ladder"] = fit_show.ladder_facts(found.ladder)
         if found.advice is not None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from servotwin.cli.terminal import patience, show, table
 from servotwin.logs.formats import FORMATS, LOG_FORMATS
+from servotwin.logs.reading import read_alike
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -73,27 +74,9 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
     return logs
 
 
-def facts(logs: Sequence[Log]) -> list[dict[str, Any]]:
-    """Return how logs were read, as plain data for JSON: one entry for each way."""
-    return [{"logs": [log.name for log in some],
-             "columns": [{"column": one.column, "signal": one.signal, "unit": one.unit, "known": one.known}
-                         for one in some[0].reading.columns if some[0].reading is not None],
-             "remarks": [remark for log in some if log.reading is not None for remark in log.reading.remarks]}
-            for some in _alike(logs) if some[0].reading is not None]
-
-
-def _alike(logs: Sequence[Log]) -> list[list[Log]]:
-    """Return logs in groups whose columns were read in the same way."""
-    groups: dict[Any, list[Log]] = {}
-    for log in logs:
-        if log.reading is not None:
-            groups.setdefault(log.reading.columns, []).append(log)
-    return list(groups.values())
-
-
 def _parts(logs: Sequence[Log]) -> list[RenderableType]:
     """Return a table of the columns that were guessed or said just now, and what was passed over."""
-    groups = _alike(logs)
+    groups = read_alike(logs)
     shown = [some for some in groups if some[0].reading is not None
              and any(one.known not in _QUIET for one in some[0].reading.columns)]
     rows = [(_file(some), one.column, one.signal, one.unit, one.known) for some in shown if some[0].reading is not None

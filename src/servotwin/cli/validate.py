@@ -12,6 +12,7 @@ import typer
 from servotwin.cli import log_reading
 from servotwin.cli import shared_options as shared
 from servotwin.cli.terminal import emit_json, patience, show, table
+from servotwin.logs.reading import reading_facts
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -131,7 +132,7 @@ def _report(found: Validation, above: Mapping[str, float], limits: Mapping[str |
     if as_json:
         emit_json({
             "servo": found.servo.name, "model": type(found.model).__name__, "logs": len(found.traces),
-            "reading": log_reading.facts([trace.log for trace in found.traces]),
+            "reading": reading_facts([trace.log for trace in found.traces]),
             "nuisance": dict(found.nuisance), "fitted": list(found.fitted),
             "errors": fit_show.error_facts(found.errors), "noise": dict(found.noise), "warnings": list(found.warnings),
             "max_error": {motion or "all": limit for motion, limit in limits.items()}, "above": dict(above),
