@@ -3,6 +3,7 @@
 import { History } from "./history.js";
 
 const AGAIN = [500, 1000, 2000, 4000, 8000]; // ms until the next attempt
+const LOOKS = 400; // ms of rest until what is looked at is kept
 
 /** @typedef {{n: number, m: number, columns: string[]}} Part */
 /** @typedef {{t: number, pace: number, speed: number|string, running: boolean, behind: boolean, replaying: number|null,
@@ -29,6 +30,10 @@ export class Bench extends EventTarget {
     this.waiting = new Map();
     this.number = 0;
     this.attempt = 0;
+    /** @type {Record<string, string|number|boolean>} how it is looked at: part of its text, and so of a link */
+    this.view = {};
+    this.looks = 0;
+    this.full = "";
     this.kept = ""; // the text of the bench, to go on with after the line was cut
     /** @type {WebSocket|null} */
     this.socket = null;
@@ -95,6 +100,18 @@ export class Bench extends EventTarget {
   /** @param {string} name @param {(detail: any) => void} listener */
   on(name, listener) { this.addEventListener(name, (event) => listener(/** @type {CustomEvent} */ (event).detail)); }
 
+  /**
+   * Keep how the bench is looked at.
+   * @param {Record<string, string|number|boolean>} changes
+   */
+  look(changes) {
+    Object.assign(this.view, changes);
+    clearTimeout(this.looks);
+    this.looks = window.setTimeout(() => {
+      if (this.role !== "watcher" && this.socket?.readyState === WebSocket.OPEN) this.tell({ view: this.view });
+    }, LOOKS);
+  }
+
   /** @param {any} message */
   told(message) {
     if ("hello" in message) this.greeted(message.hello);
@@ -133,6 +150,8 @@ export class Bench extends EventTarget {
     this.history = state.servos.map((/** @type {any} */ one) => new History(one.columns));
     this.header = null;
     this.time = 0;
+    if (Object.keys(state.view).length) this.view = { ...state.view };
+    else if (Object.keys(this.view).length) this.look({});
     this.emit("scene", state);
   }
 

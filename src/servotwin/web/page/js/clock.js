@@ -1,6 +1,6 @@
 // Time: run and pause, how fast it shall go, how fast it really goes, and single frames.
 
-import { el, unique } from "./dom.js";
+import { READABLE, el, paced, unique } from "./dom.js";
 import { engineering } from "./units.js";
 
 const SPEEDS = /** @type {[string, string][]} */ ([
@@ -19,27 +19,31 @@ export function mount(root, bench) {
     speed: speed.value === "unpaced" ? "unpaced" : Number(speed.value) }) },
   ...SPEEDS.map(([value, text]) => el("option", { value, text })));
   speed.value = "1";
-  const time = el("output", { class: "time", "aria-label": "bench time" });
+  const time = el("span", { class: "time", role: "timer", "aria-label": "bench time" });
   const pace = el("span", { class: "pace" });
+  /** @type {import("./bench.js").Header} */
+  let header;
   root.append(run, step, anew, el("label", { for: id, text: "Speed" }), speed, time, pace);
 
-  bench.on("push", (header) => {
+  const asked = () => (header.speed === "unpaced" ? Infinity : Number(header.speed));
+  const says = () => {
+    if (header.replaying !== null) return `repeating ${Math.round(100 * header.replaying)} %`;
+    if (!header.running) return "stands";
+    const second = `${engineering(header.pace, "s", 2)} in a second`;
+    if (header.behind || (asked() !== Infinity && header.pace < 0.97 * asked() && header.t > 2 * asked())) return `cannot keep up: ${second}`;
+    return asked() === 1 ? "real time" : second;
+  };
+  const draw = paced(() => {
     run.textContent = header.running ? "Pause" : "Run";
-    time.textContent = `${header.t.toFixed(header.speed < 0.01 ? 6 : 3)} s`;
-    const asked = header.speed === "unpaced" ? Infinity : header.speed;
-    if (header.replaying !== null) pace.textContent = `repeating ${Math.round(100 * header.replaying)} %`;
-    else if (!header.running) pace.textContent = "stands";
-    else if (header.behind || (asked !== Infinity && header.pace < 0.97 * asked && header.t > 2 * asked)) {
-      pace.textContent = `cannot keep up: ${engineering(header.pace, "s", 2)} in a second`;
-    } else pace.textContent = asked === 1 ? "real time" : `${engineering(header.pace, "s", 2)} in a second`;
+    time.textContent = `${header.t.toFixed(asked() >= 0.01 ? 3 : 6)} s`;
+    pace.textContent = says();
     pace.classList.toggle("late", header.behind);
-    const value = String(header.speed);
-    if (document.activeElement !== speed && [...speed.options].some((one) => Number(one.value) === Number(value))) {
-      speed.value = [...speed.options].find((one) => Number(one.value) === Number(value))?.value ?? "1";
-    } else if (value === "unpaced") speed.value = value;
-  });
+    const value = [...speed.options].find((one) => one.value === String(header.speed) || Number(one.value) === Number(header.speed))?.value;
+    if (document.activeElement !== speed && value !== undefined) speed.value = value;
+  }, READABLE);
+  bench.on("push", (found) => { header = found; draw(); });
   document.addEventListener("keydown", (event) => {
-    const into = /** @type {HTMLElement} */ (event.target);
+    const into = event.target instanceof Element ? event.target : document.body;
     if (event.key !== " " || into.closest("input,select,textarea,button,summary,[role=slider],a")) return;
     event.preventDefault();
     bench.tell({ run: !bench.running });

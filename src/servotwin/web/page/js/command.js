@@ -1,11 +1,11 @@
 // What the servos are told: a slider, a gamepad, and commands with a shape.
 
-import { choice, el, onceAFrame, panel } from "./dom.js";
+import { READABLE, choice, el, onceAFrame, paced, panel, unique } from "./dom.js";
 import { slider } from "./slider.js";
 
 /** Fields of each shape: [name, label, unit or "command", usual value]. */
 const SHAPES = /** @type {Record<string, [string, string, string, (low: number, high: number) => number][]>} */ ({
-  step: [["low", "from", "command", (a, b) => a + 0.4 * (b - a)], ["high", "to", "command", (a, b) => a + 0.6 * (b - a)],
+  step: [["low", "from", "command", (a, b) => a + 0.35 * (b - a)], ["high", "to", "command", (a, b) => a + 0.65 * (b - a)],
     ["period", "period (0: once)", "s", () => 2]],
   sine: [["mean", "mean", "command", (a, b) => (a + b) / 2], ["amplitude", "amplitude", "command", (a, b) => 0.15 * (b - a)],
     ["frequency", "frequency", "Hz", () => 0.5]],
@@ -13,105 +13,129 @@ const SHAPES = /** @type {Record<string, [string, string, string, (low: number, 
     ["start_frequency", "from", "Hz", () => 0.2], ["end_frequency", "to", "Hz", () => 5], ["duration", "in", "s", () => 10]],
   staircase: [["low", "from", "command", (a, b) => a + 0.3 * (b - a)], ["high", "to", "command", (a, b) => a + 0.7 * (b - a)],
     ["steps", "steps", "", () => 8], ["dwell", "each for", "s", () => 0.5]] });
+const RECORD = "recorded";
 const NAMES = { us: "pulse", deg: "angle", V: "input voltage" };
 const SHOWN = { us: "µs", deg: "°", V: "V" };
-const AXIS_REST = 0.12; // of a gamepad's stick: less is none
+const SIGNAL = { us: "pulse_width", deg: "command_angle", V: "command_voltage" };
+const FACTOR = { us: 1e6, deg: 180 / Math.PI, V: 1 };
+const STEP = { us: 1, deg: 0.5, V: 0.005 };
+const PULSES = [500, 2500]; // µs: ends of the slider, if the servo takes more
+const [AXIS_REST, AXIS_SPEED] = [0.12, 0.6]; // of a gamepad's stick: less is none; ranges a second when it is all the way over
+const QUIET = 1500; // ms after a hand has let go until the slider follows what a shape does
+
+/** @typedef {"us"|"deg"|"V"} Unit */
 
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
 export function mount(root, bench) {
   const body = panel(root, "Command", true);
-  /** @type {"us"|"deg"|"V"} */
+  /** @type {Unit} */
   let unit = "us";
   /** @type {[number, number]} */
-  let ends = [500, 2500];
+  let ends = [PULSES[0], PULSES[1]];
   let value = 1500;
-  const send = onceAFrame(() => bench.tell({ do: "command", value: { shape: "hold", value, unit } }));
-  const units = choice("Told in", [], (chosen) => { unit = /** @type {any} */ (chosen); begin(); });
+  let touched = -Infinity;
+  let shape = "step";
+  const send = onceAFrame(() => { touched = performance.now(); bench.tell({ do: "command", value: { shape: "hold", value, unit } }); });
+  const units = choice("Told in", [], (chosen) => { unit = /** @type {Unit} */ (chosen); bench.look({ "command.unit": unit }); begin(); });
+  const shapes = choice("Shape", [...Object.keys(SHAPES), RECORD].map((name) => [name, name]), (chosen) => { shape = chosen; form(); });
   const main = el("div", { class: "command" });
-  const shapes = el("div");
-  const said = el("p", { class: "soft" });
+  const fields = el("div", { class: "shape" });
+  const said = el("p", { class: "soft", hidden: true });
   /** @type {ReturnType<typeof slider>} */
   let hand;
 
-  /** @param {"us"|"deg"|"V"} of @returns {[number, number]|null} ends that all servos take */
+  /** @param {Unit} of @returns {[number, number]|null} ends that all servos take */
   const range = (of) => {
     const found = bench.facts.map((one) => (of === "us" ? one.pulse_us : of === "deg" ? one.travel_deg : one.voltage));
     if (!found.length || found.some((one) => !one)) return null;
-    return [Math.max(...found.map((one) => one[0])), Math.min(...found.map((one) => one[1]))];
+    const both = /** @type {[number, number]} */ ([Math.max(...found.map((one) => one[0])), Math.min(...found.map((one) => one[1]))]);
+    return both[0] < both[1] ? both : null;
   };
   const usual = () => {
-    const [low, high] = /** @type {[number, number]} */ (range(unit) ?? [0, 1]);
-    if (unit !== "us") return /** @type {[number, number]} */ ([low, high]);
-    return /** @type {[number, number]} */ ([Math.max(low, 500), Math.min(high, 2500)]);
+    const [low, high] = range(unit) ?? [0, 1];
+    return /** @type {[number, number]} */ (unit === "us" ? [Math.max(low, PULSES[0]), Math.min(high, PULSES[1])] : [low, high]);
   };
+  const now = () => FACTOR[unit] * (bench.history[0]?.latest(SIGNAL[unit]) ?? NaN);
 
   const begin = () => {
     ends = usual();
-    const seen = bench.history[0];
-    const name = unit === "us" ? "pulse_width" : unit === "deg" ? "command_angle" : "command_voltage";
-    const factor = unit === "us" ? 1e6 : unit === "deg" ? 180 / Math.PI : 1;
-    const now = seen && seen.has(name) && seen.length ? factor * seen.latest(name) : (ends[0] + ends[1]) / 2;
-    value = Number.isFinite(now) ? now : (ends[0] + ends[1]) / 2;
-    hand = slider({ label: NAMES[unit], unit: SHOWN[unit], low: ends[0], high: ends[1], value,
-      step: unit === "us" ? 1 : unit === "deg" ? 0.5 : 0.005,
+    value = Number.isFinite(now()) ? Math.min(ends[1], Math.max(ends[0], now())) : (ends[0] + ends[1]) / 2;
+    hand = slider({ label: NAMES[unit], unit: SHOWN[unit], low: ends[0], high: ends[1], value, step: STEP[unit],
       title: "Drag, use the arrow keys, type, or turn the wheel while it has the focus",
       changed: (to) => { value = to; send(); } });
     hand.row.classList.add("main");
     main.replaceChildren(hand.row);
-    shapes.replaceChildren(...Object.keys(SHAPES).map(shaped), recorded());
+    form();
   };
 
-  /** @param {string} shape */
-  const shaped = (shape) => {
-    const fields = SHAPES[shape].map(([name, label, of, first]) => {
-      const found = first(ends[0], ends[1]);
-      const input = el("input", { type: "number", step: "any", value: String(Number(found.toPrecision(4))) });
-      const shown = of === "command" ? SHOWN[unit] : of;
-      return { name, input, row: el("label", {}, `${label} `, input, shown ? ` ${shown}` : "") };
+  const form = () => fields.replaceChildren(...(shape === RECORD ? recorded() : shaped(shape)));
+
+  /** @param {number} command @returns {number} rounded to what a person would type */
+  const tidy = (command) => Number((Math.round(command / (10 * STEP[unit])) * 10 * STEP[unit]).toPrecision(6));
+
+  /** @param {string} name @returns {HTMLElement[]} */
+  const shaped = (name) => {
+    const made = SHAPES[name].map(([key, label, of, first]) => {
+      const id = unique();
+      const input = el("input", { type: "number", id, step: "any", value: String(of === "command" ? tidy(first(ends[0], ends[1])) : first(0, 0)) });
+      return { key, input, row: el("div", { class: "field" }, el("label", { for: id, text: label }), input,
+        el("span", { class: "unit", text: of === "command" ? SHOWN[unit] : of })) };
     });
-    return el("details", { class: "shape" }, el("summary", { text: shape[0].toUpperCase() + shape.slice(1) }),
-      el("div", { class: "fields" }, ...fields.map((field) => field.row)),
-      el("button", { text: `Begin the ${shape}`, onclick: () => bench.tell({ do: "command", value: { shape, unit,
-        ...Object.fromEntries(fields.map((field) => [field.name, Number(field.input.value)])) } }) }));
+    return [...made.map((field) => field.row), el("button", { text: `Begin the ${name}`, onclick: () => tell({ shape: name, unit,
+      ...Object.fromEntries(made.map((field) => [field.key, Number(field.input.value)])) }) })];
   };
 
+  /** @returns {HTMLElement[]} */
   const recorded = () => {
     const area = el("textarea", { rows: 4, spellcheck: "false", placeholder: "0, 1500\n0.5, 1700\n1.0, 1500" });
     const hold = choice("Between samples", [["previous", "hold"], ["linear", "straight line"]], () => {});
-    return el("details", { class: "shape" }, el("summary", { text: "Recorded" }),
-      el("label", {}, `Lines of time [s] and command [${SHOWN[unit]}]`, area), hold.row,
+    return [el("label", {}, `Lines of time [s] and command [${SHOWN[unit]}]`, area), hold.row,
       el("button", { text: "Begin the record", onclick: () => {
         const rows = area.value.split(/\n/).map((line) => line.trim()).filter(Boolean)
           .map((line) => line.split(/[\s,;]+/).map(Number)).filter((row) => row.every(Number.isFinite));
-        bench.tell({ do: "command", value: { shape: "recorded", unit, time: rows.map((row) => row[0]),
-          value: rows.map((row) => row[1]), hold: hold.select.value } });
-      } }));
+        tell({ shape: RECORD, unit, time: rows.map((row) => row[0]), value: rows.map((row) => row[1]), hold: hold.select.value });
+      } })];
   };
 
-  body.append(units.row, main, said, shapes);
+  /** @param {Record<string, any>} command */
+  const tell = (command) => { touched = -Infinity; bench.tell({ do: "command", value: command }); };
+
+  body.append(units.row, main, said, shapes.row, fields);
   bench.on("scene", () => {
-    const able = /** @type {("us"|"deg"|"V")[]} */ (["us", "deg", "V"]).filter((one) => range(one));
-    units.select.replaceChildren(...able.map((one) => el("option", { value: one,
-      text: `${NAMES[one]} [${SHOWN[one]}]` })));
+    const able = /** @type {Unit[]} */ (["us", "deg", "V"]).filter((one) => range(one));
+    units.select.replaceChildren(...able.map((one) => el("option", { value: one, text: `${NAMES[one]} [${SHOWN[one]}]` })));
+    const kept = /** @type {Unit} */ (bench.view["command.unit"]);
+    if (able.includes(kept)) unit = kept;
     if (!able.includes(unit)) unit = able[0] ?? "deg";
     units.select.value = unit;
     fresh = true;
     begin();
   });
   let fresh = true;
+  const follow = paced(() => { // what a shape, or a lesson, makes of the command
+    const at = now();
+    if (performance.now() - touched < QUIET || !Number.isFinite(at) || at < ends[0] || at > ends[1] || hand.busy()) return;
+    value = at;
+    hand.set(value);
+  }, READABLE);
   bench.on("push", (header) => {
     if (fresh && bench.history[0]?.length) { fresh = false; begin(); }
+    follow();
     pad(header.running);
   });
 
+  let padded = performance.now();
   /** @param {boolean} running */
   const pad = (running) => {
-    if (!navigator.getGamepads || !running) return;
+    const since = Math.min(performance.now() - padded, 100) / 1000;
+    padded = performance.now();
+    if (!navigator.getGamepads || !running || bench.role === "watcher") return;
     for (const one of navigator.getGamepads()) {
       const tilt = one?.axes[0] ?? 0;
       if (!one || Math.abs(tilt) < AXIS_REST) continue;
+      said.hidden = false;
       said.textContent = `gamepad: ${one.id.slice(0, 40)}`;
-      value = Math.min(ends[1], Math.max(ends[0], value + tilt * 0.01 * (ends[1] - ends[0])));
+      value = Math.min(ends[1], Math.max(ends[0], value + tilt * AXIS_SPEED * since * (ends[1] - ends[0])));
       hand.set(value);
       send();
     }

@@ -43,6 +43,11 @@ function dress(made, attributes) {
   }
 }
 
+/** @param {string} name @returns {HTMLElement} a name that may be broken after its dots and underlines */
+export function breakable(name) {
+  return el("code", {}, ...name.split(/(?<=[._])/).flatMap((part, k) => (k ? [el("wbr"), part] : [part])));
+}
+
 let count = 0;
 
 /** @returns {string} an id that nothing else has */
@@ -78,16 +83,40 @@ export function choice(label, options, chosen) {
   return { row: el("div", { class: "row" }, el("label", { for: id, text: label }), select), select };
 }
 
+/** Whether the system asks for little motion. */
+export const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
+const CALM = 3; // drawings a second, then
+export const READABLE = 8; // times a second that a number may change and still be read
+
 /**
  * Call something at most once a frame.
- * @param {() => void} draw
+ * @param {() => void} act
  * @returns {() => void}
  */
-export function onceAFrame(draw) {
+export function onceAFrame(act) {
   let waits = false;
   return () => {
     if (waits) return;
     waits = true;
-    requestAnimationFrame(() => { waits = false; draw(); });
+    requestAnimationFrame(() => { waits = false; act(); });
+  };
+}
+
+/**
+ * Draw at most so often; a few times a second where the system asks for little motion.
+ * @param {() => void} draw
+ * @param {number} [rate] times a second; with every frame unless given
+ * @returns {() => void}
+ */
+export function paced(draw, rate = Infinity) {
+  let last = -Infinity;
+  let waits = false;
+  const frame = onceAFrame(() => { last = performance.now(); waits = false; draw(); });
+  return () => {
+    if (waits) return;
+    waits = true;
+    const left = last + 1000 / (calm.matches ? Math.min(rate, CALM) : rate) - performance.now();
+    if (left > 4) setTimeout(frame, left);
+    else frame();
   };
 }

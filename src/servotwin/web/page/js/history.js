@@ -27,11 +27,14 @@ export class History {
   add(rows, pulses) {
     const count = rows.length / this.width;
     if (this.length + count > this.room && this.room < ROOM) this.grow(this.length + count);
-    for (let k = 0; k < count; k += 1) {
+    for (let done = 0; done < count;) { // as many at once as fit before the end of the ring
       const at = (this.first + this.length) % this.room;
-      this.data.set(rows.subarray(k * this.width, (k + 1) * this.width), at * this.width);
-      if (this.length < this.room) this.length += 1;
-      else this.first = (this.first + 1) % this.room;
+      const fit = Math.min(count - done, this.room - at);
+      this.data.set(rows.subarray(done * this.width, (done + fit) * this.width), at * this.width);
+      const over = Math.max(this.length + fit - this.room, 0);
+      this.first = (this.first + over) % this.room;
+      this.length += fit - over;
+      done += fit;
     }
     for (let k = 0; k < pulses.length; k += 2) this.edges.push([pulses[k], pulses[k + 1]]);
     if (this.edges.length > 24000) this.edges.splice(0, 8000);
@@ -72,6 +75,15 @@ export class History {
       else high = middle;
     }
     return low;
+  }
+
+  /** @param {string} name @param {number} time @returns {number} the value at a time, on the line between two rows */
+  between(name, time) {
+    const k = this.at(time);
+    if (k === 0 || k >= this.length) return NaN;
+    const [before, after] = [this.time(k - 1), this.time(k)];
+    const share = after > before ? (time - before) / (after - before) : 1;
+    return (1 - share) * this.value(name, k - 1) + share * this.value(name, k);
   }
 
   /**

@@ -1,6 +1,7 @@
 // The display: the paper's seven readings.
 
-import { el } from "./dom.js";
+import { READABLE, el, paced } from "./dom.js";
+import { fullName } from "./names.js";
 
 const LINES = /** @type {[string, string, string, (value: number) => string][]} */ ([
   ["command_voltage", "Vi", "input voltage", (x) => `${x.toFixed(3)} V`],
@@ -17,25 +18,25 @@ export function mount(root, bench) {
   root.append(el("h2", { text: "Display" }), shown);
   /** @type {HTMLElement[][]} */
   let cells = [];
+  /** @type {Record<string, number|null>[]} */
+  let readings = [];
 
   bench.on("scene", () => {
     cells = [];
     shown.replaceChildren(...bench.facts.map((facts, k) => {
       const own = LINES.map(([, , meaning]) => el("dd", { title: meaning, text: "–" }));
       cells.push(own);
-      const list = el("dl", { class: `lcd servo${k}`, "aria-label": `readings of ${facts.title}, ${facts.model}` });
-      LINES.forEach(([, symbol, meaning], n) => list.append(
-        el("div", {}, el("dt", { title: meaning, text: symbol }), own[n])));
-      return list;
+      return el("div", { class: `lcd servo${k}`, role: "group", "aria-label": `readings of ${fullName(facts)}` }, el("dl", {},
+        ...LINES.map(([, symbol, meaning], n) => el("div", {}, el("dt", { title: meaning },
+          el("span", { "aria-hidden": "true", text: symbol }), el("span", { class: "hidden", text: meaning })), own[n]))));
     }));
   });
-  bench.on("push", (header) => {
-    header.lcd.forEach((/** @type {Record<string, number|null>} */ reading, /** @type {number} */ k) => {
-      LINES.forEach(([name, , , text], n) => {
-        const value = reading[name];
-        const now = value === null || value === undefined ? "–" : text(value);
-        if (cells[k] && cells[k][n].textContent !== now) cells[k][n].textContent = now;
-      });
+  const draw = paced(() => readings.forEach((reading, k) => {
+    LINES.forEach(([name, , , text], n) => {
+      const value = reading[name];
+      const now = value === null || value === undefined ? "–" : text(value);
+      if (cells[k] && cells[k][n].textContent !== now) cells[k][n].textContent = now;
     });
-  });
+  }), READABLE);
+  bench.on("push", (header) => { readings = header.lcd; draw(); });
 }

@@ -5,7 +5,7 @@ import { el, panel } from "./dom.js";
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
 export function mount(root, bench) {
   const body = panel(root, "Lessons");
-  const list = el("ol", { class: "lessons" });
+  const list = el("ol", { class: "list" });
   const now = el("div", { class: "lesson", hidden: true });
   body.append(list, now);
   bench.on("hello", (hello) => {

@@ -3,6 +3,7 @@
 import { Bench } from "./bench.js";
 import { el } from "./dom.js";
 import * as catalog from "./catalog.js";
+import * as circuit from "./circuit.js";
 import * as classroom from "./classroom.js";
 import * as clock from "./clock.js";
 import * as command from "./command.js";
@@ -20,7 +21,7 @@ import * as theme from "./theme.js";
 import * as traces from "./traces.js";
 
 const SIDE = /** @type {[string, {mount: (root: HTMLElement, bench: Bench) => void}][]} */ ([
-  ["command", command], ["load", controls], ["registers", registers], ["any", parameters], ["servos", catalog],
+  ["command", command], ["load", controls], ["circuit", circuit], ["registers", registers], ["any", parameters], ["servos", catalog],
   ["lessons", lessons], ["mystery", mystery], ["files", exports]]);
 const INSTRUMENTS = /** @type {[string, {mount: (root: HTMLElement, bench: Bench) => void}][]} */ ([
   ["horn", horn], ["lcd", lcd], ["scope", scope], ["traces", traces], ["words", summary]]);
@@ -32,9 +33,11 @@ const bench = new Bench();
 clock.mount(place("clock"), bench);
 theme.mount(place("theme"), bench);
 classroom.mount(place("instruments"), bench);
+const left = el("div", { class: "left" });
+place("instruments").append(left);
 for (const [name, one] of INSTRUMENTS) {
   const section = el("section", { class: `panel ${name}-panel` });
-  place("instruments").append(section);
+  (name === "horn" || name === "lcd" ? left : place("instruments")).append(section);
   one.mount(section, bench);
 }
 for (const [name, one] of SIDE) {
@@ -42,6 +45,21 @@ for (const [name, one] of SIDE) {
   place("controls").append(section);
   one.mount(section, bench);
 }
+
+// On a phone the slider stands right under the horn, in the order of the keys too.
+const narrow = window.matchMedia("(max-width: 46rem)");
+const settle = () => {
+  const told = /** @type {HTMLElement} */ (document.querySelector(".side.command"));
+  if (narrow.matches) {
+    document.querySelector(".horn-panel")?.after(told);
+    place("columns").append(place("controls"));
+  } else {
+    place("controls").prepend(told);
+    place("columns").prepend(place("controls"));
+  }
+};
+narrow.addEventListener("change", settle);
+settle();
 
 const notice = place("notice");
 let quiet = 0;
@@ -51,7 +69,10 @@ bench.on("said", (line) => {
   clearTimeout(quiet);
   quiet = window.setTimeout(() => { notice.hidden = true; }, 8000);
 });
-bench.on("scene", () => document.body.classList.add("ready"));
+bench.on("scene", () => {
+  document.body.classList.add("ready");
+  document.body.classList.toggle("many", bench.facts.length > 2);
+});
 setInterval(() => { if (bench.header?.running) bench.keep(); }, 5000);
 bench.open();
 Object.assign(window, { bench });

@@ -1,6 +1,6 @@
 // A servo whose numbers are hidden: measure, fit or guess, and compare.
 
-import { el, panel, unique } from "./dom.js";
+import { breakable, el, panel, unique } from "./dom.js";
 import { plain, printed } from "./units.js";
 
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
@@ -24,7 +24,7 @@ export function mount(root, bench) {
     const fields = unknowns.map((/** @type {any} */ one) => {
       const field = unique();
       const input = el("input", { type: "number", id: field, step: "any" });
-      return { one, input, row: el("div", { class: "card" }, el("label", { for: field }, el("code", { text: one.name })),
+      return { one, input, row: el("div", { class: "card" }, el("label", { for: field }, breakable(one.name)),
         el("span", { class: "typed" }, input, el("span", { class: "unit", text: printed(one.unit) })),
         el("p", { class: "soft", text: `${one.meaning}, between ${plain(one.low, 3)} and ${plain(one.high, 3)} ${printed(one.unit)}` })) };
     });

@@ -1,6 +1,6 @@
 // Any parameter, by search: its symbol, unit, range, meaning and where its value comes from.
 
-import { choice, el, panel, unique } from "./dom.js";
+import { breakable, choice, el, panel, unique } from "./dom.js";
 import { plain, printed } from "./units.js";
 
 const MOST = 12;
@@ -35,7 +35,7 @@ export function mount(root, bench) {
     const set = (value) => bench.tell({ do: "set", value: { [one.name]: value }, servo });
     const { unit, factor } = one.shown;
     const value = Array.isArray(one.value) ? "a table" : one.choices ? one.value ?? ""
-      : one.value === null ? "" : plain(one.value / factor, 8);
+      : one.value === null ? "" : plain(one.value / factor, 7);
     const input = one.choices
       ? el("select", { id: field, onchange: () => set(input.value) },
         ...one.choices.map((/** @type {string} */ word) => el("option", { value: word, text: word, selected: word === one.value })))
@@ -43,7 +43,7 @@ export function mount(root, bench) {
         onchange: () => { if (input.value !== "") set(Number(input.value) * factor); } });
     const spread = one.spread ? `, ${one.spread}` : "";
     return el("div", { class: "card" },
-      el("label", { for: field }, el("code", { text: one.name }), one.symbol ? ` ${one.symbol}` : ""),
+      el("label", { for: field }, breakable(one.name)), el("span", { class: "symbol", text: one.symbol }),
       el("span", { class: "typed" }, input, el("span", { class: "unit", text: printed(unit) })),
       el("p", {}, `${one.meaning}; ${one.rule}. `, el("span", { class: "soft", text: one.value === null ? "Not given."
         : `${one.origin}${spread}${one.source ? `: ${one.source}` : ""}` }),

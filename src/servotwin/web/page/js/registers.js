@@ -1,6 +1,6 @@
 // The registers of a bus servo by the maker's names, and what they mean at the shaft.
 
-import { el, panel, unique } from "./dom.js";
+import { breakable, el, panel, unique } from "./dom.js";
 import { plain, printed } from "./units.js";
 
 const FIRST = ["P_Coefficient", "D_Coefficient", "I_Coefficient", "Torque_Limit", "Max_Torque_Limit", "Goal_Velocity",
@@ -10,6 +10,7 @@ const FIRST = ["P_Coefficient", "D_Coefficient", "I_Coefficient", "Torque_Limit"
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
 export function mount(root, bench) {
   const body = panel(root, "Registers");
+  const loose = /** @type {Set<number>} */ (new Set()); // servos whose torque is off
 
   const show = () => {
     const those = bench.facts.map((facts, k) => ({ facts, k })).filter(({ facts }) => facts.registers || facts.loop);
@@ -25,9 +26,17 @@ export function mount(root, bench) {
       loop ? el("p", { class: "stiffness" }, "The loop is a spring of ", el("strong", {
         text: `${plain(loop.stiffness_nm_per_rad, 3)} N m/rad` }), ` up to ${plain(loop.cap_torque_nm, 3)} N m at an error of ${
         plain((loop.cap_error_rad * 180) / Math.PI, 3)}°.`) : null,
-      el("label", { class: "tick" }, el("input", { type: "checkbox", checked: true, onchange: (/** @type {any} */ event) =>
-        bench.tell({ do: "torque", value: event.target.checked, servo: k }) }), " torque is on"),
+      el("label", { class: "tick" }, torque(k), " torque is on"),
       ...rows.map((one) => register(facts, one, k)));
+  };
+
+  /** @param {number} k @returns {HTMLInputElement} */
+  const torque = (k) => {
+    const input = el("input", { type: "checkbox", checked: !loose.has(k), onchange: () => {
+      if (input.checked) loose.delete(k); else loose.add(k);
+      bench.tell({ do: "torque", value: input.checked, servo: k });
+    } });
+    return input;
   };
 
   /** @param {any} facts @param {any} one @param {number} k */
@@ -38,11 +47,17 @@ export function mount(root, bench) {
       .map((/** @type {any} */ p) => `${p.symbol || p.meaning} = ${plain(p.value / p.shown.factor)} ${printed(p.shown.unit)}`);
     const input = el("input", { type: "number", id, min: one.low, max: one.high, step: 1, value: one.value,
       onchange: () => bench.tell({ do: "register", value: { [one.name]: Number(input.value) }, servo: k }) });
-    return el("div", { class: "card" }, el("label", { for: id }, el("code", { text: one.name }), ` (${one.address})`), input,
+    return el("div", { class: "card" }, el("label", { for: id }, breakable(one.name), ` (${one.address})`), input,
       el("p", { class: "soft", text: `${one.low} to ${one.high}${numbers.length ? `; ${numbers.join(", ")}` : ""}` }));
   };
 
-  bench.on("scene", show);
+  bench.on("scene", (state) => {
+    loose.clear();
+    for (const [, on, servo] of state.scene.matchAll(/^ *\[[^,]+, "torque", (true|false)(?:, (\d+))?\]/gm)) {
+      for (const k of servo === undefined ? bench.facts.keys() : [Number(servo)]) if (on === "true") loose.delete(k); else loose.add(k);
+    }
+    show();
+  });
   bench.on("changed", () => { if (!body.contains(document.activeElement) || document.activeElement?.tagName !== "INPUT") show(); });
 }
 

@@ -1,9 +1,9 @@
 // What an oscilloscope finds in a window: its trigger, and measures. Nothing here knows of the page.
 
-/** @typedef {{time: ArrayLike<number>, value: ArrayLike<number>}} Trace points in order; two at one time are a step */
+/** @typedef {{time: number[]|Float64Array, value: number[]|Float64Array}} Trace points in order; two at one time are a step */
 
 /** Time bases and sensitivities in steps of 1, 2, 5. */
-export const BASES = [];
+export const BASES = /** @type {number[]} */ ([]);
 for (let decade = -6; decade <= 0; decade += 1) {
   for (const step of [1, 2, 5]) if (decade < 0 || step === 1) BASES.push(Number(`${step}e${decade}`));
 }
@@ -23,6 +23,25 @@ export function level(pulses) {
     value.push(0, 1, 1, 0);
   }
   return { time, value };
+}
+
+/**
+ * The level over a window: from its start to its end, whatever pulses begin or end outside.
+ * @param {[number, number][]} pulses edges and widths
+ * @param {number} from
+ * @param {number} to
+ * @returns {Trace} 0 or 1
+ */
+export function levelBetween(pulses, from, to) {
+  const made = level(pulses);
+  const high = (/** @type {number} */ t) => Number(pulses.some(([edge, width]) => edge <= t && t < edge + width));
+  /** @type {[number, number][]} */
+  const points = [[from, high(from)]];
+  for (let k = 0; k < made.time.length; k += 1) {
+    if (made.time[k] > from && made.time[k] < to) points.push([made.time[k], made.value[k]]);
+  }
+  points.push([Math.max(to, from), high(to)]);
+  return { time: points.map(([t]) => t), value: points.map(([, v]) => v) };
 }
 
 /**

@@ -1,28 +1,32 @@
 // What the drawings show, as a sentence that is spoken and as a table.
 
 import { el } from "./dom.js";
+import { fullName, shortNames } from "./names.js";
 import { SHOWN, engineering, shown } from "./units.js";
 
 const ROWS = 20;
 const LATEST = 2; // s of the table
-const STILL = 0.02; // rad/s
+const [STILL, QUIET] = [0.02, 0.003]; // rad/s, rad within a second: what is slower, or less, stands
+const HUNTS = 5; // turns back within a second are more than a step's
 const NAMES = ["command_angle", "output_angle", "output_speed", "load_torque", "armature_current", "bus_voltage"];
 
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
 export function mount(root, bench) {
   const said = el("p", { "aria-live": "polite", class: "said" });
   const table = el("table");
-  const body = el("details", { ontoggle: () => fill() }, el("summary", { text: "Table of the last two seconds" }),
+  const body = el("details", { class: "more", ontoggle: () => fill() }, el("summary", { text: "Table of the last two seconds" }),
+    el("button", { text: "Bring it up to date", onclick: () => fill() }),
     el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "table of the last two seconds" }, table));
-  root.append(el("h2", { text: "In words" }), el("button", { text: "Say what is shown", onclick: () => {
+  root.append(el("div", { class: "head" }, el("h2", { text: "In words" }), el("button", { text: "Say what is shown", onclick: () => {
     said.textContent = bench.facts.map((_, k) => sentence(bench, k)).join(" ");
-  } }), said, body);
+  } })), said, body);
 
   const fill = () => {
     if (!(/** @type {HTMLDetailsElement} */ (body)).open) return;
     const columns = bench.facts.flatMap((facts, k) => NAMES.filter((name) => facts.columns.includes(name))
       .map((name) => ({ k, name })));
     const seen = bench.history[0];
+    const called = shortNames(bench.facts);
     const rows = [];
     const end = bench.time;
     for (let n = 0; n < ROWS && seen?.length; n += 1) {
@@ -36,10 +40,9 @@ export function mount(root, bench) {
     table.replaceChildren(
       el("caption", { text: "What the traces show" }),
       el("thead", {}, el("tr", {}, el("th", { scope: "col", text: "time [s]" }), ...columns.map(({ k, name }) => el("th", {
-        scope: "col", text: `${SHOWN[name][2]}${bench.facts.length > 1 ? ` ${k + 1}` : ""} [${SHOWN[name][0]}]` })))),
+        scope: "col", text: `${SHOWN[name][2]}${called[k] && `, ${called[k]}`} [${SHOWN[name][0]}]` })))),
       el("tbody", {}, ...rows));
   };
-  setInterval(() => { if (bench.running) fill(); }, 2000);
 }
 
 /**
@@ -65,8 +68,8 @@ export function sentence(bench, k) {
     if (way && before && way !== before) turns += 1;
     before = way || before;
   }
-  const does = turns > 5 ? "hunts" : high - low > 0.003 ? "moves" : "stands";
+  const does = high - low <= QUIET ? "stands" : turns > HUNTS ? "hunts" : "moves";
   const off = Number.isFinite(error) ? `, ${Math.abs(error).toFixed(2)} degrees ${error > 0 ? "below" : "above"} its command` : "";
-  return `${bench.facts[k].title}, ${bench.facts[k].model}, ${does} at ${angle.toFixed(1)} degrees${off}, with ${
+  return `${fullName(bench.facts[k])}, ${does} at ${angle.toFixed(1)} degrees${off}, with ${
     engineering(seen.latest("armature_current"), "A", 3)} through its motor.`;
 }

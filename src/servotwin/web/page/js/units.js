@@ -14,6 +14,7 @@ export function plain(value, digits = 4) {
   const size = Math.abs(value);
   if (size >= 1e6 || size < 1e-4) return value.toExponential(digits - 1).replace(/\.?0+e/, "e").replace("e+", "e");
   const text = value.toPrecision(digits);
+  if (text.includes("e")) return value.toFixed(0);
   return text.includes(".") ? text.replace(/\.?0+$/, "") : text;
 }
 
