@@ -50,5 +50,7 @@ def test_a_command_that_the_circuit_cannot_read_is_refused():
         live.do("frames", {"rate": 350.0})
     with pytest.raises(InputError, match="command_share"):
         live.do("control", {"command_share": 2.0})
+    with pytest.raises(InputError, match="sampling_delay"):
+        live.do("control", {"sampling_delay": 0.014})
     with pytest.raises(InputError, match="one of pulses"):
         LiveBench(read_scene(TEXT.format(control="command_share = 1.0").replace("PulseServo", "BoundedServo")))

@@ -68,7 +68,12 @@ class ControlCircuit:
     @property
     def longest(self) -> float:
         """From the edge of the longest pulse to when the program looks [s]."""
-        return _GENERATOR.width(INPUT_CONVERTER.highest) + self._supply.sampling_delay
+        return self.longest_with({})
+
+    def longest_with(self, numbers: Mapping[str, float]) -> float:
+        """Return the same with other numbers [s]."""
+        delay = ControlSupply(**{**self.numbers, **numbers}).sampling_delay
+        return _GENERATOR.width(INPUT_CONVERTER.highest) + delay
 
     @property
     def _supply(self) -> ControlSupply:

@@ -281,6 +281,9 @@ class LiveBench:
         those = [one.told.control for one in self._stations if one.told.control is not None]
         if not those:
             raise InputError("control circuit", got=", ".join(action.value), allowed="a bench that has one")
+        if any(one.longest_with(action.value) * self._sender.rate >= 1.0 for one in those):
+            raise InputError("sampling_delay of the control circuit", got=action.value["sampling_delay"],
+                             allowed="less than what a frame leaves after its longest pulse [s]")
         return [partial(one.numbers.update, action.value) for one in those]
 
     def _torque(self, action: Action) -> list[Callable[[], object]]:

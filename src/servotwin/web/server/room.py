@@ -188,7 +188,8 @@ class Room:
         mystery = unknowns() if scene.servos[0].mystery is not None else []
         return {"scene": scene.text(), "name": scene.name, "servos": [self._facts(k) for k in range(len(scene.servos))],
                 "loads": load_facts(scene, self.bench.load_numbers), "view": dict(scene.view),
-                "lesson": dict(scene.lesson),
+                "lesson": dict(scene.lesson), "supply": dict(scene.supply) or None, "control": dict(scene.control) or None,
+                "of_catalog": [servo.id for servo in scene.servos],
                 "frame_rate": self.bench.frame_rate, "running": self.pace.running, "speed": self._speed(),
                 "unknowns": mystery, "end": self._end}
 

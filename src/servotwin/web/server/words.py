@@ -9,6 +9,7 @@ from servotwin.errors import InputError
 from servotwin.web.lessons import lessons as taught
 from servotwin.web.lessons import mystery
 from servotwin.web.live import read_fragment, read_scene
+from servotwin.web.live.chosen import with_servos
 from servotwin.web.live.export import exported
 from servotwin.web.live.scene import checked_view
 
@@ -66,6 +67,12 @@ async def _scene(visitor: Visitor, message: dict[str, Any]) -> Answer:
     return {"time": 0.0}
 
 
+async def _servos(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    scene = visitor.room.bench.scene()
+    visitor.room.put(with_servos(scene, message["servos"], message.get("supply")))
+    return {"time": 0.0}
+
+
 async def _fragment(visitor: Visitor, message: dict[str, Any]) -> Answer:
     visitor.room.put(read_fragment(_text(message, "fragment")))
     return {"time": 0.0}
@@ -120,7 +127,7 @@ def _truth(message: dict[str, Any], key: str) -> bool:
 
 
 WORDS: dict[str, Callable[[Visitor, dict[str, Any]], Awaitable[Answer]]] = {
-    "do": _do, "run": _run, "speed": _speed, "step": _step, "reset": _reset, "scene": _scene, "fragment": _fragment,
+    "do": _do, "run": _run, "speed": _speed, "step": _step, "reset": _reset, "scene": _scene, "servos": _servos, "fragment": _fragment,
     "view": _view, "text": _said, "export": _export, "lesson": _lesson, "mystery": _mystery, "guess": _guess}
 """What a page may say."""
 
