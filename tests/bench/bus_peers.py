@@ -6,6 +6,7 @@ the makers' tables say, written here a second time. What moves behind them is a 
 prints the port of six of them, and lets them live until its input ends.
 """
 
+import math
 import os
 import select
 import sys
@@ -72,6 +73,9 @@ class Fleet:
         self.sims.reset(command_angle=0.0)
         self.goals, self.on = np.zeros(count), np.ones(count, bool)
         self.sims.advance(1e-3, command_angle=self.goals)
+        self.sims.set(torque_enable=self.on)
+        self.then = math.inf
+        self.look(0, 0.0, 0.0, True)  # all that has to be compiled is, before anybody waits for an answer
         self.then = time.perf_counter()
 
     def tick(self):
