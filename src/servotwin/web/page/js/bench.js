@@ -123,7 +123,7 @@ export class Bench extends EventTarget {
     } else if ("done" in message) this.answered(message.done, message, null);
     else if ("refused" in message) this.answered(message.refused, null, message.message);
     else if ("said" in message) this.notice(message.said);
-    else if ("full" in message) { this.full = message.full; this.notice(message.full); }
+    else if ("full" in message) this.full = message.full;
     for (const word of ["fit", "log"]) if (word in message) this.emit(word, message[word]);
   }
 
@@ -189,7 +189,9 @@ export class Bench extends EventTarget {
     for (const { failed } of this.waiting.values()) failed(new Error("the line to the bench was cut"));
     this.waiting.clear();
     this.emit("closed");
-    if (event.code === 4003 || event.code === 4403) { this.emit("locked", event.reason); return; }
+    if (event.code === 4003) { this.emit("locked", event.reason); return; }
+    if (event.code === 4403) { this.notice(event.reason || "this address is not one of the server's"); return; }
+    if (this.full) this.notice(this.full);
     const wait = AGAIN[Math.min(this.attempt, AGAIN.length - 1)];
     this.attempt += 1;
     if (!this.full) this.notice(`the line to the bench was cut; trying again in ${wait / 1000} s`);

@@ -5,51 +5,51 @@ import { engineering, plain } from "./units.js";
 
 const MOST = 6;
 
+/** @typedef {{id: string, title: string, models: string[], keep?: number}} Offered what may be chosen: of the catalog, or as it stands here */
+
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
 export function mount(root, bench) {
   const body = panel(root, "Servos");
   /** @type {any[]} */
   let all = [];
-  /** @type {{id: string, keep: number|null, models: string[], model: string}[]} keep: its number, of one that is no servo of the catalog */
+  /** @type {Offered[]} servos of the bench that the catalog does not have: one's own, or a mystery */
+  let own = [];
+  /** @type {{id: string, model: string}[]} */
   let chosen = [];
   const rows = el("div");
   const picture = el("div", { class: "curves" });
-  const id = unique();
-  const together = el("input", { type: "checkbox", id, onchange: () => { weak.hidden = !together.checked; } });
-  const number = (/** @type {string} */ label, /** @type {string} */ unit, /** @type {number} */ value) => {
-    const field = unique();
-    const input = el("input", { type: "number", id: field, step: "any", min: 0, value });
-    return { input, row: el("div", { class: "row" }, el("label", { for: field, text: label }), input, el("span", { class: "unit", text: unit })) };
-  };
-  const volts = number("Voltage", "V", 6);
-  const ohms = number("Internal resistance", "Ω", 0.5);
-  const weak = el("div", { hidden: true }, volts.row, ohms.row);
-  body.append(rows, el("label", { class: "tick", for: id }, together, " one battery for all of them"), weak,
-    el("div", { class: "row" }, el("button", { text: "Add a servo", onclick: () => {
-      if (chosen.length < MOST) chosen.push({ ...chosen[chosen.length - 1] });
-      show();
-    } }), el("button", { class: "primary", text: "Put on the bench", onclick: () => put() })), picture);
+  const shared = el("input", { type: "checkbox", onchange: () => { fields.hidden = !shared.checked; } });
+  const [volts, ohms] = [number("Voltage without load", "V", 6), number("Resistance of its leads", "Ω", 0.5)];
+  const fields = el("div", { hidden: true }, volts.row, ohms.row);
+  body.append(rows, el("div", { class: "buttons" }, el("button", { text: "Add a servo", onclick: () => {
+    if (chosen.length >= MOST) { bench.notice(`${MOST} servos are all that the bench has room for`); return; }
+    chosen.push({ ...chosen[chosen.length - 1] });
+    show();
+  } })), el("label", { class: "tick" }, shared, " All on one battery"), fields, el("div", { class: "buttons" },
+    el("button", { class: "primary", text: "Put on the bench", onclick: () => put() })), picture);
 
+  const offered = () => /** @type {Offered[]} */ ([...own, ...all]);
   const show = () => rows.replaceChildren(...chosen.map((one, k) => {
-    const kept = bench.facts[one.keep ?? -1];
-    const servo = choice(`Servo ${k + 1}`, [...(kept ? /** @type {[string, string][]} */ ([["", kept.title]]) : []),
-      ...all.map((found) => /** @type {[string, string]} */ ([found.id, found.title]))], (id) => {
-      const found = all.find((other) => other.id === id);
-      [one.id, one.models] = [id, found ? found.models : kept.models];
-      if (!one.models.includes(one.model)) one.model = one.models[one.models.length - 1];
+    const facts = offered().find((servo) => servo.id === one.id);
+    const servo = choice(`Servo ${k + 1}`, offered().map((found) => [found.id, found.title]), (id) => {
+      one.id = id;
+      const models = offered().find((found) => found.id === id)?.models ?? [];
+      if (!models.includes(one.model)) one.model = models[models.length - 1];
       show();
       curves(id);
+      rows.querySelectorAll("select")[2 * k]?.focus();
     });
     servo.select.value = one.id;
-    const model = choice("computed as", one.models.map((name) => /** @type {[string, string]} */ ([name, name])), (name) => { one.model = name; });
+    const model = choice("Computed as", (facts?.models ?? []).map((name) => [name, name]), (name) => { one.model = name; });
     model.select.value = one.model;
     return el("div", { class: "pick" }, servo.row, model.row, chosen.length > 1 ? el("button", { text: "Remove",
       "aria-label": `Remove servo ${k + 1}`, onclick: () => { chosen.splice(k, 1); show(); } }) : null);
   }));
 
-  const put = () => bench.tell({
-    servos: chosen.map((one) => (one.id ? { id: one.id, model: one.model } : { keep: one.keep, model: one.model })),
-    supply: together.checked ? { open_circuit_voltage: Number(volts.input.value), internal_resistance: Number(ohms.input.value) } : null });
+  const put = () => bench.tell({ servos: chosen.map(({ id, model }) => {
+    const keep = offered().find((one) => one.id === id)?.keep;
+    return keep === undefined ? { id, model } : { keep, model };
+  }), supply: shared.checked ? { open_circuit_voltage: volts.value(), internal_resistance: ohms.value() } : null });
 
   /** @param {string} id */
   const curves = async (id) => {
@@ -66,15 +66,24 @@ export function mount(root, bench) {
 
   bench.on("scene", async (state) => {
     if (!all.length) all = await (await fetch("/api/catalog")).json();
-    chosen = bench.facts.map((facts, k) => (state.of_catalog[k] ? { id: state.of_catalog[k], keep: null, models: facts.models, model: facts.model }
-      : { id: "", keep: k, models: facts.models, model: facts.model }));
-    together.checked = Boolean(state.supply);
-    weak.hidden = !together.checked;
-    volts.input.value = String(state.supply?.open_circuit_voltage ?? 6);
-    ohms.input.value = String(state.supply?.internal_resistance ?? 0.5);
+    own = bench.facts.flatMap((facts, keep) => (state.of_catalog[keep] ? []
+      : [{ id: `here ${keep}`, title: `${facts.title} (here)`, models: facts.models, keep }]));
+    chosen = bench.facts.map((facts, k) => ({ id: state.of_catalog[k] || `here ${k}`, model: facts.model }));
+    shared.checked = Boolean(state.supply);
+    fields.hidden = !state.supply;
+    if (state.supply?.open_circuit_voltage !== undefined) volts.set(state.supply.open_circuit_voltage);
+    if (state.supply?.internal_resistance !== undefined) ohms.set(state.supply.internal_resistance);
     show();
     if (chosen.length) curves(chosen[0].id);
   });
+}
+
+/** @param {string} label @param {string} unit @param {number} first */
+function number(label, unit, first) {
+  const id = unique();
+  const input = el("input", { type: "number", id, step: "any", min: 0, value: first });
+  return { row: el("div", { class: "field" }, el("label", { for: id, text: label }), input, el("span", { class: "unit", text: unit })),
+    value: () => Number(input.value), set: (/** @type {number} */ to) => { input.value = plain(to); } };
 }
 
 /**

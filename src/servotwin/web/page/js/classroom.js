@@ -15,12 +15,14 @@ export function mount(root, bench) {
   });
   bench.on("locked", (reason) => {
     place.hidden = false;
+    document.body.classList.add("locked");
+    const said = new URLSearchParams(location.search).has("code");
     const id = unique();
     const code = el("input", { type: "text", id, autocomplete: "off", autocapitalize: "none" });
     place.replaceChildren(el("form", { onsubmit: (/** @type {Event} */ event) => {
       event.preventDefault();
       location.search = `?code=${encodeURIComponent(code.value.trim().toLowerCase())}`;
-    } }, el("p", { text: reason || "This bench belongs to a class." }), el("label", { for: id, text: "Code on the teacher's screen" }),
+    } }, el("p", { text: said && reason ? reason : "This bench belongs to a class: its teacher steers, and you watch." }), el("label", { for: id, text: "Code on the teacher's screen" }),
     code, el("button", { class: "primary", text: "Watch" })));
     code.focus();
   });

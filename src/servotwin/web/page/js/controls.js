@@ -1,6 +1,6 @@
 // What the servo hangs on and what hangs on it, and the numbers of its chip that matter most.
 
-import { choice, el, onceAFrame, panel, unique } from "./dom.js";
+import { choice, el, onceAFrame, panel } from "./dom.js";
 import { slider } from "./slider.js";
 
 const MOST = [ // parameters that stand here; all others are found in the search
@@ -37,15 +37,14 @@ export function mount(root, bench) {
 
   const frames = () => {
     let rate = bench.state.frame_rate ?? 50;
-    let lost = 0;
+    let lost = Number([...bench.scene.matchAll(/^ *\[[^,]+, "frames", \{[^}]*lost = ([\d.e+-]+)/gm)].at(-1)?.[1] ?? 0);
     const send = onceAFrame(() => bench.tell({ do: "frames", value: { rate, lost } }));
-    const off = unique();
     return [
       slider({ label: "frame rate", unit: "Hz", low: 10, high: 400, value: rate, step: 1,
         changed: (value) => { rate = value; send(); } }).row,
-      slider({ label: "frames that are lost", unit: "%", low: 0, high: 100, value: 0, step: 1,
+      slider({ label: "frames that are lost", unit: "%", low: 0, high: 100, value: 100 * lost, step: 1,
         changed: (value) => { lost = value / 100; send(); } }).row,
-      el("p", { class: "soft", id: off, text: "At 100 % the transmitter is off." })];
+      el("p", { class: "soft", text: "At 100 % the transmitter is off." })];
   };
 
   const begin = () => {

@@ -1,6 +1,8 @@
 // What leaves the bench: table, picture, servo file, script, the bench itself as a file and as a link.
 
 import { choice, el, panel } from "./dom.js";
+import { fullName } from "./names.js";
+import { sheet } from "./picture.js";
 
 const LONGEST_LINK = 30000;
 
@@ -49,22 +51,11 @@ export function mount(root, bench) {
     else if (given) bench.emit("dropped", given);
   });
 
-  const picture = () => {
-    const all = [...document.querySelectorAll("canvas")].filter((one) => one.width && one.height);
-    const width = Math.max(...all.map((one) => one.width));
-    const sheet = document.createElement("canvas");
-    [sheet.width, sheet.height] = [width, all.reduce((sum, one) => sum + one.height + 8, 0)];
-    const pen = sheet.getContext("2d");
-    if (!pen) return;
-    pen.fillStyle = getComputedStyle(document.body).backgroundColor;
-    pen.fillRect(0, 0, sheet.width, sheet.height);
-    let y = 0;
-    for (const one of all) { pen.drawImage(one, 0, y); y += one.height + 8; }
-    sheet.toBlob((blob) => { if (blob) download("bench.png", blob); });
-  };
+  const picture = () => sheet(`${bench.state.name || bench.facts.map(fullName).join("; ")}, after ${bench.time.toFixed(3)} s`,
+    /** @type {HTMLElement} */ (document.getElementById("instruments"))).toBlob((blob) => { if (blob) download("bench.png", blob); });
 
   bench.on("scene", () => which.select.replaceChildren(...bench.facts.map((facts, k) => el("option", {
-    value: k, text: `${k + 1}: ${facts.title}, ${facts.model}` }))));
+    value: k, text: `${k + 1}: ${fullName(facts)}` }))));
 }
 
 /** @param {string} name @param {Blob} blob */
