@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,8 +62,12 @@ def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration
     return taped(way, duration, tape_of(len(plans)))
 
 
-def taped(way: _Compiled | Plainly, until: float, written: Tape) -> Rows:
-    """Let servos go on to a time [s], by a tape that is read whenever it is full; return what that leaves behind."""
+def taped(way: _Compiled | Plainly, until: float, written: Tape,
+          tell: Callable[[float], object] | None = None) -> Rows:
+    """Let servos go on to a time [s], by a tape that is read whenever it is full; return what that leaves behind.
+
+    Whenever it is, `tell` is told the time [s].
+    """
     found: list[list[Array]] = []
     count, status, when = 0, bus.PAUSED, 0.0
     while status == bus.PAUSED:
@@ -76,6 +80,8 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape) -> Rows:
         part[0][:, tape.FIRST] += count
         count += len(part[2])
         found.append(part)
+        if tell is not None:
+            tell(float(when))
     motions, events, numbers = (np.concatenate(column) for column in zip(*found, strict=True))
     return Rows(motions, events, numbers, int(status), float(when))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -48,7 +48,8 @@ class BusSteps:
         self._way: Plainly | None = None
         self._source: Source | None = None
 
-    def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], until: float) -> Stretch:
+    def go_on(self, source: Source, plans: Sequence[Plan], states: Sequence[State], until: float,
+              tell: Callable[[float], object] | None = None) -> Stretch:
         """Let all servos go on to a time.
 
         Parameters
@@ -59,6 +60,8 @@ class BusSteps:
             Of the servos, always in the same order.
         until : float
             [s]
+        tell : callable, optional
+            Is told the time [s] now and then; the servos cannot go on after it has raised.
 
         Raises
         ------
@@ -72,7 +75,7 @@ class BusSteps:
             if source != self._source or self._are_others(plans, states):
                 self._way.break_up(source)
         self._source = source
-        rows = taped(self._way, until, self._tape)
+        rows = taped(self._way, until, self._tape, tell)
         if rows.status != COMPLETED:
             raise failure(Status.of_code(rows.status), rows.ended)
         return self._stretch(plans, states, until, rows)

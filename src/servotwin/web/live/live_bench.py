@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters import Servo
 
+_AT_FIRST = 200  # actions at t = 0 that are done at once: what scenes have
 _WHOLE = ("command", "push", "torque")  # of these the last at an instant is all that counts
 
 
@@ -70,10 +72,11 @@ class LiveBench:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self.models, load = models_of(scene), load_of(scene)
-        self._todo = [*first_commands(scene, self.models), *scene.actions]
+        self._todo = deque([*first_commands(scene, self.models), *scene.actions])
         self._stations = [Station(model, load, first_of(self._todo, k), scene.seed + k, scene.control)
                           for k, model in enumerate(self.models)]
         self._begun = self._first_ones()
+        self._hurry: Callable[[], bool] | None = None
         self._supply = SharedSupply(self._stations) if scene.supply else None
         self._sender = Transmitter(scene.frame_rate, scene.seed)
         self._check_rate(scene.frame_rate)
@@ -83,7 +86,7 @@ class LiveBench:
         """[s]"""
         self.load_numbers: dict[str, float] = {}
         """What was changed of loads since the start, by dotted name (SI)."""
-        self._catch_up()
+        self._catch_up(_AT_FIRST)
         self.rows: list[Row] = [station.now() for station in self._stations]
         """The latest row of each servo."""
 
@@ -106,6 +109,25 @@ class LiveBench:
     def next_edge(self) -> float:
         """When the next frame begins [s]."""
         return self._sender.next_edge
+
+    @property
+    def due(self) -> bool:
+        """Whether something is still to be done before time goes on."""
+        return bool(self._todo) and self._todo[0].time <= self.time
+
+    def hurried(self, hurry: Callable[[], bool], tell: Callable[[float], object]) -> None:
+        """Let somebody else decide how long it may take.
+
+        Parameters
+        ----------
+        hurry : callable
+            Says whether `advance` is to return early, between two things that were done at one instant.
+        tell : callable
+            Is told the time [s] now and then within a motion; the bench cannot go on after it has raised.
+        """
+        self._hurry = hurry
+        for station in self._stations:
+            station.tell = tell
 
     def register_servo(self, servo: int) -> Servo:
         """Return a servo as it was at the start, with all registers that were written since."""
@@ -165,7 +187,8 @@ class LiveBench:
         rows: list[list[Row]] = [[] for _ in self._stations]
         pulses: list[list[tuple[float, float]]] = [[] for _ in self._stations]
         events: list[tuple[float, str, int]] = []
-        while self.time < until:
+        self._catch_up()
+        while self.time < until and not self.due:
             end = self._sender.snapped(min(until, self._todo[0].time) if self._todo else until)
             end = min(end, *self._looks())
             if end <= self.time:
@@ -204,10 +227,12 @@ class LiveBench:
             return self._supply.advance(until, times, switches=switches)
         return [station.advance(until, times, switches=switches) for station in self._stations]
 
-    def _catch_up(self) -> None:
-        """Do what the scene says was done by now."""
-        while self._todo and self._todo[0].time <= self.time:
-            self._act(self._todo.pop(0))
+    def _catch_up(self, most: float = math.inf) -> None:
+        """Do what the scene says was done by now, or, in a hurry, some of it."""
+        count = 0
+        while self.due and count < most and not (count and self._hurry is not None and self._hurry()):
+            self._act(self._todo.popleft())
+            count += 1
 
     def _act(self, action: Action) -> None:
         """Do something to all servos that it fits, or to none; keep it."""

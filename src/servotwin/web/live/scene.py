@@ -154,7 +154,7 @@ def read_scene(text: str) -> Scene:
         end=_number(content, "end", 0.0, 0.0, LONGEST), load=_numbers(content, "load", LOAD_FIELDS),
         supply=_numbers(content, "supply", SUPPLY_FIELDS),
         control=checked_control(content["control"]) if "control" in content else {},
-        actions=done, view=_view(content), lesson=_table(content, "lesson"))
+        actions=done, view=_view(content), lesson=_lesson(content))
 
 
 def checked_view(view: Any) -> dict[str, Any]:
@@ -224,6 +224,14 @@ def _numbers(content: Mapping[str, Any], key: str, names: tuple[str, ...]) -> di
         if not is_finite(value):
             raise InputError(f"{key}.{name} of a scene", got=value, allowed="a finite number in SI")
         found[name] = float(value)
+    return found
+
+
+def _lesson(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a table of texts and lists of them; what a lesson needs, `read_lesson` looks at."""
+    found = _table(content, "lesson")
+    if not all(isinstance(one, str) for value in found.values() for one in (value if isinstance(value, list) else [value])):
+        raise InputError("lesson of a scene", got="other values", allowed="texts and lists of texts")
     return found
 
 

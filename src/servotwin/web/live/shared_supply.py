@@ -41,7 +41,7 @@ class SharedSupply:
         """
         those = self._stations
         plans, source = [one.plan for one in those], source_of(those[0].model.servo.supply)
-        stretch = self._steps.go_on(source, plans, [one.state for one in those], until)
+        stretch = self._steps.go_on(source, plans, [one.state for one in those], until, those[0].tell)
         runs = list(zip(those, plans, stretch.segments, stretch.events, strict=True))
         switched = {time for one, _, segments, _ in runs for time in one.switched(segments)} if switches else set()
         looked = with_switches(times, sorted(switched))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.simulation import Simulator
@@ -56,6 +56,8 @@ class Station:
         self._sight = Sight(model, load)
         self._last: Segment | None = None
         self.push = 0.0  # N m, by hand
+        self.tell: Callable[[float], object] | None = None
+        """Is told the time [s] now and then within a motion."""
 
     @property
     def model(self) -> Model:
@@ -93,7 +95,7 @@ class Station:
         SimulationError
             If it cannot go on.
         """
-        record, plan = Record([], []), self.plan
+        record, plan = Record([], [], self.tell), self.plan
         self.state = self._simulator.recorded(self.state, until, self.told.signal, record, external_torque=self.push)
         looked = with_switches(times, self.switched(record.segments) if switches else [])
         return self.seen(plan, record.segments, record.events, looked)
@@ -143,7 +145,8 @@ def with_switches(times: Sequence[float], switched: Sequence[float]) -> list[flo
     >>> with_switches([0.1, 0.2], [0.15, 0.2])
     [0.1, 0.15, 0.15, 0.2, 0.2]
     """
-    return sorted([*(time for time in times if time not in set(switched)), *switched, *switched])
+    twice = set(switched)
+    return sorted([*(time for time in times if time not in twice), *switched, *switched])
 
 
 def lively(events: Sequence[tuple[float, str, float]]) -> list[tuple[float, str]]:
