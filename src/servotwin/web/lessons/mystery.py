@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -143,3 +143,58 @@ def is_hidden(name: str) -> bool:
     (True, False)
     """
     return name in _BOTH_WAYS or any(name == one.name for one in HIDDEN)
+
+
+def known_of(now: Servo) -> Servo:
+    """Return what a pupil knows of a mystery servo: the base servo, with what was changed at the bench in sight.
+
+    Parameters
+    ----------
+    now : Servo
+        The mystery servo with its numbers of now.
+
+    Examples
+    --------
+    >>> known = known_of(mystery_servo(7).replace({"supply.open_circuit_voltage": 5.0}))
+    >>> known.supply.open_circuit_voltage, known.motor == load_servo(BASE).motor
+    (5.0, True)
+    """
+    base = load_servo(BASE)
+    seen = {name: now.get(name) for name in now.names() if not is_hidden(name) and now.get(name) != base.get(name)}
+    return base.replace(seen)
+
+
+def sought() -> dict[str, tuple[float, float]]:
+    """Return what a fit of a mystery servo searches, and between which values (SI): what the page tells of it.
+
+    Friction is sought at the output, where both ways are one number.
+
+    Examples
+    --------
+    >>> list(sought())[-1]
+    'output_coulomb_torque'
+    """
+    reduction: Any = load_servo(BASE).get("gear.gear_reduction")
+    found = {}
+    for one in unknowns():
+        at_output = one["name"] == "friction.coulomb_torque"
+        times = reduction if at_output else 1.0
+        found["output_coulomb_torque" if at_output else one["name"]] = (times * one["low"], times * one["high"])
+    return found
+
+
+def guess_of(servo: Servo, unsure: Collection[str] = ()) -> dict[str, float]:
+    """Return the guess that a fitted servo is, by the names of `HIDDEN` (SI), without what the fit is not sure of.
+
+    Examples
+    --------
+    >>> compare(7, guess_of(mystery_servo(7)))[4]["said"], len(guess_of(mystery_servo(7), ["electronics.deadband"]))
+    ('found', 4)
+    """
+    found = {}
+    for name, *_ in HIDDEN:
+        friction = name == "friction.coulomb_torque"
+        value: Any = servo.get(_BOTH_WAYS[0] if friction else name)
+        if ("output_coulomb_torque" if friction else name) not in unsure and isinstance(value, float):
+            found[name] = value
+    return found

@@ -5,20 +5,27 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from servotwin.errors import InputError
 from servotwin.parameters.servo_file import servo_text
 from servotwin.simulation.files import write_csv
 from servotwin.web.live.replay import replay
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
 
     from servotwin.models import Model
     from servotwin.web.live.scene import Scene
 
+    Array = NDArray[np.float64]
+
 KINDS = ("csv", "script", "servo", "scene")
 """Kinds of files."""
 _STEP = 1e-3  # s
+_APART = 1e-9  # s: times that are nearer are one
 _SCRIPT = '''"""{title}: what was done at the bench, once more.
 
 It needs servotwin and nothing else: python {name}
@@ -102,5 +109,20 @@ def script(scene: Scene) -> str:
 def _table(scene: Scene, servo: int, progress: Callable[[float], object] | None) -> str:
     run = replay(scene, output_step=_STEP, switches=False, progress=progress)
     out = io.StringIO()
-    write_csv(out, run[servo], run.units)
+    write_csv(out, _as_heard(run[servo], run.pulses[servo]), run.units)
     return out.getvalue()
+
+
+def _as_heard(columns: Mapping[str, Array], pulses: Array) -> dict[str, Array]:
+    """Return a table whose times can be told apart in its text, and whose pulses are those of their frames.
+
+    A bench that stands at an edge has not heard its pulse yet; of a log this is the first sample of the new one.
+    """
+    time = columns["time"]
+    keep = np.append(np.diff(time) > _APART, True)
+    table = {name: values[keep] for name, values in columns.items()}
+    sent = pulses[pulses[:, 1] > 0.0]
+    if "pulse_width" in table and len(sent):
+        frame = np.searchsorted(sent[:, 0], table["time"] + _APART, side="right") - 1
+        table["pulse_width"] = np.where(frame >= 0, sent[np.maximum(frame, 0), 1], table["pulse_width"])
+    return table

@@ -21,7 +21,9 @@ from servotwin.errors import ServotwinError
 from servotwin.web.server.catalog import catalog_list, curves_data
 from servotwin.web.server.guard import Guard
 from servotwin.web.server.limits import MOST_VISITORS, MOST_WATCHERS, Allowance
+from servotwin.web.server.own.desk import Desk
 from servotwin.web.server.room import Room
+from servotwin.web.server.uploads import take_log
 from servotwin.web.server.visitor import Visitor
 from servotwin.web.server.wire import line_of, text_of
 
@@ -60,6 +62,11 @@ class House:
         self._shared: Room | None = None
         self._teachers = self._watchers = 0
         self._living: asyncio.Task[None] | None = None
+        self.desk = Desk()
+
+    async def upload(self, request: Request) -> Response:
+        """Take a log that a visitor hands in."""
+        return await take_log(request, self.desk)
 
     async def visit(self, socket: WebSocket) -> None:
         """Take a browser in, or tell it why not."""
@@ -77,7 +84,7 @@ class House:
         room = Room(self._scene)
         living = asyncio.create_task(room.live())
         try:
-            await Visitor(socket, room, "own").stay()
+            await Visitor(socket, room, "own", self.desk).stay()
         finally:
             self._visitors -= 1
             living.cancel()
@@ -100,7 +107,7 @@ class House:
             self._living = asyncio.create_task(self._shared.live())
         self._watchers += 0 if teaches else 1
         try:
-            await Visitor(socket, self._shared, "teacher" if teaches else "watcher",
+            await Visitor(socket, self._shared, "teacher" if teaches else "watcher", self.desk,
                           self.code if teaches else None).stay()
         finally:
             self._watchers -= 0 if teaches else 1
@@ -127,7 +134,8 @@ def application(scene: Scene, names: frozenset[str], *, classroom: bool = False)
     house = House(scene, classroom=classroom)
     routes = [
         Route("/", _page), Route("/api/catalog", _catalog), Route("/api/curves/{name}", _curves),
-        WebSocketRoute("/live", house.visit), Mount("/page", StaticFiles(directory=PAGE))]
+        Route("/api/log", house.upload, methods=["POST"]), WebSocketRoute("/live", house.visit),
+        Mount("/page", StaticFiles(directory=PAGE))]
 
     @contextlib.asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:

@@ -14,12 +14,14 @@ from servotwin.errors import ServotwinError
 from servotwin.web.lessons.lessons import lessons
 from servotwin.web.server.limits import Allowance
 from servotwin.web.server.outbox import Outbox
+from servotwin.web.server.own.brought import Brought
 from servotwin.web.server.wire import VERSION, id_of, line_of, message_of, text_of
 from servotwin.web.server.words import answer_to
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
+    from servotwin.web.server.own.desk import Desk
     from servotwin.web.server.room import Room
 
 _RATE, _BURST = 240.0, 480.0  # messages
@@ -35,14 +37,17 @@ class Visitor:
         That was accepted.
     room : Room
     role : {"own", "teacher", "watcher"}
+    desk : Desk
+        That takes logs.
     code : str, optional
         That watchers need, for the teacher's page.
     """
 
-    def __init__(self, socket: WebSocket, room: Room, role: str, code: str | None = None) -> None:
+    def __init__(self, socket: WebSocket, room: Room, role: str, desk: Desk, code: str | None = None) -> None:
         self.room, self.role, self.token = room, role, secrets.token_urlsafe(18)
-        self._socket, self._code = socket, code
+        self._socket, self._code, self._desk = socket, code, desk
         self._box = Outbox(socket)
+        self.brought = Brought(desk, room, self.token, role, lambda message: self._box.text(text_of(message)))
         self._allowance = Allowance(_RATE, _BURST)
 
     async def stay(self) -> None:
@@ -52,6 +57,7 @@ class Visitor:
             "lessons": [lesson.listed() for lesson in lessons()]}}))
         self._box.text(text_of({"scene": self.room.state()}))
         self.room.outboxes.append(self._box)
+        self._desk.enter(self.brought)
         self.room.show()
         tasks = [asyncio.create_task(self._listen()), asyncio.create_task(self._box.deliver())]
         try:
@@ -62,6 +68,7 @@ class Visitor:
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
+            await self._desk.leave(self.brought)
             with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):  # it may be gone already
                 await asyncio.wait_for(self._socket.close(), 1.0)
 

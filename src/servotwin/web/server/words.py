@@ -112,6 +112,41 @@ async def _guess(visitor: Visitor, message: dict[str, Any]) -> Answer:
     return {"compared": mystery.compare(servo.mystery, message["guess"])}
 
 
+async def _log(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    asked = _table(message, "log")
+    if "columns" in asked:
+        visitor.brought.read_again(asked["columns"], asked.get("drop_repeated", False))
+    elif "show" in asked:
+        visitor.brought.compare(asked)
+    elif "play" in asked:
+        return {"time": visitor.brought.play(asked.get("run", 0))}
+    elif "forget" in asked:
+        visitor.brought.forget()
+    else:
+        raise InputError("log", got=", ".join(map(str, asked))[:100], allowed="one of columns, show, play, forget")
+    return {}
+
+
+async def _fit(visitor: Visitor, message: dict[str, Any]) -> Answer:
+    asked, fits = _table(message, "fit"), visitor.brought.fits
+    if "plan" in asked:
+        return {"plan": await fits.plan(asked.get("servo", 0), asked.get("model"))}
+    if "cancel" in asked:
+        fits.cancel()
+    elif "take" in asked:
+        fits.take_over(asked["take"])
+    else:
+        fits.begin(asked)
+    return {}
+
+
+def _table(message: dict[str, Any], key: str) -> dict[str, Any]:
+    value = message[key]
+    if not isinstance(value, dict) or not value:
+        raise InputError(key, got=type(value).__name__, allowed="a table of what is asked")
+    return value
+
+
 def _text(message: dict[str, Any], key: str) -> str:
     value = message[key]
     if not isinstance(value, str):
@@ -128,6 +163,7 @@ def _truth(message: dict[str, Any], key: str) -> bool:
 
 WORDS: dict[str, Callable[[Visitor, dict[str, Any]], Awaitable[Answer]]] = {
     "do": _do, "run": _run, "speed": _speed, "step": _step, "reset": _reset, "scene": _scene, "servos": _servos, "fragment": _fragment,
-    "view": _view, "text": _said, "export": _export, "lesson": _lesson, "mystery": _mystery, "guess": _guess}
+    "view": _view, "text": _said, "export": _export, "lesson": _lesson, "mystery": _mystery, "guess": _guess,
+    "log": _log, "fit": _fit}
 """What a page may say."""
 
