@@ -53,7 +53,7 @@ export function mount(root, bench) {
 
   /** @param {string} id */
   const curves = async (id) => {
-    if (!id) { picture.replaceChildren(); return; }
+    if (own.some((one) => one.id === id)) { picture.replaceChildren(); return; }
     const answer = await fetch(`/api/curves/${encodeURIComponent(id)}`);
     const found = await answer.json();
     if (!answer.ok) { picture.replaceChildren(el("p", { class: "soft", text: found.error })); return; }
@@ -64,8 +64,9 @@ export function mount(root, bench) {
         engineering(Math.max(...found.torque), "N m", 3)}, turns 60° in ${engineering(Math.PI / 3 / Math.max(...found.speed), "s", 3)}` }));
   };
 
-  bench.on("scene", async (state) => {
+  bench.on("scene", async () => {
     if (!all.length) all = await (await fetch("/api/catalog")).json();
+    const state = bench.state; // of now: it may have changed meanwhile
     own = bench.facts.flatMap((facts, keep) => (state.of_catalog[keep] ? []
       : [{ id: `here ${keep}`, title: `${facts.title} (here)`, models: facts.models, keep }]));
     chosen = bench.facts.map((facts, k) => ({ id: state.of_catalog[k] || `here ${k}`, model: facts.model }));
