@@ -14,8 +14,8 @@ from talk import Client, come, server, watched
 
 import servotwin as st
 from servotwin.web.live import read_scene
-from servotwin.web.live.commands import checked_command, command_signal
 from servotwin.web.live.beginning import load_of
+from servotwin.web.live.commands import checked_command, command_signal
 from servotwin.web.server.first import first_scene
 
 SECONDS = 10.0

@@ -230,7 +230,8 @@ def _numbers(content: Mapping[str, Any], key: str, names: tuple[str, ...]) -> di
 def _lesson(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return a table of texts and lists of them; what a lesson needs, `read_lesson` looks at."""
     found = _table(content, "lesson")
-    if not all(isinstance(one, str) for value in found.values() for one in (value if isinstance(value, list) else [value])):
+    listed = [one for value in found.values() for one in (value if isinstance(value, list) else [value])]
+    if not all(isinstance(one, str) for one in listed):
         raise InputError("lesson of a scene", got="other values", allowed="texts and lists of texts")
     return found
 

@@ -18,6 +18,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocketDisconnect
 
 from servotwin.errors import ServotwinError
+from servotwin.web.server.aside import aside
 from servotwin.web.server.catalog import catalog_list, curves_data
 from servotwin.web.server.guard import Guard
 from servotwin.web.server.limits import MOST_VISITORS, MOST_WATCHERS, Allowance
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 PAGE = Path(__file__).parent.parent / "page"
 FULL, NOT_IN = 4008, 4003
 """Codes with which a browser is sent away: no room is left, or it has not said the code."""
+_SHEETS = asyncio.Lock()
 _LETTERS = "abcdefghjkmnpqrstuvwxyz23456789"  # none that look alike
 
 
@@ -81,42 +83,45 @@ class House:
             await _away(socket, FULL, f"all {MOST_VISITORS} places are taken: try again when someone has left")
             return
         self._visitors += 1
-        room = Room(self._scene)
-        living = asyncio.create_task(room.live())
+        living: asyncio.Task[None] | None = None
         try:
+            room = await aside("bench", lambda: Room(self._scene))
+            living = asyncio.create_task(room.live())
             await Visitor(socket, room, "own", self.desk).stay()
         finally:
             self._visitors -= 1
-            living.cancel()
+            if living is not None:
+                living.cancel()
 
     async def _class(self, socket: WebSocket) -> None:
         asked = socket.query_params
-        if not self._tries.take(time.monotonic()):
+        teaches = hmac.compare_digest(asked.get("teacher", "").encode(), (self.teacher or "").encode())
+        if not teaches and not self._tries.take(time.monotonic()):  # a code is short; what teaches nobody guesses
             await _away(socket, NOT_IN, "too many at once: try again in a moment")
             return
-        teaches = hmac.compare_digest(asked.get("teacher", "").encode(), (self.teacher or "").encode())
         if not teaches and not hmac.compare_digest(asked.get("code", "").strip().lower().encode(),
                                                    (self.code or "").encode()):
             await _away(socket, NOT_IN, "that is not the code on the teacher's screen")
             return
-        if not teaches and self._watchers >= MOST_WATCHERS:
-            await _away(socket, FULL, f"all {MOST_WATCHERS} places are taken")
+        if self._teachers >= MOST_VISITORS if teaches else self._watchers >= MOST_WATCHERS:
+            await _away(socket, FULL, f"all {MOST_VISITORS if teaches else MOST_WATCHERS} places are taken")
             return
         if self._shared is None:
             self._shared = Room(self._scene)
             self._living = asyncio.create_task(self._shared.live())
-        self._watchers += 0 if teaches else 1
+        self._watchers, self._teachers = self._watchers + (not teaches), self._teachers + teaches
         try:
             await Visitor(socket, self._shared, "teacher" if teaches else "watcher", self.desk,
                           self.code if teaches else None).stay()
         finally:
-            self._watchers -= 0 if teaches else 1
+            self._watchers, self._teachers = self._watchers - (not teaches), self._teachers - teaches
 
 
 async def _away(socket: WebSocket, code: int, line: str) -> None:
     with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):
-        await asyncio.wait_for(socket.send_text(text_of({"full": line})), 5.0)
-        await socket.close(code, line[:100])
+        async with asyncio.timeout(5.0):
+            await socket.send_text(text_of({"full": line}))
+            await socket.close(code, line[:100])
 
 
 def application(scene: Scene, names: frozenset[str], *, classroom: bool = False) -> tuple[ASGIApp, House]:
@@ -151,11 +156,13 @@ async def _page(request: Request) -> Response:
 
 
 async def _catalog(request: Request) -> Response:
-    return JSONResponse(await asyncio.to_thread(catalog_list))
+    async with _SHEETS:  # they are computed once: one waits for the other
+        return JSONResponse(await aside("catalog", catalog_list))
 
 
 async def _curves(request: Request) -> Response:
     try:
-        return JSONResponse(await asyncio.to_thread(curves_data, request.path_params["name"]))
+        async with _SHEETS:
+            return JSONResponse(await aside("curves", lambda: curves_data(request.path_params["name"])))
     except ServotwinError as error:
         return JSONResponse({"error": line_of(error)}, status_code=404)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
 _MOST_TEXTS = 256  # that wait: who takes none of them is gone
+_MOST_LETTERS = 20_000_000  # of them, beside the one that comes
+_FEW = 4  # texts that wait, and the browser may say more
 _SLOWEST = 30.0  # s for one message
 
 
@@ -27,8 +30,10 @@ class Outbox:
     def __init__(self, socket: WebSocket) -> None:
         self._socket = socket
         self._texts: deque[str] = deque()
-        self._push: bytes | None = None
-        self._something = asyncio.Event()
+        self._letters = 0  # of all texts
+        self._push: Callable[[], bytes] | None = None
+        self._something, self._room = asyncio.Event(), asyncio.Event()
+        self._room.set()
         self.missed = 0
         self.closed = False
 
@@ -39,28 +44,43 @@ class Outbox:
 
     def text(self, text: str) -> None:
         """Send a message; a browser that takes none of many is given up."""
-        if len(self._texts) >= _MOST_TEXTS:
+        if len(self._texts) >= _MOST_TEXTS or self._letters > _MOST_LETTERS:
             self.closed = True
         else:
             self._texts.append(text)
+            self._letters += len(text)
+            if len(self._texts) >= _FEW:
+                self._room.clear()
         self._something.set()
 
-    def push(self, data: bytes) -> None:
-        """Send a push, unless a later one comes before its turn."""
+    def push(self, packed: Callable[[], bytes]) -> None:
+        """Send a push, unless a later one comes before its turn: only then it is packed."""
         if self._push is not None:
             self.missed += 1
-        self._push = data
+        self._push = packed
         self._something.set()
 
+    async def room(self) -> None:
+        """Wait until few messages wait: who does not listen is not listened to."""
+        await self._room.wait()
+
     async def deliver(self) -> None:
-        """Send what waits until the browser is gone."""
+        """Send what waits until the browser is gone, or does not take it."""
         while not self.closed:
             await self._something.wait()
             self._something.clear()
-            while not self.closed and (self._texts or self._push is not None):
-                if self._texts:
-                    await asyncio.wait_for(self._socket.send_text(self._texts.popleft()), _SLOWEST)
-                    continue
-                data, self._push = self._push, None
-                if data is not None:
-                    await asyncio.wait_for(self._socket.send_bytes(data), _SLOWEST)
+            while not (self.closed or self.free):
+                async with asyncio.timeout(_SLOWEST):
+                    await self._send_next()
+
+    async def _send_next(self) -> None:
+        if self._texts:
+            text = self._texts.popleft()
+            self._letters -= len(text)
+            if len(self._texts) < _FEW:
+                self._room.set()
+            await self._socket.send_text(text)
+            return
+        push, self._push = self._push, None
+        if push is not None:
+            await self._socket.send_bytes(push())

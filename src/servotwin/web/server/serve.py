@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import socket
+import sys
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from servotwin.errors import InputError, MissingExtraError
+from servotwin.web.live import LiveBench
 from servotwin.web.server.limits import LONGEST_MESSAGE
 
 if TYPE_CHECKING:
     from servotwin.web.live import Scene
 
 LOOPBACK = "127.0.0.1"
+PING = 20.0
+"""How often a page is asked whether it is there, and how long it may take to say so [s]."""
+_HAND_OVER = 1e-3  # s after which a thread that computes lets the benches have a turn
 
 
 class Links(NamedTuple):
@@ -44,8 +50,8 @@ def serve(scene: Scene, *, host: str = LOOPBACK, port: int = 8000, classroom: bo
     ------
     MissingExtraError
         If starlette, uvicorn or websockets is not installed.
-    InputError
-        If the address is not one to listen at, or the port is taken.
+    ServotwinError
+        If the bench is not possible, the address is not one to listen at, or the port is taken.
     """
     try:
         import uvicorn
@@ -53,15 +59,18 @@ def serve(scene: Scene, *, host: str = LOOPBACK, port: int = 8000, classroom: bo
 
         from servotwin.web.server.app import application
         from servotwin.web.server.guard import names_of
+        from servotwin.web.server.line import Door, Line
     except ImportError as error:
         raise MissingExtraError(error.name or "uvicorn", "web") from None
+    LiveBench(replace(scene, end=0.0))  # raises if there is no such bench
     listening = _listening(host, port)
     with listening:
         port = listening.getsockname()[1]
         app, house = application(scene, names_of(host, port), classroom=classroom)
-        config = uvicorn.Config(app, log_level="error", access_log=False, server_header=False, ws="websockets-sansio",
-                                ws_max_size=LONGEST_MESSAGE, ws_ping_interval=20.0, ws_ping_timeout=20.0,
-                                ws_per_message_deflate=False, ws_max_queue=16, timeout_graceful_shutdown=1,
+        sys.setswitchinterval(_HAND_OVER)
+        config = uvicorn.Config(app, log_level="critical", access_log=False, server_header=False, http=Door, ws=Line,
+                                ws_max_size=LONGEST_MESSAGE, ws_ping_interval=PING, ws_ping_timeout=PING,
+                                ws_per_message_deflate=False, timeout_graceful_shutdown=1,
                                 h11_max_incomplete_event_size=65536)
         if ready is not None:
             ready(_links(host, port, house.teacher, house.code))

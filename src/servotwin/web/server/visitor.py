@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from starlette.websockets import WebSocketDisconnect
 
-from servotwin.errors import ServotwinError
+from servotwin.errors import InputError, ServotwinError
 from servotwin.web.lessons.lessons import lessons
 from servotwin.web.server.limits import Allowance
 from servotwin.web.server.outbox import Outbox
@@ -49,13 +49,14 @@ class Visitor:
         self._box = Outbox(socket)
         self.brought = Brought(desk, room, self.token, role, lambda message: self._box.text(text_of(message)))
         self._allowance = Allowance(_RATE, _BURST)
+        self._export: asyncio.Task[None] | None = None
 
     async def stay(self) -> None:
         """Listen and tell until the browser is gone."""
         self._box.text(text_of({"hello": {
             "visitor": self.token, "version": VERSION, "role": self.role, "code": self._code,
             "lessons": [lesson.listed() for lesson in lessons()]}}))
-        self._box.text(text_of({"scene": self.room.state()}))
+        self._box.text(await self.room.state_text())
         self.room.outboxes.append(self._box)
         self._desk.enter(self.brought)
         self.room.show()
@@ -65,6 +66,7 @@ class Visitor:
         finally:
             self._box.closed = True
             self.room.outboxes.remove(self._box)
+            tasks += [self._export] if self._export is not None else []
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
@@ -75,6 +77,7 @@ class Visitor:
     async def _listen(self) -> None:
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
             while True:
+                await self._box.room()
                 text = (await self._socket.receive()).get("text", b"")
                 if self._socket.client_state.name != "CONNECTED":
                     return
@@ -83,16 +86,30 @@ class Visitor:
                     await asyncio.sleep(0.05)
                     await self._socket.close(_TOO_MANY, "too many messages in a second")
                     return
-                self._box.text(text_of(await self._answered(text)))
+                await self._hear(text)
 
-    async def _answered(self, text: object) -> dict[str, Any]:
-        number = None
+    async def _hear(self, text: object) -> None:
+        """Do what a message says, and answer; files are made beside, one at a time."""
         try:
             message = message_of(text)
-            number = id_of(message)
-            return {"done": number, **await answer_to(self, message)}
         except ServotwinError as error:
-            return {"refused": number, "message": line_of(error)}
+            self._box.text(text_of({"refused": None, "message": line_of(error)}))
+            return
+        if "export" not in message:
+            await self._answer(message)
+        elif self._export is None or self._export.done():
+            self._export = asyncio.create_task(self._answer(message))
+        else:
+            self._box.text(text_of({"refused": id_of(message), "message": line_of(
+                InputError("export", got="another one at once", allowed="one after the other"))}))
+
+    async def _answer(self, message: dict[str, Any]) -> None:
+        number = id_of(message)
+        try:
+            answer = {"done": number, **await answer_to(self, message)}
+        except ServotwinError as error:
+            answer = {"refused": number, "message": line_of(error)}
         except Exception as error:  # one visitor's message shall not end the visits of others
-            return {"refused": number, "message": "a mistake of servotwin itself "
-                    f"({type(error).__name__}); please report what was done"}
+            answer = {"refused": number, "message": "a mistake of servotwin itself "
+                      f"({type(error).__name__}); please report what was done"}
+        self._box.text(text_of(answer))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from array import array
+from functools import lru_cache
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
@@ -92,9 +93,10 @@ def packed(header: Mapping[str, Any], push: Push) -> bytes:
     >>> len(data) % 8, data[-32:-24] == array("d", [0.5]).tobytes()
     (0, True)
     """
-    whole = {"t": push.time, **header, "events": push.events,
-             "servos": [{"n": len(one.points), "m": len(one.pulses), "columns": one.columns} for one in push.servos]}
-    text = text_of(whole).encode()
+    servos = ",".join(f'{{"n":{len(one.points)},"m":{len(one.pulses)},"columns":{_listed(one.columns)}}}'
+                      for one in push.servos)
+    told = text_of({"t": push.time, **header, "events": push.events})
+    text = f'{told[:-1]},"servos":[{servos}]}}'.encode()
     numbers = array("d")
     for one in push.servos:
         numbers.extend(chain.from_iterable(one.points))
@@ -115,6 +117,12 @@ def line_of(error: Exception) -> str:
     """
     line = " ".join(str(error).split())
     return line if len(line) <= _LONGEST_LINE else f"{line[:_LONGEST_LINE]} ..."
+
+
+@lru_cache(maxsize=64)
+def _listed(columns: tuple[str, ...]) -> str:
+    """Return names in JSON: the same in push after push."""
+    return json.dumps(columns, separators=(",", ":"))
 
 
 def _refused(word: str) -> Any:

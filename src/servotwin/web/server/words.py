@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError
@@ -12,6 +12,7 @@ from servotwin.web.live import read_fragment, read_scene
 from servotwin.web.live.chosen import with_servos
 from servotwin.web.live.export import exported
 from servotwin.web.live.scene import checked_view
+from servotwin.web.server.aside import EXPORTS, aside
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from servotwin.web.server.visitor import Visitor
 
 Answer = dict[str, Any]
+_LONGEST_EXPORT = 600.0  # s
 
 
 async def answer_to(visitor: Visitor, message: dict[str, Any]) -> Answer:
@@ -58,23 +60,23 @@ async def _step(visitor: Visitor, message: dict[str, Any]) -> Answer:
 
 
 async def _reset(visitor: Visitor, message: dict[str, Any]) -> Answer:
-    visitor.room.reset()
+    await visitor.room.reset()
     return {"time": 0.0}
 
 
 async def _scene(visitor: Visitor, message: dict[str, Any]) -> Answer:
-    visitor.room.put(read_scene(_text(message, "scene")))
+    await visitor.room.begin("scene", partial(read_scene, _text(message, "scene")))
     return {"time": 0.0}
 
 
 async def _servos(visitor: Visitor, message: dict[str, Any]) -> Answer:
     scene = visitor.room.bench.scene()
-    visitor.room.put(with_servos(scene, message["servos"], message.get("supply")))
+    await visitor.room.begin("servos", partial(with_servos, scene, message["servos"], message.get("supply")))
     return {"time": 0.0}
 
 
 async def _fragment(visitor: Visitor, message: dict[str, Any]) -> Answer:
-    visitor.room.put(read_fragment(_text(message, "fragment")))
+    await visitor.room.begin("link", partial(read_fragment, _text(message, "fragment")))
     return {"time": 0.0}
 
 
@@ -85,23 +87,24 @@ async def _view(visitor: Visitor, message: dict[str, Any]) -> Answer:
 
 async def _said(visitor: Visitor, message: dict[str, Any]) -> Answer:
     scene = visitor.room.bench.scene()
-    return {"text": scene.text(), "fragment": scene.fragment()}
+    return await aside("text of the bench", lambda: {"text": scene.text(), "fragment": scene.fragment()})
 
 
 async def _export(visitor: Visitor, message: dict[str, Any]) -> Answer:
     bench = visitor.room.bench
-    servo = message.get("servo") or 0
-    file = await asyncio.to_thread(exported, message["export"], bench.scene(), bench.now_models, servo)
-    return {"file": file._asdict()}
+    made = partial(exported, message["export"], bench.scene(), bench.now_models, message.get("servo") or 0)
+    async with EXPORTS:
+        return {"file": (await aside("export", made, _LONGEST_EXPORT))._asdict()}
 
 
 async def _lesson(visitor: Visitor, message: dict[str, Any]) -> Answer:
-    visitor.room.put(taught.lesson(_text(message, "lesson")).scene)
+    lesson = taught.lesson(_text(message, "lesson"))
+    await visitor.room.begin("lesson", lambda: lesson.scene)
     return {"time": 0.0}
 
 
 async def _mystery(visitor: Visitor, message: dict[str, Any]) -> Answer:
-    visitor.room.put(mystery.mystery_scene(message["mystery"]))
+    await visitor.room.begin("mystery", partial(mystery.mystery_scene, message["mystery"]))
     return {"time": 0.0}
 
 
@@ -162,7 +165,8 @@ def _truth(message: dict[str, Any], key: str) -> bool:
 
 
 WORDS: dict[str, Callable[[Visitor, dict[str, Any]], Awaitable[Answer]]] = {
-    "do": _do, "run": _run, "speed": _speed, "step": _step, "reset": _reset, "scene": _scene, "servos": _servos, "fragment": _fragment,
+    "do": _do, "run": _run, "speed": _speed, "step": _step, "reset": _reset, "scene": _scene, "servos": _servos,
+    "fragment": _fragment,
     "view": _view, "text": _said, "export": _export, "lesson": _lesson, "mystery": _mystery, "guess": _guess,
     "log": _log, "fit": _fit}
 """What a page may say."""

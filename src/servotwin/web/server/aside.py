@@ -1,0 +1,75 @@
+"""What takes longer than a turn, beside the benches: in a thread of its own, for so long and no longer."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import ctypes
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+from servotwin.errors import InputError
+
+Found = TypeVar("Found")
+_LONGEST = 30.0  # s
+EXPORTS = asyncio.Semaphore(2)
+"""So many long ones at once, of all visitors."""
+
+
+class _StoppedError(BaseException):
+    """Nobody waits any more for what a thread computes."""
+
+
+async def aside(what: str, work: Callable[[], Found], seconds: float = _LONGEST) -> Found:
+    """Return what a function returns, while the benches go on; it ends when nobody waits for it any more.
+
+    The interpreter goes on within a function of Python at any time, so it can be stopped at any time: what it does is
+    to have no effect but what it returns.
+
+    Parameters
+    ----------
+    what : str
+        For messages.
+    work : callable
+    seconds : float
+        How long it may take [s].
+
+    Raises
+    ------
+    InputError
+        If it takes longer.
+
+    Examples
+    --------
+    >>> asyncio.run(aside("sum", lambda: sum([1, 2])))
+    3
+    """
+    loop = asyncio.get_running_loop()
+    found: asyncio.Future[Found] = loop.create_future()
+    thread = threading.Thread(target=_compute, args=(work, loop, found), name=what, daemon=True)
+    thread.start()
+    try:
+        async with asyncio.timeout(seconds):
+            return await asyncio.shield(found)
+    except TimeoutError:
+        raise InputError(what, got=f"more than {seconds:g} s of work", allowed="something shorter") from None
+    finally:
+        if not found.done() and thread.ident is not None:
+            found.cancel()
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(_StoppedError))
+
+
+def _compute(work: Callable[[], Found], loop: asyncio.AbstractEventLoop, found: asyncio.Future[Found]) -> None:
+    with contextlib.suppress(_StoppedError, RuntimeError):  # stopped; or the loop is gone
+        try:
+            value = work()
+        except Exception as error:
+            loop.call_soon_threadsafe(_tell, found.set_exception, found, error)
+        else:
+            loop.call_soon_threadsafe(_tell, found.set_result, found, value)
+
+
+def _tell(tell: Callable[[Found], object], found: asyncio.Future[Found], value: Found) -> None:
+    if not found.done():
+        tell(value)
