@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin.errors import InputError
 from servotwin.models import DigitalServo
 from servotwin.models.switched import SwitchedServo
-from servotwin.physics.pieces import Piece, Pieces
+from servotwin.physics.pieces import Piece, Pieces, piece_value
 from servotwin.signals import Signal
 from servotwin.web.live.commands import command_signal
 from servotwin.web.live.control_circuit import ControlCircuit
@@ -25,6 +25,10 @@ class Taken(NamedTuple):
 
     shape: Signal
     drive: Pieces
+
+    def at(self, time: float) -> float:
+        """Return what the model follows at a time [s], of plain numbers: it is asked for at each frame."""
+        return piece_value(self.drive.at(time)[0], time)
 
 
 class Told:
@@ -123,11 +127,11 @@ class Told:
         return pulses
 
     def _width(self, edge: float) -> float:
-        return float(self._taken.drive(edge)) if self.control is None else self.control.send(edge)
+        return self._taken.at(edge) if self.control is None else self.control.send(edge)
 
     def _silence(self) -> Signal:
         """Return a train before its first pulse: the servo stands where the command asks for just before t = 0."""
-        first = float(self._taken.drive(0.0)) if self.control is None else self.control.width
+        first = self._taken.at(0.0) if self.control is None else self.control.width
         return _train([(_NEVER, first)])
 
 
