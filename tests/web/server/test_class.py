@@ -1,5 +1,7 @@
 """A class: one bench, which the teacher steers and others watch."""
 
+import time
+from contextlib import ExitStack
 from urllib.parse import urlsplit
 
 import pytest
@@ -37,13 +39,45 @@ def test_without_the_code_nobody_gets_in(school, query):
         assert "code" in page.until("full")["full"]
 
 
-@pytest.mark.slow
-def test_the_forty_first_watcher_is_told(school):
-    address, _, code = school
-    pages = [Page(address, code) for _ in range(40)]
-    for page in pages:
-        page.until("hello")
-    with Page(address, code) as late:
-        assert "40 places" in late.until("full")["full"]
-    for page in pages:
-        page.close()
+def test_forty_watch_one_stream_and_the_next_is_told(school):
+    address, teacher, code = school
+    with ExitStack() as stack:
+        teaches = stack.enter_context(Page(address, teacher))
+        pages = [stack.enter_context(Page(address, code)) for _ in range(40)]
+        for page in pages:
+            assert page.until("hello")["hello"]["role"] == "watcher"
+        with Page(address, code) as late:
+            assert "40 places" in late.until("full")["full"]
+        teaches.ask(do="command", value={"shape": "sine", "unit": "us", "mean": 1500.0, "amplitude": 200.0,
+                                         "frequency": 1.0})
+        for page in (teaches, *pages):
+            page.pushed(20)
+        seen = {}
+        for page in (teaches, *pages):
+            for header, parts in page.pushes[-20:]:
+                rows = b"".join(points.tobytes() + pulses.tobytes() for points, pulses in parts)
+                assert seen.setdefault((header["t"], len(rows)), rows) == rows
+        assert len(seen) < 200  # with benches of their own there would be 820
+    assert comes_in(address, code)
+
+
+def test_codes_are_not_tried_out_one_after_the_other(school):
+    address, teacher, code = school
+    said = []
+    for k in range(90):
+        with Page(address, f"?code=wrong{k}") as page:
+            said.append(page.until("full")["full"])
+    assert "too many at once" in said[-1]
+    with Page(address, teacher) as page:  # who has the teacher's link is not kept out by that
+        assert page.until("hello")["hello"]["role"] == "teacher"
+    assert comes_in(address, code)
+
+
+def comes_in(address, code) -> bool:
+    """Whether a watcher is let in, at once or soon."""
+    for _ in range(100):
+        with Page(address, code) as page:
+            if "hello" in (page.take() or {}):
+                return True
+        time.sleep(0.1)
+    return False
