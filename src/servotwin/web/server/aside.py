@@ -12,7 +12,8 @@ from typing import TypeVar
 from servotwin.errors import InputError
 
 Found = TypeVar("Found")
-_LONGEST = 30.0  # s
+LONGEST = 30.0
+"""How long something may take, unless it is given more time [s]."""
 EXPORTS = asyncio.Semaphore(2)
 """So many long ones at once, of all visitors."""
 
@@ -21,7 +22,7 @@ class _StoppedError(BaseException):
     """Nobody waits any more for what a thread computes."""
 
 
-async def aside(what: str, work: Callable[[], Found], seconds: float = _LONGEST) -> Found:
+async def aside(what: str, work: Callable[[], Found], seconds: float | None = None) -> Found:
     """Return what a function returns, while the benches go on; it ends when nobody waits for it any more.
 
     The interpreter goes on within a function of Python at any time, so it can be stopped at any time: what it does is
@@ -33,7 +34,7 @@ async def aside(what: str, work: Callable[[], Found], seconds: float = _LONGEST)
         For messages.
     work : callable
     seconds : float
-        How long it may take [s].
+        How long it may take [s]; `LONGEST` unless given.
 
     Raises
     ------
@@ -45,15 +46,15 @@ async def aside(what: str, work: Callable[[], Found], seconds: float = _LONGEST)
     >>> asyncio.run(aside("sum", lambda: sum([1, 2])))
     3
     """
-    loop = asyncio.get_running_loop()
+    loop, most = asyncio.get_running_loop(), LONGEST if seconds is None else seconds
     found: asyncio.Future[Found] = loop.create_future()
     thread = threading.Thread(target=_compute, args=(work, loop, found), name=what, daemon=True)
     thread.start()
     try:
-        async with asyncio.timeout(seconds):
+        async with asyncio.timeout(most):
             return await asyncio.shield(found)
     except TimeoutError:
-        raise InputError(what, got=f"more than {seconds:g} s of work", allowed="something shorter") from None
+        raise InputError(what, got=f"more than {most:g} s of work", allowed="something shorter") from None
     finally:
         if not found.done() and thread.ident is not None:
             found.cancel()

@@ -11,7 +11,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 MOST_CONNECTIONS = 400
-_PATIENCE = 15.0  # s in which a request has to be said
+PATIENCE = 15.0
+"""In which a request has to be said [s]."""
 _LONGEST = 300.0  # s until an answer is taken: the largest log comes within that
 _LINGER = 3.0  # s that a browser has to take the end of what it was told
 _UNSENT = 65536  # bytes that the system keeps of what a browser has not taken: old pushes are worth nothing
@@ -29,19 +30,19 @@ class Door(H11Protocol):
         if len(self.connections) > MOST_CONNECTIONS:
             transport.abort()
         else:
-            self.loop.call_later(_PATIENCE, self._look, 0.0)
+            self.loop.call_later(PATIENCE, self._look, 0.0)
 
     def _look(self, waited: float) -> None:
         """Cut a connection that has asked nothing since the last look, or takes too long over an answer."""
         if self.transport.is_closing() or self.transport.get_protocol() is not self:  # gone, or it became a `Line`
             return
         busy = self.cycle is not None and not self.cycle.response_complete
-        waited = waited + _PATIENCE if busy and self.cycle is self._asked else 0.0
+        waited = waited + PATIENCE if busy and self.cycle is self._asked else 0.0
         if (not busy and self.cycle is self._asked) or waited >= _LONGEST:
             self.transport.abort()
             return
         self._asked = self.cycle
-        self.loop.call_later(_PATIENCE, self._look, waited)
+        self.loop.call_later(PATIENCE, self._look, waited)
 
 
 class Line(WebSocketsSansIOProtocol):

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 _BUDGET = 0.010  # s of computing in a turn
 _SHORT, _LONG = 0.2 * _BUDGET, 0.5 * _BUDGET  # s of computing: a stretch of less, and of more, is given another length
 _FIRST, _LONGEST = 5e-4, 1e3  # s of bench time: the first stretch of which nothing is known yet, and the most
-_PATIENCE = 1.0  # s of computing in a stretch: then the bench stands
+PATIENCE = 1.0
+"""How long a stretch may take [s]: then the bench stands."""
 
 
 class Stint:
@@ -61,7 +62,7 @@ class Stint:
 
     def to(self, until: float, points: float) -> Push:
         """Let it go on to a time [s] at a stretch; what it cannot is told in `broken`."""
-        self._stands = _now() + _PATIENCE
+        self._stands = _now() + PATIENCE
         try:
             return self._bench.advance(until, points)
         except ServotwinError as error:
@@ -72,7 +73,7 @@ class Stint:
 
     def _within(self, time: float) -> None:
         if _now() > self._stands:
-            raise InputError("motion", got=f"one that takes more than {_PATIENCE:g} s to compute at t = {time:.6g} s",
+            raise InputError("motion", got=f"one that takes more than {PATIENCE:g} s to compute at t = {time:.6g} s",
                              allowed="numbers of a servo that is not so fast, and a new beginning")
 
     def _nothing(self) -> Push:
