@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 _MOST_TEXTS = 256  # that wait: who takes none of them is gone
 _MOST_LETTERS = 20_000_000  # of them, beside the one that comes
 _FEW = 4  # texts that wait, and the browser may say more
-_SLOWEST = 30.0  # s for one message
+SLOWEST = 30.0
+"""How long a browser may take over one message [s]."""
 
 
 class Outbox:
@@ -70,7 +71,7 @@ class Outbox:
             await self._something.wait()
             self._something.clear()
             while not (self.closed or self.free):
-                async with asyncio.timeout(_SLOWEST):
+                async with asyncio.timeout(SLOWEST):
                     await self._send_next()
 
     async def _send_next(self) -> None:
