@@ -5,7 +5,6 @@ nothing shown. Its time is that of a second of the bench, as the server's share 
 """
 
 import asyncio
-import os
 import time
 from typing import Any
 from urllib.parse import urlsplit
@@ -116,14 +115,3 @@ def watchers() -> None:
     for count in (0, 10, 40):
         with server("--host", "0.0.0.0", "--class") as (links, pid):
             print(row(f"{count} watchers", asyncio.run(measured(links, pid, count)), bare(text, command)), flush=True)
-
-
-def main() -> None:
-    print(f"{os.cpu_count()} cores, load of the machine {os.getloadavg()[0]:.1f}; {SECONDS:.0f} s a row")
-    for part in (one, eight, scenes, watchers):
-        part()
-        print(flush=True)
-
-
-if __name__ == "__main__":
-    main()
