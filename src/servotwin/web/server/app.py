@@ -8,18 +8,17 @@ import hmac
 import secrets
 import time
 from collections.abc import AsyncIterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from starlette.applications import Starlette
-from starlette.responses import FileResponse, JSONResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
-from starlette.staticfiles import StaticFiles
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
 from servotwin.errors import ServotwinError
 from servotwin.web.server.aside import aside
 from servotwin.web.server.catalog import catalog_list, curves_data
+from servotwin.web.server.files import PAGE, Files
 from servotwin.web.server.guard import Guard
 from servotwin.web.server.limits import MOST_VISITORS, MOST_WATCHERS, Allowance
 from servotwin.web.server.own.desk import Desk
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 
     from servotwin.web.live import Scene
 
-PAGE = Path(__file__).parent.parent / "page"
 FULL, NOT_IN = 4008, 4003
 """Codes with which a browser is sent away: no room is left, or it has not said the code."""
 _SHEETS = asyncio.Lock()
@@ -136,11 +134,11 @@ def application(scene: Scene, names: frozenset[str], *, classroom: bool = False)
     classroom : bool
         Whether there is one bench for a class.
     """
-    house = House(scene, classroom=classroom)
+    house, files = House(scene, classroom=classroom), Files(PAGE)
     routes = [
-        Route("/", _page), Route("/api/catalog", _catalog), Route("/api/curves/{name}", _curves),
-        Route("/api/log", house.upload, methods=["POST"]), WebSocketRoute("/live", house.visit),
-        Mount("/page", StaticFiles(directory=PAGE))]
+        Route("/", files.first), Route("/page/{name:path}", files.other),
+        Route("/api/catalog", _catalog), Route("/api/curves/{name}", _curves),
+        Route("/api/log", house.upload, methods=["POST"]), WebSocketRoute("/live", house.visit)]
 
     @contextlib.asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
@@ -149,10 +147,6 @@ def application(scene: Scene, names: frozenset[str], *, classroom: bool = False)
             house._living.cancel()
 
     return Guard(Starlette(routes=routes, lifespan=lifespan), names), house
-
-
-async def _page(request: Request) -> Response:
-    return FileResponse(PAGE / "index.html")
 
 
 async def _catalog(request: Request) -> Response:
