@@ -38,7 +38,10 @@ function dress(made, attributes) {
     if (value === null || value === undefined || value === false) continue;
     if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
     else if (name === "text") made.textContent = String(value);
-    else if (name === "value" && "value" in made) made.value = value;
+    else if (name === "value" && "value" in made) {
+      if (made instanceof HTMLInputElement) made.defaultValue = String(value); // so that one sees what was typed since
+      made.value = value;
+    }
     else made.setAttribute(name, value === true ? "" : String(value));
   }
 }
@@ -81,6 +84,23 @@ export function choice(label, options, chosen) {
   const select = el("select", { id, onchange: () => chosen(select.value) },
     ...options.map(([value, text]) => el("option", { value, text })));
   return { row: el("div", { class: "row" }, el("label", { for: id, text: label }), select), select };
+}
+
+/**
+ * Build something anew; the control that had the focus has it again, with what was being typed.
+ * @param {HTMLElement} body
+ * @param {() => void} build controls are known by their attribute data-key
+ */
+export function anew(body, build) {
+  const held = document.activeElement;
+  const key = held instanceof HTMLElement && body.contains(held) ? held.dataset.key : undefined;
+  const typed = held instanceof HTMLInputElement && held.value !== held.defaultValue ? held.value : null;
+  build();
+  if (!key) return;
+  const next = body.querySelector(`[data-key="${key}"]`);
+  if (!(next instanceof HTMLElement)) return;
+  next.focus();
+  if (typed !== null && next instanceof HTMLInputElement) next.value = typed;
 }
 
 /** Whether the system asks for little motion. */

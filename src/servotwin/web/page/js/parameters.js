@@ -1,6 +1,6 @@
 // Any parameter, by search: its symbol, unit, range, meaning and where its value comes from.
 
-import { breakable, choice, el, panel, unique } from "./dom.js";
+import { anew, breakable, choice, el, panel, unique } from "./dom.js";
 import { plain, printed } from "./units.js";
 
 const MOST = 12;
@@ -37,10 +37,12 @@ export function mount(root, bench) {
     const value = Array.isArray(one.value) ? "a table" : one.choices ? one.value ?? ""
       : one.value === null ? "" : plain(one.value / factor, 7);
     const input = one.choices
-      ? el("select", { id: field, onchange: () => set(input.value) },
+      ? el("select", { id: field, "data-key": one.name, onchange: () => set(input.value) },
         ...one.choices.map((/** @type {string} */ word) => el("option", { value: word, text: word, selected: word === one.value })))
-      : el("input", { id: field, type: "number", step: "any", value, disabled: !one.read || one.rule === "table",
-        onchange: () => { if (input.value !== "") set(Number(input.value) * factor); } });
+      : el("input", { id: field, "data-key": one.name, type: one.rule === "table" ? "text" : "number", step: "any", value, disabled: !one.read || one.rule === "table",
+        onchange: async () => {
+          if (input.value !== "" && !await set(Number(input.value) * factor)) input.value = value; // refused
+        } });
     const spread = one.spread ? `, ${one.spread}` : "";
     return el("div", { class: "card" },
       el("label", { for: field }, breakable(one.name)), el("span", { class: "symbol", text: one.symbol }),
@@ -55,5 +57,5 @@ export function mount(root, bench) {
       text: `${k + 1}: ${facts.title}, ${facts.model}` })));
     show();
   });
-  bench.on("changed", () => { if (!found.contains(document.activeElement)) show(); });
+  bench.on("changed", () => anew(found, show));
 }

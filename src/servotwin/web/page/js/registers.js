@@ -1,6 +1,6 @@
 // The registers of a bus servo by the maker's names, and what they mean at the shaft.
 
-import { breakable, el, panel, unique } from "./dom.js";
+import { anew, breakable, el, panel, unique } from "./dom.js";
 import { plain, printed } from "./units.js";
 
 const FIRST = ["P_Coefficient", "D_Coefficient", "I_Coefficient", "Torque_Limit", "Max_Torque_Limit", "Goal_Velocity",
@@ -32,7 +32,7 @@ export function mount(root, bench) {
 
   /** @param {number} k @returns {HTMLInputElement} */
   const torque = (k) => {
-    const input = el("input", { type: "checkbox", checked: !loose.has(k), onchange: () => {
+    const input = el("input", { type: "checkbox", checked: !loose.has(k), "data-key": `${k} torque`, onchange: () => {
       if (input.checked) loose.delete(k); else loose.add(k);
       bench.tell({ do: "torque", value: input.checked, servo: k });
     } });
@@ -45,8 +45,11 @@ export function mount(root, bench) {
     const numbers = one.numbers.map((/** @type {string} */ name) => facts.parameters.find((/** @type {any} */ p) => p.name === name))
       .filter((/** @type {any} */ p) => p && typeof p.value === "number")
       .map((/** @type {any} */ p) => `${p.symbol || p.meaning} = ${plain(p.value / p.shown.factor)} ${printed(p.shown.unit)}`);
-    const input = el("input", { type: "number", id, min: one.low, max: one.high, step: 1, value: one.value,
-      onchange: () => bench.tell({ do: "register", value: { [one.name]: Number(input.value) }, servo: k }) });
+    const input = el("input", { type: "number", id, min: one.low, max: one.high, step: 1, value: one.value, "data-key": `${k} ${one.name}`,
+      onchange: async () => {
+        const done = await bench.tell({ do: "register", value: { [one.name]: Number(input.value) }, servo: k });
+        if (!done) input.value = one.value; // refused: it holds what it held
+      } });
     return el("div", { class: "card" }, el("label", { for: id }, breakable(one.name), ` (${one.address})`), input,
       el("p", { class: "soft", text: `${one.low} to ${one.high}${numbers.length ? `; ${numbers.join(", ")}` : ""}` }));
   };
@@ -58,7 +61,7 @@ export function mount(root, bench) {
     }
     show();
   });
-  bench.on("changed", () => { if (!body.contains(document.activeElement) || document.activeElement?.tagName !== "INPUT") show(); });
+  bench.on("changed", () => anew(body, show));
 }
 
 /** @param {string} name @returns {number} */

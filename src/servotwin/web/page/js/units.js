@@ -32,7 +32,7 @@ export function printed(unit) {
  */
 export function engineering(value, unit, digits = 4) {
   if (!Number.isFinite(value)) return "–";
-  const size = Math.abs(value);
+  const size = Math.abs(Number(value.toPrecision(digits))); // 999.9 µs to two digits is a millisecond
   const [scale, prefix] = PREFIXES.find(([least]) => size >= least * 0.9999999) ?? [1, ""];
   return `${plain(value / (size ? scale : 1), digits)} ${size ? prefix : ""}${unit}`;
 }

@@ -1,0 +1,40 @@
+"""What the tests of the page ask of it."""
+
+import tomllib
+
+
+def latest(page, name: str, servo: int = 0) -> float:
+    """Return the latest value of a signal that the page has (SI)."""
+    return page.evaluate(f"bench.history[{servo}].latest('{name}')")
+
+
+def angle(page, servo: int = 0) -> float:
+    """Return the latest angle that the page has [deg]."""
+    return page.evaluate(f"bench.history[{servo}].latest('output_angle') * 180 / Math.PI")
+
+
+def go_on(page, seconds: float) -> None:
+    """Wait until the bench, not the wall, has gone on for a time [s]."""
+    page.wait_for_function(f"bench.time > {page.evaluate('bench.time') + seconds}")
+
+
+def until(page, time: float) -> None:
+    """Wait until the bench has come to a time [s]."""
+    page.wait_for_function(f"bench.time >= {time}", timeout=40000)
+
+
+def pause(page) -> None:
+    """Stop time, and wait until it stands and all is drawn."""
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Run").wait_for()
+    page.wait_for_timeout(300)
+
+
+def scene(page) -> dict:
+    """Return the text of the bench, read."""
+    return tomllib.loads(page.evaluate("bench.ask({text: true}).then((found) => found.text)"))
+
+
+def opened_panel(page, title: str) -> None:
+    """Open a panel of the side."""
+    page.get_by_role("heading", name=title, exact=True).click()
