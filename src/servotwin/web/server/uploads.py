@@ -25,7 +25,9 @@ TOKEN = "x-visitor"
 
 
 async def take_log(request: Request, desk: Desk) -> Response:
-    """Take a log and read it; answer how it was read, or in a line why not.
+    """Take a log and read it; answer how it was read.
+
+    What was taken but cannot be read is answered with a line, too: it can be read again with other words.
 
     Parameters
     ----------
@@ -44,17 +46,18 @@ async def take_log(request: Request, desk: Desk) -> Response:
     try:
         async with asyncio.timeout(_SLOWEST):
             raw = await _body(request)
-        return JSONResponse({"log": await visitor.take(raw, label_of(request.query_params.get("name", "")))})
     except _TooLargeError as error:
         return _refused(413, line_of(error))
-    except ServotwinError as error:
-        return _refused(422, line_of(error))
     except TimeoutError:
         return _refused(408, f"log: got a file that took more than {_SLOWEST:.0f} s to arrive, allowed: a faster line")
     except ClientDisconnect:
         return _refused(400, "log: got half of it")
     finally:
         visitor.uploading = False
+    try:
+        return JSONResponse({"log": await visitor.take(raw, label_of(request.query_params.get("name", "")))})
+    except ServotwinError as error:
+        return JSONResponse({"wrong": line_of(error)})
 
 
 def label_of(name: str) -> str:

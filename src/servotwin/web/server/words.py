@@ -137,7 +137,7 @@ async def _fit(visitor: Visitor, message: dict[str, Any]) -> Answer:
     if "cancel" in asked:
         fits.cancel()
     elif "take" in asked:
-        fits.take_over(asked["take"])
+        await fits.take_over(asked["take"])
     else:
         fits.begin(asked)
     return {}

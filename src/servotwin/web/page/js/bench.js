@@ -124,7 +124,7 @@ export class Bench extends EventTarget {
     else if ("refused" in message) this.answered(message.refused, null, message.message);
     else if ("said" in message) this.notice(message.said);
     else if ("full" in message) this.full = message.full;
-    for (const word of ["fit", "log"]) if (word in message) this.emit(word, message[word]);
+    for (const word of ["fit", "log", "own"]) if (word in message) this.emit(word, message[word]);
   }
 
   /** @param {any} hello */

@@ -9,9 +9,13 @@ import * as clock from "./clock.js";
 import * as command from "./command.js";
 import * as controls from "./controls.js";
 import * as exports from "./exports.js";
+import * as fit from "./fit.js";
+import * as fitFound from "./fit_found.js";
 import * as horn from "./horn.js";
 import * as lcd from "./lcd.js";
 import * as lessons from "./lessons.js";
+import * as log from "./log.js";
+import * as logDraw from "./log_draw.js";
 import * as mystery from "./mystery.js";
 import * as parameters from "./parameters.js";
 import * as registers from "./registers.js";
@@ -22,9 +26,9 @@ import * as traces from "./traces.js";
 
 const SIDE = /** @type {[string, {mount: (root: HTMLElement, bench: Bench) => void}][]} */ ([
   ["command", command], ["load", controls], ["circuit", circuit], ["registers", registers], ["any", parameters], ["servos", catalog],
-  ["lessons", lessons], ["mystery", mystery], ["files", exports]]);
+  ["lessons", lessons], ["mystery", mystery], ["own", log], ["fit", fit], ["files", exports]]);
 const INSTRUMENTS = /** @type {[string, {mount: (root: HTMLElement, bench: Bench) => void}][]} */ ([
-  ["horn", horn], ["lcd", lcd], ["scope", scope], ["traces", traces], ["words", summary]]);
+  ["horn", horn], ["lcd", lcd], ["scope", scope], ["traces", traces], ["log", logDraw], ["found", fitFound], ["words", summary]]);
 
 /** @param {string} id @returns {HTMLElement} */
 const place = (id) => /** @type {HTMLElement} */ (document.getElementById(id));

@@ -15,13 +15,20 @@ export function mount(root, bench) {
       bench.tell({ mystery: Number(seed.value) });
     } })), place);
 
+  /** @type {any[]} */
+  let fields = [];
+  bench.on("guess", (guess) => {
+    for (const { one, input } of fields) if (one.name in guess) input.value = plain(guess[one.name], 6);
+    fields[0]?.input.focus();
+  });
   bench.on("scene", (state) => {
     const unknowns = state.unknowns ?? [];
     place.replaceChildren();
+    fields = [];
     if (!unknowns.length) return;
     /** @type {HTMLDetailsElement} */ (body.parentElement).open = true;
     const said = el("div", { "aria-live": "polite" });
-    const fields = unknowns.map((/** @type {any} */ one) => {
+    fields = unknowns.map((/** @type {any} */ one) => {
       const field = unique();
       const input = el("input", { type: "number", id: field, step: "any" });
       return { one, input, row: el("div", { class: "card" }, el("label", { for: field }, breakable(one.name)),

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from servotwin.web.server.own.desk import Desk
     from servotwin.web.server.room import Room
 
-_READING, _COMPARING = 60.0, 180.0  # s that it may take; the first comparison ever compiles
+_READING, _COMPARING = 60.0, 300.0  # s that it may take; the first comparison of its kind ever compiles
 _NICE = 10
 _RATE, _BURST = 0.5, 6.0  # logs
 _LONGEST_WORDS = 2000  # characters of what columns mean

@@ -29,6 +29,9 @@ _NICE = 15
 FITTED = tuple(kind.__name__ for kind in (PulseServo, PulseServoInductive, BoundedServo, DigitalServo))
 """Fidelities that can be fitted."""
 _MOST_FREE = 30
+_AT_OUTPUT = {
+    "output_torque_constant": "torque per current at the output", "output_inertia": "inertia of motor and gear at the "
+    "output", "output_coulomb_torque": "dry friction at the output, both ways alike"}
 
 
 class Fits:
@@ -92,7 +95,7 @@ class Fits:
         if self._work is not None:
             self._work.end()
 
-    def take_over(self, how: object) -> None:
+    async def take_over(self, how: object) -> None:
         """Put the fitted servo on the bench.
 
         Raises
@@ -104,9 +107,10 @@ class Fits:
             raise InputError("fit", got="none that has ended", allowed="a fit first")
         if not isinstance(how, str) or how not in HOW:
             raise InputError("take", got=how, allowed=", ".join(HOW))
-        bench = self._of.room.bench
-        self._of.room.put(taken_over(bench.scene(), bench.now_models, bench.load_numbers, bench.frame_rate,
-                                     self._found["file"], self._found["model"], self._found["servo"], how))
+        bench, found = self._of.room.bench, self._found
+        scene, models, load, rate = bench.scene(), bench.now_models, dict(bench.load_numbers), bench.frame_rate
+        await self._of.room.begin("servos", lambda: taken_over(
+            scene, models, load, rate, found["file"], found["model"], found["servo"], how))
 
     async def _fit(self, work: Work, servo: int) -> None:
         tell = self._of.tell
@@ -170,7 +174,7 @@ def _free(asked: object, bounds: dict[str, Any] | None) -> list[str] | None:
 def _free_facts(servo: Servo, name: str) -> dict[str, Any]:
     if name in OUTPUT_SIDE:
         one = OUTPUT_SIDE[name]
-        return {"name": name, "meaning": one.meaning, "unit": si_unit(one.dimension),
+        return {"name": name, "meaning": _AT_OUTPUT.get(name, one.meaning), "unit": si_unit(one.dimension),
                 "value": output_value(servo, name)}
     from servotwin.parameters import GROUPS
 

@@ -40,6 +40,7 @@ def work(given: dict[str, Any], tell: Tell) -> tuple[dict[str, Any], list[bytes]
         `diagnose`, `limit` [s].
     tell : callable
     """
+    tell(0.0, "begins")
     model, servo = model_named(given["model"]), given["servo"]
     some = logs_of(given["logs"]) if given["run"] is None else [run_of(given["logs"], given["run"])]
     notes: dict[str, None] = {}

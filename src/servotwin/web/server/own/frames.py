@@ -1,13 +1,23 @@
-"""Pieces of bytes on a pipe, each behind its length."""
+"""What goes between a server and its processes: pieces of bytes, each behind its length, and a refusal with some."""
 
 from __future__ import annotations
 
 from typing import BinaryIO
 
+from servotwin.errors import ServotwinError
+
 HEAD = 8
 """Bytes of a length."""
 MOST = 500_000_000
 """Bytes of a piece: more is a mistake."""
+
+
+class RefusedError(ServotwinError):
+    """What is wrong, in a line, with bytes that are given back nevertheless."""
+
+    def __init__(self, line: str, blobs: list[bytes]) -> None:
+        super().__init__(line)
+        self.blobs = blobs
 
 
 def framed(data: bytes) -> tuple[bytes, bytes]:

@@ -19,7 +19,7 @@ from servotwin.logs import Log, Reading, read_logs
 from servotwin.logs.reading import reading_facts
 from servotwin.logs.sidecar import FOLDER_FILE, FORMAT
 from servotwin.web.server.limits import LONGEST_UPLOAD
-from servotwin.web.server.own.work import RefusedError
+from servotwin.web.server.own.frames import RefusedError
 
 if TYPE_CHECKING:
     from servotwin.web.server.own.work import Tell

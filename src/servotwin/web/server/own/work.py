@@ -14,21 +14,13 @@ from importlib import import_module
 from typing import Any, BinaryIO
 
 from servotwin.errors import ServotwinError
-from servotwin.web.server.own.frames import framed, taken
+from servotwin.web.server.own.frames import RefusedError, framed, taken
 from servotwin.web.server.wire import line_of, text_of
 
 KINDS = {"reading": "reading", "comparison": "comparing", "fit": "fitting"}
 """Kinds of work, and the modules whose `work` does them."""
 _BETWEEN = 0.2  # s between two words of how far it is
 Tell = Callable[[float, str], None]
-
-
-class RefusedError(ServotwinError):
-    """What is wrong, in a line, with bytes that are given back nevertheless."""
-
-    def __init__(self, line: str, blobs: list[bytes]) -> None:
-        super().__init__(line)
-        self.blobs = blobs
 
 
 def main() -> None:
