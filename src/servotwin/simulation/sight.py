@@ -36,6 +36,7 @@ Row = tuple[float, ...]
 _COMMANDS = tuple(KINDS)
 _FOUND = (*Observed._fields, "output_angle", "output_speed", *_COMMANDS)
 _LATE = 1e-12  # of an instant: so much before a tick it is the tick, as in `Trajectory`
+_ANGLE, _SPEED, _TORQUE = map(Observed._fields.index, ("motor_angle", "motor_speed", "motor_torque"))
 _start_of = attrgetter("start")
 
 
@@ -77,7 +78,7 @@ class Sight:
         self._pick: Callable[[Any], Row] = itemgetter(*map(_FOUND.index, self.names))
         self._commands = tuple(name if name in self.names else None for name in _COMMANDS)
         self._commanded: tuple[float, Row] = (math.nan, ())
-        self._observed: tuple[Any, Any] = ((), None)  # at rest nothing changes from one time to the next
+        self._observed: tuple[Any, list[float]] = ((), [])  # at rest nothing changes from one time to the next
         self._prepared: tuple[Motion | None, Motion | None] = (None, None)
 
     def seen(self, plan: Plan, segment: Segment, time: float, bus_voltage: float | None = None) -> Row:
@@ -106,7 +107,7 @@ class Sight:
             wiper = wiper_at(numbers.sensor, segment.wiper, y[0])
             shown = self._shown(numbers, (plan.curve, m.mode, u, tau, y, wiper, segment.drive, segment.error), segment)
         except (ArithmeticError, ValueError):  # numbers beyond what a float holds
-            shown = Observed(*(math.nan,) * len(Observed._fields))
+            shown = [math.nan] * len(Observed._fields)
         return self._pick((*shown, y[0], y[1], *self._command(plan, time)))
 
     def points(self, plan: Plan, segments: Sequence[Segment], times: Sequence[float],
@@ -127,7 +128,7 @@ class Sight:
         volts = bus_voltages or (None,) * len(times)
         return [(t, *self.seen(plan, segments[k], t, V)) for t, k, V in zip(times, places, volts, strict=True)]
 
-    def _shown(self, numbers: Numbers, instant: tuple[Any, ...], segment: Segment) -> Observed:
+    def _shown(self, numbers: Numbers, instant: tuple[Any, ...], segment: Segment) -> list[float]:
         """Return all signals, those of the motor at its own shaft; once where nothing differs from the time before."""
         told = _Told(segment.duty, segment.goal, segment.reference, segment.trip)
         key = (numbers, instant, told)
@@ -135,11 +136,10 @@ class Sight:
             shown, N = observed(numbers, *instant), self._reduction
             if duty.present(numbers.bridge):
                 shown = told_by(numbers.bridge, told, shown)
-            self._observed = (key, shown._replace(
-                motor_angle=N * shown.motor_angle, motor_speed=N * shown.motor_speed,
-                motor_torque=shown.motor_torque / N))
-        found: Observed = self._observed[1]
-        return found
+            found = list(shown)
+            found[_ANGLE], found[_SPEED], found[_TORQUE] = N * found[_ANGLE], N * found[_SPEED], found[_TORQUE] / N
+            self._observed = (key, found)
+        return self._observed[1]
 
     def state(self, segment: Segment, time: float) -> Vector:
         """Return where a servo stands in a segment at a time [s]; a motion is prepared once, and only where needed."""

@@ -35,7 +35,7 @@ class Outbox:
         self._push: Callable[[], bytes] | None = None
         self._something, self._room = asyncio.Event(), asyncio.Event()
         self._room.set()
-        self.missed = 0
+        self.missed = self._sent = self._taken = 0
         self.closed = False
 
     @property
@@ -67,12 +67,29 @@ class Outbox:
 
     async def deliver(self) -> None:
         """Send what waits until the browser is gone, or does not take it."""
+        sending, watching = asyncio.create_task(self._send()), asyncio.create_task(self._watch())
+        try:
+            await asyncio.wait([sending, watching], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            sending.cancel()
+            watching.cancel()
+            await asyncio.gather(sending, watching, return_exceptions=True)
+
+    async def _send(self) -> None:
         while not self.closed:
             await self._something.wait()
             self._something.clear()
             while not (self.closed or self.free):
-                async with asyncio.timeout(SLOWEST):
-                    await self._send_next()
+                self._sent += 1
+                await self._send_next()
+                self._taken = self._sent
+
+    async def _watch(self) -> None:
+        """Return when a message has been on its way for too long: one look for all is cheaper than a timer for each."""
+        last = 0
+        while self._taken == self._sent or self._sent != last:
+            last = self._sent
+            await asyncio.sleep(SLOWEST)
 
     async def _send_next(self) -> None:
         if self._texts:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 RATE = 60.0
 """Pushes a second."""
-_POINTS = 4.0  # of a push
+_POINTS = 3.0  # of a push: 180 a second are more than a screen has columns
 _COARSEST = 120.0  # Hz: of points, however fast time goes
 _TOLD_AGAIN = 0.2  # s between two messages of what has changed, at least
 _ASIDE = 5.0  # times as long as it takes to put such a message together
