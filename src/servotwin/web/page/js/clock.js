@@ -23,7 +23,7 @@ export function mount(root, bench) {
   const pace = el("span", { class: "pace" });
   /** @type {import("./bench.js").Header} */
   let header;
-  root.append(run, step, anew, el("label", { for: id, text: "Speed" }), speed, time, pace);
+  root.append(run, step, anew, el("span", { class: "pair" }, el("label", { for: id, text: "Speed" }), speed), time, pace);
 
   const asked = () => (header.speed === "unpaced" ? Infinity : Number(header.speed));
   const says = () => {

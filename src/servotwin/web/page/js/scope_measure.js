@@ -109,7 +109,7 @@ export function measure(trace, start, end) {
     const length = time[k] - time[k - 1];
     const slope = length > 0 ? (value[k] - value[k - 1]) / length : 0;
     const a = value[k - 1] + slope * (t0 - time[k - 1]);
-    const b = length > 0 ? value[k - 1] + slope * (t1 - time[k - 1]) : value[k];
+    const b = t1 < time[k] ? value[k - 1] + slope * (t1 - time[k - 1]) : value[k];
     low = Math.min(low, a, b);
     high = Math.max(high, a, b);
     area += 0.5 * (a + b) * (t1 - t0);

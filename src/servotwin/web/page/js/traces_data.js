@@ -71,6 +71,11 @@ function extremes(history, name, first, count, step, shown) {
       found[at + 3] = v;
     }
   }
+  for (let k = 0; k < found.length; k += 4) { // what changes nothing is not drawn
+    if (found[k + 1] === found[k] || found[k + 1] === found[k + 3]) found[k + 1] = undefined;
+    if (found[k + 2] === found[k] || found[k + 2] === found[k + 3]) found[k + 2] = undefined;
+    if (found[k + 3] === found[k] && found[k + 1] === undefined && found[k + 2] === undefined) found[k + 3] = undefined;
+  }
   return found;
 }
 
