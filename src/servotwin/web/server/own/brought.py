@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from servotwin.web.server.own.desk import Desk
     from servotwin.web.server.room import Room
 
-_READING, _COMPARING = 60.0, 300.0  # s that it may take; the first comparison of its kind ever compiles
+READING, COMPARING = 60.0, 300.0  # s that it may take; the first comparison of its kind ever compiles
 _NICE = 10
 _RATE, _BURST = 0.5, 6.0  # logs
 _LONGEST_WORDS = 2000  # characters of what columns mean
@@ -137,7 +137,7 @@ class Brought:
                  "load": self.load(), "frame_rate": self.room.bench.frame_rate, "rig": asked.get("rig") is not False}
 
         async def comparing() -> None:
-            done = await self._worked("comparison", given, _COMPARING)
+            done = await self._worked("comparison", given, COMPARING)
             self.tell({"own": {"overlay": done.facts}})
         self._begin(comparing())
 
@@ -204,7 +204,7 @@ class Brought:
     async def _read(self, given: dict[str, Any]) -> dict[str, Any]:
         with tempfile.TemporaryDirectory(prefix="servotwin-", ignore_cleanup_errors=True) as folder:
             try:
-                done = await self._worked("reading", {**given, "folder": folder}, _READING)
+                done = await self._worked("reading", {**given, "folder": folder}, READING)
             except WorkError as error:
                 if error.blobs and not self._gone:
                     self._log = KeptLog(given["label"], error.blobs[0])
