@@ -7,6 +7,7 @@ import contextlib
 import ctypes
 import threading
 from collections.abc import Callable
+from functools import partial
 from typing import TypeVar
 
 from servotwin.errors import InputError
@@ -66,11 +67,11 @@ def _compute(work: Callable[[], Found], loop: asyncio.AbstractEventLoop, found: 
         try:
             value = work()
         except Exception as error:
-            loop.call_soon_threadsafe(_tell, found.set_exception, found, error)
+            loop.call_soon_threadsafe(_tell, found, partial(found.set_exception, error))
         else:
-            loop.call_soon_threadsafe(_tell, found.set_result, found, value)
+            loop.call_soon_threadsafe(_tell, found, partial(found.set_result, value))
 
 
-def _tell(tell: Callable[[Found], object], found: asyncio.Future[Found], value: Found) -> None:
+def _tell(found: asyncio.Future[Found], tell: Callable[[], object]) -> None:
     if not found.done():
-        tell(value)
+        tell()
