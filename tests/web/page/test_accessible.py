@@ -156,7 +156,7 @@ def test_what_is_said_is_what_is_shown_and_only_when_asked(page):
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Run").wait_for()
     page.get_by_role("button", name="Say what is shown").click()
-    said = page.locator(".said").inner_text()
+    said = page.locator(".words-panel .said").inner_text()
     angle, told = (page.evaluate(f"bench.history[0].latest('{name}') * 180 / Math.PI")
                    for name in ("output_angle", "command_angle"))
     assert f"Hitec HS-755HB, PulseServo, stands at {angle:.1f} degrees, {told - angle:.2f} degrees below" in said

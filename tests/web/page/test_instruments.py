@@ -168,6 +168,9 @@ def test_how_the_bench_is_looked_at_goes_with_its_link(page, opened):
     page.get_by_label("Torque", exact=True).check()
     page.get_by_label("Time base").select_option("0.002")
     page.get_by_label("Told in").select_option("deg")
+    page.locator("summary", has_text="Channels and trigger").click()
+    page.get_by_label("Channel 2", exact=True).select_option("0:armature_current")
+    page.get_by_label("Scale 2").select_option("0.2")
     page.wait_for_timeout(700)
     opened_panel(page, "Save and share")
     page.get_by_role("button", name="Link").click()
@@ -177,3 +180,6 @@ def test_how_the_bench_is_looked_at_goes_with_its_link(page, opened):
     assert again.get_by_label("Window", exact=True).input_value() == "1"
     assert again.get_by_label("Time base").input_value() == "0.002"
     assert again.get_by_label("Told in").input_value() == "deg"
+    again.locator("summary", has_text="Channels and trigger").click()
+    assert again.get_by_label("Channel 2", exact=True).input_value() == "0:armature_current"
+    assert again.get_by_label("Scale 2").input_value() == "0.2"

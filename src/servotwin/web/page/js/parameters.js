@@ -35,7 +35,7 @@ export function mount(root, bench) {
     const set = (value) => bench.tell({ do: "set", value: { [one.name]: value }, servo });
     const { unit, factor } = one.shown;
     const value = Array.isArray(one.value) ? "a table" : one.choices ? one.value ?? ""
-      : one.value === null ? "" : plain(one.value / factor, 7);
+      : one.value === null ? "" : plain(one.value / factor, 6);
     const input = one.choices
       ? el("select", { id: field, "data-key": one.name, onchange: () => set(input.value) },
         ...one.choices.map((/** @type {string} */ word) => el("option", { value: word, text: word, selected: word === one.value })))

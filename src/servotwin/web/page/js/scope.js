@@ -26,7 +26,8 @@ export function mount(root, bench) {
   let single = false;
   let trigger = { channel: 0, rising: true, mode: "auto", at: 0.1, level: 0.5 * LOGIC };
   let start = -Infinity;
-  const channels = [{ of: "0:pulse", scale: 2, position: 1 }, { of: "0:armature_voltage", scale: 5, position: -2 }];
+  const channels = [{ of: "0:pulse", wish: "0:pulse", scale: 2, position: 1 },
+    { of: "0:armature_voltage", wish: "0:armature_voltage", scale: 5, position: -2 }]; // wish: what it shows where a bench has it
   /** @type {import("./scope_draw.js").Cursors|null} */
   let cursors = null;
   let gripped = "";
@@ -56,7 +57,7 @@ export function mount(root, bench) {
   });
   bases.select.value = String(base);
   const picks = channels.map((channel, k) => choice(`Channel ${k + 1}`, [], (value) => {
-    channel.of = value;
+    channel.of = channel.wish = value;
     usual(k);
     named(k);
     looked();
@@ -119,8 +120,8 @@ export function mount(root, bench) {
   // --- how it is looked at, in the text of the bench ----------------------------------------------------------------
 
   const looked = () => bench.look({ "scope.base": base, "scope.trigger": `${trigger.channel}${trigger.rising ? "+" : "-"}${trigger.mode}`,
-    "scope.level": trigger.level, ...Object.fromEntries(channels.flatMap(({ of, scale, position }, k) => [
-      [`scope.of${k + 1}`, of], [`scope.scale${k + 1}`, scale], [`scope.position${k + 1}`, position]])) });
+    "scope.level": trigger.level, ...Object.fromEntries(channels.flatMap(({ of, wish, scale, position }, k) => [
+      [`scope.of${k + 1}`, wish], ...(of === wish ? [[`scope.scale${k + 1}`, scale]] : []), [`scope.position${k + 1}`, position]])) });
   const restore = () => {
     const { "scope.base": one, "scope.trigger": edge, "scope.level": height } = bench.view;
     if (BASES.includes(Number(one))) base = Number(one);
@@ -129,7 +130,7 @@ export function mount(root, bench) {
     if (typeof height === "number") trigger.level = height;
     channels.forEach((channel, k) => {
       const [of, scale, position] = ["of", "scale", "position"].map((key) => bench.view[`scope.${key}${k + 1}`]);
-      if (typeof of === "string") channel.of = of;
+      if (typeof of === "string") channel.wish = of;
       if (SCALES.includes(Number(scale))) channel.scale = Number(scale);
       if (typeof position === "number") channel.position = position;
       places[k].input.value = String(channel.position);
@@ -146,10 +147,11 @@ export function mount(root, bench) {
       ...SEEN.filter((name) => facts.columns.includes(name)).map((name) => `${k}:${name}`)]);
     channels.forEach((channel, k) => {
       picks[k].select.replaceChildren(...options.map((value) => el("option", { value, text: nameOf(value) })));
-      if (!options.includes(channel.of)) {
-        channel.of = options.find((one) => !channels.some(({ of }) => of === one)) ?? options[0] ?? "";
-        usual(k);
-      }
+      const before = channel.of;
+      channel.of = options.includes(channel.wish) ? channel.wish
+        : options.find((one) => !channels.some(({ wish }) => wish === one)) ?? options[0] ?? "";
+      const kept = channel.of === channel.wish && bench.view[`scope.scale${k + 1}`] !== undefined;
+      if (!kept && channel.of.split(":")[1] !== before.split(":")[1]) usual(k);
       picks[k].select.value = channel.of;
       named(k);
     });
