@@ -170,6 +170,23 @@ def test_a_register_is_stiffness(opened, server):
     assert latest(page, "output_angle") < -0.3  # it is let go
 
 
+def test_a_gamepad_moves_the_command_while_its_stick_is_away_from_the_middle(page):
+    page.evaluate("""() => { window.stick = 0.05; navigator.getGamepads = () => [null,
+        { id: 'a gamepad', axes: [window.stick, 0] }]; }""")
+    before = latest(page, "pulse_width")
+    go_on(page, 0.3)
+    assert latest(page, "pulse_width") == before  # a stick that does not quite come to rest
+    page.evaluate("window.stick = -0.8")
+    go_on(page, 0.5)
+    page.evaluate("window.stick = 0")
+    go_on(page, 0.2)
+    moved = latest(page, "pulse_width")
+    assert 5e-5 < before - moved < 1e-3
+    assert page.get_by_text("gamepad: a gamepad").is_visible()
+    go_on(page, 0.2)
+    assert latest(page, "pulse_width") == moved
+
+
 def test_other_servos_are_chosen_and_their_curves_shown(page):
     opened_panel(page, "Servos")
     page.get_by_label("Servo 1", exact=True).select_option("feetech-sts3215-12v")

@@ -82,8 +82,12 @@ export function mount(root, bench) {
     for (const { plot } of charts) plot.destroy();
     charts = [];
     place.replaceChildren();
-    const those = CHARTS.filter(([title, names]) => wanted.has(title)
-      && bench.facts.some((facts) => names.some((name) => facts.columns.includes(name))));
+    const able = CHARTS.filter(([, names]) => bench.facts.some((facts) => names.some((name) => facts.columns.includes(name))));
+    for (const { title, input, row } of boxes) {
+      input.disabled = !able.some(([other]) => other === title);
+      row.title = input.disabled ? "no servo on this bench computes it" : "";
+    }
+    const those = able.filter(([title]) => wanted.has(title));
     those.forEach(([title, names, , least], n) => charts.push(chart(title, names, least, n === those.length - 1)));
     draw();
     read();
