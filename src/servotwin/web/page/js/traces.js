@@ -83,10 +83,7 @@ export function mount(root, bench) {
     charts = [];
     place.replaceChildren();
     const able = CHARTS.filter(([, names]) => bench.facts.some((facts) => names.some((name) => facts.columns.includes(name))));
-    for (const { title, input, row } of boxes) {
-      input.disabled = !able.some(([other]) => other === title);
-      row.title = input.disabled ? "no servo on this bench computes it" : "";
-    }
+    for (const { title, row } of boxes) row.hidden = !able.some(([other]) => other === title);
     const those = able.filter(([title]) => wanted.has(title));
     those.forEach(([title, names, , least], n) => charts.push(chart(title, names, least, n === those.length - 1)));
     draw();
