@@ -107,6 +107,18 @@ def test_a_fitted_servo_stands_beside_or_instead_with_load_and_command_of_now():
         again.advance(0.2, 50.0)
 
 
+def test_a_shared_supply_stays_as_it_is_now():
+    scene = Scene(servos=(SceneServo(id=ID, model="PulseServo"),) * 2,
+                  supply={"open_circuit_voltage": 6.0, "internal_resistance": 0.5})
+    bench = LiveBench(scene)
+    bench.do("set", {"supply.open_circuit_voltage": 5.0})
+    bench.advance(0.1, 50.0)
+    text = servo_text(st.load_servo(ID))
+    made = taken_over(bench.scene(), bench.now_models, bench.load_numbers, 50.0, text, "PulseServo", 1, "beside")
+    assert dict(made.supply) == {"open_circuit_voltage": 5.0, "internal_resistance": 0.5}
+    assert {model.servo.supply.open_circuit_voltage for model in LiveBench(made).now_models} == {5.0}
+
+
 def test_there_is_no_room_for_a_seventh():
     scene = Scene(servos=(SceneServo(id=ID),) * MOST_SERVOS)
     models = LiveBench(scene).now_models

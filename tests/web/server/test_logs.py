@@ -8,6 +8,7 @@ import signal
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
@@ -52,25 +53,25 @@ def brought(server: str, page: Page, data: bytes, name: str = "run.csv") -> dict
 
 
 def told(page: Page, word: str, key: str) -> dict:
-    """Take messages until one of a word has something, however long compiling takes; return that."""
-    limit = time.monotonic() + 5.0 * SLOW
-    while time.monotonic() < limit:
-        text = page.take(SLOW)
-        page.pushes.clear()
-        if text is not None and key in text.get(word, {}):
-            return text[word][key]
-    raise AssertionError(word)
+    """Return the next of what is told by a word that has something, however long compiling takes."""
+    return next_of(page, lambda text: key in (text.get(word) or {}))[word][key]
 
 
 def ended(page: Page) -> dict:
-    """Take messages until a fit has ended; return what is told of it."""
+    """Return how the next fit has ended."""
+    return next_of(page, lambda text: text.get("fit", {}).get("state", "running") != "running")["fit"]
+
+
+def next_of(page: Page, asked: Callable[[dict], bool]) -> dict:
+    """Take messages until one is what is asked for; return that once."""
     limit = time.monotonic() + 5.0 * SLOW
     while time.monotonic() < limit:
-        text = page.take(SLOW)
+        for k, text in enumerate(page.texts):
+            if asked(text):
+                return page.texts.pop(k)
+        page.take(SLOW)
         page.pushes.clear()
-        if text is not None and text.get("fit", {"state": "running"})["state"] != "running":
-            return text["fit"]
-    raise AssertionError("fit")
+    raise AssertionError(page.texts[-1])
 
 
 def is_line(text: str) -> bool:
@@ -78,11 +79,11 @@ def is_line(text: str) -> bool:
 
 
 def pace(page: Page) -> float:
-    """Return how fast the bench goes on [s per s]."""
-    page.pushed(1)
-    start, before = time.monotonic(), page.pushes[-1][0]["t"]
-    page.pushed(60)
-    return (page.pushes[-1][0]["t"] - before) / (time.monotonic() - start)
+    """Return how fast the bench has gone on for a while, of the latest push [s per s]."""
+    limit = time.monotonic() + 1.5
+    while time.monotonic() < limit:
+        page.take()
+    return page.pushes[-1][0]["pace"]
 
 
 def table_of(page: Page) -> bytes:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin.errors import InputError
 from servotwin.units import is_finite
 from servotwin.web.live.actions import Action
-from servotwin.web.live.scene import MOST_SERVOS, Scene
+from servotwin.web.live.scene import MOST_SERVOS, SUPPLY_FIELDS, Scene
 from servotwin.web.live.scene_servo import SceneServo
 
 if TYPE_CHECKING:
@@ -67,11 +67,13 @@ def taken_over(scene: Scene, models: Sequence[Model], load: Mapping[str, float],
         kept.append(new)
     else:
         kept[servo] = new
+    supply = {key: value for key in SUPPLY_FIELDS if is_finite(value := models[0].servo.get(f"supply.{key}"))}
     changed = {_FIELDS.get(name, name.removeprefix("load.")): value for name, value in load.items()}
     command = next((action.value for action in reversed(scene.actions)
                     if action.kind == "command" and action.servo is None and action.time <= scene.end), None)
     return replace(scene, servos=tuple(kept), load={**scene.load, **changed}, frame_rate=frame_rate, end=0.0,
-                   actions=() if command is None else (Action(0.0, "command", command),), lesson={})
+                   supply=supply if scene.supply else {}, lesson={},
+                   actions=() if command is None else (Action(0.0, "command", command),))
 
 
 def _as_now(servo: SceneServo, now: Model) -> SceneServo:

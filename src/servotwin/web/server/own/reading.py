@@ -31,7 +31,7 @@ _COMPUTED = ("motor_torque", "error_time", "drive")
 _UNITS = {"pulse_width": ("us", 1e6), "angle": ("deg", 180.0 / np.pi), "voltage": ("V", 1.0)}
 MOST_PLAYED = 20_000
 """Changes of a command that a bench can play."""
-_MEMORY = 3_000_000_000  # bytes: what a log of 20 MB cannot need
+_MEMORY = 2_000_000_000  # bytes: a usual log of 20 MB takes half of it
 _MOST_RUNS = 1000
 
 
