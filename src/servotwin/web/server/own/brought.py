@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.errors import InputError, ServotwinError
 from servotwin.simulation.lane_loads import with_numbers
-from servotwin.web.live.live_bench import load_of
+from servotwin.web.live.beginning import load_of
 from servotwin.web.server.limits import Allowance
 from servotwin.web.server.own.fits import Fits
 from servotwin.web.server.own.process import Done, EndedError, Work, WorkError

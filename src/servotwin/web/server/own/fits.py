@@ -79,10 +79,12 @@ class Fits:
                              f"{time.monotonic() - began:.0f} s)", allowed="one at a time: wait for its end")
         log, (kind, start, bounds) = self._of.log, self._start(asked.get("servo", 0), asked.get("model"))
         run = None if asked.get("all") is True else self._of.run_of(asked.get("run", 0))
+        free = _free(asked.get("free"), bounds)
+        sought = {name: ends for name, ends in (bounds or {}).items() if name in (free or ())}
         given = {"logs": log.logs, "run": run, "servo": start, "model": kind.__name__, "load": self._of.load(),
-                 "frame_rate": self._of.room.bench.frame_rate, "free": _free(asked.get("free"), bounds),
-                 "priors": None if bounds else "servo", "diagnose": asked.get("diagnose") is not False}
-        given["bounds"] = {name: ends for name, ends in (bounds or {}).items() if name in given["free"]} or None
+                 "frame_rate": self._of.room.bench.frame_rate, "free": free,
+                 "bounds": sought or None, "priors": None if bounds else "servo",
+                 "diagnose": asked.get("diagnose") is not False}
         self._far, self._found = (0.0, time.monotonic()), None
         work = self._work = Work("fit", given, limit=LONGEST, nice=_NICE, told=self._told)
         desk.fitting = self
