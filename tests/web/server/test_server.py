@@ -67,7 +67,8 @@ def opened(request):
     {"do": "push", "value": "much"}, {"do": "set", "value": {"motor.foo": 1.0}},
     {"do": "set", "value": {"gear.gear_reduction": -1.0}}, {"speed": 0}, {"speed": 1e9}, {"run": 1},
     {"step": True, "run": True}, {}, {"scene": "not toml ["}, {"scene": "format = 1"}, {"fragment": "xx"},
-    {"scene": 'format = 1\n[[servo]]\nid = "../../etc/passwd"'}, {"servos": "all"}, {"servos": [{"keep": 9}]}, {"lesson": "nonsense"}, {"mystery": -1}, {"guess": {}},
+    {"scene": 'format = 1\n[[servo]]\nid = "../../etc/passwd"'}, {"servos": "all"}, {"servos": [{"keep": 9}]},
+    {"lesson": "nonsense"}, {"mystery": -1}, {"guess": {}},
     {"export": "exe"}, {"view": {"a": [1]}}, {"do": "register", "value": {"P_Coefficient": 1}},
     {"do": "frames", "value": {"rate": 0}}])
 def test_what_cannot_be_done_is_refused_in_a_line(server, message):
