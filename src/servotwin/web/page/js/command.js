@@ -35,7 +35,8 @@ export function mount(root, bench) {
   let value = 1500;
   let touched = -Infinity;
   let shape = "step";
-  const send = onceAFrame(() => { touched = performance.now(); bench.tell({ do: "command", value: { shape: "hold", value, unit } }); });
+  const told = onceAFrame(() => bench.tell({ do: "command", value: { shape: "hold", value, unit } }));
+  const send = () => { touched = performance.now(); told(); }; // from now on nothing but a hand moves the slider
   const units = choice("Told in", [], (chosen) => { unit = /** @type {Unit} */ (chosen); bench.look({ "command.unit": unit }); begin(); });
   const shapes = choice("Shape", [...Object.keys(SHAPES), RECORD].map((name) => [name, name]), (chosen) => { shape = chosen; form(); });
   const main = el("div", { class: "command" });
