@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 
 _BUDGET = 0.010  # s of computing in a turn
 _SHORT, _LONG = 0.2 * _BUDGET, 0.5 * _BUDGET  # s of computing: a stretch of less, and of more, is given another length
-_FIRST, _LONGEST = 5e-4, 1e3  # s of bench time: the first stretch of which nothing is known yet, and the most
+_FIRST = 5e-4  # s of bench time: the first stretch, of which nothing is known yet
+_LONGEST = 0.1  # s: one that begins at rest may go on in motion, which costs a thousand times as much
 PATIENCE = 1.0
 """How long a stretch may take [s]: then the bench stands."""
 
