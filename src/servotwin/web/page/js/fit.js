@@ -3,7 +3,9 @@
 import { choice, el, panel } from "./dom.js";
 import { capital } from "./fit_found.js";
 import { fullName } from "./names.js";
-import { plain, printed } from "./units.js";
+import { engineering, plain, printed } from "./units.js";
+
+const PREFIXED = ["s", "V", "A"]; // units that people write prefixes before
 
 /** @param {HTMLElement} root @param {import("./bench.js").Bench} bench */
 export function mount(root, bench) {
@@ -39,7 +41,7 @@ export function mount(root, bench) {
       model.select.value = found.model;
       free.replaceChildren(el("legend", { text: "What is searched" }), ...found.free.map((/** @type {any} */ one) => el("label", { class: "tick", title: one.name },
         el("input", { type: "checkbox", checked: true, value: one.name }),
-        ` ${one.meaning}${one.value === null ? "" : ` (now ${plain(one.value, 3)} ${printed(one.unit)})`}`)));
+        ` ${one.meaning}${one.value === null ? "" : ` (now ${now(one)})`}`)));
       begin.disabled = false;
     } catch (error) {
       if (own !== asked) return;
@@ -100,4 +102,9 @@ export function mount(root, bench) {
     plan();
   });
   bench.on("closed", () => runs(false));
+}
+
+/** @param {any} one what may be searched @returns {string} its value of now */
+function now(one) {
+  return PREFIXED.includes(one.unit) ? engineering(one.value, one.unit, 3) : `${plain(one.value, 3)} ${printed(one.unit)}`.trim();
 }

@@ -181,5 +181,6 @@ def _free_facts(servo: Servo, name: str) -> dict[str, Any]:
     from servotwin.parameters import GROUPS
 
     group, _, key = name.partition(".")
-    return {"name": name, "meaning": GROUPS[group].__dataclass_fields__[key].metadata["meaning"],
+    meaning = GROUPS[group].__dataclass_fields__[key].metadata["meaning"].partition(" (")[0]  # without equations
+    return {"name": name, "meaning": meaning,
             "unit": unit_of(name), "value": servo.get(name)}
