@@ -21,3 +21,17 @@ def test_rest_makes_stretches_no_longer_than_motion_bears(name, monkeypatch):
         going.until(1e3, 120.0)
     assert going.broken is None
     assert max(stretches) < 0.11
+
+
+def test_a_target_right_behind_an_edge_is_not_tried_again_and_again(monkeypatch):
+    bench = LiveBench(taught.lesson("droop").scene)
+    going, tries, advance = Stint(bench), [], bench.advance
+    bench.advance(0.2, 100.0)
+
+    def watched(until, points):
+        tries.append(until)
+        return advance(until, points)
+
+    monkeypatch.setattr(bench, "advance", watched)
+    going.until(0.2 + 1e-13, 100.0)
+    assert len(tries) == 1

@@ -52,8 +52,10 @@ class Stint:
         """Let it go on to a time [s], but for no longer than a turn may take; return what shows, at a rate [Hz]."""
         self._ends, pushes = _now() + _BUDGET, [self._nothing()]
         while (self._bench.time < target or self._bench.due) and self.broken is None and _now() < self._ends:
-            end, at = min(target, self._bench.time + self._stretch), _now()
-            pushes.append(self.to(max(end, self._bench.time), points))
+            before, due, at = self._bench.time, self._bench.due, _now()
+            pushes.append(self.to(max(min(target, before + self._stretch), before), points))
+            if self._bench.time == before and not due:  # a rounding before the edge that it stands at
+                break
             spent = _now() - at
             if spent < _SHORT:
                 self._stretch = min(4.0 * self._stretch, _LONGEST)
