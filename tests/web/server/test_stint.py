@@ -25,8 +25,8 @@ def test_rest_makes_stretches_no_longer_than_motion_bears(name, monkeypatch):
 
 def test_a_target_right_behind_an_edge_is_not_tried_again_and_again(monkeypatch):
     bench = LiveBench(taught.lesson("droop").scene)
-    going, tries, advance = Stint(bench), [], bench.advance
     bench.advance(0.2, 100.0)
+    going, tries, advance = Stint(bench), [], bench.advance
 
     def watched(until, points):
         tries.append(until)
