@@ -102,8 +102,8 @@ export function mount(root, bench) {
   const tell = (command) => { touched = -Infinity; bench.tell({ do: "command", value: command }); };
 
   body.append(units.row, main, said, shapes.row, fields);
-  bench.on("scene", () => {
-    const able = /** @type {Unit[]} */ (["us", "deg", "V"]).filter((one) => range(one));
+  bench.on("scene", (state) => {
+    const able = /** @type {Unit[]} */ (state.control ? ["V"] : ["us", "deg", "V"]).filter((one) => range(one));
     units.select.replaceChildren(...able.map((one) => el("option", { value: one, text: `${NAMES[one]} [${SHOWN[one]}]` })));
     const kept = /** @type {Unit} */ (bench.view["command.unit"]);
     if (able.includes(kept)) unit = kept;

@@ -23,6 +23,8 @@ export function printed(unit) {
   return unit === "1" ? "" : unit.replace(/\bohm\b/, "Ω").replace(/\bus\b/, "µs").replace(/\bdeg\b/, "°").replace(/(\bm|cm|s)2\b/g, "$1²");
 }
 
+const NOTHING = 1e-15; // of a volt, an ampere, a second: what rounding leaves
+
 /**
  * A value with a prefix before its unit, such as 1.5 ms.
  * @param {number} value in SI
@@ -32,6 +34,7 @@ export function printed(unit) {
  */
 export function engineering(value, unit, digits = 4) {
   if (!Number.isFinite(value)) return "–";
+  if (Math.abs(value) < NOTHING) return `0 ${unit}`;
   const size = Math.abs(Number(value.toPrecision(digits))); // 999.9 µs to two digits is a millisecond
   const [scale, prefix] = PREFIXES.find(([least]) => size >= least * 0.9999999) ?? [1, ""];
   return `${plain(value / (size ? scale : 1), digits)} ${size ? prefix : ""}${unit}`;
