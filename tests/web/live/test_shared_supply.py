@@ -12,8 +12,9 @@ from servotwin.web.live import LiveBench, read_scene
 
 SUPPLY = {"open_circuit_voltage": 6.0, "internal_resistance": 0.5}
 ANALOG, DIGITAL = "hitec-hs-755hb", "towerpro-mg996r"
+COAST = '"electronics.off_state" = "coast"'
 CASES = [([(ANALOG, "PulseServo", "")] * 2, {}), ([(ANALOG, "PulseServo", "")] * 2, {"current_limit": 1.0}),
-         ([(ANALOG, "PulseServo", '"electronics.off_state" = "coast"'), (ANALOG, "PulseServoInductive", ""),
+         ([(ANALOG, "PulseServo", COAST), (ANALOG, "PulseServoInductive", COAST),
            (ANALOG, "PulseServo", '"electronics.supply_coupling" = 0.01')], {}),
          ([(DIGITAL, "DigitalServo", "")] * 2, {}), ([(ANALOG, "PulseServo", ""), (DIGITAL, "DigitalServo", "")], {})]
 
@@ -26,14 +27,15 @@ def scene_text(servos, supply, more: str = "") -> str:
     return "\n".join([*lines, "[load]", "inertia = 2e-4", "[supply]", *volts])
 
 
-def gone_on(bench: LiveBench, end: float, pace: random.Random) -> list[list[tuple[float, float]]]:
-    """Let a bench go on in pieces; return the pulses of each servo."""
-    pulses = [[] for _ in bench.models]
+def gone_on(bench: LiveBench, end: float, pace: random.Random) -> tuple[list, list]:
+    """Let a bench go on in pieces; return the pulses of each servo, and the rows of the first."""
+    pulses, rows = [[] for _ in bench.models], []
     while bench.time < end:
         push = bench.advance(min(end, bench.time + pace.choice([1e-5, 7e-4, 1 / 60, 0.02, 0.13])), 100.0)
+        rows += push.servos[0].points
         for own, seen in zip(pulses, push.servos, strict=True):
             own += seen.pulses
-    return pulses
+    return pulses, rows
 
 
 def angles(bench: LiveBench) -> list[float]:
@@ -46,7 +48,7 @@ def test_they_do_what_a_fleet_does(servos, more):
     bench = LiveBench(read_scene(scene_text(servos, supply)))
     bench.do("command", {"shape": "hold", "unit": "us", "value": 1400.0})
     bench.do("command", {"shape": "step", "unit": "us", "low": 1400.0, "high": 1800.0, "period": 0.5})
-    pulses = gone_on(bench, 1.0, random.Random(3))
+    pulses, rows = gone_on(bench, 1.0, random.Random(3))
     fleet = st.simulate_bus(
         {str(k): (getattr(st, model)(st.load_servo(name).replace(dict(_read(parameters)))),
                   st.signals.pulse_train(*zip(*pulses[k], strict=True), unit="s"), _load())
@@ -56,8 +58,11 @@ def test_they_do_what_a_fleet_does(servos, more):
     expected = [fleet[name]["output_angle"][-1] for name in fleet]
     np.testing.assert_allclose(angles(bench), expected, atol=1e-9)
     assert fleet.bus_voltage.min() < 5.5
-    volts = bench.rows[0][bench.columns[0].index("bus_voltage")]
-    assert volts == pytest.approx(float(fleet.bus_voltage[-1]), abs=1e-9)
+    time, volts = np.array(rows)[:, [0, bench.columns[0].index("bus_voltage")]].T
+    last = np.append(np.diff(time) > 1e-9, True)  # just after a switch, not before it
+    if any(model == "DigitalServo" for _, model, _ in servos):  # whose ticks may be a rounding beside it
+        last &= np.insert(np.diff(time) > 1e-9, 0, True)
+    np.testing.assert_allclose(volts[last], fleet.bus(time[last]), atol=1e-7)
 
 
 def _load():
@@ -91,9 +96,8 @@ def test_numbers_pushes_and_the_supply_change_as_time_goes_on():
                 number |= value if kind == "set" else {}
         if number:
             lanes.set(parameters=number)
+        np.testing.assert_allclose(angles(bench), lanes["output_angle"], atol=1e-9)
         lanes.advance(0.02, pulse_width=width, external_torque=torque)
-    gone_on(bench, 1.0, pace)
-    np.testing.assert_allclose(angles(bench), lanes["output_angle"], atol=1e-9)
     bench.do("set", {"supply.internal_resistance": 3.0}, 1)  # the supply is one: it changes for both
     assert [one.servo.get("supply.internal_resistance") for one in bench.now_models] == [3.0, 3.0]
 
