@@ -113,7 +113,11 @@ class LiveBench:
     @property
     def due(self) -> bool:
         """Whether something is still to be done before time goes on."""
-        return bool(self._todo) and self._todo[0].time <= self.time
+        return bool(self._todo) and self.reached(self._todo[0].time)
+
+    def reached(self, time: float) -> bool:
+        """Tell whether the bench has come to a time [s]; one that is a rounding behind its edge is the edge."""
+        return self._sender.snapped(time) <= self.time
 
     def hurried(self, hurry: Callable[[], bool], tell: Callable[[float], object]) -> None:
         """Let somebody else decide how long it may take.
@@ -188,7 +192,7 @@ class LiveBench:
         pulses: list[list[tuple[float, float]]] = [[] for _ in self._stations]
         events: list[tuple[float, str, int]] = []
         self._catch_up()
-        while self.time < until and not self.due:
+        while not (self.reached(until) or self.due):
             end = self._sender.snapped(min(until, self._todo[0].time) if self._todo else until)
             end = min(end, *self._looks())
             if end <= self.time:

@@ -92,7 +92,7 @@ def replay(scene: Scene | str, *, output_step: float = 1e-3, switches: bool = Tr
     bench = LiveBench(read)
     rows: list[list[tuple[float, ...]]] = [[row] for row in bench.rows]
     pulses: list[list[tuple[float, float]]] = [[] for _ in bench.models]
-    while bench.time < read.end:
+    while not bench.reached(read.end):
         push = bench.advance(min(read.end, bench.time + _STRETCH), 1.0 / output_step, switches=switches)
         for k, one in enumerate(push.servos):
             rows[k] += one.points

@@ -142,7 +142,7 @@ class Room:
     @property
     def replaying(self) -> bool:
         """Whether it is still doing what was done before."""
-        return self._stint.broken is None and (self.bench.time < self._end or self.bench.due)
+        return self._stint.broken is None and (self.bench.due or not self.bench.reached(self._end))
 
     def _next_frame(self) -> float:
         bench = self.bench

@@ -51,11 +51,9 @@ class Stint:
     def until(self, target: float, points: float) -> Push:
         """Let it go on to a time [s], but for no longer than a turn may take; return what shows, at a rate [Hz]."""
         self._ends, pushes = _now() + _BUDGET, [self._nothing()]
-        while (self._bench.time < target or self._bench.due) and self.broken is None and _now() < self._ends:
-            before, due, at = self._bench.time, self._bench.due, _now()
+        while (self._bench.due or not self._bench.reached(target)) and self.broken is None and _now() < self._ends:
+            before, at = self._bench.time, _now()
             pushes.append(self.to(max(min(target, before + self._stretch), before), points))
-            if self._bench.time == before and not due:  # a rounding before the edge that it stands at
-                break
             spent = _now() - at
             if spent < _SHORT:
                 self._stretch = min(4.0 * self._stretch, _LONGEST)
