@@ -28,13 +28,13 @@ def scene_text(servos, supply, more: str = "") -> str:
 
 
 def gone_on(bench: LiveBench, end: float, pace: random.Random) -> tuple[list, list]:
-    """Let a bench go on in pieces; return the pulses of each servo, and the rows of the first."""
-    pulses, rows = [[] for _ in bench.models], []
+    """Let a bench go on in pieces; return the pulses of each servo, and its rows."""
+    pulses, rows = ([[] for _ in bench.models] for _ in range(2))
     while bench.time < end:
         push = bench.advance(min(end, bench.time + pace.choice([1e-5, 7e-4, 1 / 60, 0.02, 0.13])), 100.0)
-        rows += push.servos[0].points
-        for own, seen in zip(pulses, push.servos, strict=True):
-            own += seen.pulses
+        for k, seen in enumerate(push.servos):
+            pulses[k] += seen.pulses
+            rows[k] += seen.points
     return pulses, rows
 
 
@@ -58,7 +58,11 @@ def test_they_do_what_a_fleet_does(servos, more):
     expected = [fleet[name]["output_angle"][-1] for name in fleet]
     np.testing.assert_allclose(angles(bench), expected, atol=1e-9)
     assert fleet.bus_voltage.min() < 5.5
-    time, volts = np.array(rows)[:, [0, bench.columns[0].index("bus_voltage")]].T
+    time, volts = np.array(rows[0])[:, [0, bench.columns[0].index("bus_voltage")]].T
+    if not more:  # Kirchhoff: what the supply loses is what all draw
+        drawn = sum(np.array(own)[:, names.index("supply_current")]
+                    for own, names in zip(rows, bench.columns, strict=True))
+        np.testing.assert_allclose(volts, 6.0 - 0.5 * drawn, atol=1e-9)
     last = np.append(np.diff(time) > 1e-9, True)  # just after a switch, not before it
     if any(model == "DigitalServo" for _, model, _ in servos):  # whose ticks may be a rounding beside it
         last &= np.insert(np.diff(time) > 1e-9, 0, True)
