@@ -50,10 +50,11 @@ class DigitalServo(SwitchedServo):
 
     requires = (*MOTOR, "firmware.control_period", "firmware.proportional_gain")
     optional = (
-        "gear.output_inertia", *elastic.READS, *friction.READS, *duty.READS, *firmware.READS, *sensor.READS,
-        *source.READS, *stops.READS, *heat.READS, *_PULSES, "potentiometer.noise", "electronics.one_shot_offset",
-        "electronics.deadband", "electronics.frame_period", "electronics.pulse_width_min",
-        "electronics.pulse_width_max", "electronics.voltage_to_pulse_gain", "electronics.command_pulse_offset",
+        "gear.output_inertia", *elastic.READS, *play.READS, *friction.READS, *duty.READS, *firmware.READS,
+        *sensor.READS, *source.READS, *stops.READS, *heat.READS, *_PULSES, "potentiometer.noise",
+        "electronics.one_shot_offset", "electronics.deadband", "electronics.frame_period",
+        "electronics.pulse_width_min", "electronics.pulse_width_max", "electronics.voltage_to_pulse_gain",
+        "electronics.command_pulse_offset",
     )
     layout = (*SHAFT, *HIDDEN)
     signals = (

@@ -49,8 +49,8 @@ class _Pulsed(SwitchedServo):
     """What both pulse servos share: the chip and the bridge."""
 
     optional = (
-        "gear.output_inertia", *elastic.READS, *friction.READS, *chip.READS, *bridge.READS, *sensor.READS,
-        *source.READS, *stops.READS, *heat.READS, "electronics.voltage_to_pulse_gain",
+        "gear.output_inertia", *elastic.READS, *play.READS, *friction.READS, *chip.READS, *bridge.READS,
+        *sensor.READS, *source.READS, *stops.READS, *heat.READS, "electronics.voltage_to_pulse_gain",
         "electronics.command_pulse_offset",
     )
     signals = (

@@ -65,7 +65,10 @@ _TWO_SHARES = ("load_friction_motor", "load_friction_external", "load_friction_m
 
 @dataclass(frozen=True, kw_only=True)
 class Friction(Group):
-    """Dry friction of motor and gear (paper, eq. 37-41), at the motor shaft; both Coulomb torques are magnitudes."""
+    """Dry friction of motor and gear (paper, eq. 37-41), at the motor shaft; both Coulomb torques are magnitudes.
+
+    The friction behind the play is given at the output shaft.
+    """
 
     title = "friction"
     coulomb_torque_forward: float | None = parameter("F_ec1", "torque", NOT_NEGATIVE, "Coulomb torque forward (41)")
@@ -84,6 +87,9 @@ class Friction(Group):
         "K_mq", "inverse torque", NOT_NEGATIVE, "quadratic in motor torque")
     load_friction_external_quad: float | None = parameter(
         "K_eq", "inverse torque", NOT_NEGATIVE, "quadratic in load torque")
+    bearing_coulomb_torque: float | None = parameter(
+        "T_o", "torque", NOT_NEGATIVE,
+        "part of the Coulomb friction that stands behind the play, at the output shaft; absent: 0.06 of it")
 
     def _relations(self) -> Iterator[Relation]:
         yield from self._only_with("stribeck_exponent", ("stribeck_speed",))

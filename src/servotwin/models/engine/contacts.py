@@ -23,7 +23,7 @@ from servotwin.models.engine.modes import (
     slides,
 )
 from servotwin.models.terms import friction, play, shaft, source
-from servotwin.models.terms.friction import Friction, holding_friction, sliding_friction
+from servotwin.models.terms.friction import NO_FRICTION, Friction, holding_friction, sliding_friction
 from servotwin.models.terms.load import dry as has_dry_load
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.numbers import Numbers
@@ -46,7 +46,17 @@ def has_friction(numbers: Numbers) -> bool:
 
 def holds(numbers: Numbers) -> bool:
     """Tell whether the output side may hold itself: by dry friction; a potentiometer with play marks its turns."""
-    return has_dry_load(numbers.load) or slack(numbers.sensor)
+    return has_dry_load(numbers.load) or numbers.play.bearing > 0.0 or slack(numbers.sensor)
+
+
+def output_friction(numbers: Numbers) -> float:
+    """Return the dry friction [N m] of the output side inside the play: of its bearing and of the load."""
+    return numbers.play.bearing + numbers.load.coulomb
+
+
+def motor_hold(numbers: Numbers, forward: bool, tau_m: float) -> float:
+    """Return the torque [N m] up to which the motor alone holds itself against a start, inside the play."""
+    return holding_friction(numbers.friction, forward, tau_m, 0.0) - numbers.play.bearing
 
 
 def holding_bounds(numbers: Numbers, tau_m: float, tau_e: float) -> tuple[float, float]:
@@ -122,11 +132,11 @@ def apart(numbers: Numbers, zone: int, u: float, tau: float, y: Vector) -> Mode:
     held, dry = holds(numbers), friction.present(numbers.friction)
     contact, motor = sliding(y[1] > 0.0, held), sliding(y[6] > 0.0, dry)
     if y[1] == 0.0:
-        contact = from_rest(-against, numbers.load.coulomb, numbers.load.coulomb, y[0] >= numbers.stops.upper,
-                            y[0] <= numbers.stops.lower, held)
+        hold = output_friction(numbers)
+        contact = from_rest(-against, hold, hold, y[0] >= numbers.stops.upper, y[0] <= numbers.stops.lower, held)
     if y[6] == 0.0:
-        motor = from_rest(torque, holding_friction(numbers.friction, False, torque, 0.0),
-                          holding_friction(numbers.friction, True, torque, 0.0), False, False, dry)
+        motor = from_rest(torque, motor_hold(numbers, False, torque), motor_hold(numbers, True, torque), False, False,
+                          dry)
     return Mode(zone, contact, INSIDE, motor, 0)
 
 
@@ -134,17 +144,15 @@ def motor_acceleration(numbers: Numbers, motor: int, torque: float, w: float) ->
     """Return the acceleration [rad/s²] of the motor alone, inside the play."""
     if at_rest(motor):
         return 0.0
-    dry = 0.0
-    if motor == FORWARD or motor == BACKWARD:
-        dry = sliding_friction(numbers.friction, motor == FORWARD, w, torque, 0.0)
-    return shaft.motor_acceleration(numbers.shaft, torque, w, dry if motor == FORWARD else -dry)
+    dry = joint_friction(numbers.friction, -numbers.play.bearing, motor, w, torque, 0.0)
+    return shaft.motor_acceleration(numbers.shaft, torque, w, dry)
 
 
 def output_acceleration(numbers: Numbers, contact: int, against: float, w: float) -> float:
     """Return the acceleration [rad/s²] of the output side alone, inside the play."""
     if at_rest(contact):
         return 0.0
-    dry = numbers.load.coulomb if contact == FORWARD else -numbers.load.coulomb if contact == BACKWARD else 0.0
+    dry = joint_friction(NO_FRICTION, output_friction(numbers), contact, w, 0.0, 0.0)
     return shaft.output_acceleration(numbers.shaft, w, dry, against)
 
 

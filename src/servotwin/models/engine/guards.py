@@ -30,7 +30,7 @@ from servotwin.models.engine.modes import (
     slides,
 )
 from servotwin.models.terms import elastic, play, source
-from servotwin.models.terms.friction import core_speed, creeping_speed, fades, holding_friction, smoothed, varying
+from servotwin.models.terms.friction import core_speed, creeping_speed, fades, smoothed, varying
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
@@ -193,7 +193,7 @@ def _release_guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float,
     di = dy[2]
     if mode.mesh == INSIDE:
         di = 0.0
-        backward = forward = numbers.load.coulomb
+        backward = forward = contacts.output_friction(numbers)
     else:
         torque = currents.drive_torque(numbers, mode.zone, u, y)
         backward, forward = contacts.holding_bounds(numbers, torque, -against)
@@ -255,12 +255,12 @@ def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, d
         against = external_torque(numbers.load, tau, y[0])
         if mode.contact == (ON_UPPER if pushes else ON_LOWER):
             return math.inf, 0.0
-        return numbers.load.coulomb + (against if pushes else -against), dtau if pushes else -dtau
+        return contacts.output_friction(numbers) + (against if pushes else -against), dtau if pushes else -dtau
     torque = currents.drive_torque(numbers, mode.zone, u, y)
     rate = motor.electromagnetic_torque(dy[2], numbers.motor.K)
     if kind == MOTOR_RELEASE_FORWARD or (kind == PART_MOTOR and not pushes):
-        return holding_friction(numbers.friction, True, torque, 0.0) - torque, -rate
-    return holding_friction(numbers.friction, False, torque, 0.0) + torque, rate
+        return contacts.motor_hold(numbers, True, torque) - torque, -rate
+    return contacts.motor_hold(numbers, False, torque) + torque, rate
 
 
 def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:

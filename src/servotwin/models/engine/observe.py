@@ -120,21 +120,23 @@ def _within_limit(supply: Source, i: float) -> float:
 
 def torques(numbers: Numbers, mode: Mode, w: float, w_motor: float, i: float, external: float) -> Torques:
     """Return all torques at the output shaft under a current [A] and an external torque against +q [N m]."""
-    own, dry, acceleration = numbers.shaft, numbers.load.coulomb, 0.0
+    own, dry, bearing, acceleration = numbers.shaft, numbers.load.coulomb, 0.0, 0.0
     tau = electromagnetic_torque(i, numbers.motor.K)
     if mode.mesh == INSIDE:
-        servo, _ = _friction(numbers.friction, 0.0, mode.motor, w_motor, tau, 0.0, tau)
-        _, of_load = _friction(NO_FRICTION, dry, mode.contact, w, 0.0, -external, -external)
+        behind = numbers.play.bearing
+        servo, _ = _friction(numbers.friction, -behind, 0.0, mode.motor, w_motor, tau, 0.0, tau)
+        bearing, of_load = _friction(NO_FRICTION, behind, dry, mode.contact, w, 0.0, -external, -external)
         if not at_rest(mode.contact):
-            acceleration = shaft.output_acceleration(own, w, of_load, external)
+            acceleration = shaft.output_acceleration(own, w, bearing + of_load, external)
     else:
         on_gear = torque_on_gear(external, w, own.b_out)
-        servo, of_load = _friction(numbers.friction, dry, mode.contact, w, tau, on_gear, tau - external)
+        servo, of_load = _friction(numbers.friction, 0.0, dry, mode.contact, w, tau, on_gear, tau - external)
         if not at_rest(mode.contact):
             acceleration = shaft.acceleration(own, tau, w, servo + of_load, external)
     return Torques(tau, servo, of_load, external, acceleration,
                    load_torque(acceleration, w, of_load, external, own.b_out, own.J_out),
-                   ((own.b - own.b_out) * w_motor + servo) * w_motor, (own.b_out * w + of_load + external) * w)
+                   ((own.b - own.b_out) * w_motor + servo) * w_motor + bearing * w,
+                   (own.b_out * w + of_load + external) * w)
 
 
 def torques_of_two(numbers: Numbers, mode: Mode, y: Vector, i: float, external: float) -> Torques:
@@ -146,16 +148,16 @@ def torques_of_two(numbers: Numbers, mode: Mode, y: Vector, i: float, external: 
     taken, lost = elastic.damper_loss(spring, between, ahead, rate), 0.0
     if elastic.behind(spring):
         against = external + between
-        servo, of_load = _friction(numbers.friction, dry, mode.contact, w, tau, torque_on_gear(against, w, own.b_out),
-                                   tau - against)
+        servo, of_load = _friction(numbers.friction, 0.0, dry, mode.contact, w, tau,
+                                   torque_on_gear(against, w, own.b_out), tau - against)
         if not at_rest(mode.contact):
             acceleration = shaft.acceleration(own, tau, w, servo + of_load, against)
         lost = taken + (spring.b * y[6] + pendulum_torque(y[5], spring.gravity, spring.hanging_angle)) * y[6]
         taken = 0.0
     else:
         against = external
-        servo, _ = _friction(numbers.friction, 0.0, mode.motor, w_motor, tau, -between, tau - between)
-        _, of_load = _friction(NO_FRICTION, dry, mode.contact, w, 0.0, between - external, between - external)
+        servo, _ = _friction(numbers.friction, 0.0, 0.0, mode.motor, w_motor, tau, -between, tau - between)
+        _, of_load = _friction(NO_FRICTION, 0.0, dry, mode.contact, w, 0.0, between - external, between - external)
         if not at_rest(mode.contact):
             acceleration = shaft.output_acceleration(own, w, of_load, external - between)
     return Torques(tau, servo, of_load, external, acceleration,
@@ -176,22 +178,24 @@ def stored_energy(numbers: Numbers, y: Vector) -> float:
             + magnetic_energy(i, numbers.motor.L))
 
 
-def _friction(gear: Friction, dry: float, contact: int, w: float, tau_m: float, tau_e: float,
+def _friction(gear: Friction, more: float, dry: float, contact: int, w: float, tau_m: float, tau_e: float,
               net: float) -> tuple[float, float]:
-    """Return the friction of gear and load [N m], against +q, where `net` is what they have to hold at rest.
+    """Return the friction of servo and load [N m], against +q, where `net` is what they have to hold at rest.
+
+    That of the servo is its gear's and `more`, that of the load is `dry`.
 
     At rest friction takes what it has to hold, shared by servo and load in proportion to what each can hold (the
     sharing is assumed: statics does not tell); what remains then is carried by a stop.
     """
     if at_rest(contact):
-        low = holding_friction(gear, False, tau_m, tau_e) + dry
-        high = holding_friction(gear, True, tau_m, tau_e) + dry
+        low = holding_friction(gear, False, tau_m, tau_e) + more + dry
+        high = holding_friction(gear, True, tau_m, tau_e) + more + dry
         held = min(max(net, -low), high)
         limit = high if held > 0.0 else low
         share = dry / limit if limit > 0.0 else 0.0
         return held * (1.0 - share), held * share
-    own = joint_friction(gear, 0.0, contact, w, tau_m, tau_e)
-    return own, joint_friction(gear, dry, contact, w, tau_m, tau_e) - own
+    own = joint_friction(gear, more, contact, w, tau_m, tau_e)
+    return own, joint_friction(gear, more + dry, contact, w, tau_m, tau_e) - own
 
 
 def observed(numbers: Numbers, curve: Sequence[Sequence[float]] | NDArray[np.float64], mode: Mode, u: float, tau: float,

@@ -1,4 +1,4 @@
-"""The play of the gear: where motor and output meet, and the speed with which they go on."""
+"""The play of the gear: where motor and output meet, how fast they are then, and the friction behind the play."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from servotwin import physics
 from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vector
 from servotwin.models.terms.dependence import TWO_BODIES
 from servotwin.models.terms.given import Given
@@ -14,15 +15,22 @@ from servotwin.parameters.group import Relation
 from servotwin.physics.backlash import impact_speed
 
 _LAST_IMPACT = 1e-12  # rad/s: an impact of motor and output this slow is the last one of many
+_BEARING_SHARE = 0.06  # of the Coulomb friction, where the servo does not say: assumed, 0.02 to 0.15
+_ROUNDING = 1e-12  # relative
+_BEARING = "friction.bearing_coulomb_torque"
+
+READS = (_BEARING,)
+"""What may be given of a servo with play, the play apart."""
 
 
 class Play(NamedTuple):
     """Numbers of the gear's play."""
 
     half: float  # of the play; 0: motor and output are one body
+    bearing: float  # T_o: the part of the Coulomb friction that acts on the output inside the play
 
 
-NO_PLAY = Play(0.0)
+NO_PLAY = Play(0.0, 0.0)
 
 
 def present(play: Play) -> bool:
@@ -51,18 +59,36 @@ def with_motor(play: Play, mesh: int, y: Vector) -> Vector:
 
 
 def pack(model: Given, load_inertia: Any) -> Play:
-    """Return the play of a model's gear; that of an elastic one belongs to its spring.
+    """Return the play of a model's gear and the friction behind it; the play of an elastic gear belongs to its spring.
 
     Raises
     ------
     ParameterError
-        If there is play without inertia behind it.
+        If there is play without inertia behind it, or more friction behind it than the gear has either way; if there
+        is friction behind the play of an elastic gear.
     """
+    given: Any = model.servo.get(_BEARING)
     if model.servo.get("gear.stiffness") is not None:
+        _require(_BEARING, given is None, given, "none beside gear.stiffness: the output of an elastic gear has the "
+                                                 "dry friction of the load alone")
         return NO_PLAY
     play: Any = model.value_or("gear.backlash", 0.0)
-    has_body = np.asarray((np.asarray(play) == 0.0) | (np.asarray(load_inertia) > 0.0)).ravel()
-    Relation("gear.backlash", has_body if has_body.size > 1 else bool(has_body[0]), np.broadcast_to(
-        np.ravel(play), has_body.shape) if has_body.size > 1 else play,
-        "play only with inertia behind it: gear.output_inertia, or a load that has some").check()
-    return Play(0.5 * play)
+    _require("gear.backlash", (np.asarray(play) == 0.0) | (np.asarray(load_inertia) > 0.0), play,
+             "play only with inertia behind it: gear.output_inertia, or a load that has some")
+    N = model.value("gear.gear_reduction")
+    most = np.minimum(*(physics.output_torque(model.value(f"friction.coulomb_torque_{way}"), N)
+                        for way in ("forward", "backward")))
+    bearing = _BEARING_SHARE * most if given is None else np.asarray(given)
+    _require(_BEARING, (np.asarray(play) == 0.0) | (bearing <= most * (1.0 + _ROUNDING)), bearing,
+             "at most the Coulomb friction either way, at the output shaft: it is a part of that")
+    behind: Any = np.where(np.asarray(play) > 0.0, np.minimum(bearing, most), 0.0)
+    return Play(0.5 * play, behind if behind.ndim else float(behind))
+
+
+def _require(name: str, holds: Any, value: Any, allowed: str) -> None:
+    """Raise ParameterError where a relation does not hold; names the lane of columns."""
+    lanes = np.asarray(holds).ravel()
+    if lanes.size > 1:
+        Relation(name, lanes, np.broadcast_to(np.ravel(value), lanes.shape), allowed).check()
+    else:
+        Relation(name, bool(lanes[0]), value, allowed).check()
