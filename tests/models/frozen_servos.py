@@ -50,7 +50,8 @@ SERVO = {
     "bridge resistance": lambda u: {"supply.bridge_drop_resistance": u(0.05, 0.4)},
     "brush drop": lambda u: {"motor.brush_drop_voltage": u(0.1, 0.5)},
     "regulator": lambda u: {"supply.current_limit": u(0.3, 1.0)},
-    "play": lambda u: {"gear.backlash": u(0.005, 0.03), "gear.output_inertia": u(3e-4, 2e-3)},
+    "play": lambda u: {"gear.backlash": u(0.005, 0.03), "gear.output_inertia": u(3e-4, 2e-3),
+                       "friction.bearing_coulomb_torque": 0.0},  # younger than the results
     "output inertia": lambda u: {"gear.output_inertia": u(3e-4, 2e-3)},
     "sensor play": lambda u: {"potentiometer.backlash": u(3e-3, 0.02)},
     "sensor table": lambda u: {"potentiometer.linearity_angle": [0.0, 0.6, 1.1, 1.7, 2.2],

@@ -22,7 +22,7 @@ NAMES = {
     "friction": "coulomb_torque_forward coulomb_torque_backward zero_crossing_slope breakaway_ratio stribeck_speed "
                 "stribeck_exponent load_friction load_friction_stribeck load_friction_motor load_friction_external "
                 "load_friction_motor_stribeck load_friction_external_stribeck load_friction_motor_quad "
-                "load_friction_external_quad",
+                "load_friction_external_quad bearing_coulomb_torque",
     "electronics": "bridge_gain comparator_gain voltage_to_pulse_gain pulse_to_voltage_gain command_offset "
                    "command_pulse_offset voltage_deadband frame_period deadband stretcher_gain minimum_drive_time "
                    "stretcher_time_constant off_state silence_state one_shot_offset one_shot_slope back_emf_injection "

@@ -251,6 +251,10 @@ def _effects(d: _Dice, v: Values, terms: Set[str], low: float, high: float, star
         v["supply.current_limit"] = d.between(0.3, 0.8) * v["supply.open_circuit_voltage"] / R
     if "backlash" in terms:
         v["gear.backlash"] = d.log(0.005, 0.05)
+        sides = [v[f"friction.coulomb_torque_{way}"] * v["gear.gear_reduction"] for way in ("forward", "backward")]
+        share = d.one_of(None, 0.0, 1.0, d.between(0.01, 0.3))  # of the friction that is behind the play
+        if share is not None:
+            v["friction.bearing_coulomb_torque"] = share * min(sides)
     if "wiper" in terms:
         v["potentiometer.backlash"] = d.log(0.005, 0.03)
     if "table" in terms:

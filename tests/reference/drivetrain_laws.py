@@ -53,6 +53,7 @@ class Plant:
     coasts: bool
     forward: float  # N F_ec1
     backward: float
+    bearing: float  # T_o: of it, what acts on the output inside the play
     r: float
     w_s: float | None
     alpha: float
@@ -129,6 +130,11 @@ class Plant:
         return (-self.budget(-1, tau_m, tau_e, 1.0, signs) - coulomb,
                 self.budget(1, tau_m, tau_e, 1.0, signs) + coulomb)
 
+    @property
+    def behind(self) -> float:
+        """Dry friction of the output inside the play [N m]."""
+        return self.coulomb + self.bearing
+
 
 def sgn(x: float) -> int:
     return (x > 0.0) - (x < 0.0)
@@ -152,6 +158,8 @@ def _friction(v: Mapping[str, Any], N: float) -> dict[str, Any]:
     v_s, one, one_static = v.get("friction.stribeck_speed"), of("load_friction"), of("load_friction_stribeck")
     return {
         "forward": N * of("coulomb_torque_forward"), "backward": N * of("coulomb_torque_backward"),
+        "bearing": of("bearing_coulomb_torque", 0.06 * N * min(of("coulomb_torque_forward"),
+                                                               of("coulomb_torque_backward"))),
         "r": of("breakaway_ratio", 1.0), "w_s": None if v_s is None else v_s / N,
         "alpha": of("stribeck_exponent", 1.0),
         "K_m": of("load_friction_motor", one), "K_e": of("load_friction_external", one),

@@ -52,10 +52,10 @@ def motion(P: Plant, m: Mode, y: Sequence[float], tau_m: float) -> Motion:
         dry = m.d * P.budget(m.d, tau_m, tau_e, P.stribeck(m.d * w), m.signs)
         a = (tau_m + tau_e - P.B_m * w - dry - m.d * P.coulomb) / P.J
         return Motion(a, a, w * (dry + P.B_m * w), load)
-    a = (tau_e - m.d * P.coulomb) / P.J_L if m.d else 0.0
-    dry = m.d_m * P.budget(m.d_m, tau_m, 0.0, P.stribeck(m.d_m * v), m.signs)
+    a = (tau_e - m.d * P.behind) / P.J_L if m.d else 0.0
+    dry = m.d_m * (P.budget(m.d_m, tau_m, 0.0, P.stribeck(m.d_m * v), m.signs) - P.bearing)
     a_m = (tau_m - P.B_m * v - dry) / P.J_m if m.d_m else 0.0
-    return Motion(a, a_m, v * (dry + P.B_m * v), load)
+    return Motion(a, a_m, v * (dry + P.B_m * v) + w * m.d * P.bearing, load)
 
 
 def blocked(P: Plant, q: float) -> tuple[bool, bool]:
@@ -73,11 +73,11 @@ def split(P: Plant, y: Sequence[float], d: int, tau_m: float) -> float:
     """Acceleration of the motor minus that of the output, each on its own, which at rest (d = 0) friction may hold."""
     w = y[W]
     tau_e = -P.external(y[Q]) - P.B_L * w
-    own = d or start(tau_m, P.holds(tau_m, 0.0, 0.0))
-    load = d or start(tau_e, (-P.coulomb, P.coulomb), blocked(P, y[Q]))
-    dry = own * P.budget(own, tau_m, 0.0, P.stribeck(own * w), P.signs(tau_m, 0.0))
+    own = d or start(tau_m, P.holds(tau_m, 0.0, -P.bearing))
+    load = d or start(tau_e, (-P.behind, P.behind), blocked(P, y[Q]))
+    dry = own * (P.budget(own, tau_m, 0.0, P.stribeck(own * w), P.signs(tau_m, 0.0)) - P.bearing)
     a_m = (tau_m - P.B_m * w - dry) / P.J_m if own else 0.0
-    return a_m - ((tau_e - load * P.coulomb) / P.J_L if load else 0.0)
+    return a_m - ((tau_e - load * P.behind) / P.J_L if load else 0.0)
 
 
 def decide(P: Plant, m: Mode, y: list[float], tau_m: float) -> None:
@@ -90,8 +90,8 @@ def decide(P: Plant, m: Mode, y: list[float], tau_m: float) -> None:
         m.d = sgn(y[W]) or start(tau_m + tau_e, P.holds(tau_m, tau_e, P.coulomb), blocked(P, y[Q]))
         m.d_m, m.signs = m.d, P.signs(tau_m, tau_e)
         return
-    m.d = sgn(y[W]) or start(tau_e, (-P.coulomb, P.coulomb), blocked(P, y[Q]))
-    m.d_m = sgn(y[V]) or start(tau_m, P.holds(tau_m, 0.0, 0.0))
+    m.d = sgn(y[W]) or start(tau_e, (-P.behind, P.behind), blocked(P, y[Q]))
+    m.d_m = sgn(y[V]) or start(tau_m, P.holds(tau_m, 0.0, -P.bearing))
     m.signs = P.signs(tau_m, 0.0)
 
 
@@ -122,14 +122,14 @@ def guards(P: Plant, m: Mode, y: Sequence[float], tau_m: float) -> list[tuple[st
         # To the last bit: the last bounces before rest are only femtoradians high.
         out.append(("stop", 100.0 * (P.upper - q if m.d > 0 else q - P.lower)))
     else:
-        holds = P.holds(tau_m, tau_e, P.coulomb) if one else (-P.coulomb, P.coulomb)
+        holds = P.holds(tau_m, tau_e, P.coulomb) if one else (-P.behind, P.behind)
         out += [("release", x) for x in _rest_guards(tau_e + (tau_m if one else 0.0), holds, blocked(P, q))]
     if not one:
         out += [("flank", 0.5 * P.play - (y[X] - q)), ("flank", 0.5 * P.play + (y[X] - q))]
         if m.d_m:
             out.append(("motor_speed", m.d_m * v))
         else:
-            out += [("motor_release", x) for x in _rest_guards(tau_m, P.holds(tau_m, 0.0, 0.0), (False, False))]
+            out += [("motor_release", x) for x in _rest_guards(tau_m, P.holds(tau_m, 0.0, -P.bearing), (False, False))]
     elif m.flank:
         out.append(("part", 1e-3 * m.flank * split(P, y, m.d, tau_m)))
     if m.d if one else m.d_m:

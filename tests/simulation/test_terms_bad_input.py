@@ -50,6 +50,19 @@ def test_play_needs_inertia_in_every_lane():
     refused(ParameterError, words, lambda: many({"load.inertia": [1e-3, 0.0]}, {"gear.backlash": 0.02}))
 
 
+def test_friction_behind_the_play_is_a_part_of_all_friction():
+    most = SERVO.gear.gear_reduction * SERVO.friction.coulomb_torque_forward
+    name = "friction.bearing_coulomb_torque"
+    words = [name, "at most the Coulomb friction either way"]
+    refused(ParameterError, words, lambda: run(PLAY | {name: 1.01 * most}))
+    refused(ParameterError, [f"{name} of lane 1", *words[1:]], lambda: many({name: [0.0, 1.01 * most]}, PLAY))
+    elastic = PLAY | {name: 0.0, "gear.stiffness": 90.0}
+    refused(ParameterError, [name, "none beside gear.stiffness"], lambda: run(elastic))
+    refused(ParameterError, [name, "at least 0"], lambda: SERVO.replace({name: -0.01}))
+    run(PLAY | {name: most}).raise_if_failed()
+    run({name: 2.0 * most}).raise_if_failed()  # without play it acts in nothing
+
+
 @pytest.mark.parametrize("name", MASSES)
 def test_heat_is_all_of_its_numbers_or_none(name):
     some = {other: value for other, value in MASSES.items() if other != name}

@@ -56,6 +56,48 @@ def test_an_impact_in_closed_form(way):
     assert result.energy.stops == pytest.approx(0.5 * MOTOR * 4.0 - 0.5 * (MOTOR + OUTPUT) * w**2, rel=1e-12)
 
 
+# --- friction behind the play -----------------------------------------------------------------------------------------
+
+SIDED = {"friction.coulomb_torque_forward": 0.24 / N, "friction.coulomb_torque_backward": 0.2 / N}
+
+
+@pytest.mark.parametrize(("given", "bearing"), [({}, 0.06 * 0.2), ({"friction.bearing_coulomb_torque": 0.05}, 0.05),
+                                                ({"friction.bearing_coulomb_torque": 0.0}, 0.0)])
+def test_the_bearing_slows_the_output_and_the_rest_of_the_friction_the_motor(given, bearing):
+    """Inside the play, open: ẇ = −T_o/J_L of the output and −(N F − T_o)/J_m of the motor; 0.06 of N F by default."""
+    case = undriven(LOOSE | SIDED | given | {"electronics.off_state": "coast"}, duration=0.02,
+                    initial={"output_angle": 0.0, "output_speed": 1.0, "motor_angle": 0.0, "motor_speed": 1.0 * N})
+    result = simulate(case, np.array([0.002]))
+    assert result["output_speed"][0] == pytest.approx(1.0 - bearing / OUTPUT * 0.002, rel=1e-12)
+    assert result["motor_speed"][0] / N == pytest.approx(1.0 - (0.24 - bearing) / MOTOR * 0.002, rel=1e-12)
+    assert result["load_torque"][0] == pytest.approx(-OUTPUT * bearing / OUTPUT, rel=1e-9, abs=1e-15)
+    assert abs(result.energy.residual) < 1e-15
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_the_bearing_holds_an_output_inside_the_play(way):
+    """It holds up to T_o and no more; an output that it stops rests after w²J/(2 T_o)."""
+    values = LOOSE | SIDED | {"friction.bearing_coulomb_torque": 0.05, "electronics.off_state": "coast"}
+    held, starts = (simulate(undriven(values, load={"torque": -way * pull}, duration=0.02), np.array([0.02]))
+                    for pull in (0.0499, 0.0501))
+    assert held["output_speed"][0] == 0.0
+    assert way * starts["output_speed"][0] == pytest.approx(0.0001 / OUTPUT * 0.02, rel=1e-9)
+    initial = {"output_angle": 0.0, "output_speed": 0.5 * way, "motor_angle": 0.0, "motor_speed": 0.0}
+    slides = simulate(undriven(values, duration=0.05, initial=initial), np.array([0.05]))
+    assert slides["output_angle"][0] == pytest.approx(way * 0.5 * 0.5**2 * OUTPUT / 0.05, rel=1e-12)
+    assert slides["output_speed"][0] == 0.0
+
+
+def test_the_bearing_adds_nothing_while_the_teeth_touch():
+    """A driven move whose teeth never part; it starts a rounding beside the flank."""
+    load = {"torque": 0.1, "coulomb_torque": 0.02}
+    runs = [simulate(driven(LOOSE | SIDED | {"friction.bearing_coulomb_torque": T_o}, load=load, duration=0.05,
+                            initial={"output_angle": -0.2, "motor_angle": N * (-0.2 + 0.5 * PLAY)}), np.array([0.05]))
+            for T_o in (0.0, 0.1)]
+    assert runs[0]["output_angle"][0] == pytest.approx(runs[1]["output_angle"][0], abs=2e-9)
+    assert abs(runs[0]["output_angle"][0] + 0.2) > 0.01
+
+
 # --- dead time --------------------------------------------------------------------------------------------------------
 
 
@@ -115,6 +157,7 @@ def test_flanks_push_and_never_pull(seed):
     """All inertia behind the play is the load's, so that the contact's force is the torque given to the load."""
     case = random_case(seed, frozenset({"backlash", "coulomb"})).replace(gear__output_inertia=None)
     case.load["inertia"] = case.load.get("inertia", 0.0) + 2e-3
+    bearing = make_plant(case.values, case.load).bearing
     times = np.linspace(0.0, case.duration, 4001)
     result = simulate(case, times)
     force, samples = result["load_torque"], result.trajectory.at(times)
@@ -123,7 +166,8 @@ def test_flanks_push_and_never_pull(seed):
     inside = samples.mesh == INSIDE
     assert 0.01 < np.mean(inside) < 0.999
     assert np.all(np.abs(gap) <= half + 1e-14)
-    assert np.max(np.abs(force[inside])) < 1e-12
+    turns = inside & (samples.speed != 0.0)  # the output's bearing brakes what turns with it
+    np.testing.assert_allclose(force[turns], -bearing * np.sign(samples.speed[turns]), rtol=0.0, atol=1e-12)
     moving = ~inside & (samples.speed != 0.0)  # at rest statics does not tell who holds
     assert np.max(np.abs(force[moving])) > 0.05
     assert np.all(force[moving] * np.sign(gap[moving]) > -1e-12)

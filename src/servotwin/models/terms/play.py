@@ -91,4 +91,4 @@ def _require(name: str, holds: Any, value: Any, allowed: str) -> None:
     if lanes.size > 1:
         Relation(name, lanes, np.broadcast_to(np.ravel(value), lanes.shape), allowed).check()
     else:
-        Relation(name, bool(lanes[0]), value, allowed).check()
+        Relation(name, bool(lanes[0]), np.asarray(value).item(), allowed).check()
