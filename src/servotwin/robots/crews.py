@@ -17,7 +17,7 @@ from servotwin.robots.mount import Joint
 from servotwin.robots.told import is_pulsed, told
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.c_entry import CEntry
-from servotwin.simulation.compile.joints_layout import GROUP, INSTANCE, RECORD, ROOM
+from servotwin.simulation.compile.joints_layout import BOOKS, GROUP, INSTANCE, RECORD, ROOM
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -181,6 +181,7 @@ class Instance:
         self.command = np.full(count, np.nan)
         self.record_words = np.zeros(len(RECORD), np.int64)
         self.rows = np.zeros((0, 0))
+        self.books = np.zeros(len(BOOKS) + count + 2 * dofs)
         behind = (2 * count + 1) * dofs + count * count
         self._room = np.zeros(behind + len(ROOM) * count)
         for i, joint in enumerate(joints):
@@ -191,7 +192,8 @@ class Instance:
         self.words = np.zeros(len(INSTANCE), np.int64)
         values = {"data": address, "block": self.block.ctypes.data, "room": self._room.ctypes.data,
                   "command": self.command.ctypes.data, "record": self.record_words.ctypes.data,
-                  "groups": self._groups.ctypes.data, "count": len(self.berths), "serial": serial}
+                  "groups": self._groups.ctypes.data, "count": len(self.berths), "serial": serial,
+                  "books": self.books.ctypes.data}
         self.words[:] = [values.get(name, 0) for name in INSTANCE]
         self._begin = [berth.sims.save() for berth in self.berths]
         self._start = self._fresh()

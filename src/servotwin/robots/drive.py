@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,12 +13,14 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, ServotwinError, SimulationError, UnknownNameError
 from servotwin.models import Model
+from servotwin.robots.books import close_books
 from servotwin.robots.command_map import CommandMap
 from servotwin.robots.crews import Instance, crews_of
 from servotwin.robots.harbour import Harbour
 from servotwin.robots.mount import Mount, joints_of, treat_friction
 from servotwin.robots.places import load_mujoco, places
 from servotwin.robots.record import Record
+from servotwin.robots.solver import TOO_FEW, set_iterations
 from servotwin.robots.state import DriveState
 from servotwin.robots.told import told
 from servotwin.robots.wiring import arrays_of, check_options, maps_of, put_into_model, words_of
@@ -55,6 +58,9 @@ class ServoDrive:
         By joint: what the control of its actuator asks for, where that is not the angle [rad] or place [m] itself.
     joint_friction : str
         What to do with damping and friction loss that these joints have themselves: "refuse", "clear" or "keep".
+    solver : str
+        "raised": where a servo has play or an elastic gear, MuJoCo's solver iterates at least 10 times, and 20 in its
+        line search, which costs nothing where it converges earlier. "given": as the model says.
 
     Attributes
     ----------
@@ -85,7 +91,8 @@ class ServoDrive:
     """
 
     def __init__(self, model: Any, servos: Mapping[str, Model | Mount], *, bus: Any = None,
-                 controls: Mapping[str, CommandMap] | None = None, joint_friction: str = "refuse") -> None:
+                 controls: Mapping[str, CommandMap] | None = None, joint_friction: str = "refuse",
+                 solver: str = "raised") -> None:
         mujoco, self._places = load_mujoco(), places()
         if not isinstance(servos, Mapping) or not servos:
             raise InputError("servos of a ServoDrive", got=servos, allowed="a mapping of joints to models")
@@ -109,6 +116,7 @@ class ServoDrive:
             treat_friction(self.model, self._joints, joint_friction)
         self._arrays = arrays_of(self._joints, first.berths, maps)
         put_into_model(mujoco, self.model, self._joints, self._arrays["armature"])
+        self._solver_note = set_iterations(self.model, self._joints, solver)
         self._control, step = joint_addresses()
         self._step = _STEP(step)
         self._words = words_of(self.model, self._joints, self._arrays, self._places, {
@@ -170,7 +178,7 @@ class ServoDrive:
         _CALLBACK(self._control)(None, self._at)
         _active[0] = self
 
-    def check(self, data: Any) -> None:
+    def raise_failure(self, data: Any) -> None:
         """Raise what went wrong in a callback, once.
 
         Raises
@@ -179,6 +187,27 @@ class ServoDrive:
             If a servo or MuJoCo could not go on; names the joint.
         """
         self._raise(data, WELL)
+
+    def check(self, data: Any) -> tuple[str, ...]:
+        """Raise what went wrong in a callback, once; return what is to be known of the model and its record.
+
+        Returns
+        -------
+        tuple of str
+            Sentences: iterations of MuJoCo's solver that were raised, or are too few with `solver="given"`, which is
+            a warning too; energy that appears from nowhere, while a record is kept.
+
+        Raises
+        ------
+        SimulationError
+            If a servo or MuJoCo could not go on; names the joint.
+        """
+        self.raise_failure(data)
+        if self._solver_note and self._solver_note.kind == TOO_FEW:
+            warnings.warn(self._solver_note.words, stacklevel=2)
+        if self._of(data).record_words[RECORD.index("row")]:
+            return self.result(data).notes
+        return (self._solver_note.words,) if self._solver_note else ()
 
     def _raise(self, data: Any, code: int) -> None:
         error, self._harbour.error = self._harbour.error, None
@@ -263,8 +292,9 @@ class ServoDrive:
         words = dict(zip(RECORD, instance.record_words.tolist(), strict=True))
         if not words["row"]:
             raise InputError("result of servos", got="no record", allowed="drive.record(data) before the run")
-        return Record(self.joints, {joint.name: joint.mount for joint in self._joints},
-                      instance.rows[:words["used"]].copy())
+        rows = instance.rows[:words["used"]].copy()
+        close_books(self.model, data, instance, [joint.speed_at for joint in self._joints], rows)
+        return Record(self.joints, {joint.name: joint.mount for joint in self._joints}, rows, self._solver_note)
 
     def look(self, data: Any, name: str) -> Array:
         """Return a signal (SI) of all servos as they stand after the last tick, in the order of `joints`.

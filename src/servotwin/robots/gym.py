@@ -118,7 +118,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Let the environment begin anew, and the servos with it, at rest."""
         with contextlib.suppress(ServotwinError):
-            self.drive.check(self.data)  # what went wrong in the episode before
+            self.drive.raise_failure(self.data)  # what went wrong in the episode before
         self.drive.reset(self.data)
         return self._with_servos(lambda: self.env.reset(seed=seed, options=options))
 
@@ -134,7 +134,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
             result = call()
         finally:
             mujoco.set_mjcb_control(before)
-        self.drive.check(self.data)
+        self.drive.raise_failure(self.data)
         return result
 
     # --- what shows ---------------------------------------------------------------------------------------------------

@@ -14,7 +14,8 @@ import numpy as np
 from servotwin.errors import MissingExtraError, ServotwinError
 from servotwin.simulation.compile.joints_layout import FUNCTIONS, PLACES
 
-_ODD = 1234.567890123456789  # a number that stands nowhere else
+_ODD, _ODD_TOO = 1234.567890123456789, 9876.54321012345678  # numbers that stand nowhere else
+_INSIDE = {"time": _ODD, "energy": _ODD_TOO}  # of the data's own memory; all else is behind addresses in it
 _CHUNK, _MOST = 256, 1 << 20  # words
 _BEHIND = 40, 80  # bytes behind the beginning of `opt.o_friction` among which the integrator is
 _PROBE = """<mujoco><size nuserdata="1"/><option timestep="0.001"/><worldbody><body><freejoint/><geom size=".1"/></body>
@@ -65,9 +66,9 @@ def places() -> Places:
     mujoco = load_mujoco()
     model = mujoco.MjModel.from_xml_string(_PROBE)
     data = mujoco.MjData(model)
-    data.time = _ODD
-    wanted = {name: getattr(data, name).ctypes.data for name in PLACES if name != "time"}
-    wanted["time"] = struct.unpack("q", struct.pack("d", _ODD))[0]
+    data.time, data.energy[:] = _ODD, _ODD_TOO
+    wanted = {name: getattr(data, name).ctypes.data for name in PLACES if name not in _INSIDE}
+    wanted |= {name: struct.unpack("q", struct.pack("d", value))[0] for name, value in _INSIDE.items()}
     found = _behind(data._address, wanted)
     option = model.opt
     option.timestep = _ODD

@@ -15,9 +15,10 @@ from servotwin.errors import MissingExtraError, UnknownNameError
 from servotwin.models.engine.observe import Observed
 from servotwin.models.outputs import SIGNALS
 from servotwin.robots.mount import Mount
+from servotwin.robots.solver import SolverNote
 from servotwin.robots.told import Told, told
 from servotwin.simulation import files
-from servotwin.simulation.compile.joints_layout import KEPT
+from servotwin.simulation.compile.joints_layout import KEPT, ROW
 from servotwin.simulation.remarks import TRIPS, Remark
 from servotwin.simulation.vector import AT_MOTOR
 
@@ -28,7 +29,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _COLUMNS = (*KEPT, *Observed._fields)
-_OF_JOINT = {"joint_angle": ("rad", "m"), "joint_command": ("rad", "m"), "joint_torque": ("N m", "N")}
+_OF_JOINT = {"joint_angle": ("rad", "m"), "joint_command": ("rad", "m"), "joint_torque": ("N m", "N"),
+             "joint_work": ("J", "J")}
+FROM_NOWHERE = "energy from nowhere"
+_NOTICED = 0.01  # of the largest energy: what may appear from nowhere; steps alone make 0.004 of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +41,8 @@ class ServoRecord(Mapping[str, Array]):
 
     Beside those of its model there are `joint_angle` and `joint_command`, the angle [rad] or place [m] of the joint and
     what was asked of it (a pulse width [s] where its servo turns endlessly), and `joint_torque`, the mean torque [N m]
-    or force [N] that the joint has got in the tick.
+    or force [N] that the joint has got in the tick, and `joint_work`, the work [J] that the servo has done at it since
+    the record began.
 
     Parameters
     ----------
@@ -124,7 +129,19 @@ class Record(Mapping[str, ServoRecord]):
     joints : tuple of str
     mounts : mapping of str to Mount
     rows : ndarray, shape (n, numbers)
-        Ends of the ticks [s], which are its `time`, then what is kept of each servo.
+        Ends of the ticks [s], which are its `time`, energies, then what is kept of each servo.
+    solver_note : SolverNote, optional
+        What was done about MuJoCo's solver.
+
+    Attributes
+    ----------
+    energy : ndarray, shape (n,)
+        Kinetic and potential energy of the model at these times, as MuJoCo counts them [J].
+    energy_from_nowhere : ndarray, shape (n,)
+        The most so far by which it has exceeded what it was when the record began and the work of servos, other
+        actuators and applied forces since, but for what a semi-implicit step borrows of gravity [J]. Contacts and
+        limits can only take; a solver that has not converged lets them give. Where bodies are moved as mocap it cannot
+        be told and is nan. State that is set by hand counts.
 
     Examples
     --------
@@ -143,16 +160,48 @@ class Record(Mapping[str, ServoRecord]):
     ((100,), True)
     """
 
-    def __init__(self, joints: tuple[str, ...], mounts: Mapping[str, Mount], rows: Array) -> None:
-        self.time = rows[:, 0].copy()
-        width = len(_COLUMNS)
-        self._servos = {name: ServoRecord(self.time, mounts[name], rows[:, 1 + width * k:1 + width * (k + 1)])
+    def __init__(self, joints: tuple[str, ...], mounts: Mapping[str, Mount], rows: Array,
+                 solver_note: SolverNote | None = None) -> None:
+        self.time, self.energy, self.energy_from_nowhere = (rows[:, k].copy() for k in range(len(ROW)))
+        self._solver_note, width, first = solver_note, len(_COLUMNS), len(ROW)
+        self._servos = {name: ServoRecord(self.time, mounts[name], rows[:, first + width * k:first + width * (k + 1)])
                         for k, name in enumerate(joints)}
 
     @staticmethod
     def width(servos: int) -> int:
         """Return how many numbers a row has."""
-        return 1 + len(_COLUMNS) * servos
+        return len(ROW) + len(_COLUMNS) * servos
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Return what holds of the whole robot, (kind, time [s]).
+
+        "solver iterations raised" or "few solver iterations" of MuJoCo, "energy from nowhere".
+        """
+        found = []
+        if self._solver_note and len(self.time):
+            found.append(Remark(self._solver_note.kind, float(self.time[0])))
+        noticed = np.flatnonzero(self.energy_from_nowhere > _NOTICED * self._largest)
+        if len(noticed):
+            found.append(Remark(FROM_NOWHERE, float(self.time[noticed[0]])))
+        return tuple(found)
+
+    @property
+    def _largest(self) -> float:
+        """The largest energy [J], from 0 or, since the height of that is anybody's choice, from the lowest."""
+        known = self.energy[np.isfinite(self.energy)]
+        return float(max(np.abs(known).max(), np.ptp(known))) if len(known) else math.nan
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The same as sentences."""
+        found = [self._solver_note.words] if self._solver_note else []
+        for time in (remark.time for remark in self.remarks if remark.kind == FROM_NOWHERE):
+            most = float(np.nanmax(self.energy_from_nowhere))
+            found.append(f"energy from nowhere from {time:.3g} s on: up to {most:.3g} J more than there was and than "
+                         f"servos have given, with {self._largest:.3g} J at most in the model: its solver does not "
+                         "converge, or its step is too long")
+        return tuple(found)
 
     def __getitem__(self, name: str) -> ServoRecord:
         """Return what one servo has done."""

@@ -27,6 +27,7 @@ from servotwin.simulation.compile.joints_layout import (
     ASK_RESET,
     ASK_ROOM,
     BLOCK,
+    BOOKS,
     DRIVE,
     FAILED,
     FOREIGN,
@@ -39,6 +40,7 @@ from servotwin.simulation.compile.joints_layout import (
     RECORD,
     RESTARTED,
     ROOM,
+    ROW,
     TOO_LONG,
     WELL,
 )
@@ -47,7 +49,7 @@ _words, _numbers = array_maker("<i8", 1, True), array_maker("<f8", 1, True)
 _WORD = 8  # bytes
 _rows, _bytes, _halves = array_maker("<f8", 2, True), array_maker("|i1", 1, True), array_maker("<i4", 1, True)
 
-_SIGNALS, _OWN_SIGNALS = len(Observed._fields), len(KEPT)
+_SIGNALS, _OWN_SIGNALS, _IN_FRONT = len(Observed._fields), len(KEPT), len(ROW)
 _PASSES = 6  # through a tick, at most
 _MISSED = 1e-3  # rad/s of a servo: what a prediction may be off by
 _LEAK = 0.01  # of the way that a servo goes: how fast its angle returns to the engine's
@@ -58,15 +60,16 @@ _RK4 = 1  # MuJoCo's number of it
 _SAME = 1e-6  # of a tick: within it one instant is another
 _HEAD, _EACH = len(BLOCK), len(OF_EACH)
 (_SERVOS, _DOFS, _COORDINATES, _WIDE, _BODIES, _TIMESTEP, _INTEGRATOR, _TIME, _QPOS, _QVEL, _CTRL, _APPLIED, _XFRC,
- _USERDATA, _XIPOS, _PASSIVE, _BIAS, _ACTUATOR, _CONSTRAINT, _SOLVE, _ACTUATE, _ACCELERATE, _CONSTRAIN, _PUSH, _STEP,
- _SLOT, _OWN, _OTHERS, _ANGLE_AT, _SPEED_AT, _COMMAND_AT, _GAIN, _ZERO, _ARMATURE, _LOWER, _UPPER, _LOW, _HIGH,
- _SCALE, _OFFSET, _CONTROL_LOW, _CONTROL_HIGH, _TOLD_GAIN, _TOLD_ZERO, _REST, _LONGEST, _KEPT_AT, _MEMORY, _INSTANCES,
- _ASK) = range(len(DRIVE))
+ _USERDATA, _XIPOS, _PASSIVE, _BIAS, _ACTUATOR, _CONSTRAINT, _SPRING, _ENERGY, _SOLVE, _ACTUATE, _ACCELERATE,
+ _CONSTRAIN, _PUSH, _POTENTIAL, _KINETIC, _STEP, _SLOT, _OWN, _OTHERS, _ANGLE_AT, _SPEED_AT, _COMMAND_AT, _GAIN,
+ _ZERO, _ARMATURE, _LOWER, _UPPER, _LOW, _HIGH, _SCALE, _OFFSET, _CONTROL_LOW, _CONTROL_HIGH, _TOLD_GAIN, _TOLD_ZERO,
+ _REST, _LONGEST, _KEPT_AT, _MEMORY, _INSTANCES, _ASK) = range(len(DRIVE))
 (_DATA, _KEPT, _ROOM, _COMMAND, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIAL_NOW, _NEW, _ANGLES,
- _ANGLE_COUNT) = range(len(INSTANCE))
+ _ANGLE_COUNT, _BOOKS) = range(len(INSTANCE))
 (_ADVANCE, _TICK, _DURATION, _LOOK, _LANES, _WHICH, _G_ANGLE, _G_SPEED, _G_GOAL, _G_LOAD, _G_INERTIA, _G_REACHED,
  _G_AFTER, _G_STATUS, _G_SEEN, _PIECES, _PIECE_COUNT) = range(len(GROUP))
 _ROW, _CAPACITY, _USED, _KEPT_ROWS = range(len(RECORD))
+_KEEPS, _LAST_TICK, _TOTAL, _FIRST, _WORK, _NOWHERE = range(len(BOOKS))
 _START, _END, _CALLS, _FRESH, _SERIAL, _RESTORED, _HALF = range(len(BLOCK))
 (_R_ANGLE, _R_SPEED, _R_GOAL, _R_LOAD, _R_INERTIA, _R_AFTER, _R_FREE, _R_ACCELERATION, _R_PREDICTED, _R_FOUND,
  _R_ACTUAL, _R_FINAL, _R_FINAL_ACCELERATION, _R_FINAL_SHARE, _R_PASSIVE, _R_PUSHED) = range(len(ROOM))
@@ -333,7 +336,7 @@ def _keep(drive, instance, room, torque, time, again):
         return
     row = _numbers(record[_KEPT_ROWS] + 8 * record[_ROW] * record[_USED], (record[_ROW],))
     record[_USED] += 1
-    row[0] = time
+    row[0], row[1], row[2] = time, math.nan, math.nan
     groups = _words(instance[_GROUPS], (instance[_COUNT],))
     for k in range(instance[_COUNT]):
         group = _words(groups[k], (len(GROUP),))
@@ -342,10 +345,74 @@ def _keep(drive, instance, room, torque, time, again):
         reached = _numbers(group[_G_REACHED], (lanes,))
         for n in range(lanes):
             i = which[n]
-            at = 1 + (_OWN_SIGNALS + _SIGNALS) * i
+            at = _IN_FRONT + (_OWN_SIGNALS + _SIGNALS) * i
             row[at], row[at + 1], row[at + 2], row[at + 3] = reached[n], room[_R_AFTER, i], room[_R_GOAL, i], torque[i]
+            row[at + 4] = math.nan  # known at the end of the tick
             for s in range(_SIGNALS):
                 row[at + _OWN_SIGNALS + s] = seen[n, s]
+
+
+@njit(error_model="numpy")
+def _books(drive, instance):
+    """Return the numbers of `BOOKS`, work of each servo, and speed and force of each degree of freedom."""
+    n, dofs = drive[_SERVOS], drive[_DOFS]
+    every = _numbers(instance[_BOOKS], (len(BOOKS) + n + 2 * dofs,))
+    at = len(BOOKS) + n
+    return every[:len(BOOKS)], every[len(BOOKS):at], every[at:at + dofs], every[at + dofs:]
+
+
+@njit(error_model="numpy")
+def _account(m, d, drive, instance, block, dt, rk4, onward):
+    """Bring the books up to the beginning of this tick; `onward` is whether it is the end of the row kept last.
+
+    A semi-implicit step moves with the speed at its end, so that on the way the energy is off by ½ Δt F·w, where F are
+    the forces of gravity and springs; that comes back, and is left out of the balance.
+    """
+    n, dofs = drive[_SERVOS], drive[_DOFS]
+    record = _words(instance[_RECORD], (len(RECORD),))
+    sums, work, speed, force = _books(drive, instance)
+    told(drive[_POTENTIAL], (m, d))
+    told(drive[_KINETIC], (m, d))
+    energy = _number(d, drive[_ENERGY]) + _number(d, drive[_ENERGY] + _WORD)
+    now = _numbers(_word(d, drive[_QVEL]), (dofs,))
+    balanced = energy
+    if not rk4:
+        bias, spring = _numbers(_word(d, drive[_BIAS]), (dofs,)), _numbers(_word(d, drive[_SPRING]), (dofs,))
+        for k in range(dofs):
+            balanced += 0.5 * dt * (spring[k] - bias[k]) * now[k]
+    if record[_USED] == 0 or sums[_KEEPS] == 0.0:
+        sums[:], work[:] = 0.0, 0.0
+        sums[_FIRST], sums[_KEEPS] = balanced, 1.0
+    elif not onward:  # the state was changed from outside, and its energy with it
+        sums[_FIRST] += balanced - sums[_TOTAL]
+    else:
+        passed = sums[_LAST_TICK]
+        for k in range(dofs):
+            sums[_WORK] += force[k] * 0.5 * (speed[k] + now[k]) * passed
+        speed_at = _words(drive[_SPEED_AT], (n,))
+        row = _numbers(record[_KEPT_ROWS] + _WORD * record[_ROW] * (record[_USED] - 1), (record[_ROW],))
+        for i in range(n):
+            k = speed_at[i]
+            work[i] += block[_HEAD + i] * 0.5 * (speed[k] + now[k]) * passed
+            row[_IN_FRONT + (_OWN_SIGNALS + _SIGNALS) * i + _OWN_SIGNALS - 1] = work[i]
+        sums[_NOWHERE] = max(sums[_NOWHERE], balanced - sums[_FIRST] - sums[_WORK])
+        row[1], row[2] = energy, sums[_NOWHERE]
+    sums[_TOTAL], sums[_LAST_TICK] = balanced, dt
+    for k in range(dofs):
+        speed[k] = now[k]
+
+
+@njit(error_model="numpy")
+def _note_forces(d, drive, instance, block, total):
+    """Note the forces that do work in this tick: all but those of gravity, springs and constraints."""
+    n, dofs = drive[_SERVOS], drive[_DOFS]
+    _, _, _, force = _books(drive, instance)
+    bias, spring = _numbers(_word(d, drive[_BIAS]), (dofs,)), _numbers(_word(d, drive[_SPRING]), (dofs,))
+    constraint, speed_at = block[_HEAD + _EACH * n:_HEAD + _EACH * n + dofs], _words(drive[_SPEED_AT], (n,))
+    for k in range(dofs):
+        force[k] = total[k] + bias[k] - spring[k] - constraint[k]
+    for i in range(n):
+        force[speed_at[i]] += block[_HEAD + i]
 
 
 @njit(error_model="numpy")
@@ -385,7 +452,8 @@ def _tick(m, d, drive, instance, block, room, before, dt, rk4, again):
     n, dofs = drive[_SERVOS], drive[_DOFS]
     at = instance[_ROOM]
     torque, known = block[_HEAD:_HEAD + n], block[_HEAD + n:_HEAD + 4 * n]
-    settled = block[_FRESH] == 0.0 and (block[_RESTORED] != 0.0 or block[_SERIAL] == instance[_SERIAL_NOW])
+    last, restored = block[_SERIAL] == instance[_SERIAL_NOW], block[_RESTORED] != 0.0
+    settled = block[_FRESH] == 0.0 and (restored or last)
     block[_RESTORED] = 0.0
     inverse = _rows(at + 8 * n * dofs, (n + 1, dofs))  # and a row for the forces
     square = _rows(at + 8 * dofs * (2 * n + 1), (n, n))
@@ -393,6 +461,8 @@ def _tick(m, d, drive, instance, block, room, before, dt, rk4, again):
     told(drive[_SOLVE], (m, d, at + 8 * n * dofs, at, n))
     _free(m, d, drive, block, inverse, room, square, settled, again)
     record, speed_at = _words(instance[_RECORD], (len(RECORD),)), _words(drive[_SPEED_AT], (n,))
+    if record[_ROW] > 0:
+        _account(m, d, drive, instance, block, dt, rk4, last and not restored and not again)
     gain, armature = _numbers(drive[_GAIN], (n,)), _numbers(drive[_ARMATURE], (n,))
     for turn in range(_PASSES):
         if turn > 0:
@@ -424,6 +494,7 @@ def _tick(m, d, drive, instance, block, room, before, dt, rk4, again):
     torque[:] = room[_R_PREDICTED]
     _expect(drive, instance, block, room, dt, rk4)
     if record[_ROW] > 0:
+        _note_forces(d, drive, instance, block, inverse[n])
         _keep(drive, instance, room, torque, block[_END], again)
 
 

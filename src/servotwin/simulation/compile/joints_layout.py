@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 PLACES = ("time", "qpos", "qvel", "ctrl", "qfrc_applied", "xfrc_applied", "userdata", "xipos", "qfrc_passive",
-          "qfrc_bias", "qfrc_actuator", "qfrc_constraint")
-"""Of the engine's data: how many bytes behind its beginning the time stands, and the addresses of arrays."""
-FUNCTIONS = ("mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration", "mj_fwdConstraint", "mj_applyFT", "mj_step")
+          "qfrc_bias", "qfrc_actuator", "qfrc_constraint", "qfrc_spring", "energy")
+"""Of the engine's data: how many bytes behind its beginning time and energies stand, and the addresses of arrays."""
+FUNCTIONS = ("mj_solveM", "mj_fwdActuation", "mj_fwdAcceleration", "mj_fwdConstraint", "mj_applyFT", "mj_energyPos",
+             "mj_energyVel", "mj_step")
 """Addresses of functions of the engine."""
 ARRAYS = ("angle_at", "speed_at", "command_at", "gain", "zero", "armature", "lower", "upper", "low", "high",
           "control_scale", "control_offset", "control_low", "control_high", "told_gain", "told_zero", "rest")
@@ -16,9 +17,14 @@ DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integra
          "own", "others", *ARRAYS, "longest", "kept_at", "memory", "instances", "ask")
 """All that servos share, wherever they are simulated."""
 INSTANCE = ("data", "block", "room", "command", "record", "groups", "count", "code", "culprit", "serial", "fresh",
-            "angles", "angle_count")
+            "angles", "angle_count", "books")
 """Servos in one of the engine's data; `room` is for numbers that are worked out anew at each tick. `fresh` is what they
 remember at rest (0: ask Python), in which the words of `angles`, pairs of place and servo, are the angle of a servo."""
+BOOKS = ("kept", "tick", "energy", "first", "work", "nowhere")
+"""Energy [J] while a record is kept, at the beginning of a tick: whether there is any yet, and the last tick's duration
+[s]; kinetic and potential energy, and what it was at first; the work of servos, actuators and applied forces since; the
+most by which the energy has exceeded both. Behind it stand the work of each servo, and speed and force of each degree
+of freedom, without those of gravity, springs and constraints."""
 ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "free", "acceleration", "predicted", "found",
         "engine's speed", "final torque", "final acceleration", "final share", "passive", "pushed")
 """Numbers of each servo there, behind the unit rows of their degrees of freedom, those of M⁻¹, all forces, and a square
@@ -31,8 +37,10 @@ PIECE = ("address", "rows", "stride", "bytes")
 """A part of their memory."""
 RECORD = ("row", "capacity", "used", "rows")
 """What is kept of a run: numbers in a row, rows that there is room for, that there are, and where."""
-KEPT = ("output_angle", "output_speed", "command_angle", "joint_torque")
-"""Of each servo in a row of the record, before what `models.engine.observe` sees; the time of the row stands first."""
+KEPT = ("output_angle", "output_speed", "command_angle", "joint_torque", "joint_work")
+"""Of each servo in a row of the record, before what `models.engine.observe` sees."""
+ROW = ("time", "energy", "energy_from_nowhere")
+"""What stands first in a row."""
 BLOCK = ("start", "end", "calls", "fresh", "serial", "restored", "half")
 """What servos remember of a tick: its times, the calls of the engine's step in it, whether it is the first, who worked
 it out last, whether it was restored with its constraint forces, and which half of the memories is of its beginning.
