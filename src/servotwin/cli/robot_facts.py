@@ -32,7 +32,7 @@ def facts(run: RobotRun, sized: dict[str, Sizing], robot: str) -> dict[str, Any]
 def _of_joint(run: RobotRun, sized: Sizing) -> dict[str, Any]:
     mount, tracking, heat = run.mounts[sized.joint], run.tracking[sized.joint], sized.heating
     shown = dataclasses.asdict(tracking)
-    shown["remarks"] = [remark._asdict() for remark in tracking.remarks]
+    shown["remarks"] = [remark.facts for remark in tracking.remarks]
     return {
         "servo": mount.model.servo.name, "model": model_name(mount.model),
         "mount": {"zero": mount.zero, "direction": mount.direction, "ratio": mount.ratio},

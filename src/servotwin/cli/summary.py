@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 from servotwin import units
 from servotwin.errors import InputError
 from servotwin.models import MODELS
-from servotwin.simulation.remarks import Remark
+from servotwin.simulation.remarks import Remark, drive_words
 
 if TYPE_CHECKING:
     from servotwin.models import Model
     from servotwin.parameters.quantity import Quantity
     from servotwin.simulation import Result
 
+NONE = "-"
 _ENERGY = ("winding", "bridge", "brush", "conversion", "friction", "stops", "load", "stored")
 
 
@@ -48,10 +49,11 @@ def facts(result: Result) -> dict[str, Any]:
         "step_metrics": None if metrics is None else dataclasses.asdict(metrics),
         "time_to_target": math.nan if metrics is None else metrics.arrival_time,
         "holding_error": result.holding_error,
+        "rest": None if result.rest is None else result.rest.facts,
         "mean_current": result.mean_current,
         "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
         "energy": dataclasses.asdict(result.energy),
-        "remarks": [remark._asdict() for remark in result.remarks],
+        "remarks": [remark.facts for remark in result.remarks],
         "solution": dataclasses.asdict(result.stats),
         "set": was_set(result.model),
         "assumed": assumed(result.model),
@@ -100,6 +102,7 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows.append((_angle_label(found), f"{_deg(found['final_angle']):z.2f} deg"))
     rows += _arrival_rows(found)
     rows += _step_rows(found.get("step_metrics"))
+    rows += _rest_rows(found.get("rest"))
     rows.append(("current", f"{found['mean_current']:z.3f} A in the mean, {found['peak_current']:z.3f} A at most"))
     energy = found["energy"]
     parts = [f"{name} {energy[name]:.4g} J" for name in _ENERGY if abs(energy.get(name, 0.0)) > 1e-9]
@@ -144,25 +147,31 @@ def _arrival_rows(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return when a servo gets to where a step sends it, and how far off it stands in the end."""
     metrics, rows = found.get("step_metrics"), []
     if metrics is not None and not math.isnan(metrics["target"]):
-        arrived = found["time_to_target"]
-        rows.append(("time to get there", f"{1e3 * arrived:.1f} ms (within 1 deg)" if not math.isnan(arrived) else
-                     "does not get within 1 deg"))
+        arrived, near = found["time_to_target"], f"within {_deg(metrics['arrival_band']):.2g} deg"
+        rows.append(("time to get there", f"{1e3 * arrived:.1f} ms ({near})" if not math.isnan(arrived) else
+                     f"does not get {near}"))
     error = found.get("holding_error", math.nan)
     return rows if math.isnan(error) else [*rows, ("holding error", f"{round(_deg(error), 2) + 0.0:.2f} deg")]
+
+
+_STEP_ROWS = (("rise_time", "rise time", 1e3, ".1f", "ms (10 to 90 %)"), ("settling_time", "settling time", 1e3, ".1f",
+              "ms (2 %)"), ("overshoot", "overshoot", 1e2, ".2f", "%"))
 
 
 def _step_rows(metrics: Mapping[str, float] | None) -> list[tuple[str, str]]:
     if metrics is None:
         return []
-    rows = []
-    if not math.isnan(metrics["rise_time"]):
-        rows.append(("rise time", f"{1e3 * metrics['rise_time']:z.1f} ms (10 to 90 %)"))
-    if not math.isnan(metrics["settling_time"]):
-        rows.append(("settling time", f"{1e3 * metrics['settling_time']:z.1f} ms (2 %)"))
-    if not math.isnan(metrics["overshoot"]):
-        rows.append(("overshoot", f"{100 * metrics['overshoot']:z.2f} %"))
+    rows = [(label, NONE if math.isnan(metrics[name]) else f"{factor * metrics[name]:z{form}} {unit}")
+            for name, label, factor, form, unit in _STEP_ROWS]
     speed = units.from_si(metrics["slew_rate"], "deg/s", "speed")
     return [*rows, ("peak speed", f"{speed:z.1f} deg/s")]
+
+
+def _rest_rows(rest: Mapping[str, Any] | None) -> list[tuple[str, str]]:
+    """Return how the bridge drives where nothing changes any more; nothing where it does not."""
+    if rest is None or not rest["duty"] > 0.0 or rest["moves_on"]:
+        return []
+    return [("at rest" if rest["stands"] else "at the end", drive_words(rest["drive_rate"], rest["duty"], rest["current"]))]
 
 
 def _deg(angle: float) -> float:

@@ -76,4 +76,4 @@ def _tornado(study: Study, metric: str) -> list[RenderableType]:
 
 def _text(value: float, metric: str) -> str:
     shown = plotting.metric_shown(metric)
-    return "" if math.isnan(value) else f"{units.from_si(value, shown.unit, shown.dimension):z.4g}"
+    return "-" if math.isnan(value) else f"{units.from_si(value, shown.unit, shown.dimension):z.4g}"

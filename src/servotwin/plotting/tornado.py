@@ -24,6 +24,7 @@ _METRICS = {
     "rise_time": Shown("rise time", "", "ms", "ms", "time"),
     "settling_time": Shown("settling time", "", "ms", "ms", "time"),
     "steady_error": Shown("steady error", "", "°", "deg", "angle"),
+    "rest_swing": Shown("swing at rest", "", "°", "deg", "angle"),
     "slew_rate": Shown("slew rate", "", "°/s", "deg/s", "speed"),
     "peak_current": Shown("peak current", "", "A", "A", "current"),
     "rms_error": Shown("rms error", "", "°", "deg", "angle"),

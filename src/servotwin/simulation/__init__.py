@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin.simulation.energy import Energy
 from servotwin.simulation.engine import Event, State
 from servotwin.simulation.metrics import StepMetrics
+from servotwin.simulation.rest import Rest
 from servotwin.simulation.result import Result, Stats
 from servotwin.simulation.simulator import Simulator, simulate
 from servotwin.simulation.status import Status
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 _LAZY = {"Batch": "batch", "CEntry": "c_entry", "CTick": "c_entry", "Failure": "batch", "Fleet": "bus", "grid": "many",
          "simulate_bus": "bus", "simulate_many": "many", "VectorMemory": "vector_memory", "VectorSimulator": "vector"}
 
-__all__ = ["Batch", "CEntry", "CTick", "Energy", "Event", "Failure", "Fleet", "Result", "Simulator", "State", "Stats",
+__all__ = ["Batch", "CEntry", "CTick", "Energy", "Event", "Failure", "Fleet", "Rest", "Result", "Simulator", "State", "Stats",
            "Status", "StepMetrics", "VectorMemory", "VectorSimulator", "grid", "simulate", "simulate_bus",
            "simulate_many"]
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.errors import InputError
+from servotwin.simulation.arrival import arrival_band, resolution, tolerance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from servotwin.simulation.result import Result
     from servotwin.simulation.trajectory import Trajectory
 
-_NEAR = math.radians(1.0)
 _LOOK = 0.1  # s, five usual frames
 
 
@@ -26,16 +26,19 @@ _LOOK = 0.1  # s, five usual frames
 class StepMetrics:
     """Metrics of a step response; times count from the step.
 
+    A shaft that ends farther from its target than 5 % of its way, and than two deadbands or counts, has not arrived:
+    it has neither rise time nor settling time nor overshoot. One that does not come to rest has no settling time.
+
     Parameters
     ----------
     initial, final, target : float
         Angle at the step, at the end of the run, and commanded [rad]; the target is nan for motors.
     rise_time : float
-        From 10 % to 90 % of the way from initial to final [s].
+        From 10 % to 90 % of the way from initial to final; nan where there is none [s].
     settling_time : float
-        Until the angle stays within 2 % of the way around the final angle [s].
+        Until the angle stays within 2 % of the way around the final angle; nan where it does not [s].
     overshoot : float
-        Beyond the final angle, as a fraction of the way.
+        Beyond the final angle, as a fraction of the way; nan where there is none.
     steady_error : float
         Target − final [rad].
     slew_rate : float
@@ -43,7 +46,9 @@ class StepMetrics:
     peak_current : float
         Highest magnitude of the armature current [A].
     arrival_time : float
-        Until the angle stays within 1° of the target; nan where it does not by the end [s].
+        Until the angle stays within `arrival_band` of the target; nan where it does not by the end [s].
+    arrival_band : float
+        1°, or less of a small step: 5 % of the way, or two deadbands or counts, but at most half of the way [rad].
     """
 
     initial: float
@@ -56,6 +61,7 @@ class StepMetrics:
     slew_rate: float
     peak_current: float
     arrival_time: float = math.nan
+    arrival_band: float = math.nan
 
 
 def step_metrics(result: Result) -> StepMetrics:
@@ -80,24 +86,30 @@ def step_metrics(result: Result) -> StepMetrics:
 
     nan = math.nan
     rise = settling = overshoot = nan
-    if abs(way) > 1e-12:
+    finest = float(resolution(result.model))
+    arrived = not has_target or abs(target - q1) <= tolerance(target - q0, finest)
+    if abs(way) > 1e-12 and arrived:
         t10, t90 = (_first_reach(result.trajectory, progress, start, level) for level in (0.1, 0.9))
         rise = t90 - t10
-        settling = _last_outside(result.trajectory, progress, start, 0.02) - start
+        rest = result.rest
+        if rest is None or rest.swing == 0.0:
+            settling = _last_outside(result.trajectory, progress, start, 0.02) - start
         overshoot = max(0.0, _highest(result.trajectory, progress, start)[1] - 1.0)
         overshoot = 0.0 if overshoot < 1e-12 else overshoot
+    band = arrival_band(target - q0, finest) if has_target else nan
     return StepMetrics(
         initial=q0, final=q1, target=target, rise_time=rise, settling_time=settling, overshoot=overshoot,
         steady_error=target - q1, slew_rate=result.peak(result.model.layout[1]),
-        peak_current=result.peak("armature_current"), arrival_time=_arrival(result, target, q1, start))
+        peak_current=result.peak("armature_current"), arrival_time=_arrival(result, target, q1, start, band),
+        arrival_band=band)
 
 
-def _arrival(result: Result, target: float, final: float, start: float) -> float:
+def _arrival(result: Result, target: float, final: float, start: float, band: float) -> float:
     """Return the time [s] from the step on until the angle stays near the target; nan where it ends elsewhere."""
-    if not abs(final - target) <= _NEAR:
+    if not abs(final - target) <= band:
         return math.nan
     return _last_outside(result.trajectory, lambda samples: 1.0 + np.asarray(samples.angle - target), start,
-                         _NEAR) - start
+                         band) - start
 
 
 def holding_error(result: Result) -> float:
@@ -114,14 +126,17 @@ def holding_error(result: Result) -> float:
     return asked - result.mean(result.model.layout[0], start)
 
 
-def mean_current(result: Result) -> float:
-    """Return the mean current of the supply [A]; of a model without one, that of the motor regardless of its sign."""
+def mean_current(result: Result, since: float = 0.0) -> float:
+    """Return the mean current of the supply from `since` [s] on [A].
+
+    Of a model without a supply it is that of the motor regardless of its sign.
+    """
     name = "supply_current" if "supply_current" in result.model.available else "armature_current"
     if name == "supply_current":
-        return result.mean(name)
-    whole = result.trajectory.integral(
+        return result.mean(name, since)
+    whole = result.trajectory.since(since).integral(
         lambda samples: np.abs(result.model.output(name, samples, result.drive, result.load))[None, :])
-    return float(whole[0]) / result.ended
+    return float(whole[0]) / (result.ended - since)
 
 
 def peak(trajectory: Trajectory, signal: Callable[[Samples], NDArray[np.float64]]) -> float:

@@ -1,4 +1,4 @@
-"""What a completed run leaves to be said: pulses that were refused, an end stop, a load that is too much, trips.
+"""What a completed run leaves to be said: refused pulses, an end stop, a load too heavy, trips, a shaft without rest.
 
 A remark is no failure: the run reached its end, and `Status` says so. One look at the end of the run finds it.
 """
@@ -27,8 +27,10 @@ if TYPE_CHECKING:
     from servotwin.models.samples import Samples
     from servotwin.models.terms.firmware import Firmware
     from servotwin.models.terms.numbers import Numbers
+    from servotwin.simulation.rest import Rest
     from servotwin.simulation.result import Result
 
+NOT_AT_REST, BUZZES = "does not come to rest", "buzzes at rest"
 REFUSED, ON_STOP, CANNOT_HOLD = KINDS = ("pulses refused", "ended on a stop", "cannot hold")
 COLUMNS = {kind: kind.replace(" ", "_") for kind in KINDS}
 """Name of a table's column that holds the time of a kind."""
@@ -38,6 +40,24 @@ TRIPS = ("overload", "current", "heat", "undervoltage")
 STAYS_TRIPPED = "stays tripped"
 _TRIPPED = {f"tripped by {kind}": f"trips by {kind}" for kind in TRIPS}  # kinds, and the events that they are of
 
+def swing_words(swing: float, frequency: float) -> str:
+    """Return a swing from end to end [rad] and its frequency [Hz] as people read them."""
+    return f"swings {math.degrees(swing):.2f} deg at {frequency:.2g} Hz"
+
+
+def drive_words(rate: float, duty: float, current: float) -> str:
+    """Return how a bridge drives a shaft that stands, as people read it: rate [Hz], duty [1] and current [A].
+
+    Examples
+    --------
+    >>> drive_words(50.0, 0.021, 0.0312), drive_words(0.0, 0.25, 0.31)
+    ('drives 50 times a second, duty 2.1 %, 0.031 A in the mean', 'drives all the time, duty 25 %, 0.310 A in the mean')
+    """
+    often = f"{rate:.3g} times a second" if rate > 0.0 else "all the time"
+    return f"drives {often}, duty {100.0 * duty:.2g} %, {current:.3f} A in the mean"
+
+
+_NUMBERS = {NOT_AT_REST: swing_words, BUZZES: drive_words}
 _MARKS = {ON_STOP: ending.ON_STOP, CANNOT_HOLD: ending.CANNOT_HOLD}
 
 
@@ -45,8 +65,13 @@ _AT_STOP = 1e-6  # rad, relative beyond 1 rad: as in `ending`
 _ROUNDING = 1e-9  # rad
 
 
-class Remark(NamedTuple):
-    """What a user should know of a run.
+class _Kind(NamedTuple):
+    kind: str
+    time: float
+
+
+class Remark(_Kind):
+    """What a user should know of a run; a pair (kind, time), with some numbers by name in `numbers`.
 
     Parameters
     ----------
@@ -57,22 +82,44 @@ class Remark(NamedTuple):
         the shaft stands or where it was sent.
         "tripped by overload", "… current", "… heat", "… undervoltage": a protection of a digital servo has acted.
         "stays tripped": one still does.
+        "does not come to rest": command and load stand still, and the shaft goes to and fro: `swing` from end to end
+        [rad] at `frequency` [Hz].
+        "buzzes at rest": the shaft stands where friction alone would hold it, and the bridge goes on switching: `rate`
+        [Hz], `duty` in the mean [1], `current` of the supply in the mean [A].
     time : float
         Of the first such pulse, or the first such trip; otherwise the end of the run, of which the remark speaks [s].
+    **numbers : float
+        Those of the kind (SI).
 
     Examples
     --------
     >>> Remark("cannot hold", 1.5).words
     'cannot hold its load at 1.5 s'
+    >>> Remark("does not come to rest", 5.0, swing=0.0116, frequency=1.13).words
+    'does not come to rest: swings 0.66 deg at 1.1 Hz'
     """
 
-    kind: str
-    time: float
+    numbers: dict[str, float]
+
+    def __new__(cls, kind: str, time: float, **numbers: float) -> Remark:
+        """Make a pair that carries numbers."""
+        made = super().__new__(cls, kind, time)
+        made.numbers = numbers
+        return made
+
+    def __getnewargs_ex__(self) -> tuple[tuple[str, float], dict[str, float]]:
+        return (self.kind, self.time), self.numbers
 
     @property
     def words(self) -> str:
         """The remark as people read it."""
-        return words(self.kind, f"{self.time:g} s")
+        said = _NUMBERS[self.kind](**self.numbers) if self.numbers else ""
+        return f"{words(self.kind)}: {said}" if said else words(self.kind, f"{self.time:g} s")
+
+    @property
+    def facts(self) -> dict[str, str | float]:
+        """Kind, time and numbers by name, as `Remark` takes them again."""
+        return {**self._asdict(), **self.numbers}
 
 
 class LaneRemark(NamedTuple):
@@ -101,7 +148,8 @@ def words(kind: str, time: str = "") -> str:
     """
     text, before, after = {
         REFUSED: ("all pulses refused", "from", "on"), ON_STOP: ("ended on a stop that it was not sent to", "at", ""),
-        CANNOT_HOLD: ("cannot hold its load", "at", ""), STAYS_TRIPPED: ("a protection still acts", "at", ""),
+        CANNOT_HOLD: ("cannot hold its load", "at", ""), NOT_AT_REST: (NOT_AT_REST, "at", ""),
+        BUZZES: (BUZZES, "at", ""), STAYS_TRIPPED: ("a protection still acts", "at", ""),
         **{tripped: (tripped, "at", "") for tripped in _TRIPPED}}[kind]
     return " ".join(filter(None, (text, before, time, after))) if time else text
 
@@ -133,7 +181,20 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
         marks = ending.marks(pulsed, numbers, accepts, rows, tau, period, edges, end, numbers.source.V,
                              not math.isnan(refused), final)
     said = tuple(Remark(remark.kind, remark.time) for remark in lane_remarks([refused], [marks], end))
-    return said if firmware is None else (*said, *_trips(result, last))
+    trips = () if firmware is None else _trips(result, last)
+    held = not said and not any(ending.starts(numbers, forward, 0.0, tau, final[0]) for forward in (True, False))
+    return (*said, *trips, *_of_rest(result.rest, end, held=held))
+
+
+def _of_rest(rest: Rest | None, end: float, *, held: bool) -> tuple[Remark, ...]:
+    """Return that a shaft does not come to rest, or that its bridge switches although friction would hold it."""
+    if rest is None:
+        return ()
+    if rest.swing > 0.0:
+        return (Remark(NOT_AT_REST, end, swing=rest.swing, frequency=rest.frequency),)
+    if held and rest.buzzes:
+        return (Remark(BUZZES, end, rate=rest.drive_rate, duty=rest.duty, current=rest.current),)
+    return ()
 
 
 def _under_sag(result: Result, numbers: Numbers, last: Samples) -> Numbers:

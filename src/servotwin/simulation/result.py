@@ -17,6 +17,7 @@ from servotwin.simulation import files
 from servotwin.simulation.energy import Energy, energy_of
 from servotwin.simulation.metrics import StepMetrics, holding_error, mean_current, peak, step_metrics
 from servotwin.simulation.remarks import Remark, remarks_of
+from servotwin.simulation.rest import Rest, rest_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.trajectory import Trajectory
 
@@ -140,8 +141,13 @@ class Result:
 
     @cached_property
     def remarks(self) -> tuple[Remark, ...]:
-        """What a completed run leaves to be said, (kind, time [s]): refused pulses, a stop, a load too heavy, trips."""
+        """What a completed run leaves to be said, (kind, time [s]): refused pulses, a stop, a heavy load, no rest."""
         return remarks_of(self)
+
+    @cached_property
+    def rest(self) -> Rest | None:
+        """What the servo does where command and load stand still at the end; None where that is under half a second."""
+        return rest_of(self)
 
     @cached_property
     def energy(self) -> Energy:

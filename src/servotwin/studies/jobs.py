@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 
 from servotwin.loads import Load
 from servotwin.models import Model
+from servotwin.models.columns import LaneServo
 from servotwin.signals import Signal
+from servotwin.simulation.arrival import resolution
 from servotwin.simulation.lane_inputs import lanes_of
 from servotwin.simulation.many import simulate_lanes
 from servotwin.simulation.remarks import columns
+from servotwin.simulation.rest import look_period, still_since
 from servotwin.simulation.workers import HERE
-from servotwin.studies.metrics import lane_metrics, signals_of
+from servotwin.studies.metrics import Judged, lane_metrics, signals_of
 
 _AT_ONCE = 2**17  # numbers of one signal: they stay in a core's cache
 
@@ -64,6 +67,16 @@ def run_chunk(job: Job, parameters: Mapping[str, NDArray[Any]], seeds: NDArray[n
     ended = np.full(len(batch), job.duration)
     for failure in batch.failures:
         ended[failure.lane] = failure.time
-    found = lane_metrics(job.metrics, job.times, job.start, batch.signals)
+    found = lane_metrics(job.metrics, job.times, job.start, batch.signals, Judged(
+        finest=_finest(job.model, parameters), still=still_since(job.command, job.load, job.duration),
+        look=look_period(job.model)))
     return {**{name: np.where(batch.status == 0, column, np.nan) for name, column in found.items()},
             "status": np.asarray(batch.status), "ended": ended, **columns(batch.remarks, len(batch))}
+
+
+def _finest(model: Model, parameters: Mapping[str, NDArray[Any]]) -> NDArray[np.float64] | float:
+    """Return the resolution of each lane [rad], or that of all."""
+    own = {name: np.asarray(column, dtype=np.float64)[:, None] for name, column in parameters.items()
+           if not name.startswith("load.") and np.asarray(column).dtype.kind in "fiu"}
+    found = resolution(model.over(LaneServo(model.servo, own)))
+    return np.asarray(found, dtype=np.float64)[:, 0] if np.ndim(found) else float(found)

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
+from servotwin.simulation.arrival import tolerance
+from servotwin.simulation.rest import AT_REST, LEAST_REST, swing_of
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -31,11 +33,14 @@ class Metric(NamedTuple):
 
 
 _MOVES = ("output_angle", "output_speed")
+_ARRIVES = (*_MOVES, "command_angle")
 METRICS: dict[str, Metric] = {
-    "overshoot": Metric("number", "beyond the final angle, as a fraction of the way", _MOVES),
-    "rise_time": Metric("time", "from 10 % to 90 % of the way", _MOVES),
-    "settling_time": Metric("time", "until the angle stays within 2 % of the way", _MOVES),
+    "overshoot": Metric("number", "beyond the final angle, as a fraction of the way", _ARRIVES),
+    "rise_time": Metric("time", "from 10 % to 90 % of the way", _ARRIVES),
+    "settling_time": Metric("time", "until the angle stays within 2 % of the way", _ARRIVES),
     "steady_error": Metric("angle", "commanded minus final angle", ("output_angle", "command_angle")),
+    "rest_swing": Metric("angle", "of a shaft that does not come to rest, from end to end; 0 where it does",
+                         ("output_angle", "command_angle"), of_step=False),
     "slew_rate": Metric("speed", "highest speed", ("output_speed",), of_step=False),
     "peak_current": Metric("current", "highest magnitude of the armature current", ("armature_current",),
                            of_step=False),
@@ -46,7 +51,8 @@ METRICS: dict[str, Metric] = {
 }
 """By name; besides, ``end_`` and the name of a signal is that signal at the end of the run."""
 
-OF_STEP = ("overshoot", "rise_time", "settling_time", "steady_error", "peak_current", "end_output_angle")
+OF_STEP = ("overshoot", "rise_time", "settling_time", "steady_error", "rest_swing", "peak_current",
+           "end_output_angle")
 OF_OTHERS = ("rms_error", "peak_error", "peak_current", "end_output_angle")
 OF_ENDLESS = ("slew_rate", "peak_current", "end_output_speed", "end_output_angle")
 _ENDS = "end_"
@@ -119,8 +125,26 @@ def output_times(duration: float, step: float, start: float, decisions: Array) -
     return np.append(np.unique(times[(times >= 0.0) & (times < duration)]), duration)
 
 
-def lane_metrics(metrics: Sequence[str], times: Array, start: float,
-                 signals: Mapping[str, NDArray[Any]]) -> dict[str, Array]:
+class Judged(NamedTuple):
+    """What decides whether a shaft has arrived, and rests.
+
+    Parameters
+    ----------
+    finest : float or ndarray, shape (n,)
+        `arrival.resolution` of each lane [rad].
+    still : float
+        From when on neither command nor load change; inf where they do to the end [s].
+    look : float
+        How often a shaft is looked at to see whether it rests [s].
+    """
+
+    finest: float | Array = 0.0
+    still: float = math.inf
+    look: float = 1e-3
+
+
+def lane_metrics(metrics: Sequence[str], times: Array, start: float, signals: Mapping[str, NDArray[Any]],
+                 judged: Judged | None = None) -> dict[str, Array]:
     """Return each metric of all lanes, shape (n,), from their signals, each of shape (n, T).
 
     Examples
@@ -130,11 +154,18 @@ def lane_metrics(metrics: Sequence[str], times: Array, start: float,
     [2.0]
     """
     found: dict[str, Array] = {}
+    judged = judged or Judged()
     of_response = {"overshoot", "rise_time", "settling_time"} & set(metrics)
     response = _response(times, start, signals) if of_response else {}
+    arrived = _arrived(times, start, signals, judged) if of_response else np.True_
+    swings = _swings(times, signals, judged) if {"rest_swing", "settling_time"} & set(metrics) else None
     for name in metrics:
-        if name in response:
-            found[name] = response[name]
+        if name == "settling_time":
+            found[name] = np.where(arrived & ~(np.asarray(swings) > 0.0), response[name], np.nan)
+        elif name in response:
+            found[name] = np.where(arrived, response[name], np.nan)
+        elif name == "rest_swing" and swings is not None:
+            found[name] = swings
         elif name == "steady_error":
             found[name] = signals["command_angle"][:, -1] - signals["output_angle"][:, -1]
         elif name in ("slew_rate", "peak_current"):
@@ -146,6 +177,28 @@ def lane_metrics(metrics: Sequence[str], times: Array, start: float,
                 np.trapezoid(error**2, times, axis=1) / times[-1])
         else:
             found[name] = signals[name.removeprefix(_ENDS)][:, -1].astype(np.float64)
+    return found
+
+
+def _arrived(times: Array, start: float, signals: Mapping[str, NDArray[Any]], judged: Judged) -> NDArray[np.bool_]:
+    """Tell which lanes end where the step sends them."""
+    if "command_angle" not in signals:
+        return np.ones(len(signals["output_angle"]), dtype=bool)
+    target, angle = signals["command_angle"][:, -1], signals["output_angle"]
+    way = target - angle[:, int(np.searchsorted(times, start))]
+    return np.asarray(np.abs(target - angle[:, -1]) <= tolerance(way, judged.finest))
+
+
+def _swings(times: Array, signals: Mapping[str, NDArray[Any]], judged: Judged) -> Array:
+    """Return the swing of each lane that does not come to rest [rad]; 0 where it does, nan where that is not seen."""
+    angles = signals["output_angle"]
+    if not times[-1] - judged.still >= LEAST_REST:
+        return np.full(len(angles), np.nan)
+    looks = times[-1] - judged.look * np.arange(int((times[-1] - judged.still) / judged.look), -1.0, -1.0)
+    moves = np.ptp(angles[:, times >= 0.5 * (judged.still + times[-1])], axis=1) > 0.5 * AT_REST
+    found = np.zeros(len(angles))
+    for k in np.flatnonzero(moves).tolist():
+        found[k] = swing_of(looks, np.interp(looks, times, angles[k])).swing
     return found
 
 

@@ -1,0 +1,242 @@
+"""What a servo does once nothing changes any more: whether its shaft comes to rest, and how its bridge drives there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.models import DigitalServo, PulseServo, PulseServoInductive
+from servotwin.models.switched import SwitchedServo
+from servotwin.models.terms.duty import drives
+from servotwin.simulation.metrics import mean_current
+
+if TYPE_CHECKING:
+    from servotwin.loads import Load
+    from servotwin.models import Model
+    from servotwin.physics.pieces import Piece
+    from servotwin.signals import Signal
+    from servotwin.simulation.engine import Segment
+    from servotwin.simulation.result import Result
+
+Array = NDArray[np.float64]
+
+AT_REST = math.radians(0.1)
+"""What swings by less is at rest [rad]: about one count of an encoder of 12 bit (0.088 deg)."""
+
+LEAST_REST = 0.5
+"""For which command and load have stood still at the end [s]; in as much the bridge is looked at."""
+
+_LEGS = 4  # ways between two reversals, which two periods have
+_KEEPS = 0.75  # part of the swing before that one that does not decay still has
+_LATE = 3.0  # times as long as such ways take: a shaft that has not turned back for longer stands
+_LONGEST = 10.0  # s that are looked at
+_SAMPLE, _GLANCE = 1e-3, 4.7e-3  # s; the second is no part of a usual frame
+_STAYS = 0.9  # part of the duty before that one that does not fade still has
+
+
+class Swing(NamedTuple):
+    """A shaft that goes to and fro.
+
+    Parameters
+    ----------
+    swing : float
+        From end to end; 0 of a shaft that is at rest [rad].
+    frequency : float
+        Of a whole period; 0 of a shaft that is at rest [Hz].
+    """
+
+    swing: float
+    frequency: float
+
+
+NONE = Swing(0.0, 0.0)
+
+
+class Rest(NamedTuple):
+    """What a servo does at the end of a run, where command and load stand still.
+
+    Parameters
+    ----------
+    since : float
+        From when on neither command nor load change [s].
+    swing : float
+        Of a shaft that does not come to rest, from end to end; 0 where it does, or is still on its way [rad].
+    frequency : float
+        Of that swing; 0 without one [Hz].
+    travel : float
+        From the lowest to the highest angle in the last half second [rad].
+    drive_rate : float
+        How often the bridge begins to drive, or reverses, there; nan of a mean voltage [Hz].
+    duty : float
+        Mean magnitude of its duty there: of pulses their share of the time; nan of a mean voltage [1].
+    current : float
+        Mean of the supply there; of a model without one, that of the motor regardless of its sign [A].
+    fades : bool
+        Whether the duty is well below that of half of the time before: of a shaft that creeps to where it stands.
+    """
+
+    since: float
+    swing: float
+    frequency: float
+    travel: float
+    drive_rate: float
+    duty: float
+    current: float
+    fades: bool
+
+    @property
+    def stands(self) -> bool:
+        """Whether the shaft is at rest."""
+        return self.swing == 0.0 and self.travel < AT_REST
+
+    @property
+    def buzzes(self) -> bool:
+        """Whether the shaft is at rest, and its bridge switches on and on."""
+        return self.stands and self.drive_rate > 0.0 and not self.fades
+
+    @property
+    def moves_on(self) -> bool:
+        """Whether the shaft is still on its way."""
+        return self.swing == 0.0 and self.travel >= AT_REST
+
+    @property
+    def facts(self) -> dict[str, float | bool]:
+        """All numbers by name (SI), and what they come to."""
+        return {**self._asdict(), "stands": self.stands, "buzzes": self.buzzes, "moves_on": self.moves_on}
+
+
+def swing_of(time: Array, angle: Array) -> Swing:
+    """Return the swing of a shaft that goes to and fro until the end, at angles [rad] since nothing changes any more.
+
+    It has to turn back several times by more than `AT_REST`, the last time not long ago, and its ways not to get
+    smaller: a shaft that overshoots, or arrives at the very end, does not swing.
+
+    Parameters
+    ----------
+    time, angle : ndarray, shape (n,)
+        [s], [rad].
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 3.0, 3001)
+    >>> swing = swing_of(t, 0.01 * np.sin(4.0 * np.pi * t))
+    >>> round(swing.swing, 4), round(swing.frequency, 2)
+    (0.02, 2.0)
+    >>> swing_of(t, np.exp(-2.0 * t) * np.sin(4.0 * np.pi * t))
+    Swing(swing=0.0, frequency=0.0)
+    """
+    half = len(time) // 2  # what comes before may still be on its way
+    if len(time) < 2 * _LEGS or not np.ptp(angle[half:]) > AT_REST:
+        return NONE
+    at = _turns(angle)
+    ways, spans = np.abs(np.diff(angle[at])), np.diff(time[at])
+    if len(ways) < _LEGS + 1:  # the first one leads there
+        return NONE
+    ways, spans = ways[-max(_LEGS, len(ways) // 2):], spans[-max(_LEGS, len(ways) // 2):]
+    middle = len(ways) // 2
+    if ways[-middle:].mean() < _KEEPS * ways[:middle].mean() or time[-1] - time[at[-1]] > _LATE * spans.max():
+        return NONE
+    return Swing(float(np.ptp(angle[at[-_LEGS - 1]:])), float(0.5 / spans.mean()))
+
+
+def _turns(angle: Array) -> list[int]:
+    """Return the places between which the angle goes one way, but for what is at rest, the first place included."""
+    found, far, way = [0], 0, 0
+    values = angle.tolist()
+    for k, value in enumerate(values):
+        if way == 0:
+            if abs(value - values[0]) > AT_REST:
+                way, far = (1 if value > values[0] else -1), k
+        elif way * (value - values[far]) >= 0.0:
+            far = k
+        elif way * (values[far] - value) > AT_REST:
+            found.append(far)
+            way, far = -way, k
+    return found
+
+
+def constant_since(pieces: Sequence[Piece], end: float) -> float:
+    """Return from when on the pieces of a signal keep one value up to the end [s]; inf where they do not.
+
+    Examples
+    --------
+    >>> from servotwin import signals
+    >>> constant_since(signals.step(0.0, 1.0, at=0.2, unit="rad").pieces.table, 1.0)
+    0.2
+    """
+    since = math.inf
+    value = math.nan
+    for piece in reversed([piece for piece in pieces if piece.start < end]):
+        if piece.slope or piece.amplitude or (piece.value != value and since < math.inf):
+            break
+        since, value = piece.start, piece.value
+    return since if since == math.inf else max(since, 0.0)
+
+
+def still_since(command: Signal, load: Load, end: float) -> float:
+    """Return from when on neither a command nor a load's torque changes by the end [s]; inf where one does."""
+    return max(constant_since(command.pieces.table, end), constant_since(load.torque_pieces.table, end),
+               *(last for _, last in command.silences if last < end), 0.0)
+
+
+def rest_of(result: Result) -> Rest | None:
+    """Return what a servo does where command and load stand still at the end of a run; None where that is too short.
+
+    A motor, a servo that turns without end, and a run that ended before its time have none.
+    """
+    model, end = result.model, result.ended
+    if not result.status.ok or model.endless or "command_angle" not in model.available:
+        return None
+    since = still_since(result.command, result.load, end)
+    begun = end - LEAST_REST
+    if not since <= begun:
+        return None
+    step = look_period(model, framed=result.command.edges is None)
+    swing, (_, angles) = _swing(result, since, step), _angles(result, begun, step)
+    middle = 0.5 * (since + end)
+    rate, duty = _drives(result, begun, end)
+    _, before = _drives(result, max(middle - 0.5 * LEAST_REST, since), min(middle + 0.5 * LEAST_REST, end))
+    return Rest(since=since, swing=swing.swing, frequency=swing.frequency, travel=float(np.ptp(angles)),
+                drive_rate=rate, duty=duty, current=mean_current(result, begun), fades=duty < _STAYS * before)
+
+
+def look_period(model: Model, *, framed: bool = True) -> float:
+    """Return how often a shaft is looked at to see whether it rests [s].
+
+    Of a pulse servo once a frame: a load moves it to and fro within each, and it stands where it is after a whole one.
+    """
+    return model.frame_period if framed and isinstance(model, PulseServo | PulseServoInductive) else _SAMPLE
+
+
+def _swing(result: Result, since: float, step: float) -> Swing:
+    since = max(since, result.ended - _LONGEST)
+    _, glance = _angles(result, 0.5 * (since + result.ended), max(step, _GLANCE))
+    return NONE if np.ptp(glance) < 0.5 * AT_REST else swing_of(*_angles(result, since, step))
+
+
+def _angles(result: Result, since: float, step: float) -> tuple[Array, Array]:
+    time = result.ended - step * np.arange(int((result.ended - since) / step), -1.0, -1.0)
+    return time, result.at("output_angle", time)
+
+
+def _drives(result: Result, start: float, end: float) -> tuple[float, float]:
+    """Return how often a bridge begins to drive or reverses [Hz], and the mean magnitude of its duty."""
+    if not isinstance(result.model, SwitchedServo):
+        return math.nan, math.nan
+    digital = isinstance(result.model, DigitalServo)
+
+    def given(segment: Segment) -> float:
+        value = segment.duty if digital else segment.drive
+        return value if drives(value) else 0.0
+
+    segments = [segment for segment in result.trajectory.segments if segment.end > start and segment.start < end]
+    before, count, whole = given(segments[0]), 0, 0.0
+    for segment in segments:
+        now = given(segment)
+        count += now != 0.0 and now * before <= 0.0
+        before, whole = now, whole + abs(now) * (min(segment.end, end) - max(segment.start, start))
+    return count / (end - start), whole / (end - start)
