@@ -49,19 +49,20 @@ def test_every_row_of_a_step_is_its_metric(simulate, inertia, arrives):
     assert number(printed["energy"]) == pytest.approx(run.energy.supply, rel=1e-3)
 
 
-def test_what_a_run_does_not_have_has_no_row():
+def test_what_a_run_does_not_have_is_shown_as_none():
     """A motor has no target, a shaft that stays has no times."""
     facts = {"final_angle": 1.0, "mean_current": 0.25, "peak_current": 0.5, "energy": {"supply": 1.0}, "step_metrics": {
         "target": math.nan, "rise_time": math.nan, "settling_time": 0.25, "overshoot": math.nan, "slew_rate": math.pi}}
-    assert dict(lines(facts)) == {"final angle": "57.30 deg", "settling time": "250.0 ms (2 %)",
-                                  "peak speed": "180.0 deg/s", "current": "0.250 A in the mean, 0.500 A at most",
-                                  "energy": "1 J supplied: nothing moved"}
-    facts["step_metrics"] |= {"target": 1.1, "rise_time": 0.1, "settling_time": math.nan, "overshoot": 0.125}
+    assert dict(lines(facts)) == {
+        "final angle": "57.30 deg", "rise time": "-", "overshoot": "-", "settling time": "250.0 ms (2 %)",
+        "peak speed": "180.0 deg/s", "current": "0.250 A in the mean, 0.500 A at most",
+        "energy": "1 J supplied: nothing moved"}
+    facts["step_metrics"] |= {"target": 1.1, "arrival_band": math.radians(0.35), "rise_time": 0.1, "settling_time": math.nan, "overshoot": 0.125}
     facts |= {"time_to_target": 0.2, "holding_error": math.radians(-2.0)}
     found = dict(lines(facts))
     assert (found["holding error"], found["rise time"], found["overshoot"], found["time to get there"]) == (
-        "-2.00 deg", "100.0 ms (10 to 90 %)", "12.50 %", "200.0 ms (within 1 deg)")
-    assert "settling time" not in found
+        "-2.00 deg", "100.0 ms (10 to 90 %)", "12.50 %", "200.0 ms (within 0.35 deg)")
+    assert found["settling time"] == "-"
 
 
 def draws(stiff, lanes=8):

@@ -10,6 +10,8 @@ from hypothesis import strategies as some
 import servotwin as st
 from servotwin import loads
 from servotwin.errors import InputError, SimulationError
+from servotwin.models import mid_travel
+from servotwin.models.default import default_model
 from servotwin.simulation.status import Status
 
 
@@ -188,6 +190,56 @@ def test_a_step_that_moves_nothing_has_no_times(servo):
     assert math.isnan(found.overshoot)
     assert (found.slew_rate, found.peak_current) == (0.0, 0.0)
     assert found.steady_error == pytest.approx(math.radians(0.01))
+
+
+# ---------------------------------------------------------------------------------------- what does not arrive
+
+@pytest.mark.parametrize(("short", "arrives"), [(0.049, True), (0.051, False)])
+def test_a_shaft_that_ends_farther_off_than_5_percent_has_no_times(linear, short, arrives):
+    """A load torque leaves a linear servo short of its target by torque over stiffness, whatever the time."""
+    servo = tuned(linear, 25.0, 0.7)
+    model = st.AveragedServo(servo)
+    e, motor, N = servo.electronics, servo.motor, servo.gear.gear_reduction
+    stiffness = (N * motor.torque_constant * e.bridge_gain * e.comparator_gain * servo.potentiometer.feedback_gain
+                 / motor.armature_resistance)
+    found = st.simulate(model, st.signals.step(20.0, 80.0, unit="deg"), duration=2.0, output_step=2.0,
+                        load=loads.Constant(short * WAY * stiffness)).step_metrics()
+    assert found.steady_error == pytest.approx(short * WAY, rel=1e-6)
+    for value in (found.rise_time, found.settling_time, found.overshoot):
+        assert math.isnan(value) != arrives
+
+
+@pytest.mark.parametrize(("servo_name", "way", "band"), [
+    ("hitec-hs-755hb", 60.0, 1.0), ("hitec-hs-755hb", 1.5, 0.75), ("feetech-sts3215-12v", 20.0, 1.0),
+    ("feetech-sts3215-12v", 10.0, 0.5), ("feetech-sts3215-12v", 1.0, 4.0 * 360.0 / 4096.0),
+    ("feetech-sts3215-12v", 0.6, 0.3)])
+def test_near_is_a_degree_or_a_part_of_a_small_step(servo_name, way, band):
+    """5 % of it, or two deadbands (of 1 count either way; 8 us, 0.8 deg), but at most half of it."""
+    model = default_model(st.load_servo(servo_name))
+    start = math.degrees(mid_travel(model))
+    found = st.simulate(model, st.signals.step(start, start + way, at=0.1, unit="deg"), duration=0.5).step_metrics()
+    assert math.degrees(found.arrival_band) == pytest.approx(band, rel=1e-6)
+
+
+def test_a_small_step_that_moves_nothing_does_not_arrive(servo):
+    """It used to be within 1 deg from the beginning."""
+    found = st.simulate(st.BoundedServo(servo), st.signals.step(90.0, 90.01, unit="deg"), duration=0.5).step_metrics()
+    assert math.isnan(found.arrival_time)
+
+
+def test_lanes_and_runs_arrive_alike():
+    """A deadband that differs from lane to lane decides for each; the third lane's is wider than the step."""
+    model, command = st.PulseServo(st.load_servo("hitec-hs-755hb")), st.signals.step(0.0, 3.0, at=0.1, unit="deg")
+    widths = np.array([4e-6, 8e-6, 60e-6])
+    study = st.sweep(model, command, duration=1.5, draws={"electronics.deadband": widths}, metrics=[
+        "rise_time", "settling_time", "overshoot", "steady_error", "rest_swing"])
+    for k, width in enumerate(widths.tolist()):
+        own = st.PulseServo(model.servo.replace({"electronics.deadband": width}))
+        metrics = st.simulate(own, command, duration=1.5).step_metrics()
+        for name in ("rise_time", "settling_time", "overshoot"):
+            assert study.table[name][k] == pytest.approx(getattr(metrics, name), abs=2e-3, nan_ok=True)
+    assert np.isnan(study.table["rise_time"]).tolist() == [False, False, True]
+    assert study.table["rest_swing"].tolist() == [0.0, 0.0, 0.0]
 
 
 # ---------------------------------------------------------------------------------------- what is refused

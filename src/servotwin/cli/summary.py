@@ -171,7 +171,8 @@ def _rest_rows(rest: Mapping[str, Any] | None) -> list[tuple[str, str]]:
     """Return how the bridge drives where nothing changes any more; nothing where it does not."""
     if rest is None or not rest["duty"] > 0.0 or rest["moves_on"]:
         return []
-    return [("at rest" if rest["stands"] else "at the end", drive_words(rest["drive_rate"], rest["duty"], rest["current"]))]
+    label = "at rest" if rest["stands"] else "at the end"
+    return [(label, drive_words(rest["drive_rate"], rest["duty"], rest["current"]))]
 
 
 def _deg(angle: float) -> float:

@@ -19,7 +19,8 @@ from servotwin.robots.solver import SolverNote
 from servotwin.robots.told import Told, told
 from servotwin.simulation import files
 from servotwin.simulation.compile.joints_layout import KEPT, ROW
-from servotwin.simulation.remarks import TRIPS, Remark
+from servotwin.simulation.remarks import NOT_AT_REST, TRIPS, Remark
+from servotwin.simulation.rest import LEAST_REST, look_period, looks_at, swing_of
 from servotwin.simulation.vector import AT_MOTOR
 
 if TYPE_CHECKING:
@@ -50,11 +51,14 @@ class ServoRecord(Mapping[str, Array]):
         Ends of the ticks [s].
     mount : Mount
     columns : ndarray, shape (n, signals)
+    still : float
+        From when on no servo of the robot gets another command [s].
     """
 
     time: Array
     mount: Mount
     columns: Array
+    still: float = 0.0
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -104,13 +108,24 @@ class ServoRecord(Mapping[str, Array]):
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """First trip by each protection, (kind, time [s])."""
+        """First trip by each protection, and that it does not come to rest, (kind, time [s])."""
+        return (*self._trips(), *self._no_rest())
+
+    def _trips(self) -> tuple[Remark, ...]:
         if "trip" not in self.names:
             return ()
         trips = self["trip"]
         found = [(float(self.time[np.argmax(trips == k)]), kind)
                  for k, kind in enumerate(TRIPS, 1) if (trips == k).any()]
         return tuple(Remark(f"tripped by {kind}", time) for time, kind in sorted(found))
+
+    def _no_rest(self) -> tuple[Remark, ...]:
+        model, time = self.mount.model, self.time
+        if model.endless or not (len(time) and time[-1] - self.still >= LEAST_REST):
+            return ()
+        looks = looks_at(self.still, float(time[-1]), look_period(model))
+        swing = swing_of(looks, np.interp(looks, time, self["output_angle"]))
+        return (Remark(NOT_AT_REST, float(time[-1]), **swing._asdict()),) if swing.swing > 0.0 else ()
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return all signals (SI) as a pandas DataFrame, indexed by time [s]."""
@@ -164,8 +179,10 @@ class Record(Mapping[str, ServoRecord]):
                  solver_note: SolverNote | None = None) -> None:
         self.time, self.energy, self.energy_from_nowhere = (rows[:, k].copy() for k in range(len(ROW)))
         self._solver_note, width, first = solver_note, len(_COLUMNS), len(ROW)
-        self._servos = {name: ServoRecord(self.time, mounts[name], rows[:, first + width * k:first + width * (k + 1)])
-                        for k, name in enumerate(joints)}
+        parts = [rows[:, first + width * k:first + width * (k + 1)] for k in range(len(joints))]
+        still = _still_since(self.time, [part[:, _COLUMNS.index("command_angle")] for part in parts])
+        self._servos = {name: ServoRecord(self.time, mounts[name], part, still)
+                        for name, part in zip(joints, parts, strict=True)}
 
     @staticmethod
     def width(servos: int) -> int:
@@ -230,3 +247,10 @@ class Record(Mapping[str, ServoRecord]):
                 if name in SIGNALS:
                     signals[f"{joint}.{name}"], units[f"{joint}.{name}"] = servo[name], SIGNALS[name].unit
         files.save_csv(path, signals, units, overwrite=overwrite)
+
+
+def _still_since(time: Array, commands: list[Array]) -> float:
+    """Return from when on none of several commands changes [s]."""
+    changes = [np.flatnonzero(np.diff(command)) for command in commands]
+    last = max((int(one[-1]) + 1 for one in changes if one.size), default=0)
+    return float(time[last]) if len(time) else 0.0

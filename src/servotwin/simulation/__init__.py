@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 _LAZY = {"Batch": "batch", "CEntry": "c_entry", "CTick": "c_entry", "Failure": "batch", "Fleet": "bus", "grid": "many",
          "simulate_bus": "bus", "simulate_many": "many", "VectorMemory": "vector_memory", "VectorSimulator": "vector"}
 
-__all__ = ["Batch", "CEntry", "CTick", "Energy", "Event", "Failure", "Fleet", "Rest", "Result", "Simulator", "State", "Stats",
-           "Status", "StepMetrics", "VectorMemory", "VectorSimulator", "grid", "simulate", "simulate_bus",
+__all__ = ["Batch", "CEntry", "CTick", "Energy", "Event", "Failure", "Fleet", "Rest", "Result", "Simulator", "State",
+           "Stats", "Status", "StepMetrics", "VectorMemory", "VectorSimulator", "grid", "simulate", "simulate_bus",
            "simulate_many"]
 
 

@@ -145,12 +145,12 @@ def swing_of(time: Array, angle: Array) -> Swing:
 
 def _turns(angle: Array) -> list[int]:
     """Return the places between which the angle goes one way, but for what is at rest, the first place included."""
-    found, far, way = [0], 0, 0
+    found, low, high, far, way = [0], 0, 0, 0, 0
     values = angle.tolist()
     for k, value in enumerate(values):
         if way == 0:
-            if abs(value - values[0]) > AT_REST:
-                way, far = (1 if value > values[0] else -1), k
+            low, high = (k if value < values[low] else low), (k if value > values[high] else high)
+            way, far = (value - values[low] > AT_REST) - (values[high] - value > AT_REST), k
         elif way * (value - values[far]) >= 0.0:
             far = k
         elif way * (values[far] - value) > AT_REST:
@@ -212,6 +212,11 @@ def look_period(model: Model, *, framed: bool = True) -> float:
     return model.frame_period if framed and isinstance(model, PulseServo | PulseServoInductive) else _SAMPLE
 
 
+def looks_at(since: float, end: float, step: float) -> Array:
+    """Return the times [s] up to an end, one step from the other, of which none is before `since`."""
+    return np.maximum(end - step * np.arange(int((end - since) / step), -1.0, -1.0), since)
+
+
 def _swing(result: Result, since: float, step: float) -> Swing:
     since = max(since, result.ended - _LONGEST)
     _, glance = _angles(result, 0.5 * (since + result.ended), max(step, _GLANCE))
@@ -219,7 +224,7 @@ def _swing(result: Result, since: float, step: float) -> Swing:
 
 
 def _angles(result: Result, since: float, step: float) -> tuple[Array, Array]:
-    time = result.ended - step * np.arange(int((result.ended - since) / step), -1.0, -1.0)
+    time = looks_at(since, result.ended, step)
     return time, result.at("output_angle", time)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.simulation.arrival import tolerance
-from servotwin.simulation.rest import AT_REST, LEAST_REST, swing_of
+from servotwin.simulation.rest import AT_REST, LEAST_REST, looks_at, swing_of
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -194,7 +194,7 @@ def _swings(times: Array, signals: Mapping[str, NDArray[Any]], judged: Judged) -
     angles = signals["output_angle"]
     if not times[-1] - judged.still >= LEAST_REST:
         return np.full(len(angles), np.nan)
-    looks = times[-1] - judged.look * np.arange(int((times[-1] - judged.still) / judged.look), -1.0, -1.0)
+    looks = looks_at(judged.still, float(times[-1]), judged.look)
     moves = np.ptp(angles[:, times >= 0.5 * (judged.still + times[-1])], axis=1) > 0.5 * AT_REST
     found = np.zeros(len(angles))
     for k in np.flatnonzero(moves).tolist():
