@@ -283,3 +283,25 @@ def test_a_servo_that_trips_is_told():
     drive.command(data, {"elbow": 1.0})
     drive.step(data, 1500)
     assert [remark.kind for remark in drive.result(data)["elbow"].remarks] == ["tripped by overload"]
+
+
+@pytest.mark.parametrize(("friction", "kinds"), [(0.0, ["does not come to rest"]), (None, [])])
+def test_a_joint_that_does_not_come_to_rest_is_told(friction, kinds):
+    """The bus servo of shared/cases/digital-servo-never-rests, at P 32: about 0.7 deg at 2 Hz at a light hinge."""
+    sts = st.feetech_sts({"P_Coefficient": 32, "D_Coefficient": 32, "Maximum_Acceleration": 254, "Acceleration": 254},
+                         servo="feetech-sts3215-7v4")
+    if friction is not None:
+        sts = sts.replace({"friction.bearing_coulomb_torque": friction})
+    light = """<mujoco><option timestep="0.001" integrator="implicitfast"/><worldbody><body>
+      <joint name="elbow" axis="0 0 1"/><inertial pos="0 0 0" mass="0.01" diaginertia="1e-4 1e-4 1e-4"/>
+      </body></worldbody></mujoco>"""
+    drive, data = driven(light, {"elbow": st.DigitalServo(sts)})
+    drive.record(data)
+    drive.command(data, {"elbow": 0.3})
+    drive.step(data, 4000)
+    record = drive.result(data)["elbow"]
+    assert [remark.kind for remark in record.remarks] == kinds
+    assert record.trips == ()
+    if kinds:
+        (remark,) = record.remarks
+        assert remark.numbers["swing"] == pytest.approx(np.ptp(record["output_angle"][-2000:]), rel=0.1)

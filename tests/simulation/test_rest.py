@@ -160,6 +160,6 @@ def test_a_mean_voltage_has_no_pulses_and_a_motor_no_rest():
 def test_a_remark_is_a_pair_that_carries_numbers():
     remark = Remark(NOT_AT_REST, 5.0, swing=0.01, frequency=2.0)
     assert dict([remark]) == {NOT_AT_REST: 5.0}
-    again = pickle.loads(pickle.dumps(remark))  # noqa: S301
+    again = pickle.loads(pickle.dumps(remark))
     assert (again, again.numbers) == (remark, remark.numbers)
     assert Remark(**remark.facts).words == remark.words

@@ -1,4 +1,4 @@
-"""What is odd about a motion: goals that a servo does not take or a joint does not reach, and collisions."""
+"""What is odd about a motion: goals out of reach, collisions, and joints that do not come to rest after it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.robots.model_file import joint_ranges
+from servotwin.simulation.remarks import NOT_AT_REST
 
 if TYPE_CHECKING:
     from servotwin.robots.run import RobotRun
@@ -16,7 +17,7 @@ _SLACK = math.radians(0.5)  # rad, of ends that goals are rounded to
 
 
 def notes_of(run: RobotRun) -> tuple[str, ...]:
-    """Return sentences on goals beyond the travel of a servo or the range of its joint, collisions, and energies.
+    """Return sentences on goals that are out of reach, on collisions, energies, and joints that do not come to rest.
 
     Examples
     --------
@@ -43,7 +44,9 @@ def notes_of(run: RobotRun) -> tuple[str, ...]:
         if joint in ranges and _beyond(goals, ranges[joint], _SLACK * (mount.ratio if slides else 1.0)):
             said.append(f"goals of joint {joint} go {_between(goals, slides=slides)}, beyond its range in the model, "
                         f"{_ends(*ranges[joint], slides=slides)}")
-    return (*said, *(touch.words for touch in run.ideal.touches), *run.record.notes)
+    swings = (f"joint {joint} {remark.words}" for joint in run.mounts for remark in run.tracking[joint].remarks
+              if remark.kind == NOT_AT_REST)
+    return (*said, *(touch.words for touch in run.ideal.touches), *run.record.notes, *swings)
 
 
 def _beyond(values: np.ndarray[tuple[int], np.dtype[np.float64]], ends: tuple[float, float], slack: float) -> bool:

@@ -109,9 +109,11 @@ class ServoRecord(Mapping[str, Array]):
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """First trip by each protection, and that it does not come to rest, (kind, time [s])."""
-        return (*self._trips(), *self._no_rest())
+        return (*self.trips, *self._no_rest())
 
-    def _trips(self) -> tuple[Remark, ...]:
+    @property
+    def trips(self) -> tuple[Remark, ...]:
+        """First trip by each protection, (kind, time [s])."""
         if "trip" not in self.names:
             return ()
         trips = self["trip"]

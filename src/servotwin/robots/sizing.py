@@ -262,7 +262,7 @@ def _sized(run: RobotRun, joint: str) -> Sizing:
         worst=Worst(float(run.time[at]), float(needed.speed[at]), float(abs(needed.torque[at])), float(has[at])),
         rms_torque=_rms(needed.torque[inside]), rms_delivered=_rms(delivered.torque[inside]),
         lasting_torque=math.nan if masses is None else lasting_torque(model, masses),
-        heating=None if masses is None else _heating(run, joint), trips=record.remarks)
+        heating=None if masses is None else _heating(run, joint), trips=record.trips)
 
 
 def _heating(run: RobotRun, joint: str) -> Heating | None:

@@ -41,7 +41,7 @@ class Tracking:
     winding, housing : float
         Highest temperatures [K]
     remarks : tuple of Remark
-        Trips of a digital servo.
+        Trips of a digital servo, and that it does not come to rest.
     """
 
     rms: float

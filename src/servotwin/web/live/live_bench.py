@@ -15,6 +15,7 @@ from servotwin.simulation.lane_loads import LOAD_NAMES
 from servotwin.units import is_finite
 from servotwin.web.live.actions import Action, checked
 from servotwin.web.live.beginning import first_commands, first_of, load_of, models_of
+from servotwin.web.live.rest_watch import RestWatch
 from servotwin.web.live.scene import LONGEST, MOST_ACTIONS, Scene
 from servotwin.web.live.scene_servo import family_of, with_registers
 from servotwin.web.live.shared_supply import SharedSupply
@@ -75,6 +76,7 @@ class LiveBench:
         self._todo = deque([*first_commands(scene, self.models), *scene.actions])
         self._stations = [Station(model, load, first_of(self._todo, k), scene.seed + k, scene.control)
                           for k, model in enumerate(self.models)]
+        self._watches = [RestWatch(station) for station in self._stations]
         self._begun = self._first_ones()
         self._hurry: Callable[[], bool] | None = None
         self._supply = SharedSupply(self._stations) if scene.supply else None
@@ -212,6 +214,7 @@ class LiveBench:
                 rows[k] += seen.rows
                 self.rows[k] = rows[k][-1] if rows[k] else self.rows[k]
                 events += [(time, kind, k) for time, kind in seen.events]
+                events += [(until, said, k) for said in self._watches[k].see(seen.rows)]
             self.time = until
 
     def _looks(self) -> list[float]:
@@ -243,6 +246,8 @@ class LiveBench:
         put = _WAYS[action.kind](self, action)
         for one in put:
             one()
+        for watch in self._watches:
+            watch.begin(self.time)
         last = self._done[-1] if len(self._done) > self._begun else None
         if last is not None and action.kind in _WHOLE and (last.time, last.kind, last.servo) == (
                 action.time, action.kind, action.servo):

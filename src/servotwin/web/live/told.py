@@ -92,6 +92,11 @@ class Told:
         if not self.pulsed:
             self.signal = command.shape
 
+    @property
+    def shape(self) -> Signal:
+        """The present command, as it was given."""
+        return self._taken.shape
+
     def fits(self, model: Model) -> Taken:
         """Return the present command for a model with other numbers, for which it may stand for other pulses.
 

@@ -11,6 +11,7 @@ from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 from servotwin.errors import InputError, ServotwinError
+from servotwin.simulation.remarks import NOT_AT_REST
 from servotwin.web.live import LiveBench, Push, Scene, ServoPush
 from servotwin.web.live.readings import reading_of
 from servotwin.web.server.aside import aside
@@ -250,6 +251,9 @@ class Room:
 
         for box in self.outboxes:
             box.push(data)
+        for _, kind, servo in push.events:
+            if kind.startswith(NOT_AT_REST):
+                self.say({"said": f"servo {servo + 1} {kind}"})
 
 
 def _built(scene: Scene, speed: float | str) -> tuple[LiveBench, float, str]:
