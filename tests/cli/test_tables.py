@@ -57,7 +57,8 @@ def test_what_a_run_does_not_have_is_shown_as_none():
         "final angle": "57.30 deg", "rise time": "-", "overshoot": "-", "settling time": "250.0 ms (2 %)",
         "peak speed": "180.0 deg/s", "current": "0.250 A in the mean, 0.500 A at most",
         "energy": "1 J supplied: nothing moved"}
-    facts["step_metrics"] |= {"target": 1.1, "arrival_band": math.radians(0.35), "rise_time": 0.1, "settling_time": math.nan, "overshoot": 0.125}
+    facts["step_metrics"] |= {"target": 1.1, "arrival_band": math.radians(0.35), "rise_time": 0.1,
+                              "settling_time": math.nan, "overshoot": 0.125}
     facts |= {"time_to_target": 0.2, "holding_error": math.radians(-2.0)}
     found = dict(lines(facts))
     assert (found["holding error"], found["rise time"], found["overshoot"], found["time to get there"]) == (

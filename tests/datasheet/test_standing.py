@@ -9,6 +9,7 @@ import servotwin as st
 from servotwin.datasheet import lift_of, thermal_masses
 from servotwin.datasheet.holding import hold, smallest_move
 from servotwin.datasheet.warming import masses_by_mass, warmed
+from servotwin.models import mid_travel
 from servotwin.physics.thermal import Temperatures, thermal_time_constants
 
 
@@ -51,12 +52,31 @@ def test_a_load_beyond_what_it_holds_makes_it_sink(servo):
     assert not hold(model, 2.5).stands
 
 
-def test_the_smallest_move_is_half_the_deadband_of_pulses_and_more_of_their_mean(servo):
-    width = smallest_move(st.PulseServo(servo)) * servo.electronics.one_shot_slope * servo.potentiometer.feedback_gain
-    assert width == pytest.approx(0.5 * servo.electronics.deadband, rel=1e-3)
-    per_volt, F, gain, half = mean_servo(servo)
-    angle = (half + F / per_volt / gain) / servo.potentiometer.feedback_gain
-    assert smallest_move(st.BoundedServo(servo)) == pytest.approx(angle, rel=1e-3)
+@pytest.mark.parametrize("kind", [st.PulseServo, st.BoundedServo])
+def test_the_smallest_move_is_followed_to_half_and_lies_beyond_what_does_not_start(servo, kind):
+    """Half of a step is left where that is half the deadband: the step is the deadband or more.
+
+    A mean servo starts beyond half the deadband and the voltage of friction, and follows to half by twice that.
+    """
+    model = kind(servo)
+    least, start = smallest_move(model), mid_travel(model)
+
+    def left(step):
+        command = st.signals.step(start, start + step, at=0.0, unit="rad")
+        return start + step - st.simulate(model, command, duration=1.0).at("output_angle", [1.0])[0]
+
+    assert left(1.01 * least) < 0.5 * 1.01 * least
+    assert left(0.97 * least) > 0.5 * 0.97 * least
+    if kind is st.PulseServo:
+        width = least * servo.electronics.one_shot_slope * servo.potentiometer.feedback_gain
+        assert servo.electronics.deadband < width < 2.0 * servo.electronics.deadband
+    else:
+        per_volt, F, gain, half = mean_servo(servo)
+        starts = (half + F / per_volt / gain) / servo.potentiometer.feedback_gain
+        assert starts < least < 2.0 * starts * 1.001
+
+
+def test_the_smallest_move_leaves_noise_out(servo):
     noisy = st.PulseServo(servo.replace({"potentiometer.noise": 5e-3}))
     assert smallest_move(noisy) == smallest_move(st.PulseServo(servo))
 

@@ -37,7 +37,8 @@ def test_a_shaft_that_goes_to_and_fro_swings(angle, swing, frequency):
 
 
 @pytest.mark.parametrize("angle", [
-    np.zeros_like(T), ARRIVES, sine(0.04, 3.0), math.radians(10.0) * T, ARRIVES * (1.0 + np.exp(-3.0 * T) * sine(9.0, 3.0)),
+    np.zeros_like(T), ARRIVES, sine(0.04, 3.0), math.radians(10.0) * T,
+    ARRIVES * (1.0 + np.exp(-3.0 * T) * sine(9.0, 3.0)),
     np.exp(-2.0 * T) * sine(20.0, 4.0), np.where(T < 1.8, sine(3.0, 5.0), 0.0),
     math.radians(20.0) * np.clip(T - 3.5, 0.0, 1.0), sine(3.0, 0.3)],
     ids=["stands", "arrives", "too little", "goes on", "overshoots", "decays", "has stopped", "late", "hardly begun"])
@@ -112,7 +113,7 @@ def test_an_analog_servo_that_hunts():
 
 
 def test_what_pulses_move_within_a_frame_is_rest_and_they_are_counted():
-    """Under a load that friction does not hold a braked servo is lifted once a frame, and sinks: it stands in between."""
+    """A braked servo that friction does not hold is lifted once a frame, and sinks: it stands in between."""
     servo = st.load_servo("hitec-hs-755hb")
     result = st.simulate(st.PulseServo(servo), st.signals.constant(0.0, unit="deg"), duration=4.0,
                          load=st.loads.Constant(0.6))

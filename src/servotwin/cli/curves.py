@@ -169,7 +169,7 @@ def _write_points(sheets: list[DataSheet], path: Path) -> None:
 
 
 def _show(sheet: DataSheet, torque: float | None) -> None:
-    from servotwin.cli.curves_words import hot_words, lift_pairs, notes, rows
+    from servotwin.cli.curves_words import hot_words, lift_pairs, notes, rest_pairs, rows
     from servotwin.cli.loop_words import loop_pairs
     from servotwin.cli.summary import model_name
     from servotwin.parameters import printed_points
@@ -180,6 +180,8 @@ def _show(sheet: DataSheet, torque: float | None) -> None:
     for part in sheet.voltages:
         head = (f"at {part.voltage:g} V", "cold", "hot", "sheet", "off")
         parts += ["", table(head, rows(part, points, torque))]
+        if part.buzz is not None:
+            parts += ["", pairs(rest_pairs(part))]
         if part.loop is not None:
             parts += ["", "the loop at rest", pairs(loop_pairs(part.loop, torque))]
         if part.lift is not None:

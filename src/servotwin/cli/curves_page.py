@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from servotwin import plotting
-from servotwin.cli.curves_words import CurveRow, hot_words, lift_pairs, notes, rows
+from servotwin.cli.curves_words import CurveRow, hot_words, lift_pairs, notes, rest_pairs, rows
 from servotwin.cli.loop_words import loop_pairs
 from servotwin.look import document, escape, picture, table, to_bytes
 from servotwin.parameters import printed_points
@@ -84,7 +84,7 @@ def _voltage(sheet: DataSheet, part: VoltageSheet, torque: float | None) -> str:
     cells = [[escape(_degrees(cell)) for cell in _minus(row)] for row in found]
     drawn = table(["", "cold", "hot", "the sheet prints", "off"], cells,
                   caption=f"At {part.voltage:g} V. Cold: 25 °C. Hot: {escape(_degrees(hot_words(part)))}.")
-    below = _loop(part, torque) + _lift(part)
+    below = _rest(part) + _loop(part, torque) + _lift(part)
     return f'<h3>At {part.voltage:g} V</h3>\n{_cards(part)}<div class="sheet">{drawn}</div>\n{below}'
 
 
@@ -96,6 +96,14 @@ def _cards(part: VoltageSheet) -> str:
         shown.append((f"{math.degrees(part.smallest_move):.2f}°", "smallest move"))
     listed = "".join(f"<li><b>{value}</b>{words}</li>" for value, words in shown)
     return f'<ul class="numbers">{listed}</ul>\n'
+
+
+def _rest(part: VoltageSheet) -> str:
+    found = rest_pairs(part)
+    if not found:
+        return ""
+    said = table(["At rest", ""], [[escape(_degrees(words)) for words in pair] for pair in found], text_columns=2)
+    return f'<div class="pairs">{said}</div>\n'
 
 
 def _loop(part: VoltageSheet, torque: float | None) -> str:
@@ -139,8 +147,8 @@ of steady motion: motor, bridge, source, current limit and the friction of the g
 <li><b>Time for 60°.</b> At the speed without load, as sheets print it; a real step also speeds up and settles.</li>
 <li><b>Hot.</b> Copper gains 0.385 % of resistance per kelvin; magnets lose 0.15 %, assumed, where the file does not
 say.</li>
-<li><b>Smallest move.</b> The smallest step of the command that moves the free shaft, from where there is no
-error.</li>
+<li><b>Smallest move.</b> The smallest step of the command that the free shaft follows to half within a second, from
+where there is no error.</li>
 <li><b>Holding.</b> The load is put on where there is no error; an analog servo gives way until its pulses are long
 enough, a digital one until its duty is large enough, or it trips.</li>
 <li><b>After ten minutes.</b> Where the file has no thermal numbers they are assumed by mass: 5 % of it copper, the rest

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin import units
 from servotwin.cli.loop_words import loop_facts
+from servotwin.cli.rest_words import buzz_facts, remedy_words, rest_words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -127,6 +128,14 @@ def _standing(part: VoltageSheet) -> list[CurveRow]:
     return found
 
 
+def rest_pairs(part: VoltageSheet) -> list[tuple[str, str]]:
+    """Return what the free servo does at rest, and what would stop it, as pairs of label and text."""
+    if part.buzz is None:
+        return []
+    return [(label, said) for label, said in (("at rest, free", rest_words(part.buzz.rest)),
+                                              ("would stop it", remedy_words(part.buzz.remedies))) if said]
+
+
 def lift_pairs(lift: Lift) -> list[tuple[str, str]]:
     """Return what a lift comes to, as pairs of label and text."""
     asked = f"{1e3 * lift.mass:.4g} g on {1e2 * lift.arm:.4g} cm: {lift.torque:.3g} N m where the arm is horizontal"
@@ -218,6 +227,8 @@ def _facts(part: VoltageSheet, torque: float | None) -> dict[str, Any]:
         "printed": [dataclasses.asdict(point) for point in part.printed]}
     if part.loop is not None:
         found["loop"] = loop_facts(part.loop, torque)
+    if part.buzz is not None:
+        found["at_rest"] = buzz_facts(part.buzz)
     if part.lift is not None:
         found["lift"] = _lift(part.lift)
     return found

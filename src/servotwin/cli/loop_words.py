@@ -33,8 +33,7 @@ def loop_pairs(loop: Loop, torque: float | None = None) -> list[tuple[str, str]]
     if loop.count > 0.0:
         found.append(("sees its angle in steps of", _deg(loop.count)))
     if loop.minimum_duty > 0.0:
-        found.append(("startup force", f"{_percent(loop.minimum_duty)} of the duty: "
-                                       f"{loop.motor_torque(loop.minimum_duty):.3g} N m"))
+        found.append(("startup force", _startup(loop)))
     start = ("no error moves the free shaft" if math.isnan(loop.start_error) else
              f"an error of {_deg(loop.start_error)} moves the free shaft")
     found.append(("friction", f"{loop.friction_torque:.3g} N m: a band of {_deg(loop.friction_error)} either way; "
@@ -48,6 +47,15 @@ def loop_pairs(loop: Loop, torque: float | None = None) -> list[tuple[str, str]]
         found.append((f"droop for {torque:.3g} N m", _droop(loop, torque)))
     found += [(f"trips by {each.kind}", _protection(each)) for each in loop.protections]
     return found if loop.protections else [*found, ("trips", "by nothing that is known of it")]
+
+
+def _startup(loop: Loop) -> str:
+    """Return the torque of the smallest duty, and that it moves the free shaft where it exceeds friction."""
+    torque, friction = loop.motor_torque(loop.minimum_duty), loop.friction_torque
+    said = f"{_percent(loop.minimum_duty)} of the duty: {torque:.3g} N m"
+    if not loop.startup_moves:
+        return said
+    return f"{said}, more than the friction of {friction:.3g} N m: every duty that is not 0 moves the free shaft"
 
 
 def _droop(loop: Loop, torque: float) -> str:
@@ -81,7 +89,7 @@ def loop_facts(loop: Loop, torque: float | None = None) -> dict[str, Any]:
     """Return the same in SI, ready for JSON."""
     found: dict[str, Any] = {name: getattr(loop, name) for name in (
         "stiffness", "dead_zone", "count", "minimum_duty", "most_duty", "has_integral", "friction_torque",
-        "friction_error", "start_error", "cap_error", "cap_torque", "cap_lifts")}
+        "friction_error", "start_error", "startup_moves", "cap_error", "cap_torque", "cap_lifts")}
     if torque is not None and torque >= 0.0:
         found["droop"] = dict(zip(("held", "lifted"), loop.droop(torque), strict=True))
     return found | {"protections": [each._asdict() for each in loop.protections]}

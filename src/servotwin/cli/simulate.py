@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from servotwin.signals import Signal
     from servotwin.simulation import Result
 
+_LOOKED_AT = 3.0  # s of a servo that does not rest, for what would stop it
 _MOST_FRAMES = 1e6  # they take an hour, and each is kept for metrics and energy
 
 
@@ -77,8 +78,8 @@ def simulate(
     made = model_of(servo, model, change or [], register=register or [])
     result = _run(made, words, load or [], duration, output_step, seed)
     found = _write(result, targets, force=force)
-    found |= {"command": words.described(duration), "load": load_words.described(load or []),
-              "files": [str(target.path) for target in targets]}
+    found |= {"remedies": _remedies(result), "command": words.described(duration),
+              "load": load_words.described(load or []), "files": [str(target.path) for target in targets]}
     _report(found, as_json=as_json)
 
 
@@ -139,6 +140,19 @@ def _write(result: Result, targets: list[Target], *, force: bool) -> dict[str, A
 
                 plotting.save(plotting.time_response(result), draft)
         return facts(result)
+
+
+def _remedies(result: Result) -> list[dict[str, Any]]:
+    """Return which numbers would bring a servo to rest that does not come there, or buzzes; none of another."""
+    from servotwin.datasheet import buzz
+    from servotwin.models.switched import SwitchedServo
+
+    rest, model = result.rest, result.model
+    if rest is None or not rest.restless or not isinstance(model, SwitchedServo):
+        return []
+    with patience("looking for what would stop it"):
+        found = buzz(model, result.load, result.command, duration=min(result.ended, rest.since + _LOOKED_AT))
+    return [remedy._asdict() for remedy in found.remedies]
 
 
 def _report(found: dict[str, Any], *, as_json: bool) -> None:

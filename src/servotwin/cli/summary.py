@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from servotwin import units
+from servotwin.cli.rest_words import remedy_words, rest_words
 from servotwin.errors import InputError
 from servotwin.models import MODELS
-from servotwin.simulation.remarks import Remark, drive_words
+from servotwin.simulation.remarks import Remark
+from servotwin.simulation.rest import Rest
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -49,7 +51,7 @@ def facts(result: Result) -> dict[str, Any]:
         "step_metrics": None if metrics is None else dataclasses.asdict(metrics),
         "time_to_target": math.nan if metrics is None else metrics.arrival_time,
         "holding_error": result.holding_error,
-        "rest": None if result.rest is None else result.rest.facts,
+        "rest": None if result.rest is None else result.rest._asdict(),
         "mean_current": result.mean_current,
         "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
         "energy": dataclasses.asdict(result.energy),
@@ -102,7 +104,7 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows.append((_angle_label(found), f"{_deg(found['final_angle']):z.2f} deg"))
     rows += _arrival_rows(found)
     rows += _step_rows(found.get("step_metrics"))
-    rows += _rest_rows(found.get("rest"))
+    rows += _rest_rows(found)
     rows.append(("current", f"{found['mean_current']:z.3f} A in the mean, {found['peak_current']:z.3f} A at most"))
     energy = found["energy"]
     parts = [f"{name} {energy[name]:.4g} J" for name in _ENERGY if abs(energy.get(name, 0.0)) > 1e-9]
@@ -167,12 +169,16 @@ def _step_rows(metrics: Mapping[str, float] | None) -> list[tuple[str, str]]:
     return [*rows, ("peak speed", f"{speed:z.1f} deg/s")]
 
 
-def _rest_rows(rest: Mapping[str, Any] | None) -> list[tuple[str, str]]:
-    """Return how the bridge drives where nothing changes any more; nothing where it does not."""
-    if rest is None or not rest["duty"] > 0.0 or rest["moves_on"]:
+def _rest_rows(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return how the bridge drives where nothing changes any more, and what would stop it; nothing of a quiet servo."""
+    from servotwin.datasheet import Remedy
+
+    rest = None if found.get("rest") is None else Rest(**found["rest"])
+    if rest is None or not rest.duty > 0.0 or rest.moves_on:
         return []
-    label = "at rest" if rest["stands"] else "at the end"
-    return [(label, drive_words(rest["drive_rate"], rest["duty"], rest["current"]))]
+    rows = [("at rest" if rest.stands else "at the end", rest_words(rest))]
+    stops = remedy_words(tuple(Remedy(**each) for each in found.get("remedies", ())))
+    return [*rows, *([("would stop it", stops)] if stops else [])]
 
 
 def _deg(angle: float) -> float:

@@ -1,5 +1,6 @@
 """A servo's sheet as it should have been: curves, holding, lifting and warming, and which servo lifts what."""
 
+from servotwin.datasheet.buzz import Buzz, Remedy, buzz
 from servotwin.datasheet.curve import OperatingPoint, SpeedCurve
 from servotwin.datasheet.full_drive import FullDrive, Swing
 from servotwin.datasheet.holding import Held
@@ -10,7 +11,7 @@ from servotwin.datasheet.warming import Masses, Warming, thermal_masses
 from servotwin.datasheet.which import Lifter, Lifters, Refused, servos_that_lift
 
 __all__ = [
-    "Bandwidth", "DataSheet", "FullDrive", "Held", "Lift", "Lifter", "Lifters", "Loop", "Masses", "OperatingPoint",
-    "Protection", "Refused", "SpeedCurve", "Standing", "Swing", "VoltageSheet", "Warming", "curves", "lift_of",
-    "servos_that_lift", "thermal_masses",
+    "Bandwidth", "Buzz", "DataSheet", "FullDrive", "Held", "Lift", "Lifter", "Lifters", "Loop", "Masses",
+    "OperatingPoint", "Protection", "Refused", "Remedy", "SpeedCurve", "Standing", "Swing", "VoltageSheet", "Warming",
+    "buzz", "curves", "lift_of", "servos_that_lift", "thermal_masses",
 ]

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 SETTLE, LOOK = 1.5, 0.5  # s: what is told of standing holds for the mean of the last half second of two, or more
 _STANDS = math.radians(2.0)  # rad/s: what goes faster at the end does not stand
 _FURTHEST_STEP = math.radians(20.0)
-_WAIT = 0.2  # s, in which a command either moves the shaft or does not
-_MOVED = 1e-9  # rad
+_WAIT, _MEAN = 1.0, 0.1  # s, after which a command has been followed or not, and over which the angle is averaged
+_FOLLOWED = 0.5  # of the command
 _HALVINGS = 18
 _TRIPS = "trips by "  # begins the events of a protection
 
@@ -89,25 +89,25 @@ def holding_errors(model: Model, stall_torque: float, shares: tuple[float, ...] 
 
 
 def smallest_move(model: Model) -> float:
-    """Return the smallest step of the command that moves the shaft, from where there is no error [rad].
+    """Return the smallest step that the free shaft follows to half, from where there is no error [rad].
 
-    The potentiometer's noise is left out: with it every command moves a little now and then.
+    It has a second for that. The potentiometer's noise is left out: with it every command moves a little now and then.
     """
     free, start = _without_stops(model), mid_travel(model)
     low, high = 0.0, _FURTHEST_STEP
-    if not _moves(free, start, high):
+    if not _follows(free, start, high):
         return math.nan
     for _ in range(_HALVINGS):
         half = 0.5 * (low + high)
-        low, high = (low, half) if _moves(free, start, half) else (half, high)
+        low, high = (low, half) if _follows(free, start, half) else (half, high)
     return high
 
 
-def _moves(model: Model, start: float, step: float) -> bool:
+def _follows(model: Model, start: float, step: float) -> bool:
     result = simulate(model, signals.step(start, start + step, at=0.0, unit="rad"), duration=_WAIT,
-                      output_times=[0.0, _WAIT])
-    before, after = result["output_angle"].tolist()
-    return bool(abs(after - before) > _MOVED)
+                      output_times=np.append(0.0, np.linspace(_WAIT - _MEAN, _WAIT, 11)))
+    before, *after = result["output_angle"].tolist()
+    return bool(float(np.mean(after)) - before >= _FOLLOWED * step)
 
 
 def _without_stops(model: Model) -> Model:

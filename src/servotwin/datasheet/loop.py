@@ -158,6 +158,11 @@ class Loop:
         """The smallest error that moves the free shaft; nan where none does [rad]."""
         return self._first(lambda e: self.at(e).lifts > 0.0)
 
+    @property
+    def startup_moves(self) -> bool:
+        """Whether the torque of the smallest duty exceeds friction: no error is small enough to be left alone."""
+        return self.minimum_duty > 0.0 and self.motor_torque(self.minimum_duty) > self.friction_torque
+
     @cached_property
     def cap_error(self) -> float:
         """The smallest error at which the motor gives all that duty and current may be [rad]."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from servotwin.datasheet.buzz import Buzz, buzz
 from servotwin.datasheet.conditions import at_temperatures, at_voltage, warned_once
 from servotwin.datasheet.curve import SpeedCurve, speed_curve
 from servotwin.datasheet.holding import Held, holding_errors, smallest_move
@@ -57,7 +58,7 @@ class VoltageSheet:
     cold, hot : SpeedCurve
         With all parts at 25 °C, and warm.
     smallest_move : float
-        The smallest step of the command that moves the free shaft [rad].
+        The smallest step of the command that the free shaft follows to half [rad].
     smallest_pulse : float
         The same as a pulse width; nan where the model has no pulses [s].
     holding : tuple of Held
@@ -70,6 +71,8 @@ class VoltageSheet:
         Where a mass was given.
     loop : Loop, optional
         Of a digital servo.
+    buzz : Buzz, optional
+        How the servo drives at rest without a load; none of one that turns without end.
     """
 
     voltage: float
@@ -82,6 +85,7 @@ class VoltageSheet:
     printed: tuple[PrintedPoint, ...]
     lift: Lift | None
     loop: Loop | None
+    buzz: Buzz | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -210,7 +214,7 @@ def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: flo
         smallest_move=step, smallest_pulse=_as_pulse(model, step), holding=holding_errors(model, cold.stall_torque),
         bandwidth=bandwidths(model) if bandwidth else (),
         printed=printed,
-        lift=None if lift is None else lift_of(model, *lift), loop=loop_of(model))
+        lift=None if lift is None else lift_of(model, *lift), loop=loop_of(model), buzz=buzz(model))
 
 
 def _as_pulse(model: Model, angle: float) -> float:

@@ -182,17 +182,16 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
                              not math.isnan(refused), final)
     said = tuple(Remark(remark.kind, remark.time) for remark in lane_remarks([refused], [marks], end))
     trips = () if firmware is None else _trips(result, last)
-    held = not said and not any(ending.starts(numbers, forward, 0.0, tau, final[0]) for forward in (True, False))
-    return (*said, *trips, *_of_rest(result.rest, end, held=held))
+    return (*said, *trips, *_of_rest(result.rest, end, alone=not said))
 
 
-def _of_rest(rest: Rest | None, end: float, *, held: bool) -> tuple[Remark, ...]:
-    """Return that a shaft does not come to rest, or that its bridge switches although friction would hold it."""
+def _of_rest(rest: Rest | None, end: float, *, alone: bool) -> tuple[Remark, ...]:
+    """Return that a shaft does not come to rest, or, where nothing else is to be said, that it buzzes there."""
     if rest is None:
         return ()
     if rest.swing > 0.0:
         return (Remark(NOT_AT_REST, end, swing=rest.swing, frequency=rest.frequency),)
-    if held and rest.buzzes:
+    if alone and rest.buzzes:
         return (Remark(BUZZES, end, rate=rest.drive_rate, duty=rest.duty, current=rest.current),)
     return ()
 

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models import DigitalServo, PulseServo, PulseServoInductive
+from servotwin.models.engine.ending import piece_before, starts
 from servotwin.models.switched import SwitchedServo
 from servotwin.models.terms.duty import drives
+from servotwin.physics.pieces import piece_value
 from servotwin.simulation.metrics import mean_current
 
 if TYPE_CHECKING:
@@ -34,7 +36,8 @@ _LEGS = 4  # ways between two reversals, which two periods have
 _KEEPS = 0.75  # part of the swing before that one that does not decay still has
 _LATE = 3.0  # times as long as such ways take: a shaft that has not turned back for longer stands
 _LONGEST = 10.0  # s that are looked at
-_SAMPLE, _GLANCE = 1e-3, 4.7e-3  # s; the second is no part of a usual frame
+_ROUNDING = 1e-9  # s
+_SAMPLE = 3e-3  # s: shafts do not swing faster than some 30 Hz
 _STAYS = 0.9  # part of the duty before that one that does not fade still has
 
 
@@ -77,6 +80,8 @@ class Rest(NamedTuple):
         Mean of the supply there; of a model without one, that of the motor regardless of its sign [A].
     fades : bool
         Whether the duty is well below that of half of the time before: of a shaft that creeps to where it stands.
+    held : bool
+        Whether friction alone holds the shaft against its load where it is.
     """
 
     since: float
@@ -87,6 +92,7 @@ class Rest(NamedTuple):
     duty: float
     current: float
     fades: bool
+    held: bool
 
     @property
     def stands(self) -> bool:
@@ -95,18 +101,18 @@ class Rest(NamedTuple):
 
     @property
     def buzzes(self) -> bool:
-        """Whether the shaft is at rest, and its bridge switches on and on."""
-        return self.stands and self.drive_rate > 0.0 and not self.fades
+        """Whether the shaft is at rest where friction would hold it, and its bridge switches on and on."""
+        return self.stands and self.held and self.drive_rate > 0.0 and not self.fades
+
+    @property
+    def restless(self) -> bool:
+        """Whether the shaft does not come to rest, or buzzes there."""
+        return self.swing > 0.0 or self.buzzes
 
     @property
     def moves_on(self) -> bool:
         """Whether the shaft is still on its way."""
         return self.swing == 0.0 and self.travel >= AT_REST
-
-    @property
-    def facts(self) -> dict[str, float | bool]:
-        """All numbers by name (SI), and what they come to."""
-        return {**self._asdict(), "stands": self.stands, "buzzes": self.buzzes, "moves_on": self.moves_on}
 
 
 def swing_of(time: Array, angle: Array) -> Swing:
@@ -183,10 +189,11 @@ def still_since(command: Signal, load: Load, end: float) -> float:
                *(last for _, last in command.silences if last < end), 0.0)
 
 
-def rest_of(result: Result) -> Rest | None:
+def rest_of(result: Result, *, with_current: bool = True) -> Rest | None:
     """Return what a servo does where command and load stand still at the end of a run; None where that is too short.
 
-    A motor, a servo that turns without end, and a run that ended before its time have none.
+    A motor, a servo that turns without end, and a run that ended before its time have none. The current, which takes
+    longer than all else, is nan where it is not asked for.
     """
     model, end = result.model, result.ended
     if not result.status.ok or model.endless or "command_angle" not in model.available:
@@ -196,12 +203,16 @@ def rest_of(result: Result) -> Rest | None:
     if not since <= begun:
         return None
     step = look_period(model, framed=result.command.edges is None)
-    swing, (_, angles) = _swing(result, since, step), _angles(result, begun, step)
+    time = looks_at(max(since, end - _LONGEST), end, step)
+    angle = result.at("output_angle", time)
+    swing = swing_of(time, angle)
     middle = 0.5 * (since + end)
     rate, duty = _drives(result, begun, end)
     _, before = _drives(result, max(middle - 0.5 * LEAST_REST, since), min(middle + 0.5 * LEAST_REST, end))
-    return Rest(since=since, swing=swing.swing, frequency=swing.frequency, travel=float(np.ptp(angles)),
-                drive_rate=rate, duty=duty, current=mean_current(result, begun), fades=duty < _STAYS * before)
+    current = mean_current(result, begun) if with_current else math.nan
+    return Rest(since=since, swing=swing.swing, frequency=swing.frequency,
+                travel=float(np.ptp(angle[time >= begun - _ROUNDING])), drive_rate=rate, duty=duty, current=current,
+                fades=duty < _STAYS * before, held=_held(result))
 
 
 def look_period(model: Model, *, framed: bool = True) -> float:
@@ -212,20 +223,17 @@ def look_period(model: Model, *, framed: bool = True) -> float:
     return model.frame_period if framed and isinstance(model, PulseServo | PulseServoInductive) else _SAMPLE
 
 
+def _held(result: Result) -> bool:
+    """Tell whether friction holds the shaft against its load where it is, without any torque of the motor."""
+    end, load = result.ended, result.load
+    numbers, tau = result.model.plant(load), piece_value(piece_before(load.torque_pieces.rows, end, False), end)
+    angle = float(result.at("output_angle", [end])[0])
+    return not any(starts(numbers, forward, 0.0, tau, angle) for forward in (True, False))
+
+
 def looks_at(since: float, end: float, step: float) -> Array:
     """Return the times [s] up to an end, one step from the other, of which none is before `since`."""
     return np.maximum(end - step * np.arange(int((end - since) / step), -1.0, -1.0), since)
-
-
-def _swing(result: Result, since: float, step: float) -> Swing:
-    since = max(since, result.ended - _LONGEST)
-    _, glance = _angles(result, 0.5 * (since + result.ended), max(step, _GLANCE))
-    return NONE if np.ptp(glance) < 0.5 * AT_REST else swing_of(*_angles(result, since, step))
-
-
-def _angles(result: Result, since: float, step: float) -> tuple[Array, Array]:
-    time = looks_at(since, result.ended, step)
-    return time, result.at("output_angle", time)
 
 
 def _drives(result: Result, start: float, end: float) -> tuple[float, float]:
