@@ -16,6 +16,7 @@ from servotwin.logs import LOG_FORMATS
 from servotwin.models import MODELS
 from servotwin.models.outputs import SIGNALS
 from servotwin.parameters import GROUPS, catalog_names, load_servo
+from servotwin.parameters.plausible import AT_OUTPUT, plausible_range
 from servotwin.units import DIMENSIONS, si_unit
 
 _GREEK = ("alpha", "beta", "tau")
@@ -59,11 +60,20 @@ def parameters() -> str:
             rule, dimension = f.metadata["rule"], f.metadata["dimension"]
             allowed = " or ".join(f'`"{word}"`' for word in rule) if isinstance(rule, tuple) else _RULES[rule]
             si = "" if dimension == "word" else unit(si_unit(dimension))
-            rows.append((f"`{f.name}`", symbol(f.metadata["symbol"]), si, allowed, _formulas(f.metadata["meaning"])))
+            rows.append((f"`{f.name}`", symbol(f.metadata["symbol"]), si, allowed, _plausible(f"{group}.{f.name}"),
+                         _formulas(f.metadata["meaning"])))
         summary = (inspect.getdoc(kind) or "").splitlines()[0]
         parts.append(f"### `{group}`\n\n{summary}\n\n"
-                     + markdown(("parameter", "symbol", "unit", "range", "meaning"), rows))
+                     + markdown(("parameter", "symbol", "unit", "range", "plausible", "meaning"), rows))
     return "\n\n".join(parts)
+
+
+def _plausible(name: str) -> str:
+    """Return the plausible range of a parameter, and where it holds at the output shaft."""
+    found = plausible_range(name)
+    if found is None:
+        return ""
+    return f"{found.low:.3g} to {found.high:.3g}" + (" at the output" if name in AT_OUTPUT else "")
 
 
 def models() -> str:

@@ -194,6 +194,10 @@ class BenchError(ServotwinError, OSError):
         return "".join(c if c.isprintable() else repr(c)[1:-1] for c in f"{self.what}: {self.problem}")
 
 
+class PlausibilityWarning(UserWarning):
+    """A number of a servo is possible, but far from those of servos: its unit is probably another."""
+
+
 def _rebuild(kind: type[InputError], args: tuple[object, ...], state: dict[str, object]) -> InputError:
     error = kind.__new__(kind)
     error.args = args

@@ -79,9 +79,9 @@ def check(
     from servotwin.cli.servo_facts import readiness
     from servotwin.parameters import load_servo
 
-    servo = load_servo(file)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
+        servo = load_servo(file)
         models = readiness(servo)
     found = {
         "file": str(file), "id": servo.name, "title": servo.title, "kind": servo.kind, "parameters": len(servo.names()),

@@ -110,7 +110,7 @@ def _models(servos: list[str], model: str | None, change: list[str], register: l
     from servotwin.cli.model_words import model_of
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # which model stands for which kind is said in the notes
+        warnings.filterwarnings("ignore", message=".*: computed as a")  # the notes say which model stands for it
         return [model_of(servo, model, change, _MODELS, register) for servo in servos]
 
 

@@ -42,6 +42,11 @@ def load_servo(name: str | Path) -> Servo:
     ServoFileError
         If the file cannot be read or holds something wrong.
 
+    Warns
+    -----
+    UserWarning
+        Of each value of a file that is not plausible.
+
     Examples
     --------
     >>> load_servo("hitec-hs-755hb").title

@@ -55,20 +55,48 @@ def _of_lane(value: Any, lane: int | None) -> Any:
     return value[lane].item() if isinstance(value, np.ndarray) else value
 
 
-def parameter(symbol: str, dimension: str, rule: str, meaning: str) -> Any:
+class Plausible(NamedTuple):
+    """Between which numbers (SI) a parameter of a servo lies, and by what source; others have probably a wrong unit."""
+
+    low: float
+    high: float
+    source: str
+
+
+class Basis(NamedTuple):
+    """What plausible ranges are taken from."""
+
+    source: str
+
+    def of(self, low: float, high: float) -> Plausible:
+        """Return a range (SI) with this source."""
+        return Plausible(low, high, self.source)
+
+
+CATALOG = Basis("the servos of the catalog and about ten times beyond; assumed")
+THEORY = Basis("values and priors of the theory pages and about ten times beyond; assumed")
+PROGRAMS = Basis("registers and programs of digital and bus servos and about ten times beyond; assumed")
+TURNS = Basis("about three turns either way; assumed")
+CELSIUS = Basis("temperatures that servos bear; assumed")
+SHARE = Basis("a share, by what it means")
+
+
+def parameter(symbol: str, dimension: str, rule: str, meaning: str, plausible: Plausible) -> Any:
     """Declare a number that may be absent."""
-    return field(default=None, metadata={"symbol": symbol, "dimension": dimension, "rule": rule, "meaning": meaning})
+    return field(default=None, metadata={"symbol": symbol, "dimension": dimension, "rule": rule, "meaning": meaning,
+                                         "plausible": plausible})
 
 
-def table(symbol: str, dimension: str, meaning: str) -> Any:
+def table(symbol: str, dimension: str, meaning: str, plausible: Plausible) -> Any:
     """Declare a table of numbers that may be absent."""
     return field(default=None, metadata={"symbol": symbol, "dimension": dimension, "rule": "table",
-                                         "meaning": meaning})
+                                         "meaning": meaning, "plausible": plausible})
 
 
 def choice(options: tuple[str, ...], meaning: str) -> Any:
     """Declare a word out of a few that may be absent."""
-    return field(default=None, metadata={"symbol": "", "dimension": "word", "rule": options, "meaning": meaning})
+    return field(default=None, metadata={"symbol": "", "dimension": "word", "rule": options, "meaning": meaning,
+                                         "plausible": None})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from servotwin.parameters.servo import Servo
+if TYPE_CHECKING:
+    from servotwin.parameters.servo import Servo
 
 N = "gear.gear_reduction"
 

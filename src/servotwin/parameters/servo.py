@@ -22,6 +22,7 @@ from servotwin.parameters.groups import (
     Supply,
     Thermal,
 )
+from servotwin.parameters.plausible import warn_of
 from servotwin.parameters.quantity import SET_BY_USER, Quantity
 from servotwin.units import si_unit
 
@@ -164,6 +165,11 @@ class Servo:
         ------
         ParameterError, UnknownNameError
             If a value is not physical, or a name unknown.
+
+        Warns
+        -----
+        UserWarning
+            Of each new value that is not plausible.
         """
         changed: dict[str, dict[str, Value | None]] = {}
         for name, value in values.items():
@@ -176,7 +182,9 @@ class Servo:
             value = getattr(groups[group], key)
             if value is not None:
                 quantities[name] = _replaced(name, value, source)
-        return replace(self, quantities=quantities, **groups)
+        made = replace(self, quantities=quantities, **groups)
+        warn_of(made, [name for name in values if made.get(name) != self.get(name)])
+        return made
 
     def continuous(self, fixed_angle: float) -> Servo:
         """Return the servo rebuilt to turn without end: its potentiometer off the shaft, its stops taken away.
@@ -248,6 +256,11 @@ def servo_from_values(name: str, values: Mapping[str, Mapping[str, Value]], *, t
     ParameterError, UnknownNameError
         If a value is not physical, or a name unknown.
 
+    Warns
+    -----
+    UserWarning
+        Of each value that is not plausible.
+
     Examples
     --------
     >>> servo_from_values("mine", {"gear": {"gear_reduction": 280.0}}).source("gear.gear_reduction").origin
@@ -262,7 +275,9 @@ def servo_from_values(name: str, values: Mapping[str, Mapping[str, Value]], *, t
         for key in entries:
             check_name(f"{group}.{key}")
         groups[group] = GROUPS[group](**entries)
-    return Servo(name=name, title=title, kind=kind, **groups)  # type: ignore[arg-type]
+    made = Servo(name=name, title=title, kind=kind, **groups)  # type: ignore[arg-type]
+    warn_of(made, made.names())
+    return made
 
 
 def check_name(name: str) -> tuple[str, str]:

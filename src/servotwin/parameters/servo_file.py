@@ -14,6 +14,7 @@ from servotwin.errors import OutputError, ParameterError, ServoFileError, UnitEr
 from servotwin.parameters.group import Group
 from servotwin.parameters.groups import GROUPS
 from servotwin.parameters.output_file import write_file
+from servotwin.parameters.plausible import warn_of
 from servotwin.parameters.quantity import ORIGINS, Quantity
 from servotwin.parameters.servo import KINDS, Servo, unit_of
 
@@ -84,11 +85,19 @@ def _servo_of(content: dict[str, Any], label: str) -> Servo:
             quantities |= found
     sheet, fit = _table(label, content, "sheet"), _table(label, content, "fit")
     try:
-        return Servo(name=content["name"], title=content.get("title", content["name"]), notes=content.get("notes", ""),
-                     kind=kind_of_servo, sheet=sheet, fit=fit, quantities=quantities,
-                     **groups)  # type: ignore[arg-type]
+        servo = Servo(
+            name=content["name"], title=content.get("title", content["name"]), notes=content.get("notes", ""),
+            kind=kind_of_servo, sheet=sheet, fit=fit, quantities=quantities, **groups)  # type: ignore[arg-type]
     except ParameterError as error:  # what two groups say together
         raise ServoFileError(label, f"{error.what} is not possible", got=error.got, allowed=error.allowed) from None
+    warn_of(servo, servo.names(), lambda name: _unit_in(content, name), stacklevel=5)
+    return servo
+
+
+def _unit_in(content: Mapping[str, Any], name: str) -> str | None:
+    table, _, key = name.partition(".")
+    unit = content[table][key].get("unit")
+    return None if unit is None else str(unit)
 
 
 def _read_toml(read: Callable[[], str], label: str) -> dict[str, Any]:

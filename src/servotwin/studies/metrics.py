@@ -51,8 +51,7 @@ METRICS: dict[str, Metric] = {
 }
 """By name; besides, ``end_`` and the name of a signal is that signal at the end of the run."""
 
-OF_STEP = ("overshoot", "rise_time", "settling_time", "steady_error", "rest_swing", "peak_current",
-           "end_output_angle")
+OF_STEP = ("overshoot", "rise_time", "settling_time", "steady_error", "peak_current", "end_output_angle", "rest_swing")
 OF_OTHERS = ("rms_error", "peak_error", "peak_current", "end_output_angle")
 OF_ENDLESS = ("slew_rate", "peak_current", "end_output_speed", "end_output_angle")
 _ENDS = "end_"
@@ -78,7 +77,8 @@ def checked_metrics(metrics: Sequence[str] | None, model: Model, command: Signal
     """
     start = step_time(command)
     if metrics is None:
-        return OF_ENDLESS if model.endless else OF_STEP if start < duration else OF_OTHERS
+        usual = OF_ENDLESS if model.endless else OF_STEP if start < duration else OF_OTHERS
+        return tuple(name for name in usual if name != "rest_swing" or duration - start >= LEAST_REST)
     names = (metrics,) if isinstance(metrics, str) else tuple(dict.fromkeys(metrics))
     had = {name: set(metric.signals) <= set(model.available) for name, metric in METRICS.items()}
     known = (*(name for name in METRICS if had[name]), *(f"{_ENDS}{name}" for name in model.available))
