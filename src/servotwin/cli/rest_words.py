@@ -29,7 +29,7 @@ def rest_words(rest: Rest | None) -> str:
     --------
     >>> import servotwin as st
     >>> rest_words(st.datasheet.buzz(st.PulseServo(st.load_servo("hitec-hs-755hb"))).rest)
-    'drives 50 times a second, duty 0.77 %, 0.014 A in the mean, less and less'
+    'drives 50 times a second, duty 0.6 %, 0.011 A in the mean, less and less'
     """
     if rest is None or rest.moves_on:
         return ""

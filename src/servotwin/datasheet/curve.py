@@ -31,7 +31,7 @@ class OperatingPoint(NamedTuple):
     efficiency: float
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class SpeedCurve:
     """What a servo does at full drive, from standing still to turning freely.
 
@@ -60,6 +60,10 @@ class SpeedCurve:
     current: Array
     power: Array
     efficiency: Array
+
+    def __repr__(self) -> str:
+        return (f"SpeedCurve({self.drive.model!r}, stall {self.stall_torque:.3g} N m, "
+                f"no load {self.no_load_speed:.3g} rad/s)")
 
     @property
     def stall_torque(self) -> float:

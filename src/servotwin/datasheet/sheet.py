@@ -18,6 +18,7 @@ from servotwin.datasheet.loop import Loop, loop_of
 from servotwin.datasheet.warming import HOT_WINDING, MAGNET_COEFFICIENT, masses_by_mass, thermal_masses
 from servotwin.errors import InputError
 from servotwin.linear import frequency_response
+from servotwin.look import escape, number, table
 from servotwin.models import Model, mid_travel
 from servotwin.parameters import PrintedPoint, printed_points
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, Temperatures
@@ -47,7 +48,7 @@ class Bandwidth(NamedTuple):
     frequency: float
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class VoltageSheet:
     """What a servo does at one supply voltage.
 
@@ -87,8 +88,11 @@ class VoltageSheet:
     loop: Loop | None
     buzz: Buzz | None = None
 
+    def __repr__(self) -> str:
+        return f"VoltageSheet({self.voltage:g} V, stall {self.cold.stall_torque:.3g} N m)"
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class DataSheet:
     """A servo's sheet, computed: one part for each supply voltage.
 
@@ -101,6 +105,17 @@ class DataSheet:
 
     model: Model
     voltages: tuple[VoltageSheet, ...]
+
+    def __repr__(self) -> str:
+        return f"DataSheet({self.model!r}, {', '.join(f'{part.voltage:g} V' for part in self.voltages)})"
+
+    def _repr_html_(self) -> str:
+        """Return the main figures of each voltage, cold, as notebooks show them."""
+        head = ["V", "stall torque [N m]", "stall current [A]", "speed [rad/s]", "60° [s]", "smallest move [rad]"]
+        rows = [[number(x) for x in (part.voltage, part.cold.stall_torque, part.cold.stall_current,
+                                     part.cold.no_load_speed, part.cold.time_60, part.smallest_move)]
+                for part in self.voltages]
+        return table(head, rows, caption=escape(self.servo.title or self.servo.name))
 
     @property
     def servo(self) -> Servo:

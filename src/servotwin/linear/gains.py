@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ from servotwin.parameters import REGISTER_FAMILIES
 
 _TRIED = 60  # P gains for each D, evenly by their logarithm
 _RANGE = (0.02, 50.0)  # of P without a register, over what the servo has
+_NEXT = 1e-4  # of a gain: nothing is between two that are nearer
 _LEADS = (0.0, 0.005, 0.01, 0.02, 0.04)  # s, D over P without a register; as long as ticks and motors take
 
 
@@ -66,3 +68,25 @@ def _by_number(model: DigitalServo, *, derivative: bool) -> list[list[Gain]]:
             row.append(Gain(settings, DigitalServo(model.servo.replace(settings))))
         found.append(row)
     return found
+
+
+def between(low: Gain, high: Gain) -> Gain | None:
+    """Return a gain between two of one row, or around one servo; None where nothing is between them.
+
+    Examples
+    --------
+    >>> import servotwin as st
+    >>> model = st.PulseServo(st.load_servo("hitec-hs-755hb"))
+    >>> between(Gain({"outer_gain": 0.1}, model), Gain({"outer_gain": 0.4}, model)).settings
+    {'outer_gain': 0.2}
+    """
+    model = low.model
+    names = _REGISTERS.get(str(model.servo.sheet.get("registers")))
+    if names is not None and names.P in low.settings and isinstance(model, DigitalServo):
+        P = int(low.settings[names.P] + high.settings[names.P]) // 2
+        D = low.settings.get(names.D)
+        return None if P == low.settings[names.P] else _set(model, names, P, None if D is None else int(D))
+    if all(high.settings[name] <= value * (1.0 + _NEXT) for name, value in low.settings.items()):
+        return None
+    settings = {name: math.sqrt(value * high.settings[name]) for name, value in low.settings.items()}
+    return Gain(settings, DigitalServo(model.servo.replace(settings)) if isinstance(model, DigitalServo) else model)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.linear.balance import Balance, Turn
+from servotwin.linear.frequency_response import frequency_response
 from servotwin.linear.loops import check_size
 from servotwin.linear.transfer_function import check_model
 from servotwin.loads import as_load
@@ -25,6 +26,21 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+
+class Error(NamedTuple):
+    """How far off a response is.
+
+    Parameters
+    ----------
+    gain : ndarray, shape (F,)
+        Its magnitude over that of what it is compared with, less 1; nan where nothing moves.
+    phase : ndarray, shape (F,)
+        By what its phase is larger; nan where nothing moves [rad].
+    """
+
+    gain: Array
+    phase: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -79,6 +95,36 @@ class Linearised:
         turns = [self._turn(w) for w in _checked(frequencies)]
         found = np.array([0j if turn is None else p * turn.angle.first / turn.command for turn in turns])
         return found.reshape(np.shape(frequencies))
+
+    def error(self, frequencies: ArrayLike) -> Error:
+        """Return how far off simulated sines of the same model the response is, in gain and in phase.
+
+        Harmonics are left out of it, of friction and of the limit; they turn the phase more than they change the gain.
+
+        Parameters
+        ----------
+        frequencies : array_like, shape (F,)
+            ω, increasing [rad/s].
+
+        Raises
+        ------
+        InputError
+            If a frequency is not a finite positive number, or they do not increase.
+
+        Examples
+        --------
+        >>> import servotwin as st
+        >>> off = linearise(st.BoundedServo(st.load_servo("hitec-hs-755hb")), amplitude=0.6).error([12.0])
+        >>> bool(abs(off.gain[0]) < 0.1), bool(abs(off.phase[0]) < 0.1)
+        (True, True)
+        """
+        omega = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
+        found = self.response(omega)
+        truth = frequency_response(self.model, omega, amplitude=self.amplitude, mean=self.angle,
+                                   load=self.load).response[0]
+        with np.errstate(all="ignore"):
+            ratio = np.where((found == 0.0) | (truth == 0.0), np.nan, found / truth)
+        return Error(np.abs(ratio) - 1.0, np.angle(ratio))
 
     def sticks(self, frequencies: ArrayLike) -> NDArray[np.bool_]:
         """Return where the shaft stands for a while at its ends, or always; the sine is none there."""

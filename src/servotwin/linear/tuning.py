@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from servotwin import physics, signals
 from servotwin.errors import InputError
 from servotwin.linear.bursts import Bursts
-from servotwin.linear.gains import Gain, gains_of
+from servotwin.linear.gains import Gain, between, gains_of
 from servotwin.linear.outer_loop import OuterLoop, stepped
 from servotwin.linear.sampled import Margins, SampledServo, sampled
 from servotwin.linear.transfer_function import check_model
@@ -23,6 +23,8 @@ from servotwin.simulation import simulate_many
 from servotwin.units import is_finite
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from servotwin.loads import Load, Part
     from servotwin.models import Model
 
@@ -97,7 +99,8 @@ def tune(model: Model, load: Load | Part | None = None, *, overshoot: float | No
     overshoot : float, optional
         Of a simulated step, over its way; within 0.05 of it [1].
     phase_margin : float, optional
-        At least that, of the sampled loop without friction [rad].
+        At least that, of the sampled loop without friction, by the largest gain: bisected, or the largest number that
+        a register takes [rad].
     derivative : bool
         Whether D of a digital servo is looked for too.
     step : float
@@ -161,13 +164,23 @@ def _by_margin(task: _Task, rows: list[list[Gain]], wanted: float) -> Tuning:
             middle = (low + high) // 2
             enough = margin(row[middle]) >= wanted
             low, high = (middle + 1, high) if enough else (low, middle)
-        if low > 0 and (best is None or _stiffness(row[low - 1]) > _stiffness(best)):
-            best = row[low - 1]
+        if low == 0:
+            continue
+        found = row[low - 1] if low == len(row) else _largest(row[low - 1], row[low], lambda g: margin(g) >= wanted)
+        if best is None or _stiffness(found) > _stiffness(best):
+            best = found
     if best is None:
         most = max(margin(row[0]) for row in rows)
         raise InputError("phase margin", got=f"{math.degrees(wanted):.4g} deg",
                          allowed=f"at most {math.degrees(most):.4g} deg, that of the smallest gain")
     return _tuning(task, best, float(_overshoots(task, [best])[0]))
+
+
+def _largest(low: Gain, high: Gain, enough: Callable[[Gain], bool]) -> Gain:
+    """Return the largest gain from one that leaves enough up to one that does not."""
+    while (middle := between(low, high)) is not None:
+        low, high = (middle, high) if enough(middle) else (low, middle)
+    return low
 
 
 def _by_overshoot(task: _Task, rows: list[list[Gain]], wanted: float) -> Tuning:

@@ -34,14 +34,14 @@ def number(value: float, digits: int = 4) -> str:
 
 
 def fixed(value: float, places: int) -> str:
-    """Return a number with so many decimals; what rounds to zero has no sign.
+    """Return a number with so many decimals; what rounds to zero has no sign, and what is none is a dash.
 
     Examples
     --------
     >>> fixed(-0.9779, 2), fixed(-0.0001, 2)
     ('−0.98', '0.00')
     """
-    return f"{value:z.{places}f}".replace("-", MINUS)
+    return f"{value:z.{places}f}".replace("-", MINUS) if math.isfinite(value) else number(value)
 
 
 def with_error(value: float, error: float, unit: str = "") -> str:

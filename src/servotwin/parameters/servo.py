@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from servotwin.errors import ParameterError, UnknownNameError
+from servotwin.look import escape, number, table
 from servotwin.parameters.firmware import Firmware
 from servotwin.parameters.group import Group
 from servotwin.parameters.groups import (
@@ -38,7 +39,7 @@ _USUAL = {  # what people call it -> its name
 _PLACES = {f"{group}.{f.name}": (group, f.name) for group, kind in GROUPS.items() for f in fields(kind)}
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Servo:
     """All that is known of one servo; made by `load_servo` or `servo_from_values`.
 
@@ -112,6 +113,16 @@ class Servo:
         if known is not None and known.value == value:
             return known
         return Quantity(value=value, unit=unit_of(name), origin="assumed")
+
+    def __repr__(self) -> str:
+        return f"Servo({self.name!r}, kind={self.kind!r}, {len(self.names())} values)"
+
+    def _repr_html_(self) -> str:
+        """Return all values with unit, origin and source, as notebooks show them."""
+        known = {name: self.quantities[name] for name in self.names()}
+        rows = [[f"<code>{escape(name)}</code>", _shown(each.value), escape(each.unit), escape(each.origin),
+                 escape(each.source or "")] for name, each in known.items()]
+        return table(["parameter", "value", "unit", "origin", "source"], rows, caption=escape(self.title or self.name))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle by plain mappings."""
@@ -331,6 +342,12 @@ def unit_of(name: str) -> str:
 
 def _replaced(name: str, value: Value, source: str) -> Quantity:
     return Quantity(value=value, unit=unit_of(name), origin="assumed", source=source)
+
+
+def _shown(value: Value) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(map(number, value))
+    return escape(value) if isinstance(value, str) else number(value)
 
 
 def _rebuild(state: dict[str, Any]) -> Servo:

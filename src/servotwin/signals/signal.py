@@ -37,7 +37,7 @@ _MOST_FRAMES = 1e7
 _SAME = 1e-9  # of a frame: instants that are nearer are one, as for the engine
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Signal:
     """A command over time.
 
@@ -73,6 +73,10 @@ class Signal:
     silences: tuple[tuple[float, float], ...] = ()
     header: bytes = field(init=False, repr=False, compare=False)
     """What `headers` reads of it."""
+
+    def __repr__(self) -> str:
+        pieces, edges = len(self.pieces.table), "" if self.edges is None else f", {len(self.edges)} edges"
+        return f"Signal({self.kind}, given in {self.unit}, {pieces} piece{'s'[:pieces != 1]}{edges})"
 
     def __post_init__(self) -> None:
         kind = kind_of(self.unit)

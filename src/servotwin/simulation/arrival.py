@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ _STEPS = 2.0  # deadbands or counts, whichever is wider
 _NEAR = math.radians(1.0)  # a degree, as far as the step is long enough
 
 
-def resolution(model: Model) -> Real:
+def resolution(model: Model) -> Any:
     """Return within which angle a servo does not tell two apart: its deadband, of full width, or its count [rad].
 
     Of a model whose numbers are columns of lanes it is one.

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 _BUS_UNITS = {"bus_voltage": "V", "bus_current": "A"}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fleet(Mapping[str, Result]):
     """The outcome of a simulation of several servos on one supply: a mapping of their results.
 
@@ -76,6 +76,9 @@ class Fleet(Mapping[str, Result]):
     ended: float
     cause: str
     bus: Callable[[Array], Array]
+
+    def __repr__(self) -> str:
+        return f"Fleet({', '.join(self.results)}; {self.ended:g} s, {self.status.name}, {len(self.time)} times)"
 
     def __getitem__(self, name: str) -> Result:
         """Return the result of a servo."""

@@ -122,7 +122,7 @@ class Plan:
                       self.curve, self.seed, self.accuracy, (self.firmware,))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class State:
     """Everything that a servo remembers; picklable, comparable, and enough to go on from.
 
@@ -145,6 +145,10 @@ class State:
     memory: Memory
     numbers: Numbers | None = None
     changes: tuple[tuple[str, object], ...] = ()
+
+    def __repr__(self) -> str:
+        values = (f"{name}={value:.6g}" for name, value in zip(self.names, self.values, strict=True))
+        return f"State(time={self.time:g}, {', '.join(values)})"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from servotwin.errors import InputError
+from servotwin.look import number, table
 from servotwin.simulation.arrival import arrival_band, resolution, tolerance
 
 if TYPE_CHECKING:
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from servotwin.simulation.trajectory import Trajectory
 
 _LOOK = 0.1  # s, five usual frames
+
+
+_UNITS = {"rise_time": "s", "settling_time": "s", "arrival_time": "s", "overshoot": "", "slew_rate": "rad/s",
+          "peak_current": "A"}
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,11 @@ class StepMetrics:
     peak_current: float
     arrival_time: float = math.nan
     arrival_band: float = math.nan
+
+    def _repr_html_(self) -> str:
+        """Return all of them with their units (SI), as notebooks show them."""
+        return table(["metric", "value", "unit"], [
+            [f"<code>{name}</code>", number(value), _UNITS.get(name, "rad")] for name, value in asdict(self).items()])
 
 
 def step_metrics(result: Result) -> StepMetrics:

@@ -20,7 +20,7 @@ from servotwin.physics.motor import electromagnetic_torque
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -57,7 +57,7 @@ def drive_words(rate: float, duty: float, current: float) -> str:
     return f"drives {often}, duty {100.0 * duty:.2g} %, {current:.3f} A in the mean"
 
 
-_NUMBERS = {NOT_AT_REST: swing_words, BUZZES: drive_words}
+_NUMBERS: dict[str, Callable[..., str]] = {NOT_AT_REST: swing_words, BUZZES: drive_words}
 _MARKS = {ON_STOP: ending.ON_STOP, CANNOT_HOLD: ending.CANNOT_HOLD}
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin.errors import MissingExtraError, SimulationError
+from servotwin.look import escape, number, table
 from servotwin.models.engine.motion import is_step
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
@@ -44,7 +45,7 @@ class Stats:
     events: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """The outcome of a simulation; signals are computed when they are asked for.
 
@@ -76,6 +77,19 @@ class Result:
     status: Status
     ended: float
     cause: str
+
+    def __repr__(self) -> str:
+        return f"Result({self.model!r}, {self.ended:g} s, {self.status.name}, {len(self.time)} times)"
+
+    def _repr_html_(self) -> str:
+        """Return what the run came to, as notebooks show it."""
+        angle, events = self.model.layout[0], len(self.events)
+        rows = [["status", escape(f"{self.status.message}, {self.ended:g} s")],
+                *(["remark", escape(remark.words)] for remark in self.remarks),
+                [f"<code>{angle}</code> at the end", f"{number(float(self.at(angle, [self.ended])[0]))} rad"],
+                ["solved", escape(f"{self.stats.method}, {self.stats.motions} motions, {events} events")],
+                ["signals", ", ".join(f"<code>{name}</code>" for name in self.names)]]
+        return table(["", ""], rows, caption=escape(repr(self.model)), text_columns=2)
 
     @property
     def _signals(self) -> tuple[str, ...]:

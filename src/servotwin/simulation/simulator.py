@@ -82,6 +82,9 @@ class Simulator:
         self._others: dict[tuple[tuple[str, Any], ...], Simulator] = {}
         self._circuits: dict[float | None, tuple[Chip, Firmware]] = {}  # by the frame period of a command
 
+    def __repr__(self) -> str:
+        return f"Simulator({self.model!r})"
+
     def drive(self, command: Signal) -> Pieces:
         """Return the command as what the model follows [V]."""
         if not isinstance(command, Signal):

@@ -117,6 +117,9 @@ class VectorSimulator:
         self._entry: CEntry | None = None
         self.reset()
 
+    def __repr__(self) -> str:
+        return f"VectorSimulator({self._numbers.model!r}, lanes={len(self)})"
+
     def __len__(self) -> int:
         """Return the number of lanes."""
         return self._numbers.count
