@@ -125,3 +125,18 @@ def test_a_servo_without_motor_has_no_torque(cli, tmp_path):
     (tmp_path / "mine.toml").write_text('name = "x"\n')
     assert cli("catalog", "show", "mine.toml", "--json").data["twin_stall_torque"] is None
     assert "stall torque" not in cli("catalog", "show", "mine.toml").out
+
+
+def test_a_wrong_unit_in_a_file_or_an_option_is_warned_of(cli, tmp_path):
+    text = ('name = "mine"\n[electronics]\ndeadband = { value = 8, unit = "s", origin = "assumed" }\n')
+    (tmp_path / "mine.toml").write_text(text)
+    ended = cli("catalog", "check", "mine.toml")
+    assert ended.code == 0
+    said = "electronics.deadband of 8 s is not plausible (1e-07 to 0.0005 s): 8 us?"
+    assert f"warning: mine: {said}" in " ".join(ended.out.split())
+    assert cli("catalog", "check", "mine.toml", "--json").data["warnings"] == [f"mine: {said}"]
+    for words in (("simulate", "hitec-hs-755hb", "--step", "0:10"), ("curves", "hitec-hs-755hb", "--quick")):
+        ended = cli(*words, "--set", "gear.backlash=0.3", "--set", "gear.output_inertia=2e-6")
+        assert ended.code == 0
+        assert "gear.backlash of 0.3 rad is not plausible (0 to 0.2 rad): 0.3 deg?" in ended.err
+        assert ended.err.count("plausible") == 1
