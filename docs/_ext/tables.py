@@ -16,6 +16,7 @@ from servotwin.logs import LOG_FORMATS
 from servotwin.models import MODELS
 from servotwin.models.outputs import SIGNALS
 from servotwin.parameters import GROUPS, catalog_names, load_servo
+from servotwin.parameters.registers.listing import listed_models, rows_of
 from servotwin.units import DIMENSIONS, si_unit
 
 _GREEK = ("alpha", "beta", "tau")
@@ -192,6 +193,29 @@ def protocol_words() -> str:
     return markdown(("of", "numbers"), rows)
 
 
+def register_models() -> str:
+    """Return the models of bus servos, and of how many of their registers no page prints the value."""
+    models = listed_models()
+    rows = [(model.family, model.name, str(model.number), str(model.rows), str(model.assumed),
+             f"[page]({model.page})" if model.page else "none was seen") for model in models]
+    total = ("all", f"{len(models)} models", "", str(sum(m.rows for m in models)), str(sum(m.assumed for m in models)),
+             "")
+    return markdown(("family", "model", "number", "registers", "assumed", "page"), [*rows, total])
+
+
+def registers() -> str:
+    """Return the registers of every model, each with its value and where that is printed."""
+    parts = []
+    for model in listed_models():
+        rows = [(str(row.address), f"`{row.name}`", str(row.value), f"{row.lower} to {row.upper}",
+                 ", ".join(f"`{number}`" for number in row.numbers), row.document or "assumed")
+                for row in rows_of(model)]
+        head = markdown(("address", "register", "new", "range", "numbers of the firmware", "printed in"), rows)
+        parts.append(f"### {model.name}\n\n{model.family}, model number {model.number}; {model.assumed} of "
+                     f"{model.rows} assumed.\n\n{head}")
+    return "\n\n".join(parts)
+
+
 def _is_own(module, name: str) -> bool:
     item = getattr(module, name)
     return not name.startswith("_") and getattr(item, "__module__", None) == module.__name__
@@ -199,6 +223,7 @@ def _is_own(module, name: str) -> bool:
 
 TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "signals": signals,
           "units": units, "catalog": catalog, "log-formats": log_formats, "top-level": top_level, "api": api,
+          "register-models": register_models, "registers": registers,
           "protocol-messages": protocol_messages, "protocol-fields": protocol_fields,
           "protocol-numbers": protocol_numbers, "protocol-words": protocol_words}
 

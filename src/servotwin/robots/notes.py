@@ -16,7 +16,7 @@ _SLACK = math.radians(0.5)  # rad, of ends that goals are rounded to
 
 
 def notes_of(run: RobotRun) -> tuple[str, ...]:
-    """Return sentences on goals beyond the travel of a servo or the range of its joint, collisions, and energies.
+    """Return sentences on what was assumed of servos, on goals beyond travel or range, on collisions, and on energies.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def notes_of(run: RobotRun) -> tuple[str, ...]:
         if joint in ranges and _beyond(goals, ranges[joint], _SLACK * (mount.ratio if slides else 1.0)):
             said.append(f"goals of joint {joint} go {_between(goals, slides=slides)}, beyond its range in the model, "
                         f"{_ends(*ranges[joint], slides=slides)}")
-    return (*said, *(touch.words for touch in run.ideal.touches), *run.record.notes)
+    return (*run.remarks, *said, *(touch.words for touch in run.ideal.touches), *run.record.notes)
 
 
 def _beyond(values: np.ndarray[tuple[int], np.dtype[np.float64]], ends: tuple[float, float], slack: float) -> bool:
