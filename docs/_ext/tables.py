@@ -12,7 +12,7 @@ from dataclasses import fields
 
 import servotwin as st
 from servotwin.bench.wire import protocol
-from servotwin.logs import LOG_FORMATS
+from servotwin.logs import BAM_ACTUATORS, LOG_FORMATS
 from servotwin.models import MODELS
 from servotwin.models.outputs import SIGNALS
 from servotwin.parameters import GROUPS, catalog_names, load_servo
@@ -137,6 +137,15 @@ def log_formats() -> str:
     return markdown(("format", "what it is"), [(f"`{name}`", each.what) for name, each in LOG_FORMATS.items()])
 
 
+def bam_actuators() -> str:
+    """BAM's actuators, and what its code says of each."""
+    rows = [(f"`{name}`", f"sets the {one.sets}" if one.error_gain is None else f"{one.error_gain:.6g}",
+             "" if one.error_gain is None else f"{one.largest_duty:g}", "" if one.speed is None else f"{one.speed:.4g}",
+             one.source) for name, one in BAM_ACTUATORS.items()]
+    return markdown(("actuator", "duty per radian and unit of the gain [1/rad]", "largest duty", "speed [rad/s]",
+                     "where BAM says it"), rows)
+
+
 def top_level() -> str:
     """What `import servotwin as st` offers, and where it is described."""
     rows = []
@@ -222,7 +231,8 @@ def _is_own(module, name: str) -> bool:
 
 
 TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "signals": signals,
-          "units": units, "catalog": catalog, "log-formats": log_formats, "top-level": top_level, "api": api,
+          "units": units, "catalog": catalog, "log-formats": log_formats,
+          "bam-actuators": bam_actuators, "top-level": top_level, "api": api,
           "register-models": register_models, "registers": registers,
           "protocol-messages": protocol_messages, "protocol-fields": protocol_fields,
           "protocol-numbers": protocol_numbers, "protocol-words": protocol_words}
