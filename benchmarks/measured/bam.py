@@ -5,6 +5,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from bam_rule import ERROR_GAIN
 from report import row
 
 import servotwin as st
@@ -26,8 +27,9 @@ PUBLISHED = {
 FREE = ["motor.armature_resistance", "output_torque_constant", "output_inertia"]
 HELD_OUT = (0, 6, 11)  # one run of each gain, each of another trajectory
 RUNGS = ("M1", "M3")
-FITTED = BamConvention(frame_period=4e-3)  # a quarter of the frames, for time; errors of all are told at 1 ms
-TOLD = BamConvention()
+# a quarter of the frames, for time; errors of all are told at 1 ms
+FITTED = BamConvention(error_gain=ERROR_GAIN, frame_period=4e-3)
+TOLD = BamConvention(error_gain=ERROR_GAIN)
 
 
 def logs(folder: Path, convention: BamConvention) -> list[st.Log]:

@@ -16,7 +16,7 @@ from servotwin.identification import LogError
 Array = NDArray[np.float64]
 
 STEP = 5e-3  # s
-ERROR_GAIN = 0.00246  # duty per rad and unit of the gain, of the XL330
+ERROR_GAIN = 0.00246  # duty per rad and unit of the gain: what BAM's code had when its parameters here were found
 GRAVITY = 9.80665  # m/s2
 
 

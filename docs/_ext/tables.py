@@ -12,11 +12,12 @@ from dataclasses import fields
 
 import servotwin as st
 from servotwin.bench.wire import protocol
-from servotwin.logs import LOG_FORMATS
+from servotwin.logs import BAM_ACTUATORS, LOG_FORMATS
 from servotwin.models import MODELS
 from servotwin.models.outputs import SIGNALS
 from servotwin.parameters import GROUPS, catalog_names, load_servo
 from servotwin.parameters.plausible import AT_OUTPUT, plausible_range
+from servotwin.parameters.registers.listing import listed_models, rows_of
 from servotwin.units import DIMENSIONS, si_unit
 
 _GREEK = ("alpha", "beta", "tau")
@@ -146,6 +147,15 @@ def log_formats() -> str:
     return markdown(("format", "what it is"), [(f"`{name}`", each.what) for name, each in LOG_FORMATS.items()])
 
 
+def bam_actuators() -> str:
+    """BAM's actuators, and what its code says of each."""
+    rows = [(f"`{name}`", f"sets the {one.sets}" if one.error_gain is None else f"{one.error_gain:.6g}",
+             "" if one.error_gain is None else f"{one.largest_duty:g}", "" if one.speed is None else f"{one.speed:.4g}",
+             one.source) for name, one in BAM_ACTUATORS.items()]
+    return markdown(("actuator", "duty per radian and unit of the gain [1/rad]", "largest duty", "speed [rad/s]",
+                     "where BAM says it"), rows)
+
+
 def top_level() -> str:
     """What `import servotwin as st` offers, and where it is described."""
     rows = []
@@ -202,13 +212,38 @@ def protocol_words() -> str:
     return markdown(("of", "numbers"), rows)
 
 
+def register_models() -> str:
+    """Return the models of bus servos, and of how many of their registers no page prints the value."""
+    models = listed_models()
+    rows = [(model.family, model.name, str(model.number), str(model.rows), str(model.assumed),
+             f"[page]({model.page})" if model.page else "none was seen") for model in models]
+    total = ("all", f"{len(models)} models", "", str(sum(m.rows for m in models)), str(sum(m.assumed for m in models)),
+             "")
+    return markdown(("family", "model", "number", "registers", "assumed", "page"), [*rows, total])
+
+
+def registers() -> str:
+    """Return the registers of every model, each with its value and where that is printed."""
+    parts = []
+    for model in listed_models():
+        rows = [(str(row.address), f"`{row.name}`", str(row.value), f"{row.lower} to {row.upper}",
+                 ", ".join(f"`{number}`" for number in row.numbers), row.document or "assumed")
+                for row in rows_of(model)]
+        head = markdown(("address", "register", "new", "range", "numbers of the firmware", "printed in"), rows)
+        parts.append(f"### {model.name}\n\n{model.family}, model number {model.number}; {model.assumed} of "
+                     f"{model.rows} assumed.\n\n{head}")
+    return "\n\n".join(parts)
+
+
 def _is_own(module, name: str) -> bool:
     item = getattr(module, name)
     return not name.startswith("_") and getattr(item, "__module__", None) == module.__name__
 
 
 TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "signals": signals,
-          "units": units, "catalog": catalog, "log-formats": log_formats, "top-level": top_level, "api": api,
+          "units": units, "catalog": catalog, "log-formats": log_formats,
+          "bam-actuators": bam_actuators, "top-level": top_level, "api": api,
+          "register-models": register_models, "registers": registers,
           "protocol-messages": protocol_messages, "protocol-fields": protocol_fields,
           "protocol-numbers": protocol_numbers, "protocol-words": protocol_words}
 

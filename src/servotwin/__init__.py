@@ -13,8 +13,8 @@ __version__ = "0.1.0"
 
 # public name -> module that defines it
 _LAZY = {
-    **dict.fromkeys(("Servo", "catalog_names", "dynamixel_ax", "dynamixel_mx", "dynamixel_x", "feetech_sts",
-                     "load_dataset", "load_servo", "servo_from_values", "Supply"), "parameters"),
+    **dict.fromkeys(("Servo", "catalog_names", "dynamixel_ax", "dynamixel_mx", "dynamixel_x", "dynamixel_xl320",
+                     "feetech_sts", "load_dataset", "load_servo", "servo_from_values", "Supply"), "parameters"),
     **dict.fromkeys(
         ("AveragedServo", "AveragedServoInductive", "BoundedServo", "DCMotor", "DigitalServo", "GearedMotor",
          "PulseServo", "PulseServoInductive"), "models"),

@@ -8,6 +8,7 @@ import servotwin as st
 
 BUS, DIGITAL, ANALOG = "feetech-sts3215-12v", "towerpro-mg996r", "hitec-hs-755hb"
 SOFTER = ["--register", "P_Coefficient=16"]
+STIFFER = ["--register", "P_Coefficient=32"]
 
 
 def test_registers_are_those_of_the_servos_own_family(cli):
@@ -29,6 +30,15 @@ def test_registers_are_those_of_the_servos_own_family(cli):
     stiff = st.simulate(st.DigitalServo(st.dynamixel_x({"Position_P_Gain": 800}, servo="dynamixel-xl330-m288")),
                         st.signals.step(0.0, 10.0, at=0.1, unit="deg"), duration=0.3)
     assert dynamixel["final_angle"] == float(stiff["output_angle"][-1])
+
+
+def test_a_set_of_registers_has_a_name_and_single_values_go_on_top(cli):
+    def gain(*words):
+        return cli("curves", BUS, *words, "--quick", "--json").data["servos"][0]["voltages"][0]["loop"]["stiffness"]
+
+    soft = gain(*SOFTER, "--register", "Maximum_Acceleration=254,Acceleration=254")
+    assert gain("--register", "lerobot") == soft
+    assert gain("--register", "P_Coefficient=32,lerobot") == gain("--register", "lerobot", *STIFFER) == 2 * soft
 
 
 def test_set_comes_after_the_registers(cli):
@@ -66,12 +76,16 @@ def test_a_servo_on_a_bus_follows_goals_and_says_that_it_trips(cli, tmp_path):
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    ([BUS, "--register", "P_Coefficient=0"], "P_Coefficient (21) of Feetech STS: got 0, allowed: a whole number"),
-    ([BUS, "--register", "P_Coefficient=300"], "P_Coefficient (21) of Feetech STS: got 300"),
+    ([BUS, "--register", "P_Coefficient=0"], "P_Coefficient (21) of STS3215-12V: got 0, allowed: a whole number"),
+    ([BUS, "--register", "P_Coefficient=300"], "P_Coefficient (21) of STS3215-12V: got 300"),
     ([BUS, "--register", "P_Coeficient=16"], "did you mean 'P_Coefficient'"),
     ([BUS, "--register", "P_Coefficient=1.5"], "--register P_Coefficient: got '1.5', allowed: a whole number"),
-    ([BUS, "--register", "P_Coefficient"], "--register: got 'P_Coefficient', allowed: NAME=VALUE"),
+    ([BUS, "--register", "P_Coefficient"], "got 'no value', allowed: a raw value, such as P_Coefficient=32"),
     ([BUS, "--register", "P_Coefficient="], "allowed: NAME=VALUE"),
+    ([BUS, "--register", "lerobo"], "unknown set of registers of Feetech STS 'lerobo'; did you mean 'lerobot'?"),
+    ([BUS, "--register", "lerobot,,"], "allowed: NAME=VALUE"),
+    (["dynamixel-xl330-m288", "--register", "lerobot"], "this family has no named sets"),
+    ([ANALOG, "--register", "lerobot"], "--register for hitec-hs-755hb: got 'lerobot'"),
     ([BUS, *SOFTER, *SOFTER], "--register P_Coefficient: got '16 and 16', allowed: one value"),
     ([BUS, "--register", "Operating_Mode=1"], "Operating_Mode"),
     (["dynamixel-xl330-m288", *SOFTER], "unknown register of Dynamixel X 'P_Coefficient'"),
@@ -95,7 +109,7 @@ def test_bad_input_is_one_line(cli, tmp_path, words, said):
     ([ANALOG, "--loop", "loop.png"], "--loop: got 'hitec-hs-755hb', allowed: one digital or bus servo"),
     ([BUS, DIGITAL, "--loop", "loop.png"], "--loop: got 'feetech-sts3215-12v, towerpro-mg996r'"),
     ([BUS, "--loop", "loop.txt"], "--loop: got 'loop.txt', allowed: a name that ends in .png"),
-    ([BUS, "--register", "P_Coefficient=999"], "P_Coefficient (21) of Feetech STS: got 999"),
+    ([BUS, "--register", "P_Coefficient=999"], "P_Coefficient (21) of STS3215-12V: got 999"),
     ([BUS, "--register", "Torque_Limit=0"], "does not turn at 12 V"),
 ])
 def test_curves_refuses_bad_input(cli, tmp_path, words, said):

@@ -166,6 +166,8 @@ def test_a_list_makes_a_folder_of_servos(make, tmp_path):
     ([*GOOD, "--rate", "0.1 deg"], "--rate"), ([*GOOD, "--gear-ratio", "many"], "--gear-ratio"),
     ([*GOOD, "--modulation", "fm"], "modulation: got 'fm'"),
     ([*GOOD, "--modulation", "bus", "--registers", "dynamixel-y"], "did you mean 'dynamixel-x'"),
+    ([*GOOD, "--modulation", "bus"], "registers of a bus servo: got 'nothing', allowed: feetech-sts, dynamixel-x"),
+    ([*GOOD, "--modulation", "bus", "--registers", "lx-16a"], "(LX-16A, SCS, HTS) no table says what its registers do"),
     ([*GOOD, "--registers", "dynamixel-x"], "registers: got 'dynamixel-x'"),
     ([*GOOD, "--name", "my servo"], "name of a servo"),
     ([*GOOD, "--mass", "110"], "--mass: got '110'"), ([*GOOD, "--at", "six"], "--at: got 'six'"),

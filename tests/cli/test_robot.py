@@ -126,6 +126,14 @@ def test_an_episode_of_lerobot(robot, tmp_path):
     found = robot(*words, "--unit", "range", "--calibration", "follower.json", "--episode", "5", "--json").data
     assert found["motion"] == "set, episode 5"
     assert found["duration"] == pytest.approx(7 / 30, rel=1e-3)
+    assert not any("registers assumed" in note for note in found["notes"])
+    factory = (*words, "--unit", "range", "--calibration", "follower.json", "--servo", "*=feetech-sts3215-7v4",
+               "--json")
+    assert robot(*factory, "--force").data["notes"][0] == (
+        "registers assumed as LeRobot writes them for so101_follower (set lerobot and lerobot-gripper), not the "
+        "factory's")
+    own = robot(*factory, "--force", "--register", "P_Coefficient=32").data
+    assert not any("registers assumed" in note for note in own["notes"])
 
 
 def test_a_video(robot, tmp_path, monkeypatch):

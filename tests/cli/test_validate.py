@@ -56,6 +56,7 @@ def test_a_limit_that_is_exceeded_fails(cli, folder):
 @pytest.mark.parametrize(("words", "said"), [
     (["--max-error", "3"], "a number with one of the units rad, deg"), (["--max-error=-3deg"], "a positive number"),
     (["--max-error", "3 V"], "rad, deg"), (["--max-error", "fish=3deg"], "unknown motion"),
+    (["--register", "P_Coefficient=16"], "--register for hitec-hs-755hb: got 'P_Coefficient', allowed: a servo with"),
     (["--nuisance", "none,delay"], "none alone"), (["--nuisance", "fish"], "nuisance: got 'fish'"),
     (["--report", "fish.txt"], "ends in .html"), (["--model", "dc-motor"], "unknown model"),
 ])

@@ -84,8 +84,8 @@ def test_ticks_of_every_log_have_a_phase():
 @pytest.mark.parametrize(("servo", "log", "expected"), [
     ("dynamixel-xl330-m288", {"gain": 200.0}, 200.0 / (256.0 * 885.0 * 2.0 * math.pi / 4096.0)),
     ("feetech-sts3215-7v4", {"gain": 16.0}, 16.0 * 4096.0 / (4000.0 * 2.0 * math.pi)),
-    (ON_BUS, {"gain": 200.0}, 200.0 * 0.00246),
-    (ON_BUS, {}, 200.0 * 0.00246),
+    (ON_BUS, {"gain": 200.0}, 200.0 * st.identification.BamConvention().error_gain),
+    (ON_BUS, {}, 200.0 * st.identification.BamConvention().error_gain),
 ], ids=["dynamixel", "feetech", "convention", "convention alone"])
 def test_the_gain_of_a_log_reaches_the_firmware(servo, log, expected):
     made = bam_log(**log)

@@ -307,7 +307,8 @@ def test_the_mean_voltage_of_a_locked_shaft_is_that_of_bam(file, gain, error):
 
 def test_the_bounded_servo_has_the_same_voltage(file):
     model = st.BoundedServo(read_bam_parameters(file(parameters("m1")), gain=100, voltage=7.4))
-    for error, duty in [(0.5, 0.123), (-3.0, -0.738), (5.0, 1.0)]:
+    g = 4096 / (2 * math.pi) / (256 * 885)  # of the XL330, in BAM's code
+    for error, duty in [(0.5, 50 * g), (-3.0, -300 * g), (5.0, 1.0)]:
         result = st.simulate(model, st.signals.constant(error, unit="rad"), duration=0.1, load=st.loads.Coulomb(1e3),
                              initial={"output_angle": 0.0}, output_times=[0.05])
         assert result["armature_voltage"][0] == pytest.approx(7.4 * duty, rel=1e-9)

@@ -9,8 +9,9 @@ import servotwin as st
 from servotwin.identification import motor_range, servo_file_text, servo_from_sheet, sheet_contradictions, sheet_of
 from servotwin.parameters import REGISTER_FAMILIES, catalog_names, load_servo, unit_of
 
-BUS = ("dynamixel-ax-12a", "dynamixel-mx-106", "dynamixel-mx-28", "dynamixel-mx-64", "dynamixel-xl330-m077",
-       "dynamixel-xl330-m288", "dynamixel-xl430-w250", "feetech-sts3215-12v", "feetech-sts3215-7v4", "feetech-sts3250")
+BUS = ("dynamixel-ax-12a", "dynamixel-mx-106", "dynamixel-mx-28", "dynamixel-mx-64", "dynamixel-xl-320",
+       "dynamixel-xl330-m077", "dynamixel-xl330-m288", "dynamixel-xl430-w250", "feetech-sts3215-12v",
+       "feetech-sts3215-7v4", "feetech-sts3250")
 DIGITAL = ("dsservo-ds3218", "dsservo-rds3115", "emax-es08md", "feetech-ft-15m0", "feetech-ft-2806", "feetech-ft-7235",
            "hitec-hs-5485hb", "jx-pdi-6221mg", "towerpro-mg995", "towerpro-mg996r", "towerpro-sg92r")
 FITTED = ("miuzei-25kg",)  # to logs, without a sheet
@@ -27,7 +28,11 @@ PLANTS = {
                         0.0006300275797440622, 0.07580074806755707),
     "dynamixel-mx-106": (2.204165397088512, 2.653346939680077, 0.02484689556730746, 0.1133532996239035,
                          0.01194450384263248, 0.10824037267470683),
+    "dynamixel-xl-320": (1.0408462056437213, 27.543138077523064, 0.001498599811990824, 0.020630491373515955,
+                         0.0022633483259072375, 0.21898043608013565),
 }
+OF_LITERATURE = ("dynamixel-xl-320",)  # published, and not checked by logs
+HALF_AS_FAST = ("dynamixel-xl-320",)  # as BAM's motor, whose notes say so
 TOLD_BY_LOGS = {  # and nothing else: the rest of a file that was fitted is assumed, or said of the rig
     "motor.armature_resistance", "motor.torque_constant", "motor.back_emf_constant", "motor.rotor_inertia",
     "friction.coulomb_torque_forward", "friction.coulomb_torque_backward", "friction.load_friction_external",
@@ -109,6 +114,7 @@ def test_each_file_is_what_its_own_sheet_makes_but_for_what_was_identified(name)
         assert servo_file_text(made) == file.read_text(encoding="utf-8")
     own = {key for key in servo.names() if servo.source(key).origin in ("identified", "measured")}
     if name in PLANTS:
+        own |= {key for key in servo.names() if "Rhoban/bam, params" in servo.source(key).source}
         own |= {"supply.bridge_drop_voltage", "friction.load_friction_motor", "friction.load_friction_external"}
     for key in {*servo.names(), *made.names()} - own:
         value = made.get(key)
@@ -126,7 +132,7 @@ def test_plants_of_bam_are_as_published(name):
     assert motor.back_emf_constant == motor.torque_constant
     assert friction.coulomb_torque_backward == friction.coulomb_torque_forward
     for key in ("motor.torque_constant", "motor.armature_resistance", "motor.rotor_inertia", "friction.load_friction"):
-        assert servo.source(key).origin == "identified"
+        assert servo.source(key).origin == ("literature" if name in OF_LITERATURE else "identified")
         assert "Rhoban/bam" in servo.source(key).source
 
 
@@ -145,7 +151,7 @@ def test_each_turns_about_as_fast_as_its_sheet_says(name):
     """Those made of their sheet within what the duty leaves; the identified ones within 12 %."""
     servo = load_servo(name)
     printed = sheet_of(servo).nominal.no_load_speed
-    assert full_speed(servo) == pytest.approx(printed, rel=0.12)
+    assert full_speed(servo) == pytest.approx(printed * (0.5 if name in HALF_AS_FAST else 1.0), rel=0.12)
     assert servo.supply.open_circuit_voltage == sheet_of(servo).nominal.supply_voltage
 
 

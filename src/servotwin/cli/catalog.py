@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from servotwin.cli.catalog_registers import registers
 from servotwin.cli.catalog_which import which
 from servotwin.cli.from_sheet import from_sheet
 from servotwin.cli.terminal import emit_help, emit_json, pairs, patience, show, table
@@ -130,5 +131,7 @@ catalog.command("from-sheet", help="Make a servo file from a data sheet.", epilo
     'Example: servotwin catalog from-sheet --name my-servo --torque "13.2 kgf.cm" --speed "0.23 s/60deg" '
     '--running-current "285 mA" --at 6V --deadband "8 us" --out my-servo.toml\n\n'
     "Example: servotwin catalog from-sheet --csv sheets.csv --out my-catalog"))(from_sheet)
+catalog.command("registers", help="Show what the registers of a model of bus servo hold when it is new, and which page "
+                "prints it.", epilog="Example: servotwin catalog registers XL330-M288")(registers)
 catalog.command("which", help="List the servos that can lift a mass on an arm, lightest first.", epilog=(
     "Example: servotwin catalog which --lift 0.5kg --arm 10cm --voltage 5 --time 0.3"))(which)

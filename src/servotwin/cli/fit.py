@@ -35,6 +35,7 @@ def fit(
     change: Annotated[list[str] | None, typer.Option(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of the servo first; repeatable; with a unit, or "
         "in SI units.", rich_help_panel=_LOGS)] = None,
+    register: shared.LogRegisterOption = None,
     holdout: Annotated[str | None, typer.Option(
         metavar="SHARE|NAMES", help="Logs to predict rather than fit: a share of each kind of motion, such as "
         "0.25, or names with commas; 0 for none (default: a quarter of each kind with four logs or more).",
@@ -107,14 +108,15 @@ def fit(
         "--json", help="Print JSON, in SI units.", rich_help_panel=shared.OUTPUT)] = False,
 ) -> None:
     """Find the parameters of a servo, with intervals."""
-    _check_words(logs, servo, table, report, scheduler, advise=advise)
+    _check_words(logs, servo, table, report, scheduler, advise=advise, registers=bool(register))
     if table is not None:
         from servotwin.cli.fit_table import calibrate_from
 
         calibrate_from(table, servo, out, force=force, as_json=as_json)
         return
     targets = _targets(out, report, [*(logs or []), Path(servo or "")], force=force)
-    search = _search(servo or "", model, change or [], free, bounds or [], prior or [], priors=not no_priors)
+    search = _search(servo or "", model, change or [], register or [], free, bounds or [], prior or [],
+                     priors=not no_priors)
     if not logs:
         _show_advice(_first_advice(search), as_json=as_json)
         return
@@ -123,7 +125,8 @@ def fit(
                "loss": loss, "level": level, "intervals": intervals, "seed": seed, "compare": compare,
                "diagnose": diagnose, "accuracy": accuracy}
     chosen = _options(options)
-    given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json)
+    given = log_reading.read(logs, file_format, columns, joint, leave_out or [], force=force, quiet=as_json,
+                             registers=bool(register))
     climbs = _climber(search, asked=bool(free), ladder=ladder, structures=structures, springs=spring)
     found = _run(search, given, chosen, scheduler, climbs)
     files = _write(found, targets, force=force)
@@ -154,12 +157,12 @@ class _Found:
 
 
 def _check_words(logs: list[Path] | None, servo: str | None, table: Path | None, report: Path | None,
-                 scheduler: str | None, *, advise: bool) -> None:
+                 scheduler: str | None, *, advise: bool, registers: bool) -> None:
     from servotwin.errors import InputError
 
     if table is not None:
         for given, what in ((bool(logs), "logs"), (report is not None, "--report"), (advise, "--advise"),
-                            (scheduler is not None, "--scheduler")):
+                            (scheduler is not None, "--scheduler"), (registers, "--register")):
             if given:
                 raise InputError("--table", got=f"also {what}", allowed="a table alone; it is calibrated, not fitted")
         return
@@ -195,13 +198,13 @@ def _targets(out: Path | None, report: Path | None, inputs: list[Path], *, force
     return targets
 
 
-def _search(servo: str, model: str | None, change: list[str], free: list[str] | None, bounds: list[str],
-            prior: list[str], *, priors: bool) -> _Search:
+def _search(servo: str, model: str | None, change: list[str], register: list[str], free: list[str] | None,
+            bounds: list[str], prior: list[str], *, priors: bool) -> _Search:
     from servotwin.cli import fit_words
     from servotwin.cli.model_words import model_of
     from servotwin.identification.fitting.checks import usual_free
 
-    nominal = model_of(servo, model, change, fit_words.MODEL_NAMES)
+    nominal = model_of(servo, model, change, fit_words.MODEL_NAMES, register)
     names = fit_words.names(free) or usual_free(nominal)
     fit_words.check_free(names, nominal)
     return _Search(nominal, names, fit_words.bounds_of(bounds, names),

@@ -37,10 +37,12 @@ MendOption = Annotated[list[str] | None, typer.Option(
 
 
 def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None, joints: Sequence[str] | None,
-         leave_out: Sequence[str], *, force: bool = False, quiet: bool = False) -> list[Log]:
+         leave_out: Sequence[str], *, force: bool = False, quiet: bool = False,
+         registers: bool = False) -> list[Log]:
     """Return the logs of files and folders.
 
-    What was guessed or said of columns is shown, unless `quiet`, and what was said is written into sidecars.
+    What was guessed or said of columns is shown, unless `quiet`, and what was said is written into sidecars. Where the
+    user says the registers of the servo (`registers`), those that a dataset's robot has are not assumed.
 
     Raises
     ------
@@ -50,6 +52,7 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
     from servotwin.cli import fit_words
     from servotwin.errors import OutputError, OutputExistsError
     from servotwin.identification import keep_columns, read_logs
+    from servotwin.identification.fitting.robot_registers import of_no_robot
 
     windows = fit_words.left_out(leave_out)
     said = None if not columns else " ".join(columns)
@@ -71,7 +74,7 @@ def read(paths: Sequence[Path], file_format: str, columns: Sequence[str] | None,
         show(*parts, *written, "")
     for line in written if quiet else ():
         typer.echo(line, err=True)
-    return logs
+    return of_no_robot(logs) if registers else logs
 
 
 def _parts(logs: Sequence[Log]) -> list[RenderableType]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -62,8 +63,8 @@ def run(
         "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter of all servos; repeatable; with a unit, or in SI "
         "units.", rich_help_panel=_ROBOT)] = None,
     register: Annotated[list[str] | None, typer.Option(
-        metavar="NAME=VALUE", help="Write a register of all servos, such as P_Coefficient=16; repeatable, or with "
-        "commas.", rich_help_panel=_ROBOT)] = None,
+        metavar="NAME=VALUE", help="Write a register of all servos, such as P_Coefficient=16, or a set such as "
+        "lerobot; repeatable, or with commas.", rich_help_panel=_ROBOT)] = None,
     supply: Annotated[str | None, typer.Option(
         metavar="VOLTS[:OHMS]", help="Supply that all servos share, such as 12V:0.1ohm (default: each its own).",
         rich_help_panel=_ROBOT)] = None,
@@ -116,6 +117,8 @@ def run(
     with as_options():
         followed = _read(motion, joints, joint_ranges(plant), unit=units_of(unit or []), calibration=calibration,
                          episode=episode)
+    if register:  # who says registers does not have them assumed
+        followed = replace(followed, robot="")
     picture = check_drawing(plant, camera, video=video)
     inputs = [Path(model_file), motion, *([] if calibration is None else [calibration])]
     with files.folder(out):

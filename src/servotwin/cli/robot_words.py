@@ -22,9 +22,6 @@ _PYTHON = (("joint_friction='clear' sets it so, 'keep'", "--friction clear sets 
            ("mount it with another zero or direction", "--mount gives it another zero or direction"))
 _OPTIONS = {"joint_friction": "--friction", "hold": "--hold", "settle": "--settle", "timestep": "--timestep"}
 
-# What LeRobot writes into the servos of an SO-101 follower when it connects (so_follower.py, feetech.py)
-_LEROBOT = ["P_Coefficient=16,I_Coefficient=0,D_Coefficient=32,Maximum_Acceleration=254,Acceleration=254"]
-_GRIPPER = ["Max_Torque_Limit=500,Protection_Current=250,Overload_Torque=25"]
 _ARM_SERVO = "feetech-sts3215-12v"
 
 
@@ -61,9 +58,9 @@ def chosen_servos(robot: str, words: Sequence[str], joints: Mapping[str, str]) -
     {'elbow': 'mg996r', 'wrist': 'sg90'}
     """
     if not words and robot == "so101":
-        arm = Chosen(_ARM_SERVO, _LEROBOT)
-        return {joint: arm._replace(registers=[*_LEROBOT, *_GRIPPER]) if joint == "gripper" else arm
-                for joint in joints}
+        from servotwin.parameters.registers.robots import set_of_robot
+
+        return {joint: Chosen(_ARM_SERVO, [set_of_robot(robot, joint)]) for joint in joints}
     if not words:
         raise InputError("servos of the robot", got="none",
                          allowed=f"--servo JOINT=ID, repeatable; joints: {', '.join(joints) or 'none has a name'}")
@@ -120,15 +117,9 @@ def models_of(chosen: Mapping[str, Chosen], model: str | None, change: Sequence[
     for joint, (servo, own) in chosen.items():
         key = servo, tuple(own)
         if key not in made:
-            made[key] = model_of(servo, model, change, MODELS, _merged(own, register))
+            made[key] = model_of(servo, model, change, MODELS, [*own, *register])
         found[joint] = made[key]
     return found
-
-
-def _merged(own: Sequence[str], register: Sequence[str]) -> list[str]:
-    """Return words for registers, those of the user before those that the servo has from the start."""
-    said = {part.partition("=")[0].strip() for word in register for part in word.split(",")}
-    return [part for word in own for part in word.split(",") if part.partition("=")[0] not in said] + list(register)
 
 
 def mounts_of(models: Mapping[str, Model], words: Sequence[str], joints: Mapping[str, str]) -> dict[str, Mount]:

@@ -44,8 +44,12 @@ ColumnOption = Annotated[str | None, typer.Option(
 DurationOption = Annotated[float, typer.Option(
     metavar="SECONDS", help="Time to simulate.", rich_help_panel=OUTPUT)]
 RegisterOption = Annotated[list[str] | None, typer.Option(
-    metavar="NAME=VALUE", help="Write a register of a bus servo (Feetech STS, Dynamixel), such as P_Coefficient=16; "
-    "repeatable, or with commas.", rich_help_panel=PLANT)]
+    metavar="NAME=VALUE", help="Write a register of a bus servo (Feetech STS, Dynamixel), such as P_Coefficient=16, or "
+    "a set: lerobot, lerobot-gripper; repeatable, or with commas.", rich_help_panel=PLANT)]
+LogRegisterOption = Annotated[list[str] | None, typer.Option(
+    "--register", metavar="NAME=VALUE", help="Registers that the bus servo had (Feetech STS, Dynamixel), such as "
+    "P_Coefficient=16, or a set: lerobot, lerobot-gripper; repeatable, or with commas. Of datasets of an SO-100 or "
+    "SO-101 lerobot is assumed unless given.", rich_help_panel="Logs and servo")]
 SchedulerOption = Annotated[str | None, typer.Option(
     metavar="ADDRESS", help="Run on the workers of a dask scheduler, such as tcp://host:8786.", rich_help_panel=OUTPUT)]
 AccuracyOption = Annotated[float, typer.Option(

@@ -27,7 +27,7 @@ class _Names(NamedTuple):
 _REGISTERS = {
     "feetech-sts": _Names("P_Coefficient", "D_Coefficient", 254, (0, 8, 16, 32, 64, 128, 254)),
     "dynamixel-x": _Names("Position_P_Gain", "Position_D_Gain", 16383, (0, 250, 500, 1000, 2000, 4000, 8000, 16000)),
-    "dynamixel-mx": _Names("P_Gain", "D_Gain", 254, (0, 8, 16, 32, 64, 128, 254)),
+    **dict.fromkeys(("dynamixel-mx", "dynamixel-xl320"), _Names("P_Gain", "D_Gain", 254, (0, 8, 16, 32, 64, 128, 254))),
 }
 
 

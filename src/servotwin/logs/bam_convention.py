@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Self
 
 from servotwin.errors import InputError
+from servotwin.logs.bam_actuators import BAM_ACTUATORS, bam_actuator
 from servotwin.units import is_finite
 
 
@@ -21,7 +22,7 @@ class BamConvention:
     Parameters
     ----------
     error_gain : float
-        g, duty per radian and unit of k_P; 0.00246 for the XL330, in BAM's code and not in its files [1/rad].
+        g, duty per radian and unit of k_P, in BAM's code and not in its files; the XL330's unless given [1/rad].
     frame_period : float
         T_f, how often the loop looks at the shaft [s].
     pulse_per_angle : float
@@ -29,8 +30,7 @@ class BamConvention:
     centre : float
         Pulse width at angle 0; angles reach from −centre/s_µ to +centre/s_µ, ±10 rad [s].
     largest_duty : float
-        Most of the supply that the servo gets, in BAM's code: 1 for the XL330, 0.97 for the STS3215, 0.9625 for MX. The
-        firmware has it, the pulse servo not.
+        Most of the supply that the servo gets, in BAM's code. The firmware has it, the pulse servo not.
 
     Raises
     ------
@@ -46,11 +46,11 @@ class BamConvention:
 
     Examples
     --------
-    >>> round(BamConvention().stretcher_gain(400), 6)
-    984.0
+    >>> round(BamConvention().stretcher_gain(400), 1), round(BamConvention.of("sts3215").stretcher_gain(32), 6)
+    (1151.0, 5312.0)
     """
 
-    error_gain: float = 0.00246
+    error_gain: float = BAM_ACTUATORS["xl330"].error_gain or 0.0
     frame_period: float = 1e-3
     pulse_per_angle: float = 1e-6
     centre: float = 1e-5
@@ -66,13 +66,37 @@ class BamConvention:
         if self.largest_duty > 1.0:
             raise InputError("BamConvention(largest_duty)", got=self.largest_duty, allowed="at most 1")
 
+    @classmethod
+    def of(cls, actuator: str) -> Self:
+        """Return the numbers of one of BAM's actuators, those of `BAM_ACTUATORS`.
+
+        Parameters
+        ----------
+        actuator : str
+            What BAM calls it.
+
+        Raises
+        ------
+        UnknownNameError
+            If BAM has none of that name.
+        InputError
+            If BAM sets its current or its torque, so that no duty belongs to a gain.
+        """
+        one = bam_actuator(actuator)
+        if one.error_gain is None:
+            raise InputError("firmware gain of an actuator of BAM", got=actuator,
+                             allowed=f"one whose duty BAM sets; of {actuator} it sets the {one.sets}, and no duty "
+                                     "belongs to a gain")
+        return cls(error_gain=one.error_gain, largest_duty=one.largest_duty)
+
     def stretcher_gain(self, gain: float) -> float:
         """Return K for a firmware gain k_P."""
         if not is_finite(gain) or not gain > 0.0:
             raise InputError("firmware gain kp", got=gain, allowed="a positive number")
         return gain * self.error_gain * (self.frame_period / self.pulse_per_angle)
 
-    def parameters(self, gain: float | None = None, voltage: float | None = None) -> dict[str, float]:
+    def parameters(self, gain: float | None = None, voltage: float | None = None,
+                   ratio: float = 1.0) -> dict[str, float]:
         """Return the servo parameters by dotted name; those of gain and supply only where they are given.
 
         Parameters
@@ -81,6 +105,8 @@ class BamConvention:
             k_P.
         voltage : float, optional
             V_in [V].
+        ratio : float
+            BAM's error_gain_ratio, by which a fit corrects g [1].
         """
         made = {
             "electronics.frame_period": self.frame_period,
@@ -92,13 +118,14 @@ class BamConvention:
         if voltage is not None:
             made["supply.open_circuit_voltage"] = voltage
         if gain is not None:
-            made["electronics.stretcher_gain"] = self.stretcher_gain(gain)
+            made["electronics.stretcher_gain"] = self.stretcher_gain(gain) * ratio
         if gain is not None and voltage is not None:  # the same law with the mean voltage, for the bounded servo
-            made["electronics.bridge_gain"] = gain * self.error_gain * voltage
+            made["electronics.bridge_gain"] = gain * self.error_gain * ratio * voltage
             made["electronics.comparator_gain"] = 1.0
         return made
 
-    def firmware(self, gain: float | None = None, ratio: float = 1.0, speed: float | None = None) -> dict[str, Any]:
+    def firmware(self, gain: float | None = None, ratio: float = 1.0, speed: float | None = None,
+                 delay: float | None = None) -> dict[str, Any]:
         """Return the same loop as numbers of the firmware, by dotted name; the gain only where it is given.
 
         Parameters
@@ -109,11 +136,13 @@ class BamConvention:
             BAM's error_gain_ratio, by which a fit corrects g [1].
         speed : float, optional
             BAM's max_velocity, at which the goal moves at most [rad/s].
+        delay : float, optional
+            BAM's command_delay, from the write of a goal until it counts [s].
 
         Examples
         --------
         >>> round(BamConvention().firmware(400)["firmware.proportional_gain"], 6)
-        0.984
+        1.150951
         """
         made: dict[str, Any] = {"firmware.control_period": self.frame_period, "firmware.duty_limit": self.largest_duty,
                                 "firmware.command_kind": "goal"}
@@ -121,4 +150,6 @@ class BamConvention:
             made["firmware.proportional_gain"] = gain * self.error_gain * ratio
         if speed is not None:
             made["firmware.speed_limit"] = speed
+        if delay is not None:
+            made["firmware.bus_latency"] = delay
         return made

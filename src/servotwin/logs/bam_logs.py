@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.loads import Pendulum
+from servotwin.logs.bam_actuators import BAM_ACTUATORS
 from servotwin.logs.bam_convention import BamConvention
 from servotwin.logs.csv_logs import in_file
 from servotwin.logs.json_file import read_json, write_json
@@ -30,17 +31,20 @@ def read_bam_log(path: str | Path, *, convention: BamConvention | None = None) -
 
     The pendulum's point mass m and its arm m_a have inertia (m + m_a/3) l² and gravity torque (m + m_a/2) g l sin q
     (Duclusaud et al., 2025); an arm that is not recorded weighs nothing. The firmware gain becomes
-    `electronics.stretcher_gain` by the convention. Where torque is off BAM's motor is disconnected.
+    `electronics.stretcher_gain` by what BAM's code says of the log's `motor`; a log that names none is read as an
+    XL330's, and the gain of a motor whose current or torque BAM sets stays a condition alone. Where torque is off BAM's
+    motor is disconnected.
 
     Parameters
     ----------
     path : str or Path
     convention : BamConvention, optional
+        Instead of what BAM's code says of the motor.
 
     Raises
     ------
     InputError
-        If it is no such file, or an entry lacks a number.
+        If it is no such file, an entry lacks a number, or BAM has no such motor and there is no convention.
     """
     return _log(Path(path), read_json(path), convention)
 
@@ -75,9 +79,23 @@ def _log(path: Path, content: object, convention: BamConvention | None = None) -
             name=path.stem, source=str(path), motion=text["trajectory"], time=time, command=command,
             command_kind="angle", measured=measured, torque_on=None if on.all() else on,
             load=_pendulum(number["mass"], number["arm_mass"], number["length"]).as_load(),
-            parameters=(convention or BamConvention()).parameters(number["kp"], number["vin"]),
+            parameters=_loop(path, text["motor"], number["kp"], number["vin"], convention),
             conditions={"gain": number["kp"], "voltage": number["vin"],
                         **({"motor": text["motor"]} if text["motor"] else {})})
+
+
+def _loop(path: Path, motor: str, gain: float, voltage: float, convention: BamConvention | None) -> dict[str, float]:
+    """Return what stands for the loop, by dotted name."""
+    if convention is None and motor:
+        if motor not in BAM_ACTUATORS:
+            raise InputError(f"{path}: motor, to which the gain kp belongs", got=motor,
+                             allowed=f"{', '.join(BAM_ACTUATORS)}; of another, read_bam_log(…, "
+                                     "convention=BamConvention(error_gain=…)) says its duty per radian")
+        if BAM_ACTUATORS[motor].error_gain is None:
+            BamConvention().stretcher_gain(gain)  # a gain it has to be
+            return {"supply.open_circuit_voltage": voltage}
+        convention = BamConvention.of(motor)
+    return (convention or BamConvention()).parameters(gain, voltage)
 
 
 def write_bam_log(log: Log, path: str | Path, *, overwrite: bool = False) -> None:

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from servotwin.errors import InputError, ParameterError, UnknownNameError
+from servotwin.logs.bam_actuators import BAM_ACTUATORS, bam_actuator, bam_name_of
 from servotwin.logs.bam_convention import BamConvention
 from servotwin.logs.json_file import read_json, write_json
 from servotwin.parameters import GROUPS, Quantity, Servo, unit_of
+from servotwin.parameters.firmware import MOST_WAITING
 from servotwin.units import is_finite
 
 _MOTOR = {"kt": "motor.torque_constant", "R": "motor.armature_resistance", "armature": "motor.rotor_inertia",
@@ -30,6 +32,14 @@ MODELS: dict[str, tuple[str, ...]] = {
 }
 _FRICTION = ("friction_base", *_STRIBECK, *_SHARES)
 _MAY_BE_NEGATIVE = ("q_offset",)
+_LOOP_OF_FILE = {"max_velocity": "firmware.speed_limit", "command_delay": "firmware.bus_latency"}
+_OF_LOOP = ("error_gain_ratio", *_LOOP_OF_FILE)
+_UNUSED = {  # keys that BAM writes and a servo has no use for: why
+    "q_offset": "it turns the rig's gravity: a pendulum hangs at -q_offset",
+    "current_limit": "the most current of a loop that sets the current",
+    "viscous_damping_with_torque": "damping by a loop that sets the current",
+    "ratio": "the gear of a loop that sets the torque", "max_torque": "the limit of a loop that sets the torque",
+}
 
 
 def read_bam_parameters(path: str | Path, *, gain: float | None = None, voltage: float | None = None,
@@ -38,8 +48,10 @@ def read_bam_parameters(path: str | Path, *, gain: float | None = None, voltage:
 
     All is at the output shaft: the gear reduction is 1, k_a = k_b = k_t. With the friction law of `servotwin.physics`:
     F_c = friction_base, r = 1 + friction_stribeck/friction_base, v_s = dtheta_stribeck, B_m = friction_viscous, and
-    the shares K_l … K_eq by their names. The position loop is that of `BamConvention`, as pulses and as firmware; as
-    firmware it has BAM's error_gain_ratio and max_velocity where the file gives them.
+    the shares K_l … K_eq by their names. The position loop is that of `BamConvention`, as pulses and as firmware, with
+    the numbers that BAM's code has for the file's `actuator` (`BAM_ACTUATORS`); it has BAM's error_gain_ratio, and as
+    firmware max_velocity and command_delay as `firmware.bus_latency`. An actuator whose current or torque BAM sets has
+    no such loop.
 
     Parameters
     ----------
@@ -47,17 +59,19 @@ def read_bam_parameters(path: str | Path, *, gain: float | None = None, voltage:
     gain, voltage : float, optional
         Firmware gain k_P and supply [V]; a log of BAM brings its own.
     convention : BamConvention, optional
+        Instead of what BAM's code says of the actuator.
 
     Returns
     -------
     Servo
-        Its sheet has a table `bam` with model, actuator and what belongs to the rig: `q_offset` [rad] turns gravity,
-        so a pendulum then hangs at −q_offset.
+        Its sheet has a table `bam` with model, actuator and what belongs to the loop or the rig. Its notes say which
+        keys of the file are not used, and why.
 
     Raises
     ------
     InputError
-        If it is no such file, lacks a number of its model, or has one that its model does not know.
+        If it is no such file, lacks a number of its model, or has one that its model does not know; if a gain is given
+        and BAM has no such actuator, or sets no duty of it.
     ParameterError
         If a number is not physical.
     """
@@ -67,28 +81,80 @@ def read_bam_parameters(path: str | Path, *, gain: float | None = None, voltage:
     model = content["model"]
     if not isinstance(model, str) or model not in MODELS:
         raise InputError(f"{path}: model", got=model, allowed=", ".join(MODELS))
+    actuator = content.get("actuator", "")
+    if not isinstance(actuator, str):
+        raise InputError(f"{path}: actuator", got=actuator, allowed="a text")
+    if "R" not in content:
+        raise InputError(f"{path}: R", got="nothing", allowed="the resistance of the motor [ohm]; BAM's files of an "
+                         "actuator whose current it sets, as of erob80_100, may have none: add it")
     needed = (*_MOTOR, "friction_base", *MODELS[model])
     numbers = {key: _number(path, content, key) for key in needed}
     for key in _FRICTION:
         if key in content and key not in needed:
             raise InputError(f"{path}: {key}", got=content[key], allowed=f"no such number in model {model}")
     values = _identified(path, numbers)
-    actuator = content.get("actuator", "")
-    if not isinstance(actuator, str):
-        raise InputError(f"{path}: actuator", got=actuator, allowed="a text")
-    rig = {key: _number(path, content, key) for key, value in content.items()
-           if key not in (*needed, "model", "actuator") and isinstance(value, int | float)}
-    used = convention or BamConvention()
-    loop: dict[str, Any] = {
-        **used.parameters(gain, voltage), "electronics.deadband": 0.0, "electronics.minimum_drive_time": 0.0,
-        "electronics.off_state": "brake",
-        **used.firmware(gain, rig.get("error_gain_ratio", 1.0), rig.get("max_velocity"))}
+    for key in (*_OF_LOOP, *_UNUSED):
+        if key in content and _number(path, content, key) == 0.0 and key == "error_gain_ratio":
+            raise InputError(f"{path}: {key}", got=content[key], allowed="a positive number")
+    rig = {key: float(value) if is_finite(value) else value for key, value in content.items()
+           if key not in (*needed, "model", "actuator") and (is_finite(value) or isinstance(value, str))}
+    loop, unused = _loop(path, content, actuator, rig, (gain, voltage), convention)
     source = f"BAM, friction model {model.upper()}" + (f" of {actuator}" if actuator else "") + f": {Path(path).name}"
+    unused |= {key: _UNUSED.get(key, "not known here")
+               for key in content if key not in (*needed, *_OF_LOOP, "model", "actuator")}
+    notes = f"Not used of the file: {'; '.join(f'{key} ({why})' for key, why in unused.items())}." if unused else ""
     try:
-        return _servo(f"{actuator or 'bam'}-{model}", values, loop, source,
-                      {"bam": {"model": model, "actuator": actuator, **rig}})
+        return _servo(f"{actuator or 'bam'}-{model}", values, loop, (source, _loop_source(actuator, convention)),
+                      {"bam": {"model": model, "actuator": actuator, **rig}}, notes)
     except ParameterError as error:
         raise ParameterError(f"{path}: {error.what}", got=error.got, allowed=error.allowed) from None
+
+
+def _loop(path: str | Path, content: Mapping[str, Any], actuator: str, rig: Mapping[str, Any],
+          asked: tuple[float | None, float | None],
+          convention: BamConvention | None) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the values of the loop by dotted name, and which keys of it are not used, and why."""
+    gain, voltage = asked
+    known = BAM_ACTUATORS.get(actuator)
+    sets = "duty" if known is None or convention is not None else known.sets
+    if gain is not None and convention is None:
+        _asked_a_gain(path, actuator)
+    used = convention or (BamConvention.of(actuator) if known is not None and sets == "duty" else BamConvention())
+    delay, most = rig.get("command_delay"), (MOST_WAITING - 1) * used.frame_period
+    if delay is not None and delay > most:
+        raise InputError(f"{path}: command_delay", got=delay, allowed=f"at most {most:g} s with frames of "
+                         f"{used.frame_period:g} s; a convention=BamConvention(frame_period=…) with longer ones")
+    if sets != "duty":
+        loop: dict[str, Any] = {} if voltage is None else {"supply.open_circuit_voltage": voltage}
+        if delay is not None:
+            loop["firmware.bus_latency"] = delay
+        return loop, {key: f"of {actuator} BAM sets the {sets}, and no duty"
+                      for key in ("error_gain_ratio", "max_velocity") if key in content}
+    speed = rig.get("max_velocity", None if known is None or convention is not None else known.speed)
+    ratio = rig.get("error_gain_ratio", 1.0)
+    return {**used.parameters(gain, voltage, ratio), "electronics.deadband": 0.0,
+            "electronics.minimum_drive_time": 0.0, "electronics.off_state": "brake",
+            **used.firmware(gain, ratio, speed, delay)}, {}
+
+
+def _loop_source(actuator: str, convention: BamConvention | None) -> str:
+    if convention is not None:
+        return "position loop of BAM, by a convention that was given"
+    one = BAM_ACTUATORS.get(actuator)
+    return "position loop of BAM" + (f", {one.source}" if one else "'s XL330, for want of a known actuator")
+
+
+def _asked_a_gain(path: str | Path, actuator: str) -> None:
+    """Refuse a gain of an actuator of which no duty per gain is known."""
+    instead = "convention=BamConvention(error_gain=…) says its duty per radian"
+    try:
+        known = bam_actuator(actuator)
+    except UnknownNameError as error:
+        raise InputError(f"{path}: actuator, to which a gain belongs", got=actuator or "nothing",
+                         allowed=f"{error.allowed}; of another, {instead}") from None
+    if known.error_gain is None:
+        raise InputError(f"{path}: gain of {actuator}", got="a gain",
+                         allowed=f"none, for BAM sets its {known.sets} and no duty; or {instead}")
 
 
 def is_bam_parameters(content: object) -> bool:
@@ -100,7 +166,8 @@ def write_bam_parameters(servo: Servo, path: str | Path, *, model: str = "auto",
                          overwrite: bool = False) -> None:
     """Write the motor and the friction of a servo as a parameter file of BAM, at the output shaft.
 
-    What BAM does not know, such as deadband, bridge and play, is left out.
+    What BAM does not know, such as deadband, bridge and play, is left out; `firmware.bus_latency` is
+    its command_delay.
 
     Parameters
     ----------
@@ -109,7 +176,7 @@ def write_bam_parameters(servo: Servo, path: str | Path, *, model: str = "auto",
     model : {"auto", "m1", …, "m6"}
         The smallest that holds all friction of the servo unless given.
     actuator : str, optional
-        What BAM calls the servo; from `servo.sheet` or its name unless given.
+        What BAM calls the servo; from `servo.sheet`, by its name in the catalog, or its name unless given.
     overwrite : bool
         Replace a file that is there.
 
@@ -138,7 +205,10 @@ def write_bam_parameters(servo: Servo, path: str | Path, *, model: str = "auto",
     content: dict[str, Any] = {key: numbers.get(key, 0.0) for key in keys}
     content["q_offset"] = 0.0
     content |= {key: value for key, value in rig.items() if key not in content or key == "q_offset"}
-    content |= {"model": chosen, "actuator": actuator or str(rig.get("actuator") or servo.name)}
+    if servo.firmware.bus_latency is not None:
+        content["command_delay"] = servo.firmware.bus_latency
+    called = actuator or str(rig.get("actuator") or bam_name_of(servo.name) or servo.name)
+    content |= {"model": chosen, "actuator": called}
     write_json(path, content, overwrite=overwrite)
 
 
@@ -161,20 +231,20 @@ def _identified(path: object, numbers: Mapping[str, float]) -> dict[str, float]:
     return values
 
 
-def _servo(name: str, values: Mapping[str, float], loop: Mapping[str, Any], source: str,
-           sheet: Mapping[str, Any]) -> Servo:
+def _servo(name: str, values: Mapping[str, float], loop: Mapping[str, Any], sources: tuple[str, str],
+           sheet: Mapping[str, Any], notes: str) -> Servo:
     groups: dict[str, dict[str, Any]] = {}
     for dotted, value in {**values, **loop}.items():
         group, _, key = dotted.partition(".")
         groups.setdefault(group, {})[key] = value
     made: dict[str, Any] = {group: GROUPS[group](**fields) for group, fields in groups.items()}
-    quantities = {dotted: Quantity(value=float(value), unit=unit_of(dotted), origin="identified", source=source)
-                  for dotted, value in values.items()}
+    own = [dotted for key, dotted in _LOOP_OF_FILE.items() if key in sheet["bam"] and dotted in loop]
+    quantities = {dotted: Quantity(value=float(value), unit=unit_of(dotted), origin="identified", source=sources[0])
+                  for dotted, value in {**values, **{dotted: loop[dotted] for dotted in own}}.items()}
     quantities |= {dotted: Quantity(value=value, unit=unit_of(dotted), origin="assumed",
-                                    source="position loop of BAM" + ("" if dotted.startswith("firmware.") else
-                                                                     " as pulses"))
-                   for dotted, value in loop.items()}
-    return Servo(name=name, title=source, kind="bus", quantities=quantities, sheet=sheet, **made)
+                                    source=sources[1] + ("" if dotted.startswith("firmware.") else ", as pulses"))
+                   for dotted, value in loop.items() if dotted not in own}
+    return Servo(name=name, title=sources[0], kind="bus", quantities=quantities, sheet=sheet, notes=notes, **made)
 
 
 def _at_output(servo: Servo) -> dict[str, float]:

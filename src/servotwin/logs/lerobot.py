@@ -59,9 +59,10 @@ def read_lerobot_logs(path: str | Path, *, joints: str | Mapping[str, str] | Non
     left = [joint.name for joint in known if joint not in chosen and joint.is_gripper and joints is None]
     remarks = tuple(f"{name} was left out: it has 0 to 100 of its range; {_OPTION} {name}:0.9deg reads it, with what "
                     "one of these is" for name in left)
-    return [log for start, stop, episode in data.episodes()
-            for joint in chosen for log in [_log(folder, data, joint, columns[joint.name], (start, stop), episode,
-                                                 remarks)]]
+    robot = str(dataset.info.get("robot_type") or "")
+    return [_log(folder, data, joint, columns[joint.name], (start, stop), {
+        "joint": joint.name, "episode": float(episode), **({"robot": robot} if robot else {})}, remarks)
+        for start, stop, episode in data.episodes() for joint in chosen]
 
 
 def _asked(joints: object) -> dict[str, str]:
@@ -121,11 +122,11 @@ def _columns(folder: Path, chosen: list[Joint], asked: Mapping[str, str], data: 
     return made
 
 
-def _log(folder: Path, data: Rows, joint: Joint, said: tuple[Column, str], rows: tuple[int, int], episode: int,
-         remarks: tuple[str, ...]) -> Log:
+def _log(folder: Path, data: Rows, joint: Joint, said: tuple[Column, str], rows: tuple[int, int],
+         conditions: dict[str, float | str], remarks: tuple[str, ...]) -> Log:
     column, known = said
     a, b = rows
-    name = f"{joint.name} {episode:06d}"
+    name = f"{joint.name} {conditions['episode']:06.0f}"
     unit = unit_shown(column.unit, column.scale, column.offset)
     reading = Reading(file=str(folder), remarks=remarks, columns=(
         ReadColumn(f"{ACTION} {joint.column}", "command_angle", unit, known),
@@ -134,4 +135,4 @@ def _log(folder: Path, data: Rows, joint: Joint, said: tuple[Column, str], rows:
         return Log(name=name, source=str(folder), time=data.time[a:b], command_kind="angle",
                    command=column.to_si(data.actions[a:b, joint.action], "command_angle"),
                    measured={"output_angle": column.to_si(data.states[a:b, joint.state], "output_angle")},
-                   conditions={"joint": joint.name, "episode": float(episode)}, reading=reading)
+                   conditions=conditions, reading=reading)

@@ -23,6 +23,7 @@ from servotwin.parameters.registers import (
     dynamixel_ax,
     dynamixel_mx,
     dynamixel_x,
+    dynamixel_xl320,
     feetech_sts,
 )
 from servotwin.parameters.servo import KINDS, Servo, dimension_of, servo_from_values, unit_of
@@ -30,7 +31,8 @@ from servotwin.parameters.servo import KINDS, Servo, dimension_of, servo_from_va
 __all__ = [
     "GROUPS", "KINDS", "ORIGINS", "REGISTER_FAMILIES", "Dataset", "Electronics", "Firmware", "Friction", "Gear",
     "Group", "Motor", "Potentiometer", "PrintedPoint", "Quantity", "Servo", "Stops", "Supply", "Thermal",
-    "catalog_names", "dataset_names", "dimension_of", "dynamixel_ax", "dynamixel_mx", "dynamixel_x", "feetech_sts",
+    "catalog_names", "dataset_names", "dimension_of", "dynamixel_ax", "dynamixel_mx", "dynamixel_x", "dynamixel_xl320",
+    "feetech_sts",
     "load_dataset", "load_servo", "printed_fact", "printed_flags", "printed_points", "servo_from_values", "unit_of",
     "write_file",
 ]

@@ -34,11 +34,14 @@ class Goals:
         By joint [rad]
     source : str
         Dataset and episode.
+    robot : str
+        LeRobot's `robot_type`, empty where the dataset does not say it.
     """
 
     time: NDArray[np.float64]
     angles: dict[str, NDArray[np.float64]]
     source: str
+    robot: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +78,8 @@ def episode_goals(path: Path, joints: Mapping[str, str], *, unit: str | Mapping[
     rows = dataset.rows()
     start, stop, number = _episode(dataset, rows, episode)
     forms = _forms(dataset, rows, unit)
-    drive_mode = not str(dataset.info.get("robot_type") or "").startswith(_DYNAMIXEL)
+    robot = str(dataset.info.get("robot_type") or "")
+    drive_mode = not robot.startswith(_DYNAMIXEL)
     known = None if calibration is None else read_calibration(calibration, drive_mode=drive_mode)
     angles = {}
     for joint in dataset.joints:
@@ -90,7 +94,7 @@ def episode_goals(path: Path, joints: Mapping[str, str], *, unit: str | Mapping[
                              got=float(goals[~np.isfinite(goals)][0]))
         angles[joint.name] = joint_angles(form.degrees(goals), form.form, one, limits)
     time = np.asarray(rows.time[start:stop] - rows.time[start])
-    return Goals(time=time, angles=angles, source=f"{path}, episode {number}")
+    return Goals(time=time, angles=angles, source=f"{path}, episode {number}", robot=robot)
 
 
 def _episode(dataset: Dataset, rows: Rows, episode: int | None) -> tuple[int, int, int]:

@@ -35,6 +35,8 @@ class Motion:
         Where it comes from.
     still : tuple of str
         Joints that it says nothing of: they hold still where they are.
+    robot : str
+        LeRobot's name of the kind of robot that it was recorded with; empty where that is not known.
 
     Raises
     ------
@@ -52,6 +54,7 @@ class Motion:
     angles: Mapping[str, NDArray[np.float64]]
     source: str
     still: tuple[str, ...] = field(default=())
+    robot: str = ""
 
     def __post_init__(self) -> None:
         """Check, and keep own copies that nobody changes."""
@@ -178,7 +181,7 @@ def read_motion(path: str | Path, joints: Iterable[str] | Mapping[str, str], *,
         _check_limits(joint, limits)
     if _is_dataset(path):
         goals = episode_goals(path, known, unit=unit, calibration=calibration, episode=episode, ranges=ranges)
-        time, angles, source = goals.time, goals.angles, goals.source
+        time, angles, source, robot = goals.time, goals.angles, goals.source, goals.robot
     else:
         for name, given in (("unit", unit), ("calibration", calibration), ("episode", episode)):
             if given is not None:
@@ -186,8 +189,9 @@ def read_motion(path: str | Path, joints: Iterable[str] | Mapping[str, str], *,
                                  allowed="datasets of LeRobot; in a table, the name of a column ends in its unit")
         table = read_table(path, lambda name: name in _TIMES or _meaning(name, known) is not None)
         table.check_lengths()
-        time, angles, source = _time(table), _angles(table, known), f"{path}"
-    return Motion(time=time, angles=angles, source=source, still=tuple(joint for joint in known if joint not in angles))
+        time, angles, source, robot = _time(table), _angles(table, known), f"{path}", ""
+    still = tuple(joint for joint in known if joint not in angles)
+    return Motion(time=time, angles=angles, source=source, still=still, robot=robot)
 
 
 def _is_dataset(path: Path) -> bool:

@@ -17,7 +17,7 @@ _SLACK = math.radians(0.5)  # rad, of ends that goals are rounded to
 
 
 def notes_of(run: RobotRun) -> tuple[str, ...]:
-    """Return sentences on goals that are out of reach, on collisions, energies, and joints that do not come to rest.
+    """Return sentences on what was assumed of servos, goals out of reach, collisions, energies, and joints that swing.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def notes_of(run: RobotRun) -> tuple[str, ...]:
                         f"{_ends(*ranges[joint], slides=slides)}")
     swings = (f"joint {joint} {remark.words}" for joint in run.mounts for remark in run.tracking[joint].remarks
               if remark.kind == NOT_AT_REST)
-    return (*said, *(touch.words for touch in run.ideal.touches), *run.record.notes, *swings)
+    return (*run.remarks, *said, *(touch.words for touch in run.ideal.touches), *run.record.notes, *swings)
 
 
 def _beyond(values: np.ndarray[tuple[int], np.dtype[np.float64]], ends: tuple[float, float], slack: float) -> bool:

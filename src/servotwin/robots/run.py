@@ -22,6 +22,7 @@ from servotwin.robots.mount import Mount
 from servotwin.robots.notes import notes_of
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.record import Record
+from servotwin.robots.registers import as_motion_says
 from servotwin.robots.sizing import supplied
 from servotwin.robots.tracking import Tracking, tracking_of
 from servotwin.simulation.progress import Progress, shown
@@ -56,6 +57,8 @@ class RobotRun:
         The same with ideal actuators, at the same times.
     tracking : mapping of str to Tracking
         How well each joint has followed.
+    remarks : tuple of str
+        What was assumed of its servos.
     """
 
     model: Any
@@ -66,6 +69,7 @@ class RobotRun:
     poses: Array
     ideal: IdealRun
     tracking: Mapping[str, Tracking]
+    remarks: tuple[str, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -118,7 +122,9 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     servos : mapping of str to Model or Mount
         By the name of the joint.
     motion : Motion
-        Of these joints; those of which it says nothing hold still.
+        Of these joints; those of which it says nothing hold still. One that was recorded with an SO-100 or SO-101
+        says what LeRobot wrote into the registers of servos that have the factory's here: it is assumed, and a note
+        says so.
     bus, joint_friction
         As of `ServoDrive`.
     timestep : float, optional
@@ -157,6 +163,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     if timestep is not None:
         own.opt.timestep = timestep
     mounts = warm_mounts(servos, assume_heat=assume_heat, shared=bus is not None)
+    mounts, remarks = as_motion_says(mounts, motion)
     for joint, mount in mounts.items():
         supplied(mount.model, supply_of(bus, joint))  # raises before anything is run
     _check_joints(motion, mounts, joint_names(own))
@@ -173,11 +180,13 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
             poses[k] = data.qpos
             if k % _TELL == 0:
                 tell(k)
-        return finished(drive, data, motion, mounts, bus, poses, window=window, tell=lambda k: tell(len(time) + k))
+        return finished(drive, data, motion, mounts, bus, poses, window=window, remarks=remarks,
+                        tell=lambda k: tell(len(time) + k))
 
 
 def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mount], bus: Any, poses: Array, *,
-             window: float | None = None, tell: Callable[[int], object] | None = None) -> RobotRun:
+             window: float | None = None, remarks: tuple[str, ...] = (),
+             tell: Callable[[int], object] | None = None) -> RobotRun:
     """Return what servos have done that were recorded in some data, beside the same robot with ideal actuators.
 
     Parameters
@@ -189,6 +198,8 @@ def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, 
         As of `run_motion`.
     poses : ndarray, shape (n, nq)
         At the times of the record.
+    remarks : tuple of str
+        What was assumed of the servos.
     tell : callable, optional
         Is told how many times are done.
     """
@@ -196,6 +207,7 @@ def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, 
     ideal = ideal_run(drive.model, drive.joints, motion, record.time, progress=tell,
                       window=blend_window(motion) if window is None else window)
     return RobotRun(model=drive.model, motion=motion, mounts=mounts, bus=bus, record=record, poses=poses, ideal=ideal,
+                    remarks=remarks,
                     tracking={joint: tracking_of(record[joint], goal_of(motion, joint, record.time, ideal),
                                                  motion.duration) for joint in drive.joints})
 

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from servotwin.bench.bus import registers as tables
 from servotwin.bench.bus.registers import Table
 from servotwin.errors import BenchError
+from servotwin.parameters.registers.dynamixel_one_models import AX_MODELS, MX_MODELS, OneModel
+from servotwin.parameters.registers.dynamixel_x import FULL, SPEED
+from servotwin.parameters.registers.dynamixel_x_models import X_MODELS, XModel
+from servotwin.parameters.registers.feetech_models import STS_MODELS
+from servotwin.parameters.registers.model import RegisterModel
 
 _ZERO_CELSIUS = 273.15
 _RPM = 6.0  # deg/s
@@ -111,7 +116,7 @@ _STS = BusFamily(
     channels=(
         Channel("duty", "Present_Load", 1e-3),
         # assumed: what Protection_Current is compared with, the motor's
-        Channel("armature_current_A", "Present_Current", 6.5e-3),
+        Channel("armature_current_A", "Present_Current", STS_MODELS[0].current_unit),
         Channel("bus_voltage_V", "Present_Voltage", 0.1), _heat("Present_Temperature")),
     errors={1: "voltage", 2: "angle sensor", 4: "heat", 8: "current", 32: "overload"},
     source="Feetech's memory table of SMS/STS servos; SMS_STS library")
@@ -120,8 +125,8 @@ _STS = BusFamily(
 def _x(registers: Table, *current: Channel) -> BusFamily:
     return BusFamily(
         name="dynamixel-x", protocol="dynamixel-2", registers=registers, block=(124, 23), count=_TURN, middle=2048,
-        speed=Channel("output_speed_deg_per_s", "Present_Velocity", 0.229 * _RPM),
-        channels=(Channel("duty", "Present_PWM", 1.0 / 885.0), *current,
+        speed=Channel("output_speed_deg_per_s", "Present_Velocity", SPEED * _RPM),
+        channels=(Channel("duty", "Present_PWM", 1.0 / FULL), *current,
                   Channel("bus_voltage_V", "Present_Input_Voltage", 0.1), _heat("Present_Temperature")),
         # of Hardware_Error_Status; the status byte has one bit for all of them
         errors={1: "voltage", 4: "heat", 8: "encoder", 16: "electric shock or too little power", 32: "overload"},
@@ -139,17 +144,21 @@ def _one(name: str, registers: Table, count: float, middle: int, rpm: float) -> 
         source="e-manual, protocol 1")
 
 
-def _motor(unit: float) -> Channel:
-    return Channel("armature_current_A", "Present_Current", unit)
+def _of_x(model: XModel) -> BusFamily:
+    """Return the registers of a model of the X series, or of an MX with protocol 2."""
+    if model.current_unit is None:
+        return _x(tables.X_WITHOUT_CURRENT, Channel("present_load", "Present_Load", 1e-3))
+    if model.current_sense == "bus":
+        return _x(tables.X330, Channel("supply_current_A", "Present_Current", model.current_unit))
+    return _x(tables.X, Channel("armature_current_A", "Present_Current", model.current_unit))
 
 
-_X330 = _x(tables.X330, Channel("supply_current_A", "Present_Current", 1e-3))
-_X = _x(tables.X, _motor(2.69e-3))
-_XV = _x(tables.X, _motor(1.34e-3))
-_MX2 = _x(tables.X, _motor(3.36e-3))
-_BARE = _x(tables.X_WITHOUT_CURRENT, Channel("present_load", "Present_Load", 1e-3))
-_MX = _one("dynamixel-mx", tables.MX, _TURN, 2048, 0.114)
-_AX = _one("dynamixel-ax", tables.AX, 300.0 / 1023.0, 512, 0.111)
+def _of_mx(model: OneModel) -> BusFamily:
+    return _one("dynamixel-mx", tables.MX, _TURN, 2048, model.speed_unit)
+
+
+def _of_ax(model: OneModel) -> BusFamily:
+    return _one("dynamixel-ax", tables.AX, 300.0 / 1023.0, 512, model.speed_unit)
 
 
 class BusModel(NamedTuple):
@@ -168,20 +177,22 @@ class BusModel(NamedTuple):
     family: BusFamily
 
 
-_NAMES: tuple[tuple[BusFamily, str], ...] = (
-    (_STS, "777 STS3215, 2825 STS3250"),
-    (_X330, "1190 XL330-M077, 1200 XL330-M288, 1210 XC330-T181, 1220 XC330-T288, 1230 XC330-M181, 1240 XC330-M288"),
-    (_BARE, "1060 XL430-W250, 1070 XC430-W150, 1080 XC430-W240, 1090 2XL430-W250, 1160 2XC430-W250, 30 MX-28(2.0)"),
-    (_X, "1000 XH430-W350, 1010 XH430-W210, 1020 XM430-W350, 1030 XM430-W210, 1100 XH540-W270, 1110 XH540-W150, "
-         "1120 XM540-W270, 1130 XM540-W150, 1140 XH540-V270, 1150 XH540-V150, 1170 XW540-T260, 1180 XW540-T140"),
-    (_XV, "1040 XH430-V350, 1050 XH430-V210"),
-    (_MX2, "311 MX-64(2.0), 321 MX-106(2.0)"),
-    (_MX, "29 MX-28, 310 MX-64, 320 MX-106, 360 MX-12W"),
-    (_AX, "12 AX-12A, 18 AX-18A, 300 AX-12W"),
-)
-MODELS: dict[tuple[str, int], BusModel] = {
-    (family.protocol, int(number)): BusModel(int(number), name, family)
-    for family, words in _NAMES for number, name in (word.split(" ", 1) for word in words.split(", "))}
+def _known() -> Iterator[tuple[RegisterModel, BusFamily]]:
+    yield from ((model, _STS) for model in STS_MODELS)
+    yield from ((model, _of_x(model)) for model in X_MODELS)
+    yield from ((model, _of_mx(model)) for model in MX_MODELS)
+    yield from ((model, _of_ax(model)) for model in AX_MODELS)
+
+
+def _models() -> dict[tuple[str, int], BusModel]:
+    found: dict[tuple[str, int], BusModel] = {}
+    for model, family in _known():
+        key = family.protocol, model.number  # what two models answer with tells their series alone
+        found[key] = BusModel(model.number, model.series if key in found else model.name, family)
+    return found
+
+
+MODELS = _models()
 """By protocol and model number; numbers as LeRobot and Robotis list them."""
 
 MODEL_NUMBER_AT = {"feetech": 3, "dynamixel-2": 0, "dynamixel-1": 0}

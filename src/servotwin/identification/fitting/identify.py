@@ -34,6 +34,7 @@ from servotwin.identification.fitting.phases import credible
 from servotwin.identification.fitting.point import FINE, NUISANCES, SHARED, LogPart, Point
 from servotwin.identification.fitting.record import identified_servo, with_record, with_what_logs_say
 from servotwin.identification.fitting.remedies import with_remedies
+from servotwin.identification.fitting.robot_registers import as_logs_say
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.identification.fitting.uncertainty import Rows, Uncertainty, rows_of, uncertainty
 from servotwin.identification.fitting.words import explain, simplest, vague_directions
@@ -156,8 +157,10 @@ def identify(
     began = clock.monotonic()
     read = checks.checked_logs(logs)
     plain = checks.checked_servo(servo, model)
+    usual = checks.usual_free(plain, read) if free is None else ()
+    plain, assumed = as_logs_say(plain, read)
     given, noticed = first_looks(read, plain, mend)
-    names = checks.usual_free(plain, given) if free is None else checks.checked_list("free", free)
+    names = usual if free is None else checks.checked_list("free", free)
     beside = checks.checked_words("compare_with", compare_with, BESIDE)
     level, seed = checks.checked_level(level), checks.checked_count("seed", seed, least=0)
     seen = checks.checked_sensors(given, sensors, plain)
@@ -172,7 +175,7 @@ def identify(
                 checks.checked_count("starts", starts, least=1), checks.checked_noise(noise, seen))
     with running.crew, checks.shown(progress) as show, explained(noticed):
         fit = _run(task, held_out, beside, level, show, intervals=intervals, trials=trials)
-    fit = replace(fit, warnings=(*noticed, *fit.warnings), seconds=clock.monotonic() - began)
+    fit = replace(fit, warnings=(*assumed, *noticed, *fit.warnings), seconds=clock.monotonic() - began)
     return with_record(fit, read, fitted, mend)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from servotwin.logs.log import Log
@@ -11,7 +12,8 @@ from servotwin.parameters.registers import REGISTER_FAMILIES
 from servotwin.units import is_finite
 
 GAIN = "firmware.proportional_gain"
-_REGISTERS = {"feetech-sts": "P_Coefficient", "dynamixel-x": "Position_P_Gain", "dynamixel-mx": "P_Gain"}
+_REGISTERS = {"feetech-sts": "P_Coefficient", "dynamixel-x": "Position_P_Gain", "dynamixel-mx": "P_Gain",
+              "dynamixel-xl320": "P_Gain"}
 _LOOP = ("electronics.stretcher_gain", "electronics.one_shot_slope", "electronics.frame_period")
 _OF_PULSES = ("electronics.", "potentiometer.")
 
@@ -20,8 +22,8 @@ def with_loop_gain(log: Log, model: Model) -> Log:
     """Return a log of a servo on a bus with the gain of its loop as a number of the firmware.
 
     A log's condition `gain` is the register for P: of a servo whose sheet names its registers it makes the duty per
-    angle as they do, and of others as the log's convention of pulses does. What stands for pulses in such a log is left
-    out: a bus servo has none.
+    angle as they do, and of others as the log's convention of pulses does, times the error_gain_ratio of a file of
+    BAM. What stands for pulses in such a log is left out: a bus servo has none.
 
     Parameters
     ----------
@@ -38,7 +40,7 @@ def with_loop_gain(log: Log, model: Model) -> Log:
         return log
     own = {name: value for name, value in log.parameters.items() if not name.startswith(_OF_PULSES)}
     gain = own.get(GAIN, _of_registers(model.servo, log))
-    gain = _of_pulses(log) if gain is None else gain
+    gain = _of_pulses(log, model.servo) if gain is None else gain
     return replace(log, parameters=own if gain is None else {**own, GAIN: gain})
 
 
@@ -50,8 +52,10 @@ def _of_registers(servo: Servo, log: Log) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
 
-def _of_pulses(log: Log) -> float | None:
+def _of_pulses(log: Log, servo: Servo) -> float | None:
     """Return the duty per angle of a chip that stretches K s_µ per angle in each frame [1/rad]."""
     K, s_mu, T_f = (log.parameters.get(name) for name in _LOOP)
     p = log.parameters.get("potentiometer.feedback_gain")
-    return None if K is None or s_mu is None or T_f is None or p is None else K * s_mu * p / T_f
+    rig = servo.sheet.get("bam")
+    ratio = rig.get("error_gain_ratio", 1.0) if isinstance(rig, Mapping) else 1.0
+    return None if K is None or s_mu is None or T_f is None or p is None else K * s_mu * p / T_f * ratio

@@ -21,6 +21,7 @@ from servotwin.identification.fitting.free import Space
 from servotwin.identification.fitting.held_out import trace_of, with_pulses_of
 from servotwin.identification.fitting.holdout import ErrorTable
 from servotwin.identification.fitting.point import NUISANCES, SHARED, LogPart, Point
+from servotwin.identification.fitting.robot_registers import as_logs_say
 from servotwin.identification.fitting.scatter import scatter_of
 from servotwin.identification.fitting.task import HUBER, Task
 from servotwin.logs.log import Log
@@ -91,9 +92,10 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
              progress: Progress = False) -> Validation:
     """Run a servo against logs, and return how far it is off.
 
-    Every log starts at the angle and speed that it shows. Delay and angle offset are those that the servo file's [fit]
-    recorded, where it has any. Where pulses have a phase, the first half of each log says when they come, and the
-    errors are those of the second.
+    Of logs of an SO-100 or SO-101 (datasets of LeRobot) a servo with the factory's registers is taken with those that
+    LeRobot writes, and a warning says so. Every log starts at the angle and speed that it shows. Delay and angle offset
+    are those that the servo file's [fit] recorded, where it has any. Where pulses have a phase, the first half of each
+    log says when they come, and the errors are those of the second.
 
     Parameters
     ----------
@@ -128,7 +130,9 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     True
     """
     plain = checks.checked_servo(servo, recorded_model(servo) if model is None else model)
-    given, noticed = first_looks(checks.checked_logs(logs), plain, mend)
+    read = checks.checked_logs(logs)
+    plain, assumed = as_logs_say(plain, read)
+    given, noticed = first_looks(read, plain, mend)
     seen = checks.checked_sensors(given, sensors, plain)
     for name in nuisance:
         if name not in NUISANCES:
@@ -145,10 +149,10 @@ def validate(logs: Sequence[Log] | str | Path, servo: Servo, model: type[Model] 
     traces = tuple(trace_of(forecast, point, k, part, held_out=True) for k, part in enumerate(parts))
     own = type(plain).__name__
     return Validation(
-        servo=servo, model=plain, traces=traces, fitted=tuple(name for name in NUISANCES if name in nuisance),
+        servo=plain.servo, model=plain, traces=traces, fitted=tuple(name for name in NUISANCES if name in nuisance),
         errors=ErrorTable((own,), {own: tuple(trace.error for trace in traces)}),
         nuisance={name: forecast.nuisance_of(point.shared, name) for name in forecast.extra},
-        noise=_noise(forecast, parts), warnings=noticed)
+        noise=_noise(forecast, parts), warnings=(*assumed, *noticed))
 
 
 def recorded_model(servo: Any) -> type[Model] | None:

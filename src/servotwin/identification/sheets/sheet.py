@@ -161,7 +161,7 @@ class Sheet:
         if self.modulation not in MODULATIONS:
             raise InputError("modulation", got=self.modulation, allowed="analog, digital, bus, or nothing")
         if self.modulation == "bus" and self.registers not in REGISTER_FAMILIES:
-            raise UnknownNameError("family of registers", self.registers, REGISTER_FAMILIES)
+            raise _no_family(self.registers)
         if self.modulation != "bus" and self.registers:
             raise InputError("registers", got=self.registers, allowed='nothing, for modulation is not "bus"')
         if (self.pulse_min is None) != (self.pulse_max is None) or not (self.pulse_min or 0.0) < (self.pulse_max or 1):
@@ -233,6 +233,15 @@ class Sheet:
     def source_at(self, point: SheetPoint) -> str:
         """Return where the figures of a point were read."""
         return point.source or self.source or "data sheet"
+
+
+def _no_family(registers: str) -> InputError | UnknownNameError:
+    """Return the error of a bus servo without registers, or with those of a family that has no table."""
+    allowed = (f"{', '.join(REGISTER_FAMILIES)}; of another family (LX-16A, SCS, HTS) no table says what its registers "
+               "do: modulation digital makes its motor, its gear and an assumed program that pulses command")
+    if not registers:
+        return InputError("registers of a bus servo", got="nothing", allowed=allowed)
+    return UnknownNameError("family of registers", registers, REGISTER_FAMILIES, allowed=allowed)
 
 
 def _check(given: SheetPoint | Sheet) -> None:

@@ -7,21 +7,24 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from servotwin.errors import ParameterError
-from servotwin.parameters.registers.table import Family, Raw, Register, Setting, on, set_registers
+from servotwin.parameters.catalog import load_servo
+from servotwin.parameters.registers.dynamixel_one_models import AX_MODELS, MX_MODELS, OneModel
+from servotwin.parameters.registers.model import model_for
+from servotwin.parameters.registers.table import Family, Given, Raw, Register, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
 _TICK = 1e-3  # s
 _RPM = math.pi / 30.0
 _DEG = math.pi / 180.0
 _GUESS = "assumed"
-_by_voltage, _by_heat, _by_load = on(0, "Shutdown"), on(2, "Shutdown"), on(5, "Shutdown")
+_BITS = (0, 2, 5)  # of Shutdown: voltage, heat, load
 _SLOPES = (2, 4, 8, 16, 32, 64, 128)  # what the servo takes a compliance slope for, each up to the next
 _OTHER_NAMES = {"Alarm_Shutdown": "Shutdown", "Goal_Speed": "Moving_Speed"}
 
 
 def _common(last: int, *, temperature: int) -> dict[str, Register]:
-    feedback = {name: Register(address, 0, 65535, 0) for name, address in (
-        ("Model_Number", 0), ("Firmware_Version", 2), ("Goal_Position", 30), ("Present_Position", 36),
+    feedback = {name: Register(address, 0, 65535, 0, reading=True) for name, address in (
+        ("Firmware_Version", 2), ("Goal_Position", 30), ("Present_Position", 36),
         ("Present_Speed", 38), ("Present_Load", 40), ("Present_Voltage", 42), ("Present_Temperature", 43),
         ("Registered", 44), ("Moving", 46))}
     return {
@@ -33,6 +36,7 @@ def _common(last: int, *, temperature: int) -> dict[str, Register]:
         "Torque_Limit": Register(34, 0, 1023, 1023),
         "Moving_Speed": Register(32, 0, 1023, 0),
         "Shutdown": Register(18, 0, 127, 36),
+        "Model_Number": Register(0, 0, 65535, 0),
         # without effect on the control of the angle
         "ID": Register(3, 0, 253, 1),
         "Baud_Rate": Register(4, 0, 254, 1),
@@ -58,8 +62,8 @@ MX_REGISTERS: dict[str, Register] = {
     "Torque_Control_Mode_Enable": Register(70, 0, 1, 0, (0,), "control of the torque is not computed"),
     "Multi_Turn_Offset": Register(20, -24576, 24576, 0),
     "Drive_Mode": Register(10, 0, 3, 0),
-    "Realtime_Tick": Register(50, 0, 32767, 0),
-    "Current": Register(68, 0, 4095, 0),
+    "Realtime_Tick": Register(50, 0, 32767, 0, reading=True),
+    "Current": Register(68, 0, 4095, 0, reading=True),
     "Goal_Torque": Register(71, 0, 2047, 0),
 }
 AX_REGISTERS: dict[str, Register] = {
@@ -74,7 +78,7 @@ _MARGINS = ("CW_Compliance_Margin", "CCW_Compliance_Margin")
 _COMPLIANCE = ("CW_Compliance_Slope", "CCW_Compliance_Slope")
 
 
-def dynamixel_mx(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
+def dynamixel_mx(registers: Given, *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Dynamixel's MX series, protocol 1, set into its firmware.
 
     Parameters
@@ -97,10 +101,11 @@ def dynamixel_mx(registers: Mapping[str, int], *, servo: str | Path | Servo) -> 
     >>> round(knee.firmware.proportional_gain, 4)
     2.5465
     """
-    return set_registers(MX, registers, servo)
+    base, number = _base(registers, servo)
+    return set_registers(mx_family_of(base, number), registers, base)
 
 
-def dynamixel_ax(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
+def dynamixel_ax(registers: Given, *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Dynamixel's AX series set into its firmware.
 
     Parameters
@@ -129,10 +134,17 @@ def dynamixel_ax(registers: Mapping[str, int], *, servo: str | Path | Servo) -> 
     >>> round(dynamixel_ax(soft, servo="dynamixel-ax-12a").firmware.proportional_gain, 3)
     2.957
     """
-    return set_registers(AX, registers, servo)
+    base, number = _base(registers, servo)
+    return set_registers(ax_family_of(base, number), registers, base)
 
 
-def _check_limits(label: str, last: int, raw: Raw) -> None:
+def _base(registers: Given, servo: str | Path | Servo) -> tuple[Servo, int]:
+    base = servo if isinstance(servo, Servo) else load_servo(servo)
+    return base, registers.get("Model_Number", 0) if isinstance(registers, Mapping) else 0
+
+
+def check_limits(label: str, last: int, raw: Raw) -> None:
+    """Raise ParameterError where both angle limits do not go together."""
     low, high = raw["CW_Angle_Limit"], raw["CCW_Angle_Limit"]
     if low == high == 0:
         raise ParameterError(f"registers CW_Angle_Limit and CCW_Angle_Limit of {label}", got=0,
@@ -142,9 +154,23 @@ def _check_limits(label: str, last: int, raw: Raw) -> None:
                              allowed=f"less than CCW_Angle_Limit = {high}")
 
 
-def _shared(count: float, last: int, speed: float) -> tuple[Setting, ...]:
-    """Return what both series have: `count` [rad], the last count, and the unit of Moving_Speed [rad/s]."""
+def shared_settings(count: float, last: int, speed: float,
+                    bits: tuple[int, int, int] = _BITS) -> tuple[Setting, ...]:
+    """Return what servos with the control of the MX and AX series have.
+
+    Parameters
+    ----------
+    count : float
+        [rad]
+    last : int
+        The last count.
+    speed : float
+        Unit of Moving_Speed [rad/s].
+    bits : tuple of int
+        Of Shutdown that say whether voltage, heat and load do.
+    """
     middle = (last + 1) // 2
+    by_voltage, by_heat, by_load = (on(bit, "Shutdown") for bit in bits)
 
     def goal(name: str, register: str) -> Setting:
         return Setting(name, lambda raw, _: None if raw["CW_Angle_Limit"] == raw["CCW_Angle_Limit"] else
@@ -163,11 +189,11 @@ def _shared(count: float, last: int, speed: float) -> tuple[Setting, ...]:
         goal("upper_goal", "CCW_Angle_Limit"),
         Setting("speed_limit", lambda raw, _: raw["Moving_Speed"] * speed or None, ("Moving_Speed",),
                 f"{speed / _RPM:.3g} rpm; 0: none"),
-        Setting("overload_output", lambda raw, _: 0.0 if _by_load(raw) else None, ("Shutdown",), "torque off"),
-        Setting("overload_latches", lambda raw, _: "yes" if _by_load(raw) else "no", ("Shutdown",), "till a restart"),
-        Setting("trip_temperature", lambda raw, _: raw["Temperature_Limit"] + 273.15 if _by_heat(raw) else None,
+        Setting("overload_output", lambda raw, _: 0.0 if by_load(raw) else None, ("Shutdown",), "torque off"),
+        Setting("overload_latches", lambda raw, _: "yes" if by_load(raw) else "no", ("Shutdown",), "till a restart"),
+        Setting("trip_temperature", lambda raw, _: raw["Temperature_Limit"] + 273.15 if by_heat(raw) else None,
                 ("Temperature_Limit", "Shutdown"), "deg C"),
-        Setting("undervoltage", lambda raw, _: raw["Min_Voltage_Limit"] * 0.1 if _by_voltage(raw) else None,
+        Setting("undervoltage", lambda raw, _: raw["Min_Voltage_Limit"] * 0.1 if by_voltage(raw) else None,
                 ("Min_Voltage_Limit", "Shutdown"), "0.1 V"),
         Setting("undervoltage_action", lambda raw, _: "stop", ("Shutdown",)),
         Setting("signal_loss", lambda raw, _: "hold", said="keeps its last goal"),
@@ -186,28 +212,50 @@ def _slope(raw: Raw) -> int:
 
 _MX_GAIN = 4.0 / math.pi  # duty per rad and unit of the manual's K_p = P/8
 _AX_COUNT = 300.0 / 1023.0 * _DEG
-MX = Family(
-    label="Dynamixel MX", reference="e-manual of the MX series, protocol 1", registers=MX_REGISTERS,
-    settings=(
-        Setting("proportional_gain", lambda raw, _: raw["P_Gain"] / (2.0 * math.pi), ("P_Gain",),
-                "P/(2 pi) of duty a radian, as an oscilloscope showed the authors of BAM"),
-        Setting("integral_gain", lambda raw, _: raw["I_Gain"] * 1000.0 / 2048.0 * _MX_GAIN, ("I_Gain",),
-                "I 1000/2048 in the manual, where P is P/8", _GUESS, (0.5, 2.0)),
-        Setting("derivative_gain", lambda raw, _: raw["D_Gain"] * 4.0 / 1000.0 * _MX_GAIN, ("D_Gain",),
-                "D 4/1000 in the manual, where P is P/8", _GUESS, (0.5, 2.0)),
-        Setting("duty_limit", lambda raw, _: 0.9625, said="as an oscilloscope showed the authors of BAM"),
-        Setting("acceleration_limit", lambda raw, _: raw["Goal_Acceleration"] * 8.583 * _DEG or None,
-                ("Goal_Acceleration",), "8.583 degrees/s2; 0: none"),
-        *_shared(2.0 * math.pi / 4096.0, 4095, 0.114 * _RPM)),
-    other_names=_OTHER_NAMES, copied={"Torque_Limit": "Max_Torque"},
-    check=lambda raw: _check_limits("Dynamixel MX", 4095, raw))
-AX = Family(
-    label="Dynamixel AX", reference="e-manual of the AX series", registers=AX_REGISTERS,
-    settings=(
-        Setting("proportional_gain", lambda raw, _: (1.0 - raw["Punch"] / 1023.0) / (_slope(raw) * 0.29326 * _DEG),
-                (*_COMPLIANCE, "Punch"), "from Punch to all of the duty over the slope, the larger one, of 0.29326 "
-                "degrees a count"),
-        Setting("deadband_angle", lambda raw, _: _margin(raw) * _AX_COUNT, _MARGINS, "counts, the larger one"),
-        *_shared(_AX_COUNT, 1023, 0.111 * _RPM)),
-    other_names=_OTHER_NAMES, copied={"Torque_Limit": "Max_Torque"}, pairs=(_MARGINS, _COMPLIANCE),
-    check=lambda raw: _check_limits("Dynamixel AX", 1023, raw))
+_MX_SETTINGS = (
+    Setting("proportional_gain", lambda raw, _: raw["P_Gain"] / (2.0 * math.pi), ("P_Gain",),
+            "P/(2 pi) of duty a radian, as an oscilloscope showed the authors of BAM"),
+    Setting("integral_gain", lambda raw, _: raw["I_Gain"] * 1000.0 / 2048.0 * _MX_GAIN, ("I_Gain",),
+            "I 1000/2048 in the manual, where P is P/8", _GUESS, (0.5, 2.0)),
+    Setting("derivative_gain", lambda raw, _: raw["D_Gain"] * 4.0 / 1000.0 * _MX_GAIN, ("D_Gain",),
+            "D 4/1000 in the manual, where P is P/8", _GUESS, (0.5, 2.0)),
+    Setting("duty_limit", lambda raw, _: 0.9625, said="as an oscilloscope showed the authors of BAM"),
+    Setting("acceleration_limit", lambda raw, _: raw["Goal_Acceleration"] * 8.583 * _DEG or None,
+            ("Goal_Acceleration",), "8.583 degrees/s2; 0: none"),
+)
+_AX_SETTINGS = (
+    Setting("proportional_gain", lambda raw, _: (1.0 - raw["Punch"] / 1023.0) / (_slope(raw) * 0.29326 * _DEG),
+            (*_COMPLIANCE, "Punch"), "from Punch to all of the duty over the slope, the larger one, of 0.29326 "
+            "degrees a count"),
+    Setting("deadband_angle", lambda raw, _: _margin(raw) * _AX_COUNT, _MARGINS, "counts, the larger one"),
+)
+
+
+def mx_family_of(servo: Servo, number: int = 0) -> Family:
+    """Return the registers of a servo of the MX series, by its model number, else by its name."""
+    return mx_family(model_for(MX_MODELS, servo, number, MX_REGISTERS))
+
+
+def mx_family(model: OneModel) -> Family:
+    """Return the registers of a model of the MX series."""
+    return Family(
+        label="Dynamixel MX", model=model.name, reference=model.document, registers=model.registers(MX_REGISTERS),
+        assumed=model.unseen(MX_REGISTERS), masks=("Shutdown",),
+        settings=(*_MX_SETTINGS, *shared_settings(2.0 * math.pi / 4096.0, 4095, model.speed_unit * _RPM)),
+        other_names=_OTHER_NAMES, copied={"Torque_Limit": "Max_Torque"},
+        check=lambda raw: check_limits("Dynamixel MX", 4095, raw))
+
+
+def ax_family_of(servo: Servo, number: int = 0) -> Family:
+    """Return the registers of a servo of the AX series, by its model number, else by its name."""
+    return ax_family(model_for(AX_MODELS, servo, number, AX_REGISTERS))
+
+
+def ax_family(model: OneModel) -> Family:
+    """Return the registers of a model of the AX series."""
+    return Family(
+        label="Dynamixel AX", model=model.name, reference=model.document, registers=model.registers(AX_REGISTERS),
+        assumed=model.unseen(AX_REGISTERS), masks=("Shutdown",),
+        settings=(*_AX_SETTINGS, *shared_settings(_AX_COUNT, 1023, model.speed_unit * _RPM)),
+        other_names=_OTHER_NAMES, copied={"Torque_Limit": "Max_Torque"}, pairs=(_MARGINS, _COMPLIANCE),
+        check=lambda raw: check_limits("Dynamixel AX", 1023, raw))

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
-from servotwin.parameters.registers.table import Family, Raw, Register, Setting, on, set_registers
+from servotwin.parameters.registers.dynamixel_x_models import OF_CURRENT, OF_SLOPE, X_MODELS, XModel
+from servotwin.parameters.registers.model import model_for
+from servotwin.parameters.registers.table import Family, Given, Raw, Register, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
 _COUNT = 2.0 * math.pi / 4096.0  # rad
 _MIDDLE = 2048  # counts at angle 0
 _TICK = 1e-3  # s
-_FULL = 885.0  # PWM steps of the whole duty
+FULL = 885.0  # PWM steps of the whole duty
+SPEED = 0.229  # rpm a step
 _RPM = math.pi / 30.0
-_SPEED, _ACCELERATION = 0.229 * _RPM, 214.577 * _RPM / 60.0  # rad/s and rad/s2 a step
+_SPEED, _ACCELERATION = SPEED * _RPM, 214.577 * _RPM / 60.0  # rad/s and rad/s2 a step
 _GUESS = "assumed"
 _POSITION, _TURNS, _BY_CURRENT = 3, 4, 5
 _by_voltage, _by_heat, _by_load = on(0, "Shutdown"), on(2, "Shutdown"), on(5, "Shutdown")
@@ -41,10 +43,10 @@ REGISTERS: dict[str, Register] = {
     "Profile_Acceleration": Register(108, 0, 32767, 0),
     "PWM_Limit": Register(36, 0, 885, 885),
     "Goal_PWM": Register(100, 0, 885, 885),
-    "Current_Limit": Register(38, 0, 2047, 1193),
-    "Goal_Current": Register(102, 1, 2047, 1193),
+    "Current_Limit": Register(38, 0, 2352, 1193),
+    "Goal_Current": Register(102, 1, 2352, 1193),
     "Temperature_Limit": Register(31, 0, 100, 80),
-    "Min_Voltage_Limit": Register(34, 0, 160, 95),
+    "Min_Voltage_Limit": Register(34, 31, 300, 95),
     "Shutdown": Register(63, 0, 255, 52),
     "Bus_Watchdog": Register(98, 0, 127, 0),
     "PWM_Slope": Register(62, 1, 255, 140),
@@ -59,7 +61,7 @@ REGISTERS: dict[str, Register] = {
     "Protocol_Type": Register(13, 1, 22, 2),
     "Homing_Offset": Register(20, -1044479, 1044479, 0),
     "Moving_Threshold": Register(24, 0, 1023, 10),
-    "Max_Voltage_Limit": Register(32, 0, 160, 160),
+    "Max_Voltage_Limit": Register(32, 31, 300, 160),
     "Acceleration_Limit": Register(40, 0, 32767, 32767),
     "Velocity_Limit": Register(44, 0, 2047, 200),
     "Startup_Configuration": Register(60, 0, 3, 0),
@@ -69,50 +71,16 @@ REGISTERS: dict[str, Register] = {
     "Registered_Instruction": Register(69, 0, 1, 0),
     "Velocity_I_Gain": Register(76, 0, 16383, 1920),
     "Velocity_P_Gain": Register(78, 0, 16383, 100),
-    **{name: Register(address, -2**31, 2**31 - 1, 0) for name, address in _FEEDBACK},
+    **{name: Register(address, -2**31, 2**31 - 1, 0, reading=True) for name, address in _FEEDBACK},
 }
 
 
-@dataclass(frozen=True)
-class _Variant:
-    """What differs between models.
-
-    Parameters
-    ----------
-    factory : mapping of str to int
-        Values that the e-manual gives for it.
-    current_unit : float, optional
-        Of Goal_Current [A]; None: it has none.
-    current_sense : {"motor", "bus"}
-    slope : bool
-        Whether it has PWM_Slope.
-    measured : bool
-        Whether the scale of its P is known.
-    """
-
-    factory: Mapping[str, int]
-    current_unit: float | None = 2.69e-3
-    current_sense: str = "motor"
-    slope: bool = False
-    measured: bool = False
-
-
-_X330 = _Variant({"Position_P_Gain": 400, "Temperature_Limit": 70, "Min_Voltage_Limit": 35, "Current_Limit": 1750,
-                  "Goal_Current": 1750, "Shutdown": 53}, current_unit=1e-3, current_sense="bus", slope=True,
-                 measured=True)
-_XL430 = _Variant({"Position_P_Gain": 640, "Position_D_Gain": 4000, "Temperature_Limit": 72, "Min_Voltage_Limit": 60},
-                  current_unit=None)
-_X = _Variant({})
-_OF_CURRENT, _OF_SLOPE = ("Current_Limit", "Goal_Current", "Present_Current"), ("PWM_Slope",)
-_BY_NAME = {"xl330": _X330, "xc330": _X330, "xl430": _XL430, "xc430": _XL430}
-_BY_NUMBER = {1190: _X330, 1200: _X330, 1060: _XL430, 1070: _XL430}
-
-
-def dynamixel_x(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
+def dynamixel_x(registers: Given, *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Dynamixel's X series set into its firmware.
 
     Which model it is, and with it the factory's values and the unit of the current, follows from Model_Number or the
-    servo's name; a name that tells none counts as an XM430.
+    servo's name. Of a name that tells a series alone, such as xl330, what differs within the series is assumed; one
+    that tells none counts as an XM430-W350, and all of it is assumed.
 
     Parameters
     ----------
@@ -137,36 +105,31 @@ def dynamixel_x(registers: Mapping[str, int], *, servo: str | Path | Servo) -> S
     """
     base = servo if isinstance(servo, Servo) else load_servo(servo)
     number = registers.get("Model_Number", 0) if isinstance(registers, Mapping) else 0
-    variant = _BY_NUMBER.get(number) or _variant_of(base)
     if "PWM_Slope" in registers and base.supply.open_circuit_voltage is None:
         raise ParameterError(f"register PWM_Slope of Dynamixel X for {base.name!r}, whose supply voltage is not given")
-    return set_registers(_family(variant), registers, base)
+    return set_registers(family_of(base, number), registers, base)
 
 
-def family_of(servo: Servo) -> Family:
-    """Return the registers of a servo of this series, by its name."""
-    return _family(_variant_of(servo))
+def family_of(servo: Servo, number: int = 0) -> Family:
+    """Return the registers of a servo of this series, by its model number, else by its name."""
+    return x_family(model_for(X_MODELS, servo, number, REGISTERS))
 
 
-def _variant_of(servo: Servo) -> _Variant:
-    return next((found for name, found in _BY_NAME.items() if name in servo.name.lower()), _X)
-
-
-def _family(variant: _Variant) -> Family:
-    lacking = (*(() if variant.current_unit else _OF_CURRENT), *(() if variant.slope else _OF_SLOPE))
-    registers = {name: replace(register, factory=variant.factory.get(name, register.factory))
-                 for name, register in REGISTERS.items() if name not in lacking}
-    settings = tuple(setting for setting in (*_control(variant), *_LIMITS, *_TRIPS)
-                     if not any(name in lacking for name in setting.registers))
+def x_family(model: XModel) -> Family:
+    """Return the registers of a model."""
+    lacking = {*(() if model.current_unit else OF_CURRENT), *(() if model.slope_unit else OF_SLOPE)}
+    settings = tuple(setting for setting in (*_control(model), *_LIMITS, *_TRIPS)
+                     if not lacking & set(setting.registers))
     return Family(
-        label="Dynamixel X", reference="e-manual of the X series", registers=registers, settings=settings,
+        label="Dynamixel X", model=model.name, reference=model.document, registers=model.registers(REGISTERS),
+        assumed=model.unseen(REGISTERS), masks=("Shutdown",), settings=settings,
         other_names={"Secondary_Shadow_ID": "Secondary_ID"},
-        copied={"Goal_PWM": "PWM_Limit", "Goal_Current": "Current_Limit"},
-        check=lambda raw: _check(variant, raw))
+        copied={"Goal_PWM": "PWM_Limit", **({"Goal_Current": "Current_Limit"} if model.current_unit else {})},
+        check=lambda raw: _check(model, raw))
 
 
-def _check(variant: _Variant, raw: Raw) -> None:
-    if raw["Operating_Mode"] == _BY_CURRENT and variant.current_unit is None:
+def _check(model: XModel, raw: Raw) -> None:
+    if raw["Operating_Mode"] == _BY_CURRENT and model.current_unit is None:
         raise ParameterError("register Operating_Mode of Dynamixel X", got=_BY_CURRENT,
                              allowed="3 or 4: this model does not sense its current")
     for goal, limit in (("Goal_PWM", "PWM_Limit"), ("Goal_Current", "Current_Limit")):
@@ -184,39 +147,39 @@ def _goal(name: str, register: str) -> Setting:
                    (register, "Operating_Mode"), "angle 0 at count 2048; mode 4 turns without end")
 
 
-def _control(variant: _Variant) -> tuple[Setting, ...]:
-    unit = variant.current_unit or 0.0
+def _control(model: XModel) -> tuple[Setting, ...]:
+    unit, slope = model.current_unit or 0.0, model.slope_unit or 0.0
     return (
         Setting("control_period", lambda raw, _: _TICK, said="a guess", origin=_GUESS, bounds=(5e-4, 2e-3)),
         Setting("compute_delay", lambda raw, _: 0.0, said="a guess", origin=_GUESS, bounds=(0.0, _TICK)),
         Setting("angle_quantum", lambda raw, _: _COUNT, said="4096 counts a turn"),
         Setting("filter_weight", lambda raw, _: 1.0, said="a guess: no filter", origin=_GUESS, bounds=(0.2, 1.0)),
-        Setting("proportional_gain", lambda raw, _: raw["Position_P_Gain"] / (256.0 * _FULL * _COUNT),
+        Setting("proportional_gain", lambda raw, _: raw["Position_P_Gain"] / (256.0 * FULL * _COUNT),
                 ("Position_P_Gain",), "P/256 steps of PWM a count, " + (
-                    "as recordings of an XL330 show; the manual says 128" if variant.measured else
+                    "as recordings of an XL330 show; the manual says 128" if model.measured else
                     "as of the XL330; the manual says 128"),
-                *(() if variant.measured else (_GUESS, (1.0, 2.0)))),
-        Setting("integral_gain", lambda raw, _: raw["Position_I_Gain"] / (2.0 * 65536.0 * _FULL * _COUNT * _TICK),
+                *(() if model.measured else (_GUESS, (1.0, 2.0)))),
+        Setting("integral_gain", lambda raw, _: raw["Position_I_Gain"] / (2.0 * 65536.0 * FULL * _COUNT * _TICK),
                 ("Position_I_Gain",), "I/131072 steps of PWM a count and tick, a guess", _GUESS, (0.5, 2.0)),
-        Setting("derivative_gain", lambda raw, _: raw["Position_D_Gain"] * _TICK / (32.0 * _FULL * _COUNT),
+        Setting("derivative_gain", lambda raw, _: raw["Position_D_Gain"] * _TICK / (32.0 * FULL * _COUNT),
                 ("Position_D_Gain",), "D/32 steps of PWM a count in a tick, a guess", _GUESS, (0.5, 2.0)),
-        Setting("duty_quantum", lambda raw, _: 1.0 / _FULL, said="PWM in 885 steps"),
+        Setting("duty_quantum", lambda raw, _: 1.0 / FULL, said="PWM in 885 steps"),
         Setting("command_kind", lambda raw, _: "goal", ("Operating_Mode",), "goals on the bus"),
         Setting("current_limit", lambda raw, _: raw["Goal_Current"] * unit
                 if raw["Operating_Mode"] == _BY_CURRENT else None,
                 ("Goal_Current", "Operating_Mode"), f"{1e3 * unit:.3g} mA, in mode 5"),
         Setting("current_sense",
-                lambda raw, _: variant.current_sense if raw["Operating_Mode"] == _BY_CURRENT else None,
+                lambda raw, _: model.current_sense if raw["Operating_Mode"] == _BY_CURRENT else None,
                 ("Operating_Mode", "Goal_Current"), "in mode 5"),
-        Setting("duty_slew", lambda raw, servo: raw["PWM_Slope"] * 1.977 / servo.supply.open_circuit_voltage
+        Setting("duty_slew", lambda raw, servo: raw["PWM_Slope"] * slope / servo.supply.open_circuit_voltage
                 if servo.supply.open_circuit_voltage else None,
-                ("PWM_Slope",), "1.977 V/s over the supply, a guess", _GUESS, (0.5, 2.0)),
+                ("PWM_Slope",), f"{slope:.4g} V/s over the supply, a guess", _GUESS, (0.5, 2.0)),
     )
 
 
 _LIMITS = (
-    Setting("torque_limit", lambda raw, _: raw["Goal_PWM"] / _FULL, ("Goal_PWM",), "1/885, from PWM_Limit at power-up"),
-    Setting("duty_limit", lambda raw, _: raw["PWM_Limit"] / _FULL, ("PWM_Limit",), "1/885"),
+    Setting("torque_limit", lambda raw, _: raw["Goal_PWM"] / FULL, ("Goal_PWM",), "1/885, from PWM_Limit at power-up"),
+    Setting("duty_limit", lambda raw, _: raw["PWM_Limit"] / FULL, ("PWM_Limit",), "1/885"),
     _goal("lower_goal", "Min_Position_Limit"),
     _goal("upper_goal", "Max_Position_Limit"),
     Setting("speed_limit", lambda raw, _: raw["Profile_Velocity"] * _SPEED or None, ("Profile_Velocity",), "0.229 rpm"),

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from servotwin.errors import ParameterError
 from servotwin.parameters.catalog import load_servo
-from servotwin.parameters.registers.table import Family, Raw, Register, Setting, on, set_registers
+from servotwin.parameters.registers.feetech_models import STS_MODELS, StsModel
+from servotwin.parameters.registers.model import model_for
+from servotwin.parameters.registers.sets import LEROBOT_SETS
+from servotwin.parameters.registers.table import Family, Given, Raw, Register, Setting, on, set_registers
 from servotwin.parameters.servo import Servo
 
 _COUNT = 2.0 * math.pi / 4096.0  # rad
@@ -60,56 +62,35 @@ REGISTERS: dict[str, Register] = {
     "Baud_Rate": Register(6, 0, 7, 0),
     "Return_Delay_Time": Register(7, 0, 254, 0),
     "Response_Status_Level": Register(8, 0, 1, 1),
-    "Max_Voltage_Limit": Register(14, 0, 254, 80),
+    "Max_Voltage_Limit": Register(14, 0, 254, 140),
     "LED_Alarm_Condition": Register(20, 0, 254, 47),
     "Homing_Offset": Register(31, -2047, 2047, 0),
     "Velocity_closed_loop_P_proportional_coefficient": Register(37, 0, 254, 10),
-    "Velocity_closed_loop_I_integral_coefficient": Register(39, 0, 254, 10),
+    "Velocity_closed_loop_I_integral_coefficient": Register(39, 0, 254, 200),
     "Torque_Enable": Register(40, 0, 128, 0),
     "Goal_Time": Register(44, 0, 1000, 0),
     "Lock": Register(55, 0, 1, 0),
     "Velocity_Unit_factor": Register(82, 0, 254, 1),
-    **{name: Register(address, -65535, 65535, 0) for name, address in _FEEDBACK},
+    **{name: Register(address, -65535, 65535, 0, reading=True) for name, address in _FEEDBACK},
 }
 
 
-@dataclass(frozen=True)
-class _Variant:
-    """What differs between models.
-
-    Parameters
-    ----------
-    most_speed : int
-        Factory value of Maximum_Velocity_Limit.
-    current_unit : float
-        Of Protection_Current [A].
-    sure : bool
-        Whether both are known.
-    """
-
-    most_speed: int = 68
-    current_unit: float = 6.5e-3
-    sure: bool = True
-
-
-_STS3250 = _Variant(most_speed=254, current_unit=3.8 / 310.0, sure=False)
-
-
-def feetech_sts(registers: Mapping[str, int], *, servo: str | Path | Servo) -> Servo:
+def feetech_sts(registers: Given, *, servo: str | Path | Servo) -> Servo:
     """Return a servo with registers of Feetech's STS series set into its firmware.
 
     Parameters
     ----------
-    registers : mapping of str to int
+    registers : mapping of str to int, or str
         Raw values by LeRobot's names, such as ``{"P_Coefficient": 16, "D_Coefficient": 32}``; all of a dump may be
-        given. Angle 0 is at count 2048.
+        given. Angle 0 is at count 2048. ``"lerobot"`` stands for what LeRobot writes into the servos of an SO-100 or
+        SO-101 follower, ``"lerobot-gripper"`` for what it writes into the one of the gripper.
     servo : str, Path or Servo
         Catalog id, path of a servo file, or a servo. What is not given stays as it has it, or is the factory's.
 
     Raises
     ------
     UnknownNameError
-        If there is no such register: the nearest are suggested.
+        If there is no such register or set: the nearest are suggested.
     ParameterError
         If a value is not whole, out of range or not computed.
 
@@ -125,22 +106,25 @@ def feetech_sts(registers: Mapping[str, int], *, servo: str | Path | Servo) -> S
     2.6076
     >>> arm.source("firmware.proportional_gain").source[:52]
     'Feetech STS firmware: register P_Coefficient (21) = '
+    >>> feetech_sts("lerobot", servo="feetech-sts3215-12v").firmware.proportional_gain == arm.firmware.proportional_gain
+    True
     """
     base = servo if isinstance(servo, Servo) else load_servo(servo)
-    return set_registers(family_of(base), registers, base)
+    number = registers.get("Model_Number", 0) if isinstance(registers, Mapping) else 0
+    return set_registers(family_of(base, number), registers, base)
 
 
-def family_of(servo: Servo) -> Family:
-    """Return the registers of a servo of this series."""
-    return _family(_STS3250 if "3250" in servo.name else _Variant())
+def family_of(servo: Servo, number: int = 0) -> Family:
+    """Return the registers of a servo of this series, by its model number, else by its name."""
+    return sts_family(model_for(STS_MODELS, servo, number, REGISTERS))
 
 
-def _family(variant: _Variant) -> Family:
-    most = REGISTERS["Maximum_Velocity_Limit"]
+def sts_family(model: StsModel) -> Family:
+    """Return the registers of a model."""
     return Family(
-        label="Feetech STS", reference="memory table of Feetech's SMS/STS servos",
-        registers={**REGISTERS, "Maximum_Velocity_Limit": replace(most, factory=variant.most_speed)},
-        settings=(*_CONTROL, *_profile(variant), *_trips(variant)),
+        label="Feetech STS", model=model.name, reference=model.document, registers=model.registers(REGISTERS),
+        assumed=model.unseen(REGISTERS), elsewhere=model.elsewhere, masks=(_MASK,), sets=LEROBOT_SETS,
+        settings=(*_CONTROL, *_profile(model), *_trips(model)),
         other_names={"Hts": "Minimum_Velocity_Limit", "Moving_Velocity": "Moving_Velocity_Threshold"},
         copied={"Torque_Limit": "Max_Torque_Limit"}, pairs=(("CW_Dead_Zone", "CCW_Dead_Zone"),), check=_check)
 
@@ -213,12 +197,12 @@ def _acceleration(raw: Raw, _: Servo) -> float:
     return min(raw["Acceleration"], raw["Maximum_Acceleration"]) * 100.0 * _COUNT
 
 
-def _profile(variant: _Variant) -> tuple[Setting, ...]:
+def _profile(model: StsModel) -> tuple[Setting, ...]:
+    most = "Maximum_Velocity_Limit"
     return (
-        Setting("speed_limit", _speed, ("Goal_Velocity", "Phase", "Maximum_Velocity_Limit"),
-                "counts/s, or 50 counts/s where bit 2 of Phase is not set; 0: Maximum_Velocity_Limit in 50 counts/s"
-                + ("" if variant.sure else ", whose factory value is a guess"),
-                *(() if variant.sure else (_GUESS, (0.4, 1.0)))),
+        Setting("speed_limit", _speed, ("Goal_Velocity", "Phase", most),
+                f"counts/s, or 50 counts/s where bit 2 of Phase is not set; 0: {most} in 50 counts/s",
+                factors=(0.4, 1.0) if most in model.assumed else None),
         Setting("acceleration_limit", _acceleration,
                 ("Acceleration", "Maximum_Acceleration", "Acceleration_Multiplier"),
                 "100 counts/s2, the smaller of the first two; 0: the product of the others"),
@@ -227,11 +211,11 @@ def _profile(variant: _Variant) -> tuple[Setting, ...]:
     )
 
 
-def _trips(variant: _Variant) -> tuple[Setting, ...]:
+def _trips(model: StsModel) -> tuple[Setting, ...]:
     def overload(raw: Raw) -> bool:
         return _by_load(raw) and raw["Overload_Torque"] <= 100
 
-    unit = f"{1e3 * variant.current_unit:.4g} mA"
+    unit = f"{1e3 * model.current_unit:.4g} mA"
     return (
         Setting("overload_duty", lambda raw, _: raw["Overload_Torque"] / 100.0 if overload(raw) else None,
                 ("Overload_Torque", _MASK), "%"),
@@ -240,9 +224,9 @@ def _trips(variant: _Variant) -> tuple[Setting, ...]:
         Setting("stall_travel", lambda raw, _: 50.0 * _COUNT if overload(raw) else None, (_MASK,), "50 counts"),
         Setting("overload_output", lambda raw, _: min(raw["Protective_Torque"] / 100.0, 1.0) if overload(raw) else None,
                 ("Protective_Torque", _MASK), "%"),
-        Setting("trip_current", lambda raw, _: raw["Protection_Current"] * variant.current_unit
+        Setting("trip_current", lambda raw, _: raw["Protection_Current"] * model.current_unit
                 if _by_current(raw) else None, ("Protection_Current", _MASK), unit,
-                *(() if variant.sure else (_GUESS, (6.5e-3 / variant.current_unit, 1.0)))),
+                *((_GUESS, (6.5e-3 / model.current_unit, 1.0)) if model.unit_assumed else ())),
         Setting("trip_time", lambda raw, _: raw["Over_Current_Protection_Time"] * 0.01 if _by_current(raw) else None,
                 ("Over_Current_Protection_Time", _MASK), "10 ms"),
         Setting("trip_temperature", lambda raw, _: raw["Max_Temperature_Limit"] + _ZERO_CELSIUS

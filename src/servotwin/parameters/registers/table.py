@@ -5,20 +5,24 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from servotwin.errors import ParameterError, UnknownNameError
 from servotwin.parameters.catalog import load_servo
+from servotwin.parameters.firmware import Firmware
+from servotwin.parameters.group import FRACTION
 from servotwin.parameters.quantity import Quantity
 from servotwin.parameters.servo import Servo, unit_of
 from servotwin.units import is_finite
 
 Raw = Mapping[str, int]
 Value = float | str | None
-_AS_WRITTEN = re.compile(r"(\w+) \((\d+)\) = (\d+)")  # in sources: P_Coefficient (21) = 32
+_AS_WRITTEN = re.compile(r"(\w+) \((\d+)\) = (-?\d+)( assumed)?")  # in sources: P_Coefficient (21) = 32
+_GUESS = "assumed"
+_UNSURE = (0.5, 2.0)  # ends of the range over what an assumed register makes
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,8 @@ class Register:
         The values that are computed, where they are not all of the range; empty: all.
     why : str
         What to say of the others.
+    reading : bool
+        Whether the servo writes it, as what it measured or was told last: a new one holds nothing to speak of.
     """
 
     address: int
@@ -44,6 +50,7 @@ class Register:
     factory: int
     only: tuple[int, ...] = ()
     why: str = ""
+    reading: bool = False
 
     def allows(self, value: int) -> bool:
         """Return whether a raw value is in its range, and computed."""
@@ -89,16 +96,26 @@ class Setting:
 
 @dataclass(frozen=True)
 class Family:
-    """Servos with the same registers.
+    """The registers of a model of servo, and the numbers that follow from them.
 
     Parameters
     ----------
     label : str
-        What people call them, such as ``"Feetech STS"``.
+        What people call servos of this family, such as ``"Feetech STS"``.
+    model : str
+        Of the family, such as ``"STS3250"``.
     registers : mapping of str to Register
     settings : tuple of Setting
     reference : str
-        Where the registers are described.
+        Where the registers are described; empty where no page was seen.
+    assumed : frozenset of str
+        Registers whose factory value no page prints.
+    elsewhere : mapping of str to str
+        Where single registers are described.
+    masks : tuple of str
+        Registers whose bits say whether a number acts, and not how large it is.
+    sets : mapping of str to mapping
+        Values that a program writes, by the name of the set.
     other_names : mapping of str to str
         Further names of registers.
     copied : mapping of str to str
@@ -110,16 +127,31 @@ class Family:
     """
 
     label: str
+    model: str
     registers: Mapping[str, Register]
     settings: tuple[Setting, ...]
     reference: str
+    assumed: frozenset[str] = frozenset()
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
+    masks: tuple[str, ...] = ()
+    sets: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
     other_names: Mapping[str, str] = field(default_factory=dict)
     copied: Mapping[str, str] = field(default_factory=dict)
     pairs: tuple[tuple[str, str], ...] = ()
     check: Callable[[Raw], None] = lambda raw: None
 
+    def document(self, name: str) -> str:
+        """Return where the factory value of a register is printed; empty where it is assumed."""
+        if name in self.assumed:
+            return ""
+        return self.document(self.copied[name]) if name in self.copied else self.elsewhere.get(name, self.reference)
 
-def set_registers(family: Family, registers: Mapping[str, int], servo: str | Path | Servo) -> Servo:
+
+Given = Mapping[str, int] | str
+"""Raw values by name, or the name of a set of them."""
+
+
+def set_registers(family: Family, registers: Given, servo: str | Path | Servo, *, assumed: bool = False) -> Servo:
     """Return a servo whose firmware group follows from registers.
 
     What is given makes the numbers that depend on it. The other numbers stay as the servo has them; where it has none
@@ -128,15 +160,17 @@ def set_registers(family: Family, registers: Mapping[str, int], servo: str | Pat
     Parameters
     ----------
     family : Family
-    registers : mapping of str to int
-        Raw values by name.
+    registers : mapping of str to int, or str
+        Raw values by name, or the name of one of the family's sets.
     servo : str, Path or Servo
         Catalog id, path of a servo file, or the servo itself.
+    assumed : bool
+        Whether it is only assumed that they hold these values.
 
     Raises
     ------
     UnknownNameError
-        If there is no register of this name: the nearest are suggested.
+        If there is no register, or no set, of this name: the nearest are suggested.
     ParameterError
         If a value is not whole or out of range, values do not go together, or the servo has the firmware of another
         family.
@@ -149,10 +183,10 @@ def set_registers(family: Family, registers: Mapping[str, int], servo: str | Pat
     base = servo if isinstance(servo, Servo) else load_servo(servo)
     given = read_registers(family, registers)
     own = _is_own(family, base)
-    raw = {name: register.factory for name, register in family.registers.items()}
-    raw |= {name: value for name, value in _written(base).items() if own and name in raw}
-    raw |= given
-    raw |= {name: raw[source] for name, source in family.copied.items() if source in given and name not in given}
+    held = _held(family, base if own else None)
+    held |= {name: _Value(value, assumed) for name, value in given.items()}
+    held |= {name: held[source] for name, source in family.copied.items() if source in given and name not in given}
+    raw = {name: value.raw for name, value in held.items()}
     family.check(raw)
     _warn_of_pairs(family, given, raw)
     numbers: dict[str, Any] = {}
@@ -160,7 +194,7 @@ def set_registers(family: Family, registers: Mapping[str, int], servo: str | Pat
     for setting in family.settings:
         stays = own or base.get(f"firmware.{setting.name}") is not None
         if not stays or any(name in given or family.copied.get(name) in given for name in setting.registers):
-            quantity = _quantity(family, setting, raw, base)
+            quantity = _quantity(family, setting, held, base)
             numbers[setting.name] = None if quantity is None else quantity.value
             if quantity is not None:
                 quantities[f"firmware.{setting.name}"] = quantity
@@ -168,13 +202,15 @@ def set_registers(family: Family, registers: Mapping[str, int], servo: str | Pat
 
 
 def read_registers(family: Family, registers: Any) -> dict[str, int]:
-    """Return raw values by the family's own names, each checked.
+    """Return raw values by the family's own names, each checked; those of a set by its name.
 
     Raises
     ------
     UnknownNameError, ParameterError
         As `set_registers` does.
     """
+    if isinstance(registers, str):
+        registers = _set_named(family, registers)
     if not isinstance(registers, Mapping):
         raise ParameterError(f"registers of {family.label}", got=registers, allowed="a mapping of names to raw values")
     found: dict[str, int] = {}
@@ -185,12 +221,26 @@ def read_registers(family: Family, registers: Any) -> dict[str, int]:
                                    (*family.registers, *family.other_names),
                                    allowed=f"the name of a register, such as {next(iter(family.registers))}")
         register = family.registers[name]
-        what = f"register {name} ({register.address}) of {family.label}"
+        what = f"register {name} ({register.address}) of {family.model if family.reference else family.label}"
         if not _is_whole(value) or not register.allows(int(value)):
             raise ParameterError(what, got=value, allowed=register.allowed)
         if found.setdefault(name, int(value)) != int(value):
             raise ParameterError(f"{what}, given by two names", got=value, allowed=f"one value, as {found[name]}")
     return found
+
+
+def _set_named(family: Family, name: str) -> Mapping[str, int]:
+    """Return the values of a set."""
+    if name in family.sets:
+        return family.sets[name]
+    if name in family.registers or name in family.other_names:
+        raise ParameterError(f"register {name} of {family.label}", got="no value",
+                             allowed=f"a raw value, such as {name}={family.registers[name].factory}"
+                             if name in family.registers else "a raw value")
+    if not family.sets:
+        raise ParameterError(f"set of registers of {family.label}", got=name,
+                             allowed="raw values by name: this family has no named sets")
+    raise UnknownNameError(f"set of registers of {family.label}", name, family.sets)
 
 
 def on(bit: int, mask: str) -> Callable[[Raw], bool]:
@@ -227,8 +277,7 @@ def written(family: Family, servo: Servo) -> dict[str, int]:
     >>> written(family_of(servo), servo)["P_Coefficient"]
     32
     """
-    raw = {name: register.factory for name, register in family.registers.items()}
-    return raw | {name: value for name, value in _written(servo).items() if name in raw}
+    return {name: value.raw for name, value in _held(family, servo).items()}
 
 
 def family_label(servo: Servo) -> str | None:
@@ -248,13 +297,23 @@ def _family_of(source: str) -> str:
     return label if found else ""
 
 
-def _written(servo: Servo) -> dict[str, int]:
-    """Return the raw values that the sources of a servo name, so that one register may follow another in later calls.
+class _Value(NamedTuple):
+    """What a register holds, and whether that is assumed."""
 
+    raw: int
+    assumed: bool = False
+
+
+def _held(family: Family, servo: Servo | None) -> dict[str, _Value]:
+    """Return what the registers of a servo hold: what its numbers were made of, else the factory's.
+
+    The sources of its numbers say what they were made of, so that one register may follow another in later calls.
     Numbers that were replaced since have another source, and name none.
     """
-    return {name: int(value) for text in _of_firmware(servo) if _family_of(text)
-            for name, _, value in _AS_WRITTEN.findall(text)}
+    held = {name: _Value(register.factory, not family.document(name)) for name, register in family.registers.items()}
+    texts = () if servo is None else (text for text in _of_firmware(servo) if _family_of(text))
+    return held | {name: _Value(int(value), bool(assumed)) for text in texts
+                   for name, _, value, assumed in _AS_WRITTEN.findall(text) if name in held}
 
 
 def _warn_of_pairs(family: Family, given: Iterable[str], raw: Raw) -> None:
@@ -264,17 +323,34 @@ def _warn_of_pairs(family: Family, given: Iterable[str], raw: Raw) -> None:
                           f"turning: computed with {max(raw[one], raw[two])} for both", stacklevel=4)
 
 
-def _quantity(family: Family, setting: Setting, raw: Raw, servo: Servo) -> Quantity | None:
-    value = setting.value(raw, servo)
+def _quantity(family: Family, setting: Setting, held: Mapping[str, _Value], servo: Servo) -> Quantity | None:
+    value = setting.value({name: one.raw for name, one in held.items()}, servo)
     if value is None:
         return None
-    named = ", ".join(f"{name} ({family.registers[name].address}) = {raw[name]}" for name in setting.registers)
-    parts = [f"register{'s' if len(setting.registers) > 1 else ''} {named}" if named else "", setting.said,
-             family.reference]
-    spread: dict[str, float] = {}
+    named = ", ".join(f"{name} ({family.registers[name].address}) = {held[name].raw}"
+                      + " assumed" * held[name].assumed for name in setting.registers)
+    unsure = any(held[name].assumed for name in setting.registers
+                 if name not in family.masks or set(setting.registers) <= set(family.masks))
+    origin = _GUESS if unsure else setting.origin
+    documents = dict.fromkeys(_document(family, name, held[name]) for name in setting.registers) or {
+        "" if origin == _GUESS else family.reference: None}
+    parts = [f"register{'s' if len(setting.registers) > 1 else ''} {named}" if named else "", setting.said, *documents]
+    return Quantity(value=value, unit=unit_of(f"firmware.{setting.name}"), origin=origin,
+                    source=f"{family.label} firmware: " + "; ".join(part for part in parts if part),
+                    **_spread(setting, value, unsure=unsure))
+
+
+def _document(family: Family, name: str, value: _Value) -> str:
+    """Return where the factory value of a register is printed, or, of another value, where the register is."""
+    return family.document(name) if value.raw == family.registers[name].factory else family.reference
+
+
+def _spread(setting: Setting, value: float | str, *, unsure: bool) -> dict[str, float]:
     if setting.bounds is not None:
-        spread = {"lower": setting.bounds[0], "upper": setting.bounds[1]}
-    elif setting.factors is not None and isinstance(value, float) and value != 0.0:
-        spread = {"lower": setting.factors[0] * value, "upper": setting.factors[1] * value}
-    return Quantity(value=value, unit=unit_of(f"firmware.{setting.name}"), origin=setting.origin,
-                    source=f"{family.label} firmware: " + "; ".join(part for part in parts if part), **spread)
+        return {"lower": setting.bounds[0], "upper": setting.bounds[1]}
+    factors = setting.factors or _UNSURE
+    if not (unsure or setting.origin == _GUESS) or not isinstance(value, float) or value == 0.0:
+        return {}
+    low, high = sorted(factor * value for factor in factors)
+    rule = next(f.metadata["rule"] for f in fields(Firmware) if f.name == setting.name)
+    return {"lower": low, "upper": min(high, 1.0) if rule == FRACTION else high}

@@ -1,0 +1,132 @@
+"""The tables of registers, to be printed: every register of every model with its value and the page that prints it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+from servotwin.errors import UnknownNameError
+from servotwin.parameters.registers.dynamixel_one import ax_family, mx_family
+from servotwin.parameters.registers.dynamixel_one_models import AX_MODELS, MX_MODELS
+from servotwin.parameters.registers.dynamixel_x import x_family
+from servotwin.parameters.registers.dynamixel_x_models import X_MODELS
+from servotwin.parameters.registers.dynamixel_xl320 import XL320_MODELS, xl320_family
+from servotwin.parameters.registers.feetech import sts_family
+from servotwin.parameters.registers.feetech_models import STS_MODELS
+from servotwin.parameters.registers.table import Family
+
+_FAMILIES: dict[str, tuple[Callable[[Any], Family], tuple[Any, ...]]] = {
+    "feetech-sts": (sts_family, STS_MODELS), "dynamixel-x": (x_family, X_MODELS),
+    "dynamixel-mx": (mx_family, MX_MODELS), "dynamixel-ax": (ax_family, AX_MODELS),
+    "dynamixel-xl320": (xl320_family, XL320_MODELS)}
+
+
+class ListedModel(NamedTuple):
+    """A model of a family.
+
+    Parameters
+    ----------
+    family, name : str
+    number : int
+        That it answers with.
+    rows, assumed : int
+        How many registers its table has, and of how many no page prints the value.
+    page : str
+        Address of the page; empty where none was seen.
+    table : Family
+    """
+
+    family: str
+    name: str
+    number: int
+    rows: int
+    assumed: int
+    page: str
+    table: Family
+
+
+class Row(NamedTuple):
+    """A register of a model.
+
+    Parameters
+    ----------
+    name : str
+    address : int
+    value : int
+        When the servo is new, or after power-up.
+    lower, upper : int
+        Range.
+    numbers : tuple of str
+        Of the firmware group, that follow from it.
+    document : str
+        Document and section that print the value; empty: it is assumed.
+    page : str
+        Address of that page, where it is the model's own.
+    """
+
+    name: str
+    address: int
+    value: int
+    lower: int
+    upper: int
+    numbers: tuple[str, ...]
+    document: str
+    page: str
+
+
+def listed_models() -> list[ListedModel]:
+    """Return all models of all families.
+
+    Examples
+    --------
+    >>> [model.name for model in listed_models() if model.family == "dynamixel-xl320"]
+    ['XL-320']
+    """
+    return list(_models())
+
+
+def listed_model(name: str) -> ListedModel:
+    """Return a model by its name.
+
+    Raises
+    ------
+    UnknownNameError
+        If there is none of this name.
+
+    Examples
+    --------
+    >>> listed_model("xl330-m288").number
+    1200
+    """
+    found = {model.name.lower(): model for model in _models()}
+    if name.strip().lower() not in found:
+        raise UnknownNameError("model with registers", name, [model.name for model in found.values()])
+    return found[name.strip().lower()]
+
+
+def rows_of(model: ListedModel) -> list[Row]:
+    """Return the registers of a model by address; what the servo itself writes, such as its angle, is left out.
+
+    Examples
+    --------
+    >>> next(row for row in rows_of(listed_model("XC330-M288")) if row.name == "Position_P_Gain").value
+    1100
+    """
+    family, rows = model.table, []
+    for name, register in sorted(family.registers.items(), key=lambda item: item[1].address):
+        if register.reading:
+            continue
+        numbers = tuple(setting.name for setting in family.settings if name in setting.registers)
+        document = family.document(name)
+        rows.append(Row(name, register.address, register.factory, register.lower, register.upper, numbers, document,
+                        model.page if document == family.reference else ""))
+    return rows
+
+
+def _models() -> Iterator[ListedModel]:
+    for name, (make, models) in _FAMILIES.items():
+        for model in models:
+            family = make(model)
+            shown = [key for key, register in family.registers.items() if not register.reading]
+            yield ListedModel(name, model.name, model.number, len(shown),
+                              sum(not family.document(key) for key in shown), model.page, family)
