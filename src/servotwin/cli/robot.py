@@ -106,11 +106,12 @@ def run(
     from servotwin.cli.robot_facts import facts
     from servotwin.cli.robot_words import as_options, chosen_servos, models_of, mounts_of, supply_of, units_of
     from servotwin.robots import joint_names, joint_ranges, robot_model, run_motion, sizing_of
+    from servotwin.robots.coupling import couplings_of
 
     check_numbers(output_step=output_step, rate=rate, blend=blend)
     plant = robot_model(model_file)
     joints = joint_names(plant)
-    chosen = chosen_servos(model_file, servo or [], joints)
+    chosen = chosen_servos(model_file, servo or [], joints, followers=couplings_of(plant))
     mounts = mounts_of(models_of(chosen, model, change or [], register or []), mount or [], joints)
     bus = supply_of(supply)
     with as_options():

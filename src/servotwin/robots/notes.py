@@ -27,7 +27,7 @@ def notes_of(run: RobotRun) -> tuple[str, ...]:
     >>> notes_of(run)
     ('goals of joint gripper go from 85.9 to 115 deg, beyond its range in the model, -10 to 100 deg',)
     """
-    said = []
+    said = list(run.said)
     ranges = joint_ranges(run.model)
     for joint in run.motion.joints:
         goals, mount, servo = run.motion.angles[joint], run.mounts[joint], run.mounts[joint].model.servo

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
+from servotwin.robots.coupling import couple, couplings_of, led
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.heat import with_heat
 from servotwin.robots.ideal import IdealRun, blend_window, ideal_run
@@ -56,6 +57,8 @@ class RobotRun:
         The same with ideal actuators, at the same times.
     tracking : mapping of str to Tracking
         How well each joint has followed.
+    said : tuple of str
+        What was done about the motion and the model that nobody has asked for, one sentence each.
     """
 
     model: Any
@@ -66,6 +69,7 @@ class RobotRun:
     poses: Array
     ideal: IdealRun
     tracking: Mapping[str, Tracking]
+    said: tuple[str, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -118,7 +122,8 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     servos : mapping of str to Model or Mount
         By the name of the joint.
     motion : Motion
-        Of these joints; those of which it says nothing hold still.
+        Of these joints; those of which it says nothing hold still. Goals of joints that follow others by an equality of
+        the model are left out, and the others have to move them too.
     bus, joint_friction
         As of `ServoDrive`.
     timestep : float, optional
@@ -159,6 +164,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     mounts = warm_mounts(servos, assume_heat=assume_heat, shared=bus is not None)
     for joint, mount in mounts.items():
         supplied(mount.model, supply_of(bus, joint))  # raises before anything is run
+    motion, said = _led_motion(own, motion, mounts)
     _check_joints(motion, mounts, joint_names(own))
     drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction)
     time = _times(own.opt.timestep, motion.duration, settle)
@@ -173,7 +179,8 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
             poses[k] = data.qpos
             if k % _TELL == 0:
                 tell(k)
-        return finished(drive, data, motion, mounts, bus, poses, window=window, tell=lambda k: tell(len(time) + k))
+        done = finished(drive, data, motion, mounts, bus, poses, window=window, tell=lambda k: tell(len(time) + k))
+    return replace(done, said=said)
 
 
 def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mount], bus: Any, poses: Array, *,
@@ -209,6 +216,24 @@ def _check(motion: Motion, settle: float, hold: str, timestep: float | None) -> 
         raise InputError("hold", got=hold, allowed=" or ".join(map(repr, _HOLDS)))
     if timestep is not None and not (is_finite(timestep) and timestep > 0.0):
         raise InputError("timestep", got=timestep, allowed="a positive number of seconds")
+
+
+def _led_motion(model: Any, motion: Motion, mounts: Mapping[str, Mount]) -> tuple[Motion, tuple[str, ...]]:
+    """Return a motion without joints that follow others, whose actuators are silenced, and sentences on them."""
+    said = []
+    for joint, coupling in couplings_of(model).items():
+        if joint in mounts:
+            continue  # the drive refuses it
+        said.append(coupling.words)
+        said += [f"actuator {name} at {joint} has no force: the joint follows" for name in led(model, joint)]
+        if joint in motion.angles:
+            said.append(f"goals of joint {joint} are left out: it follows")
+    angles = {joint: goals for joint, goals in motion.angles.items()
+              if joint in mounts or joint not in couplings_of(model)}
+    if not angles:
+        raise InputError(f"joints of {motion.source}", got=", ".join(motion.joints),
+                         allowed="one that does not follow others by an equality of the model")
+    return replace(motion, angles=angles), tuple(said)
 
 
 def _check_joints(motion: Motion, mounts: Mapping[str, Mount], joints: Mapping[str, str]) -> None:
@@ -264,6 +289,7 @@ def begin(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mou
         if not mount.model.endless:  # such as a bridge without its chip, which is told no angle
             goals[joint] = float(data.qpos[at])
             _check_travel(joint, mount, goals[joint])
+    couple(model, data.qpos)
     data.time = time
     load_mujoco().mj_forward(model, data)
     drive.record(data)

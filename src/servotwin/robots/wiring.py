@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.robots.command_map import CommandMap
+from servotwin.robots.coupling import silence
 from servotwin.robots.crews import Berth
 from servotwin.robots.mount import Joint
 from servotwin.robots.places import Places
@@ -19,7 +20,6 @@ from servotwin.robots.told import told
 from servotwin.simulation.compile.joints_layout import ARRAYS, DRIVE
 
 Arrays = dict[str, NDArray[Any]]
-_SILENCED = ("gaintype", "biastype", "gainprm", "biasprm", "armature", "damping", "dampingpoly")
 
 
 def longest_tick(joints: Sequence[Joint]) -> tuple[float, str]:
@@ -87,9 +87,7 @@ def put_into_model(mujoco: Any, model: Any, joints: Sequence[Joint], armature: N
     for joint, own in zip(joints, armature.tolist(), strict=True):
         model.dof_armature[joint.speed_at] = own
         if joint.actuator >= 0:
-            for field in _SILENCED:
-                if hasattr(model, f"actuator_{field}"):
-                    getattr(model, f"actuator_{field}")[joint.actuator] = 0
+            silence(model, joint.actuator)
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
