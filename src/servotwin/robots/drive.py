@@ -55,7 +55,8 @@ class ServoDrive:
     bus : Supply or sequence of tuple (Supply, joints), optional
         Supplies that servos share.
     controls : mapping of str to CommandMap, optional
-        By joint: what the control of its actuator asks for, where that is not the angle [rad] or place [m] itself.
+        By joint: what the control of its actuator asks for. Unless given, that of a position actuator keeps its
+        meaning; of any other it is the angle [rad] or place [m] itself, and a control range is refused.
     joint_friction : str
         What to do with damping and friction loss that these joints have themselves: "refuse", "clear" or "keep".
     solver : str
@@ -67,6 +68,8 @@ class ServoDrive:
     model : MjModel
     joints : tuple of str
         Names of the joints, in the order of all arrays.
+    maps : dict of str to CommandMap
+        What controls of actuators ask of the servos, by joint; `print` shows one.
 
     Raises
     ------
@@ -105,6 +108,7 @@ class ServoDrive:
         self._told = [told(joint.mount) for joint in self._joints]
         check_options(mujoco, self.model, self._joints)
         maps = maps_of(self.model, self._joints, controls)
+        self.maps = {one.joint: one for one, joint in zip(maps, self._joints, strict=True) if joint.actuator >= 0}
         crews = crews_of(self._joints, bus)
         treat_friction(self.model, self._joints, joint_friction)
         self._harbour = Harbour(self._joints, crews, int(self.model.nv))

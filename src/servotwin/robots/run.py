@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
+from servotwin.robots.command_map import unused_ranges
 from servotwin.robots.coupling import couple, couplings_of, led
 from servotwin.robots.drive import ServoDrive
 from servotwin.robots.heat import with_heat
@@ -166,7 +167,8 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
         supplied(mount.model, supply_of(bus, joint))  # raises before anything is run
     motion, said = _led_motion(own, motion, mounts)
     _check_joints(motion, mounts, joint_names(own))
-    drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction)
+    controls, ranges = unused_ranges(own, mounts)
+    drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction, controls=controls)
     time = _times(own.opt.timestep, motion.duration, settle)
     with shown(progress, 2 * len(time), "following the motion") as tell:
         data = mujoco.MjData(drive.model)
@@ -180,7 +182,7 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
             if k % _TELL == 0:
                 tell(k)
         done = finished(drive, data, motion, mounts, bus, poses, window=window, tell=lambda k: tell(len(time) + k))
-    return replace(done, said=said)
+    return replace(done, said=(*said, *ranges))
 
 
 def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mount], bus: Any, poses: Array, *,
