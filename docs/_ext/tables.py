@@ -192,6 +192,14 @@ def protocol_words() -> str:
     return markdown(("of", "numbers"), rows)
 
 
+def recipes() -> str:
+    """Servos beside their recipes for MuJoCo's actuators."""
+    from recipe_table import HEAD
+    from recipe_table import recipes as rows
+
+    return markdown(HEAD, rows())
+
+
 def _is_own(module, name: str) -> bool:
     item = getattr(module, name)
     return not name.startswith("_") and getattr(item, "__module__", None) == module.__name__
@@ -200,7 +208,7 @@ def _is_own(module, name: str) -> bool:
 TABLES = {"parameters": parameters, "models": models, "model-list": model_list, "signals": signals,
           "units": units, "catalog": catalog, "log-formats": log_formats, "top-level": top_level, "api": api,
           "protocol-messages": protocol_messages, "protocol-fields": protocol_fields,
-          "protocol-numbers": protocol_numbers, "protocol-words": protocol_words}
+          "protocol-numbers": protocol_numbers, "protocol-words": protocol_words, "recipes": recipes}
 
 
 def setup(app):

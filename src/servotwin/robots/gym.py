@@ -37,9 +37,9 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     the action now says where to go.
 
     The servos begin anew at `reset`. In `qfrc_actuator` and `actuator_force` there is nothing of them: MuJoCo has their
-    torques [N m], or forces [N], among the passive ones. After each step `info` has them as "servo_torque", currents of the
-    windings as "servo_current" [A], voltages of the supplies as "servo_voltage" [V], temperatures of the windings as
-    "servo_temperature" [K], and as "servo_trip" the protections that act (0: none, 1 overload, 2 current, 3 heat,
+    torques [N m], or forces [N], among the passive ones. After each step `info` has them as "servo_torque", currents of
+    the windings as "servo_current" [A], voltages of the supplies as "servo_voltage" [V], temperatures of the windings
+    as "servo_temperature" [K], and as "servo_trip" the protections that act (0: none, 1 overload, 2 current, 3 heat,
     4 undervoltage), each in the order of `drive.joints`; a signal that not all servos have is left out.
 
     Parameters
