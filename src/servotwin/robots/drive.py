@@ -16,7 +16,7 @@ from servotwin.models import Model
 from servotwin.robots.books import close_books
 from servotwin.robots.command_map import CommandMap
 from servotwin.robots.crews import Instance, crews_of
-from servotwin.robots.harbour import Harbour
+from servotwin.robots.harbour import Harbour, goals_in
 from servotwin.robots.mount import Mount, joints_of, treat_friction
 from servotwin.robots.places import load_mujoco, places
 from servotwin.robots.record import Record
@@ -254,11 +254,11 @@ class ServoDrive:
         InputError
             If a joint has no servo, a goal is no finite number, or a pulse no width that fits into a frame.
         """
-        command = self._of(data).command
+        told = goals_in(self._block(data), len(self._joints))
         for name, goal in goals.items():
             k = self._number(name)
             self._told[k].check(name, goal, self._joints[k].mount.model.value_or("electronics.frame_period", 0.02))
-            command[k] = goal
+            told[:, k] = goal, 1.0
             if self._joints[k].command_at >= 0:
                 scale, offset = self._arrays["control_scale"][k], self._arrays["control_offset"][k]
                 data.ctrl[self._joints[k].command_at] = (goal - offset) / scale
@@ -312,8 +312,15 @@ class ServoDrive:
         return found
 
     def reset(self, data: Any) -> None:
-        """Let the servos begin anew at the next step, at rest where their joints are then, as if time had gone back."""
-        self._block(data)[:] = 0.0
+        """Let the servos begin anew at the next step, at rest where their joints are then, as if time had gone back.
+
+        They keep their commands.
+        """
+        block = self._block(data)
+        goals = goals_in(block, len(self._joints))
+        kept = goals.copy()
+        block[:] = 0.0
+        goals[:] = kept
 
     # --- memory -------------------------------------------------------------------------------------------------------
 
@@ -324,7 +331,7 @@ class ServoDrive:
         state = np.empty(mujoco.mj_stateSize(self.model, kind))
         mujoco.mj_getState(self.model, data, state, kind)
         instance = self._of(data)
-        return DriveState(state, data.qfrc_constraint.copy(), instance.block.copy(), instance.command.copy())
+        return DriveState(state, data.qfrc_constraint.copy(), instance.block.copy())
 
     def restore(self, data: Any, state: DriveState) -> None:
         """Go back to what was saved, in this data or another of the model.
@@ -344,7 +351,6 @@ class ServoDrive:
         mujoco.mj_setState(self.model, data, state.engine, kind)
         data.qfrc_constraint[:] = state.constraint
         instance.block[:] = state.servos
-        instance.command[:] = state.command
         block = self._block(data)
         block[BLOCK.index("serial")], block[BLOCK.index("restored")] = -1.0, 1.0
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -105,7 +105,7 @@ class RecipeError:
 def error_of(recipe: Recipe) -> RecipeError:
     """Return how far both actuators are off the servo."""
     half = droops_of_twin(recipe.model, 0.5 * recipe.load, inertia_under(0.5 * recipe.load))
-    moves = [(_twin(recipe, goals), goals) for goals in (_step_goals, _sine_goals)]
+    moves: list[tuple[Array, Goals]] = [(_twin(recipe, goals), goals) for goals in (_step_goals, _sine_goals)]
     found = [_done(recipe, text("joint"), moves) for text in (recipe.position, recipe.dcmotor)]
     return RecipeError(load=recipe.load, lift=recipe.lift, droops=recipe.droops, droops_at_half=half, position=found[0],
                        dcmotor=found[1], lacks=recipe.lacks)
@@ -133,7 +133,7 @@ def _twin(recipe: Recipe, goals: Goals) -> Array:
     return np.asarray(result["output_angle"] - middle)
 
 
-def _done(recipe: Recipe, actuator: str, moves: list[tuple[Array, Goals]]) -> Actuator:
+def _done(recipe: Recipe, actuator: str, moves: Sequence[tuple[Array, Goals]]) -> Actuator:
     off = [float(np.sqrt(np.mean((_followed(recipe, actuator, recipe.load, goals, REST + _LONG) - twin)**2)))
            for twin, goals in moves]
     return Actuator(_lifted(recipe, actuator), _droops(recipe, actuator, recipe.load),
@@ -156,7 +156,7 @@ def _followed(recipe: Recipe, actuator: str, torque: float, goals: Goals, durati
     data, every = mujoco.MjData(model), round(_LOOK / _TIMESTEP)
     data.qpos[0], data.qfrc_applied[0] = start, -torque
     angles = [start]
-    table = goals(_TIMESTEP * np.arange(round(duration / _TIMESTEP)) + 1e-9)
+    table = goals(np.asarray(_TIMESTEP * np.arange(round(duration / _TIMESTEP)) + 1e-9, np.float64))
     for k, goal in enumerate(table.tolist(), 1):
         data.ctrl[0] = goal
         mujoco.mj_step(model, data)

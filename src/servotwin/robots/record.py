@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,29 @@ Array = NDArray[np.float64]
 _COLUMNS = (*KEPT, *Observed._fields)
 _OF_JOINT = {"joint_angle": ("rad", "m"), "joint_command": ("rad", "m"), "joint_torque": ("N m", "N"),
              "joint_work": ("J", "J")}
+CLIPPED = "commands clipped"
+_ROUNDING = 1e-6  # of a command: what clips it by less tells nothing
 FROM_NOWHERE = "energy from nowhere"
 _NOTICED = 0.01  # of the largest energy: what may appear from nowhere; steps alone make 0.004 of it
+
+
+class Clipped(NamedTuple):
+    """Commands that a servo got otherwise than they were given, at an end of its control, its travel or its program.
+
+    Parameters
+    ----------
+    ticks : int
+        In how many of all.
+    time : float
+        Of the first [s].
+    asked, given : float
+        The command that was changed most, and what became of it [rad, m, or s of a pulse].
+    """
+
+    ticks: int
+    time: float
+    asked: float
+    given: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +133,18 @@ class ServoRecord(Mapping[str, Array]):
                  for k, kind in enumerate(TRIPS, 1) if (trips == k).any()]
         return tuple(Remark(f"tripped by {kind}", time) for time, kind in sorted(found))
 
+    @property
+    def clipped(self) -> Clipped | None:
+        """What became of commands beyond the ends that there are; None if all were followed as they were given."""
+        asked, given = (self.columns[:, _COLUMNS.index(name)] for name in ("asked", "command_angle"))
+        off = np.abs(asked - given)
+        changed = np.flatnonzero(off > _ROUNDING * (np.abs(given) + (0.0 if self._told.unit == "s" else 1.0)))
+        if not len(changed):
+            return None
+        most = int(np.argmax(off))
+        at_joint = (self._told.zero + self._told.gain * float(values[most]) for values in (asked, given))
+        return Clipped(len(changed), float(self.time[changed[0]]), *at_joint)
+
     def to_dataframe(self) -> pd.DataFrame:
         """Return all signals (SI) as a pandas DataFrame, indexed by time [s]."""
         try:
@@ -176,9 +209,10 @@ class Record(Mapping[str, ServoRecord]):
     def remarks(self) -> tuple[Remark, ...]:
         """Return what holds of the whole robot, (kind, time [s]).
 
-        "solver iterations raised" or "few solver iterations" of MuJoCo, "energy from nowhere".
+        "solver iterations raised" or "few solver iterations" of MuJoCo, "energy from nowhere", "commands clipped" of
+        each joint where they were.
         """
-        found = []
+        found = [Remark(CLIPPED, servo.clipped.time) for servo in self._servos.values() if servo.clipped]
         if self._solver_note and len(self.time):
             found.append(Remark(self._solver_note.kind, float(self.time[0])))
         noticed = np.flatnonzero(self.energy_from_nowhere > _NOTICED * self._largest)
@@ -201,6 +235,11 @@ class Record(Mapping[str, ServoRecord]):
             found.append(f"energy from nowhere from {time:.3g} s on: up to {most:.3g} J more than there was and than "
                          f"servos have given, with {self._largest:.3g} J at most in the model: its solver does not "
                          "converge, or its step is too long")
+        for joint, servo in self._servos.items():
+            clipped, unit = servo.clipped, "s" if servo.unit("joint_command") == "s" else "rad (of a slide m)"
+            if clipped:
+                found.append(f"commands of joint {joint} were clipped in {clipped.ticks} of {len(self.time)} ticks, "
+                             f"from {clipped.time:.3g} s on: {clipped.asked:.4g} {unit} became {clipped.given:.4g}")
         return tuple(found)
 
     def __getitem__(self, name: str) -> ServoRecord:
