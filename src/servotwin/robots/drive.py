@@ -6,7 +6,8 @@ import ctypes
 import math
 import warnings
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from servotwin.robots.books import close_books
 from servotwin.robots.command_map import CommandMap
 from servotwin.robots.crews import Instance, crews_of
 from servotwin.robots.harbour import Harbour, goals_in
+from servotwin.robots.heat import heat_notes, warm_mounts
 from servotwin.robots.mount import Mount, joints_of, treat_friction
 from servotwin.robots.places import load_mujoco, places
 from servotwin.robots.record import Record
@@ -63,6 +65,10 @@ class ServoDrive:
         "raised": where a servo has play or an elastic gear, MuJoCo's solver iterates at least 10 times, and 20 in its
         line search, which costs nothing where it converges earlier. "given": as the model says.
 
+    assume_heat : bool
+        Whether servos whose files have no thermal numbers get warm by ones that their mass lets assume; `check` and the
+        notes of a record say so. Without, they stay cold, and their temperatures are nan.
+
     Attributes
     ----------
     model : MjModel
@@ -95,7 +101,7 @@ class ServoDrive:
 
     def __init__(self, model: Any, servos: Mapping[str, Model | Mount], *, bus: Any = None,
                  controls: Mapping[str, CommandMap] | None = None, joint_friction: str = "refuse",
-                 solver: str = "raised") -> None:
+                 solver: str = "raised", assume_heat: bool = True) -> None:
         mujoco, self._places = load_mujoco(), places()
         if not isinstance(servos, Mapping) or not servos:
             raise InputError("servos of a ServoDrive", got=servos, allowed="a mapping of joints to models")
@@ -104,6 +110,11 @@ class ServoDrive:
             raise InputError("model of a ServoDrive", got=type(model).__name__, allowed="an MjModel or MjSpec")
         self.model = spec.compile() if spec is not None else model
         self._joints = joints_of(self.model, servos)
+        self._said: tuple[str, ...] = ()
+        if assume_heat:
+            mounts = warm_mounts(servos, assume_heat=True, shared=bus is not None)
+            self._said = heat_notes(servos, mounts)
+            self._joints = [replace(joint, mount=mounts[joint.name]) for joint in self._joints]
         self.joints = tuple(joint.name for joint in self._joints)
         self._told = [told(joint.mount) for joint in self._joints]
         check_options(mujoco, self.model, self._joints)
@@ -199,7 +210,8 @@ class ServoDrive:
         -------
         tuple of str
             Sentences: iterations of MuJoCo's solver that were raised, or are too few with `solver="given"`, which is
-            a warning too; energy that appears from nowhere, while a record is kept.
+            a warning too; temperatures that are assumed or not known; energy that appears from nowhere and commands
+            that were clipped, while a record is kept.
 
         Raises
         ------
@@ -211,7 +223,12 @@ class ServoDrive:
             warnings.warn(self._solver_note.words, stacklevel=2)
         if self._of(data).record_words[RECORD.index("row")]:
             return self.result(data).notes
-        return (self._solver_note.words,) if self._solver_note else ()
+        return (*((self._solver_note.words,) if self._solver_note else ()), *self._said)
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be pickled or copied: its servos belong to MuJoCo's data of this process."""
+        raise InputError("pickling or copying of a ServoDrive", allowed="its states, what save(data) returns; a drive "
+                         "is made anew from a model and servos")
 
     def _raise(self, data: Any, code: int) -> None:
         error, self._harbour.error = self._harbour.error, None
@@ -298,7 +315,8 @@ class ServoDrive:
             raise InputError("result of servos", got="no record", allowed="drive.record(data) before the run")
         rows = instance.rows[:words["used"]].copy()
         close_books(self.model, data, instance, [joint.speed_at for joint in self._joints], rows)
-        return Record(self.joints, {joint.name: joint.mount for joint in self._joints}, rows, self._solver_note)
+        return Record(self.joints, {joint.name: joint.mount for joint in self._joints}, rows, self._solver_note,
+                      self._said)
 
     def look(self, data: Any, name: str) -> Array:
         """Return a signal (SI) of all servos as they stand after the last tick, in the order of `joints`.

@@ -57,6 +57,8 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     joint_friction : str
         What to do with damping and friction loss of these joints: "clear" (they stand for the actuator's, and a servo
         has its own), "keep", where they are those of a bearing, or "refuse".
+    assume_heat : bool
+        As of `ServoDrive`.
 
     Attributes
     ----------
@@ -88,9 +90,10 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], servos: Mapping[str, Model | Mount], *, command: Any = None,
-                 bus: Any = None, joint_friction: str = "clear") -> None:
+                 bus: Any = None, joint_friction: str = "clear", assume_heat: bool = True) -> None:
         _check(env, servos)
-        kept = {"servos": dict(servos), "command": command, "bus": bus, "joint_friction": joint_friction}
+        kept = {"servos": dict(servos), "command": command, "bus": bus, "joint_friction": joint_friction,
+                "assume_heat": assume_heat}
         gymnasium.utils.RecordConstructorArgs.__init__(self, **kept)
         gymnasium.Wrapper.__init__(self, env)
         self._kept, model = kept, self._bare.model
@@ -99,7 +102,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
         self.maps: dict[str, CommandMap] = maps(model, places, mounts, command)
         self.drive = ServoDrive(
             model, {seat.joint: mounts[seat.key] for seat in places}, joint_friction=joint_friction,
-            bus=_by_joint(bus, {seat.key: seat.joint for seat in places}),
+            assume_heat=assume_heat, bus=_by_joint(bus, {seat.key: seat.joint for seat in places}),
             controls={one.joint: one for one in self.maps.values()})
 
     @property

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
+    import xarray as xr
 
 Array = NDArray[np.float64]
 _COLUMNS = (*KEPT, *Observed._fields)
@@ -165,6 +166,8 @@ class Record(Mapping[str, ServoRecord]):
         Ends of the ticks [s], which are its `time`, energies, then what is kept of each servo.
     solver_note : SolverNote, optional
         What was done about MuJoCo's solver.
+    said : tuple of str
+        Sentences on what was assumed of the servos.
 
     Attributes
     ----------
@@ -194,9 +197,9 @@ class Record(Mapping[str, ServoRecord]):
     """
 
     def __init__(self, joints: tuple[str, ...], mounts: Mapping[str, Mount], rows: Array,
-                 solver_note: SolverNote | None = None) -> None:
+                 solver_note: SolverNote | None = None, said: tuple[str, ...] = ()) -> None:
         self.time, self.energy, self.energy_from_nowhere = (rows[:, k].copy() for k in range(len(ROW)))
-        self._solver_note, width, first = solver_note, len(_COLUMNS), len(ROW)
+        self._solver_note, self._said, width, first = solver_note, said, len(_COLUMNS), len(ROW)
         self._servos = {name: ServoRecord(self.time, mounts[name], rows[:, first + width * k:first + width * (k + 1)])
                         for k, name in enumerate(joints)}
 
@@ -228,8 +231,8 @@ class Record(Mapping[str, ServoRecord]):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The same as sentences."""
-        found = [self._solver_note.words] if self._solver_note else []
+        """The same as sentences, and what was assumed of the servos."""
+        found = [*([self._solver_note.words] if self._solver_note else []), *self._said]
         for time in (remark.time for remark in self.remarks if remark.kind == FROM_NOWHERE):
             most = float(np.nanmax(self.energy_from_nowhere))
             found.append(f"energy from nowhere from {time:.3g} s on: up to {most:.3g} J more than there was and than "
@@ -254,6 +257,42 @@ class Record(Mapping[str, ServoRecord]):
     def __len__(self) -> int:
         """Return the number of servos."""
         return len(self._servos)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return all signals (SI) of all joints as a pandas DataFrame: columns (joint, signal), indexed by time [s].
+
+        Raises
+        ------
+        MissingExtraError
+            If pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingExtraError("pandas", "data") from None
+        found = {(joint, name): servo[name] for joint, servo in self._servos.items() for name in servo.names[1:]}
+        return pd.DataFrame(found, index=pd.Index(self.time, name="time")).rename_axis(
+            columns=["joint", "signal"])
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return all signals (SI) as an xarray Dataset over joint and time [s]; nan where a servo has none of a name.
+
+        Raises
+        ------
+        MissingExtraError
+            If xarray is not installed.
+        """
+        try:
+            import xarray as xr
+        except ImportError:
+            raise MissingExtraError("xarray", "data") from None
+        names = dict.fromkeys(name for servo in self._servos.values() for name in servo.names[1:])
+        absent = np.full(len(self.time), math.nan)
+        units = {name: next(servo.unit(name) for servo in self._servos.values() if name in servo) for name in names}
+        return xr.Dataset(
+            {name: (("joint", "time"), np.array([servo.get(name, absent) for servo in self._servos.values()]),
+                    {} if name in _OF_JOINT else {"units": units[name]}) for name in names},
+            coords={"joint": list(self._servos), "time": ("time", self.time, {"units": "s"})})
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write all signals of all joints to a CSV file, `joint.signal` with its unit in each column's name.

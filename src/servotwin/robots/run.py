@@ -16,7 +16,7 @@ from servotwin.parameters.groups import Supply
 from servotwin.robots.command_map import unused_ranges
 from servotwin.robots.coupling import couple, couplings_of, led
 from servotwin.robots.drive import ServoDrive
-from servotwin.robots.heat import with_heat
+from servotwin.robots.heat import warm_mounts
 from servotwin.robots.ideal import IdealRun, blend_window, ideal_run
 from servotwin.robots.model_file import joint_names, robot_model
 from servotwin.robots.motion import Motion
@@ -168,7 +168,8 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     motion, said = _led_motion(own, motion, mounts)
     _check_joints(motion, mounts, joint_names(own))
     controls, ranges = unused_ranges(own, mounts)
-    drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction, controls=controls)
+    drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction, controls=controls,
+                       assume_heat=False)  # it is in the mounts
     time = _times(own.opt.timestep, motion.duration, settle)
     with shown(progress, 2 * len(time), "following the motion") as tell:
         data = mujoco.MjData(drive.model)
@@ -251,20 +252,6 @@ def _check_joints(motion: Motion, mounts: Mapping[str, Mount], joints: Mapping[s
         if joint not in mounts:
             raise InputError(f"joint {joint} of {motion.source}", got="no servo at it",
                              allowed=f"joints with servos, {', '.join(mounts)}")
-
-
-def warm_mounts(servos: Mapping[str, Model | Mount], *, assume_heat: bool, shared: bool) -> dict[str, Mount]:
-    """Return mounts of servos, with thermal numbers by their mass where that is asked for and possible."""
-    if not isinstance(servos, Mapping) or not servos:
-        raise InputError("servos of a robot", got=servos, allowed="a mapping of joints to models")
-    found = {name: given if isinstance(given, Mount) else Mount(given) for name, given in servos.items()}
-    if not assume_heat:
-        return found
-    warm: dict[int, Model] = {id(mount.model): with_heat(mount.model) for mount in found.values()}
-    known = [model.servo.thermal.winding_capacity is not None for model in warm.values()]
-    if shared and not all(known):  # servos on a shared supply all have thermal masses, or none
-        return found
-    return {name: replace(mount, model=warm[id(mount.model)]) for name, mount in found.items()}
 
 
 def _times(timestep: float, duration: float, settle: float) -> Array:
