@@ -162,8 +162,8 @@ def recipe_of(model: Model, *, load: float | None = None) -> Recipe:
     >>> import servotwin as st
     >>> servo = st.feetech_sts({"P_Coefficient": 16, "D_Coefficient": 32}, servo="feetech-sts3215-12v")
     >>> recipe = recipe_of(st.DigitalServo(servo), load=0.85)
-    >>> round(recipe.stiffness, 1), round(recipe.friction_loss, 2), round(recipe.most_torque, 2)
-    (12.7, 0.74, 3.59)
+    >>> round(recipe.stiffness), round(recipe.friction_loss, 1), round(recipe.most_torque, 1)
+    (13, 0.7, 3.6)
     """
     plant = _plant(model)
     lift = lift_of_twin(model)
