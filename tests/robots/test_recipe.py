@@ -124,8 +124,8 @@ def test_a_joint_by_a_recipe_holds():
 
 
 @pytest.mark.parametrize(("load", "message"), [
-    (0.0, "load of a recipe of feetech-sts3215-12v: got 0.0, allowed: a positive number"), (float("nan"), "load of a"),
-    (-1.0, "positive"), (2.8, "tripped by"), (9.0, "allowed: less")])
+    (0.0, "load of a recipe of feetech-sts3215-12v: got 0.0, allowed: at least 0.05"), (float("nan"), "load of a"),
+    (-1.0, "at least"), ("0.5", "at least"), (2.8, "tripped by"), (9.0, "allowed: less")])
 def test_what_load_is_refused(load, message):
     with pytest.raises(InputError, match=message):
         recipe_of(LEROBOT, load=load)

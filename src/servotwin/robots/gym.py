@@ -130,9 +130,11 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
 
         Raises
         ------
-        UnknownNameError
-            If it is given options and reads none, as those of Gymnasium on MuJoCo.
+        InputError, UnknownNameError
+            If options are no mapping, or given to an environment that reads none, as those of Gymnasium on MuJoCo.
         """
+        if options is not None and not isinstance(options, Mapping):
+            raise InputError("options of reset", got=options, allowed="a mapping, or None")
         if options and not _reads_options(self.env):
             raise UnknownNameError("option of reset", next(iter(options)), (),
                                    allowed="none: the environment reads none")

@@ -32,6 +32,7 @@ STICKS = "0.9999 0.9999 0.001"
 """`solimpfriction` of a joint with which MuJoCo's friction loss all but holds; as it is by default, it creeps."""
 SHARE = 0.3  # of what a servo lifts: the load that a recipe is for unless another is given
 _NO_LOAD = 0.0
+_LIGHTEST = 0.02  # of what a servo lifts
 _LEAST = 0.1  # of the droop that the linear zone has without friction: what stands nearer has an integral
 
 
@@ -155,7 +156,7 @@ def recipe_of(model: Model, *, load: float | None = None) -> Recipe:
     ------
     InputError
         If the model has no gain from error to voltage (a motor, or a servo of which too little is known), the load is
-        no positive number, or the servo does not hold it.
+        no number of at least 2 % of what it lifts, or the servo does not hold it.
 
     Examples
     --------
@@ -168,8 +169,9 @@ def recipe_of(model: Model, *, load: float | None = None) -> Recipe:
     plant = _plant(model)
     lift = lift_of_twin(model)
     load = SHARE * lift if load is None else load
-    if not is_finite(load) or not load > 0.0:
-        raise InputError(f"load of a recipe of {model.servo.name}", got=load, allowed="a positive number [N m]")
+    if not is_finite(load) or not load >= _LIGHTEST * lift:
+        raise InputError(f"load of a recipe of {model.servo.name}", got=load, allowed=f"at least {_LIGHTEST * lift:.3g}"
+                         f" N m, {_LIGHTEST:.0%} of what it lifts: below it friction hides what the load does")
     droops = droops_of_twin(model, load, inertia_under(load))
     whole = droops.up + droops.down
     if whole > _LEAST * 2.0 * load / plant.stiffness:
