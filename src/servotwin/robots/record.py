@@ -294,17 +294,24 @@ class Record(Mapping[str, ServoRecord]):
                     {} if name in _OF_JOINT else {"units": units[name]}) for name in names},
             coords={"joint": list(self._servos), "time": ("time", self.time, {"units": "s"})})
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+    def save(self, path: str | Path, *, overwrite: bool = False, every: int = 1) -> None:
         """Write all signals of all joints to a CSV file, `joint.signal` with its unit in each column's name.
+
+        Parameters
+        ----------
+        path : str or Path
+        overwrite : bool
+        every : int
+            Of how many ticks one is written.
 
         Raises
         ------
         OutputExistsError, OutputError
             If the file exists and `overwrite` is false, or it cannot be written.
         """
-        signals, units = {"time": self.time}, {"time": "s"}
+        signals, units = {"time": self.time[::every]}, {"time": "s"}
         for joint, servo in self._servos.items():
             for name in servo.names[1:]:
                 if name in SIGNALS:
-                    signals[f"{joint}.{name}"], units[f"{joint}.{name}"] = servo[name], SIGNALS[name].unit
+                    signals[f"{joint}.{name}"], units[f"{joint}.{name}"] = servo[name][::every], SIGNALS[name].unit
         files.save_csv(path, signals, units, overwrite=overwrite)
