@@ -1,6 +1,8 @@
 """What a control asks of a servo: an angle is followed, what is no angle is refused, what is changed is told."""
 
 
+import math
+
 import mujoco
 import numpy as np
 import pytest
@@ -83,8 +85,18 @@ def test_a_command_that_is_clipped_is_told_and_counted(actuator, mount, goal, gi
     assert (found.asked, found.given) == (pytest.approx(goal), pytest.approx(given))
     assert record["elbow"]["joint_command"][-1] == pytest.approx(given)
     assert ("commands clipped", found.time) in [tuple(remark) for remark in record.remarks]
-    words = f"commands of joint elbow were clipped in 20 of 50 ticks, from 0.031 s on: {goal:.4g} rad"
+    words = f"joint elbow were clipped in 20 of 50 ticks, from 0.031 s on: {math.degrees(goal):.4g} deg became"
     assert words in " ".join(record.notes)
+
+
+def test_a_slide_is_told_in_millimetres():
+    xml = hinge(joint='type="slide" axis="0 0 1"')
+    drive = ServoDrive(mujoco.MjModel.from_xml_string(xml), {"elbow": Mount(DIGITAL, ratio=0.01)})
+    data = mujoco.MjData(drive.model)
+    drive.record(data)
+    drive.command(data, {"elbow": 0.05})
+    drive.step(data, 3)
+    assert "clipped in 3 of 3 ticks, from 0.001 s on: 50 mm became 31.4" in drive.check(data)[-1]
 
 
 def test_a_command_within_the_ends_is_no_remark():

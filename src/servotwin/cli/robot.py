@@ -50,7 +50,7 @@ def run(
         metavar="FOLDER", help="Folder for tables, pictures, video and page.", rich_help_panel=shared.OUTPUT)],
     servo: Annotated[list[str] | None, typer.Option(
         metavar="JOINT=ID", help="Servo of a joint, repeatable: catalog id, or path of a servo file (.toml); "
-        "'*=ID' for all other hinges.", rich_help_panel=_ROBOT)] = None,
+        "'*=ID' for all other hinges that follow no other joint.", rich_help_panel=_ROBOT)] = None,
     mount: Annotated[list[str] | None, typer.Option(
         metavar="JOINT=ZERO:DIRECTION:RATIO", help="How a servo sits at its joint, repeatable: angle of the joint "
         "where the servo's is 0, 1 or -1, turns of the joint per turn of the servo, such as elbow=-90deg:-1; of a "

@@ -110,6 +110,8 @@ class ServoDrive:
             raise InputError("model of a ServoDrive", got=type(model).__name__, allowed="an MjModel or MjSpec")
         self.model = spec.compile() if spec is not None else model
         self._joints = joints_of(self.model, servos)
+        slide = mujoco.mjtJoint.mjJNT_SLIDE
+        self._slides = tuple(one.name for one in self._joints if self.model.jnt_type[one.number] == slide)
         self._said: tuple[str, ...] = ()
         if assume_heat:
             mounts = warm_mounts(servos, assume_heat=True, shared=bus is not None)
@@ -316,7 +318,7 @@ class ServoDrive:
         rows = instance.rows[:words["used"]].copy()
         close_books(self.model, data, instance, [joint.speed_at for joint in self._joints], rows)
         return Record(self.joints, {joint.name: joint.mount for joint in self._joints}, rows, self._solver_note,
-                      self._said)
+                      self._said, self._slides)
 
     def look(self, data: Any, name: str) -> Array:
         """Return a signal (SI) of all servos as they stand after the last tick, in the order of `joints`.

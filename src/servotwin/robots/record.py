@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 _COLUMNS = (*KEPT, *Observed._fields)
 _OF_JOINT = {"joint_angle": ("rad", "m"), "joint_command": ("rad", "m"), "joint_torque": ("N m", "N"),
              "joint_work": ("J", "J")}
+_SHOWN = {"rad": (math.degrees(1.0), "deg"), "m": (1e3, "mm"), "s": (1e6, "us")}
 CLIPPED = "commands clipped"
 _ROUNDING = 1e-6  # of a command: what clips it by less tells nothing
 FROM_NOWHERE = "energy from nowhere"
@@ -168,6 +169,8 @@ class Record(Mapping[str, ServoRecord]):
         What was done about MuJoCo's solver.
     said : tuple of str
         Sentences on what was assumed of the servos.
+    slides : tuple of str
+        Joints that are slides, and no hinges.
 
     Attributes
     ----------
@@ -197,9 +200,11 @@ class Record(Mapping[str, ServoRecord]):
     """
 
     def __init__(self, joints: tuple[str, ...], mounts: Mapping[str, Mount], rows: Array,
-                 solver_note: SolverNote | None = None, said: tuple[str, ...] = ()) -> None:
+                 solver_note: SolverNote | None = None, said: tuple[str, ...] = (),
+                 slides: tuple[str, ...] = ()) -> None:
         self.time, self.energy, self.energy_from_nowhere = (rows[:, k].copy() for k in range(len(ROW)))
-        self._solver_note, self._said, width, first = solver_note, said, len(_COLUMNS), len(ROW)
+        self._solver_note, self._said, self._slides = solver_note, said, slides
+        width, first = len(_COLUMNS), len(ROW)
         self._servos = {name: ServoRecord(self.time, mounts[name], rows[:, first + width * k:first + width * (k + 1)])
                         for k, name in enumerate(joints)}
 
@@ -239,10 +244,12 @@ class Record(Mapping[str, ServoRecord]):
                          f"servos have given, with {self._largest:.3g} J at most in the model: its solver does not "
                          "converge, or its step is too long")
         for joint, servo in self._servos.items():
-            clipped, unit = servo.clipped, "s" if servo.unit("joint_command") == "s" else "rad (of a slide m)"
+            clipped, (factor, unit) = servo.clipped, _SHOWN.get(
+                servo.unit("joint_command", slides=joint in self._slides), (1.0, ""))
             if clipped:
                 found.append(f"commands of joint {joint} were clipped in {clipped.ticks} of {len(self.time)} ticks, "
-                             f"from {clipped.time:.3g} s on: {clipped.asked:.4g} {unit} became {clipped.given:.4g}")
+                             f"from {clipped.time:.3g} s on: {factor * clipped.asked:.4g} {unit} became "
+                             f"{factor * clipped.given:.4g}")
         return tuple(found)
 
     def __getitem__(self, name: str) -> ServoRecord:
@@ -291,7 +298,7 @@ class Record(Mapping[str, ServoRecord]):
         units = {name: next(servo.unit(name) for servo in self._servos.values() if name in servo) for name in names}
         return xr.Dataset(
             {name: (("joint", "time"), np.array([servo.get(name, absent) for servo in self._servos.values()]),
-                    {} if name in _OF_JOINT else {"units": units[name]}) for name in names},
+                    {} if self._slides and name in _OF_JOINT else {"units": units[name]}) for name in names},
             coords={"joint": list(self._servos), "time": ("time", self.time, {"units": "s"})})
 
     def save(self, path: str | Path, *, overwrite: bool = False, every: int = 1) -> None:
