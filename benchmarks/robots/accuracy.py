@@ -11,7 +11,7 @@ import servotwin as st
 
 def followed(xml: str, servos: dict, goals, duration: float, every: float = 1e-3) -> tuple[np.ndarray, ...]:
     """Return times, angles (joint, time) and places of the tool under goals over time."""
-    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(xml), servos)
+    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(xml), servos, assume_heat=False)
     data, dt = mujoco.MjData(drive.model), drive.model.opt.timestep
     data.qpos[:] = [goals(0.0)[name] for name in drive.joints]
     times, angles, tools = [], [], []
@@ -69,7 +69,7 @@ def held() -> None:
     for name, model in arms.servos().items():
         for integrator in ("RK4", "implicitfast"):
             drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(arms.links(integrator, 1e-3, "0 1 0")),
-                                         dict.fromkeys(("shoulder", "elbow"), model))
+                                         dict.fromkeys(("shoulder", "elbow"), model), assume_heat=False)
             data = mujoco.MjData(drive.model)
             data.qpos[:] = [0.3, 0.5]
             drive.step(data, 3000)

@@ -23,7 +23,7 @@ def pressed(model: mujoco.MjModel, data: mujoco.MjData) -> float:
 
 def run(xml: str, model: object, goals: dict[str, float], duration: float = 1.5, **start: float) -> np.ndarray:
     """Return rows of time, force, fastest joint, energy, and the work of servos and of contacts and limits [J]."""
-    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(xml), dict.fromkeys(goals, model))
+    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(xml), dict.fromkeys(goals, model), assume_heat=False)
     data, own = mujoco.MjData(drive.model), drive.model
     dofs = [int(own.jnt_dofadr[own.joint(name).id]) for name in goals]
     for name, angle in start.items():

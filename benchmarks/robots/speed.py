@@ -53,7 +53,7 @@ def table() -> None:
         single = moved(lambda k, m=plain, d=idle: mujoco.mj_step(m, d))
         for name, model in arms.servos().items():
             drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(arms.chains(joints)),
-                                         {f"j{k}": model for k in range(joints)})
+                                         {f"j{k}": model for k in range(joints)}, assume_heat=False)
             data = mujoco.MjData(drive.model)
 
             def step(k: int, drive: st.robots.ServoDrive = drive, data: mujoco.MjData = data, n: int = joints) -> None:

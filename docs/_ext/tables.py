@@ -233,6 +233,12 @@ def registers() -> str:
         parts.append(f"### {model.name}\n\n{model.family}, model number {model.number}; {model.assumed} of "
                      f"{model.rows} assumed.\n\n{head}")
     return "\n\n".join(parts)
+def recipes() -> str:
+    """Servos beside their recipes for MuJoCo's actuators."""
+    from recipe_table import HEAD
+    from recipe_table import recipes as rows
+
+    return markdown(HEAD, rows())
 
 
 def _is_own(module, name: str) -> bool:
@@ -245,7 +251,7 @@ TABLES = {"parameters": parameters, "models": models, "model-list": model_list, 
           "bam-actuators": bam_actuators, "top-level": top_level, "api": api,
           "register-models": register_models, "registers": registers,
           "protocol-messages": protocol_messages, "protocol-fields": protocol_fields,
-          "protocol-numbers": protocol_numbers, "protocol-words": protocol_words}
+          "protocol-numbers": protocol_numbers, "protocol-words": protocol_words, "recipes": recipes}
 
 
 def setup(app):

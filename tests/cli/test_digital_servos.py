@@ -52,7 +52,7 @@ def test_the_loop_is_told_in_words_picture_and_page(cli, tmp_path):
     ended = cli("curves", BUS, *SOFTER, "--load", "torque=0.2", "--quick", "--loop", "loop.png", "--out", "page.html")
     assert ended.code == 0, ended.err
     lines = {line[:29].strip(): line[29:].strip() for line in ended.out.splitlines()}
-    assert lines["stiffness"] == "16.7 N m/rad (0.292 N m/deg)"
+    assert lines["stiffness"] == "16.2 N m/rad (0.282 N m/deg)"
     assert lines["dead zone"] == "0.09 deg either way"
     assert lines["startup force"].startswith("1.6 % of the duty")
     assert lines["reaches the cap at"].endswith(" deg")

@@ -34,6 +34,17 @@ def robot(cli, tmp_path, monkeypatch):
     return lambda *words: cli("robot", "run", *words)
 
 
+URDF = """<robot name="arm"><link name="base"/>
+  <link name="finger"><inertial><origin xyz="0 0 .02"/><mass value=".02"/><inertia ixx="5e-6" iyy="5e-6" izz="1e-6"
+    ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="finger2"><inertial><origin xyz="0 0 .02"/><mass value=".02"/><inertia ixx="5e-6" iyy="5e-6" izz="1e-6"
+    ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="grip" type="revolute"><parent link="base"/><child link="finger"/><axis xyz="0 1 0"/>
+    <limit lower="0" upper=".6" effort="1" velocity="6"/></joint>
+  <joint name="grip2" type="revolute"><parent link="base"/><child link="finger2"/><axis xyz="0 -1 0"/>
+    <limit lower="0" upper=".6" effort="1" velocity="6"/><mimic joint="grip"/></joint></robot>"""
+
+
 def quick(*words, motion="wave.csv", out="out"):
     return (*words, "--motion", motion, "--out", out, "--no-video", "--settle", "0.05")
 
@@ -212,3 +223,20 @@ def test_help_has_an_example(cli, words):
     ended = cli(*words)
     assert (ended.code, ended.err) == (0, "")
     assert "Example: servotwin robot run" in ended.out
+
+
+def test_a_joint_that_mimics_another_gets_no_servo(robot, tmp_path):
+    """Two fingers of 20 g on one servo needed 20 N m when each had its own."""
+    (tmp_path / "grip.urdf").write_text(URDF)
+    rows = "\n".join(f"{0.02 * k:.2f},{10.0 - 10.0 * math.cos(0.05 * k):.4f}" for k in range(20))
+    (tmp_path / "grip.csv").write_text(f"time_s,grip_deg\n{rows}\n")
+    words = quick("grip.urdf", "--servo", "*=towerpro-mg996r", motion="grip.csv")
+    ended = robot(*words, "--json")
+    assert ended.code == 0, ended.err
+    found = json.loads(ended.out)
+    assert list(found["joints"]) == ["grip"]
+    assert found["notes"] == ["grip2 follows grip and gets no servo"]
+    assert found["joints"]["grip"]["sizing"]["worst"]["torque"] < 0.05
+    ended = robot(*words, "--servo", "grip2=towerpro-mg996r", "--force")
+    assert ended.code == 2
+    assert "servo of joint grip2: got 'one of its own', allowed: none: grip2 follows grip" in ended.err

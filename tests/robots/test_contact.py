@@ -29,7 +29,7 @@ CLOSE, PUSH = {"left": -0.6, "right": 0.6}, {"elbow": 1.2}
 
 def run(xml, model, goals, duration=1.5, start=None):
     """Return, step by step: force of the constraints, fastest joint, energy, work of servos and of constraints."""
-    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(xml), dict.fromkeys(goals, model))
+    drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(xml), dict.fromkeys(goals, model), assume_heat=False)
     own, data = drive.model, mujoco.MjData(drive.model)
     data.qpos[own.jnt_qposadr[own.joint(next(iter(goals))).id]] = start or 0.0
     drive.command(data, goals)

@@ -33,7 +33,7 @@ def quadruped(dt, integrator, iterations):
 def stood(own, dt, integrator, iterations, drop, **more):
     """Let a quadruped stand for a second, or drop onto its feet; return drive, data, heights and the record."""
     drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(quadruped(dt, integrator, iterations)),
-                                 dict.fromkeys(LEGS, st.DigitalServo(own)), **more)
+                                 dict.fromkeys(LEGS, st.DigitalServo(own)), assume_heat=False, **more)
     data = mujoco.MjData(drive.model)
     data.qpos[2] += drop
     data.qpos[7::2], data.qpos[8::2] = 0.5, -1.0
@@ -100,7 +100,7 @@ def test_iterations_are_raised_where_motor_and_output_move_apart(options, own, a
     xml = hinge().replace("<option", f"<option {options}")
     given = tuple(int(word.split('"')[1]) for word in options.split())
     for source in (mujoco.MjModel.from_xml_string(xml), mujoco.MjSpec.from_string(xml)):
-        drive = st.robots.ServoDrive(source, {"elbow": st.DigitalServo(own)})
+        drive = st.robots.ServoDrive(source, {"elbow": st.DigitalServo(own)}, assume_heat=False)
         assert (drive.model.opt.iterations, drive.model.opt.ls_iterations) == after
         data = mujoco.MjData(drive.model)
         with warnings.catch_warnings():

@@ -148,12 +148,10 @@ def test_an_environment_with_servos_is_the_loop_written_by_hand(option, command)
     env = ServoActuated(Arm(option=option), SERVOS, command=command)
     seen = run(env)[:, :6]
     bare = Arm(option=option)
-    if command is None:
-        bare.model.actuator_ctrlrange[:2] = [[-REACH, REACH], [-1.2, REACH]]
-    else:
-        bare.model.actuator_ctrlrange[:2] = [[-1.0, 1.0], [-2.0, 2.0]]
+    ends = [(-REACH, REACH), (-1.2, REACH)] if command is None else [(-1.0, 1.0), (-2.0, 2.0)]
     drive = ServoDrive(bare.model, {"shoulder": SERVOS["turn"], "elbow": SERVOS["elbow"], "finger": SERVOS["grip"]},
-                       joint_friction="clear")
+                       joint_friction="clear", controls={
+                           name: CommandMap(name, *own) for name, own in zip(("shoulder", "elbow"), ends, strict=True)})
     rows = [bare.reset(seed=3)[0]]
     for k in range(40):
         controls = np.sin(0.2 * k + np.arange(3)).astype(np.float32).astype(float)
@@ -427,3 +425,22 @@ def test_without_gymnasium_one_line_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "gymnasium", None)
     with pytest.raises(MissingExtraError, match=r"pip install 'servotwin\[robots\]'"):
         import servotwin.robots.gym  # noqa: F401
+
+
+def test_options_that_nobody_reads_are_refused(own):
+    env = actuated(own("Reacher-v5"))
+    with pytest.raises(UnknownNameError, match="unknown option of reset 'angle': allowed: none"):
+        env.reset(seed=1, options={"angle": 1.0})
+    env.reset(seed=1, options={})
+    ServoActuated(Arm(), SERVOS).reset(seed=1, options={"angle": 1.0})  # an own reset may read it
+
+
+def test_info_has_what_the_servos_do():
+    env = ServoActuated(Arm(), SERVOS)
+    env.reset(seed=1)
+    info = env.step(np.array([1.0, 2.0, 0.01]))[4]
+    names = {f"servo_{name}" for name in ("torque", "current", "voltage", "trip")}
+    assert {name: value.shape for name, value in info.items() if name in names} == dict.fromkeys(names, (3,))
+    assert np.array_equal(info["servo_current"], env.drive.look(env.data, "armature_current"))
+    assert np.abs(info["servo_current"]).max() > 0.1
+    assert np.isfinite(info["servo_trip"]).any()  # of the bus servo

@@ -25,7 +25,7 @@ def loop_pairs(loop: Loop, torque: float | None = None) -> list[tuple[str, str]]
     >>> import servotwin as st
     >>> model = st.DigitalServo(st.load_servo("feetech-sts3215-12v"))
     >>> loop_pairs(st.curves(model, bandwidth=False).voltages[0].loop)[0]
-    ('stiffness', '33.4 N m/rad (0.584 N m/deg)')
+    ('stiffness', '32.3 N m/rad (0.564 N m/deg)')
     """
     stiffness = f"{loop.stiffness:.3g} N m/rad ({math.radians(loop.stiffness):.3g} N m/deg)"
     zone = f"{_deg(loop.dead_zone)} either way" if loop.dead_zone > 0.0 else "none"

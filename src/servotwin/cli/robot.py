@@ -51,7 +51,7 @@ def run(
         metavar="FOLDER", help="Folder for tables, pictures, video and page.", rich_help_panel=shared.OUTPUT)],
     servo: Annotated[list[str] | None, typer.Option(
         metavar="JOINT=ID", help="Servo of a joint, repeatable: catalog id, or path of a servo file (.toml); "
-        "'*=ID' for all other hinges.", rich_help_panel=_ROBOT)] = None,
+        "'*=ID' for all other hinges that follow no other joint.", rich_help_panel=_ROBOT)] = None,
     mount: Annotated[list[str] | None, typer.Option(
         metavar="JOINT=ZERO:DIRECTION:RATIO", help="How a servo sits at its joint, repeatable: angle of the joint "
         "where the servo's is 0, 1 or -1, turns of the joint per turn of the servo, such as elbow=-90deg:-1; of a "
@@ -107,11 +107,12 @@ def run(
     from servotwin.cli.robot_facts import facts
     from servotwin.cli.robot_words import as_options, chosen_servos, models_of, mounts_of, supply_of, units_of
     from servotwin.robots import joint_names, joint_ranges, robot_model, run_motion, sizing_of
+    from servotwin.robots.coupling import couplings_of
 
     check_numbers(output_step=output_step, rate=rate, blend=blend)
     plant = robot_model(model_file)
     joints = joint_names(plant)
-    chosen = chosen_servos(model_file, servo or [], joints)
+    chosen = chosen_servos(model_file, servo or [], joints, followers=couplings_of(plant))
     mounts = mounts_of(models_of(chosen, model, change or [], register or []), mount or [], joints)
     bus = supply_of(supply)
     with as_options():

@@ -129,7 +129,7 @@ def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Targ
     with staged(targets, force=force) as drafts:
         places = {target.path.name: draft for target, draft in zip(targets, drafts, strict=True)}
         writers: dict[str, Callable[[Path], object]] = {
-            SERVOS: lambda path: _servo_table(run, path, output_step),
+            SERVOS: lambda path: run.record.save(path, every=_every(run, output_step)),
             JOINTS: lambda path: path.write_bytes(_joint_table(run, output_step).encode()),
             SUMMARY: lambda path: path.write_bytes((json_text(found) + "\n").encode()),
             PAGE: lambda path: path.write_bytes(page(
@@ -146,14 +146,6 @@ def write_all(run: RobotRun, sized: Mapping[str, Sizing], targets: Sequence[Targ
 
 def _every(run: RobotRun, output_step: float) -> int:
     return max(round(output_step / float(run.time[1] - run.time[0])), 1)
-
-
-def _servo_table(run: RobotRun, path: Path, output_step: float) -> None:
-    """Write all signals of all servos."""
-    from servotwin.robots import Record
-
-    rows = np.column_stack([run.time, *(record.columns for record in run.record.values())])
-    Record(tuple(run.record), run.mounts, rows[::_every(run, output_step)]).save(path)
 
 
 def _joint_table(run: RobotRun, output_step: float) -> str:

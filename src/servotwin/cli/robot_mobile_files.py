@@ -97,18 +97,11 @@ def write(run: WaypointRun, found: dict[str, Any], targets: Sequence[Any], outpu
             places[PATH_TABLE].write_bytes(_path_table(run, output_step).encode())
             if run.record is not None:
                 every = max(round(output_step / float(run.record.time[1] - run.record.time[0])), 1)
-                _sparse(run.record, every).save(places[files.SERVOS])
+                run.record.save(places[files.SERVOS], every=every)
             places[files.SUMMARY].write_bytes((json_text(found) + "\n").encode())
             places[files.PAGE].write_bytes(_page(found, list(places)).encode())
         if files.PICTURE in places:
             _draw(run, places[files.PICTURE], places.get(files.VIDEO))
-
-
-def _sparse(record: Any, every: int) -> Any:
-    from servotwin.robots import Record
-
-    rows = np.column_stack([record.time, *(one.columns for one in record.values())])
-    return Record(tuple(record), {joint: one.mount for joint, one in record.items()}, rows[::every])
 
 
 def _path_table(run: WaypointRun, step: float) -> str:

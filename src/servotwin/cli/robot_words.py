@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.errors import InputError, UnknownNameError
@@ -32,7 +32,8 @@ class Chosen(NamedTuple):
     registers: Sequence[str] = ()
 
 
-def chosen_servos(robot: str, words: Sequence[str], joints: Mapping[str, str]) -> dict[str, Chosen]:
+def chosen_servos(robot: str, words: Sequence[str], joints: Mapping[str, str], *,
+                  followers: Container[str] = ()) -> dict[str, Chosen]:
     """Return the servo of each joint that has one, in the order of the joints.
 
     Parameters
@@ -43,6 +44,8 @@ def chosen_servos(robot: str, words: Sequence[str], joints: Mapping[str, str]) -
         Such as ``"elbow=hitec-hs-755hb"``; ``"*=ID"`` stands for all hinges that are not named themselves.
     joints : mapping of str to str
         "angle" of a hinge or "length" of a slide, by name.
+    followers : container of str
+        Joints that follow others by an equality of the model: `*` leaves them out.
 
     Raises
     ------
@@ -66,7 +69,8 @@ def chosen_servos(robot: str, words: Sequence[str], joints: Mapping[str, str]) -
                          allowed=f"--servo JOINT=ID, repeatable; joints: {', '.join(joints) or 'none has a name'}")
     given = dict(named_words("--servo", words, "JOINT=ID, such as elbow=hitec-hs-755hb", joints))
     if ALL in given:
-        given = {joint: given[ALL] for joint, kind in joints.items() if kind == "angle"} | given
+        given = {joint: given[ALL] for joint, kind in joints.items()
+                 if kind == "angle" and joint not in followers} | given
     found = {joint: Chosen(given[joint]) for joint in joints if joint in given}
     if not found:
         raise InputError("--servo", got=words[0], allowed="a robot whose hinges have names")

@@ -103,7 +103,7 @@ class Loop:
     >>> servo = st.feetech_sts({"P_Coefficient": 16}, servo="feetech-sts3215-12v")
     >>> loop = Loop(st.DigitalServo(servo))
     >>> round(loop.stiffness, 1), round(loop.cap_error, 3), round(loop.cap_torque, 2)
-    (16.7, 0.368, 6.01)
+    (16.2, 0.368, 6.01)
     """
 
     model: DigitalServo
@@ -114,7 +114,7 @@ class Loop:
 
     @cached_property
     def stiffness(self) -> float:
-        """Torque of the motor per error, between dead zone and cap: k_p V K_out/R [N m/rad]."""
+        """Torque of the motor per error, between dead zone and cap: k_p (V − V_ce0) K_out/R [N m/rad]."""
         return float(self.model.loop_stiffness())
 
     @cached_property

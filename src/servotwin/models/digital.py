@@ -143,10 +143,15 @@ class DigitalServo(SwitchedServo):
         return np.minimum(self.value_or("firmware.torque_limit", 1.0), self.value_or("firmware.duty_limit", 1.0))
 
     def loop_stiffness(self) -> Any:
-        """Return the stiffness of the loop at rest, within its limits: k_p V K_out/R [N m/rad].
+        """Return the stiffness of the loop at rest, within its limits: k_p (V − V_ce0) K_out/R [N m/rad].
 
-        R is R_a + r_c; drops, dead zone and friction are left out.
+        R is R_a + r_c; brushes, dead zone and friction are left out.
         """
         K = self.value("gear.gear_reduction") * self.value("motor.torque_constant")
         R = self.value("motor.armature_resistance") + self.value_or("supply.bridge_drop_resistance", 0.0)
-        return self.value("firmware.proportional_gain") * self.value("supply.open_circuit_voltage") * K / R
+        return self.value("firmware.proportional_gain") * self.driving_voltage * K / R
+
+    @property
+    def driving_voltage(self) -> Any:
+        """Voltage at the motor per duty: what the bridge leaves of the supply's, V − V_ce0 [V]."""
+        return self.value("supply.open_circuit_voltage") - self.value_or("supply.bridge_drop_voltage", 0.0)

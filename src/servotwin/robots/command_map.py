@@ -11,13 +11,15 @@ import numpy as np
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.base import PULSE_RANGE
-from servotwin.robots.mount import Mount
+from servotwin.robots.model_file import joint_names
+from servotwin.robots.mount import Joint, Mount, joints_of
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.told import is_pulsed, told
 from servotwin.simulation import VectorSimulator
 from servotwin.units import is_finite
 
 _AT_JOINT = ("JOINT", "JOINTINPARENT")
+_OF_PLACE = 1  # MuJoCo's word for a control that is a place, from 4 on
 
 
 @dataclass(frozen=True)
@@ -178,15 +180,13 @@ def _map(model: Any, seat: Seat, mount: Mount, given: Any) -> CommandMap:
     """Return the map that is given, or that follows from the model."""
     mujoco = load_mujoco()
     low, high = map(float, model.actuator_ctrlrange[seat.control])
-    limits = (low, high) if model.actuator_ctrllimited[seat.control] else (-math.inf, math.inf)
-    unit = "m" if mujoco.mjtJoint(int(model.jnt_type[seat.number])) == mujoco.mjtJoint.mjJNT_SLIDE else "rad"
-    unit = told(mount).unit or unit
+    limits, unit = _limits(model, seat.control), _unit(model, seat.number, mount)
     if isinstance(given, CommandMap):
         return replace(given, joint=seat.joint, unit=unit)
     if isinstance(given, str) and given == "identity":
         return CommandMap(seat.joint, *limits, unit=unit)
     if given is None and not mount.model.endless:  # no spring pulls a wheel to an angle
-        law = _spring(mujoco, model, seat.actuator)
+        law = _law(mujoco, model, seat.actuator)
         if law is not None:
             return CommandMap(seat.joint, *limits, scale=law[0], offset=law[1], unit=unit)
     ends = _given_ends(seat.key, given, unit) if given is not None else _reach(model, seat, mount)
@@ -195,6 +195,79 @@ def _map(model: Any, seat: Seat, mount: Mount, given: Any) -> CommandMap:
                          allowed="'identity', or a range in the model")
     scale = (ends[1] - ends[0]) / (high - low)
     return CommandMap(seat.joint, low, high, scale, (ends[0] * high - ends[1] * low) / (high - low), unit)
+
+
+def own_map(model: Any, joint: Joint) -> CommandMap:
+    """Return what the control of an actuator asks of the servo in its place by itself.
+
+    That is the angle at which an actuator like a spring has no force. Of another, and where there is none, it is the
+    angle itself; then a control range, which was for something else, is refused.
+
+    Raises
+    ------
+    InputError
+        If the control has a range that is no angle, or no pulse of a servo that turns endlessly.
+    """
+    unit, law, how = _unit(model, joint.number, joint.mount), None, told(joint.mount)
+    if joint.actuator < 0:
+        return CommandMap(joint.name, -math.inf, math.inf, unit=unit)
+    low, high = _limits(model, joint.command_at)
+    if how.kind == "pulse_width":
+        frame = joint.mount.model.value_or("electronics.frame_period", 0.02)
+        fits = math.isinf(low) or 0.0 < low < high < frame
+    else:
+        law = None if joint.mount.model.endless else _law(load_mujoco(), model, joint.actuator)
+        silent = not (model.actuator_gainprm[joint.actuator].any() or model.actuator_biasprm[joint.actuator].any())
+        fits = law is not None or math.isinf(low) or joint.mount.model.endless or silent  # by a drive before
+    if not fits:
+        meant = "pulse width" if how.kind == "pulse_width" else "place" if unit == "m" else "angle"
+        raise InputError(f"control range of the actuator at joint {joint.name}", allowed="none, one of a position "
+                         f"actuator, or a CommandMap in controls=: what it asks of the servo [{unit}]",
+                         got=f"{low:g} to {high:g}, which is no {meant}")
+    scale, offset = law or (1.0, 0.0)
+    return CommandMap(joint.name, low, high, scale=scale, offset=offset, unit=unit)
+
+
+def unused_ranges(model: Any, mounts: Mapping[str, Mount]) -> tuple[dict[str, CommandMap], tuple[str, ...]]:
+    """Return maps without an end in the place of control ranges that are no angles, and a sentence on each of them.
+
+    They are for joints whose goals are angles, and that nobody tells anything by `ctrl`.
+    """
+    found, said = {}, []
+    known = {name: mount for name, mount in mounts.items() if name in joint_names(model)}
+    for joint in joints_of(model, known):
+        try:
+            own_map(model, joint)
+        except InputError as error:
+            unit = _unit(model, joint.number, joint.mount)
+            found[joint.name] = CommandMap(joint.name, -math.inf, math.inf, unit=unit)
+            said.append(f"control range of the actuator at joint {joint.name} is left out: {error.got}")
+    return found, tuple(said)
+
+
+def _limits(model: Any, control: int) -> tuple[float, float]:
+    """Return the range of a control, infinite where it has none."""
+    if not model.actuator_ctrllimited[control]:
+        return -math.inf, math.inf
+    low, high = map(float, model.actuator_ctrlrange[control])
+    return low, high
+
+
+def _unit(model: Any, joint: int, mount: Mount) -> str:
+    """Return the unit of a command of a joint."""
+    mujoco = load_mujoco()
+    slides = mujoco.mjtJoint(int(model.jnt_type[joint])) == mujoco.mjtJoint.mjJNT_SLIDE
+    return told(mount).unit or ("m" if slides else "rad")
+
+
+def _law(mujoco: Any, model: Any, actuator: int) -> tuple[float, float] | None:
+    """Return scale and offset of the angle that a control asks for by itself; None where it asks for something else."""
+    if int(model.actuator_gaintype[actuator]) != int(getattr(mujoco.mjtGain, "mjGAIN_DCMOTOR", -1)):
+        return _spring(mujoco, model, actuator)
+    if not hasattr(model, "actuator_ctrlspec") or int(model.actuator_ctrlspec[actuator]) != _OF_PLACE:
+        return None
+    gear = float(model.actuator_gear[actuator, 0])
+    return None if gear == 0.0 else (1.0 / gear, 0.0)
 
 
 def _spring(mujoco: Any, model: Any, actuator: int) -> tuple[float, float] | None:

@@ -178,7 +178,6 @@ class Instance:
         self.berths = [Berth(crew) for crew in crews]
         self.size = sum(berth.size for berth in self.berths)
         self.block = np.zeros(head + 2 * self.size)
-        self.command = np.full(count, np.nan)
         self.record_words = np.zeros(len(RECORD), np.int64)
         self.rows = np.zeros((0, 0))
         self.books = np.zeros(len(BOOKS) + count + 2 * dofs)
@@ -191,7 +190,7 @@ class Instance:
         self._groups = np.array([berth.words.ctypes.data for berth in self.berths], np.int64)
         self.words = np.zeros(len(INSTANCE), np.int64)
         values = {"data": address, "block": self.block.ctypes.data, "room": self._room.ctypes.data,
-                  "command": self.command.ctypes.data, "record": self.record_words.ctypes.data,
+                  "record": self.record_words.ctypes.data,
                   "groups": self._groups.ctypes.data, "count": len(self.berths), "serial": serial,
                   "books": self.books.ctypes.data}
         self.words[:] = [values.get(name, 0) for name in INSTANCE]
@@ -207,7 +206,7 @@ class Instance:
 
         None where that is not all: where the command counts too, or what is remembered is more than the angle.
         """
-        count = len(self.command)
+        count = len(self._joints)
         first, other = (self._within(size * np.arange(1.0, count + 1.0)) for size in (1e-3, 2e-3))
         words = [self._rested(angle, self._goals(goal))
                  for angle, goal in ((first, first), (first, other), (other, first))]

@@ -6,7 +6,8 @@ import ctypes
 import math
 import warnings
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import replace
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,8 @@ from servotwin.models import Model
 from servotwin.robots.books import close_books
 from servotwin.robots.command_map import CommandMap
 from servotwin.robots.crews import Instance, crews_of
-from servotwin.robots.harbour import Harbour
+from servotwin.robots.harbour import Harbour, goals_in
+from servotwin.robots.heat import heat_notes, warm_mounts
 from servotwin.robots.mount import Mount, joints_of, treat_friction
 from servotwin.robots.places import load_mujoco, places
 from servotwin.robots.record import Record
@@ -55,18 +57,25 @@ class ServoDrive:
     bus : Supply or sequence of tuple (Supply, joints), optional
         Supplies that servos share.
     controls : mapping of str to CommandMap, optional
-        By joint: what the control of its actuator asks for, where that is not the angle [rad] or place [m] itself.
+        By joint: what the control of its actuator asks for. Unless given, that of a position actuator keeps its
+        meaning; of any other it is the angle [rad] or place [m] itself, and a control range is refused.
     joint_friction : str
         What to do with damping and friction loss that these joints have themselves: "refuse", "clear" or "keep".
     solver : str
         "raised": where a servo has play or an elastic gear, MuJoCo's solver iterates at least 10 times, and 20 in its
         line search, which costs nothing where it converges earlier. "given": as the model says.
 
+    assume_heat : bool
+        Whether servos whose files have no thermal numbers get warm by ones that their mass lets assume; `check` and the
+        notes of a record say so. Without, they stay cold, and their temperatures are nan.
+
     Attributes
     ----------
     model : MjModel
     joints : tuple of str
         Names of the joints, in the order of all arrays.
+    maps : dict of str to CommandMap
+        What controls of actuators ask of the servos, by joint; `print` shows one.
 
     Raises
     ------
@@ -92,7 +101,7 @@ class ServoDrive:
 
     def __init__(self, model: Any, servos: Mapping[str, Model | Mount], *, bus: Any = None,
                  controls: Mapping[str, CommandMap] | None = None, joint_friction: str = "refuse",
-                 solver: str = "raised") -> None:
+                 solver: str = "raised", assume_heat: bool = True) -> None:
         mujoco, self._places = load_mujoco(), places()
         if not isinstance(servos, Mapping) or not servos:
             raise InputError("servos of a ServoDrive", got=servos, allowed="a mapping of joints to models")
@@ -101,10 +110,18 @@ class ServoDrive:
             raise InputError("model of a ServoDrive", got=type(model).__name__, allowed="an MjModel or MjSpec")
         self.model = spec.compile() if spec is not None else model
         self._joints = joints_of(self.model, servos)
+        slide = mujoco.mjtJoint.mjJNT_SLIDE
+        self._slides = tuple(one.name for one in self._joints if self.model.jnt_type[one.number] == slide)
+        self._said: tuple[str, ...] = ()
+        if assume_heat:
+            mounts = warm_mounts(servos, assume_heat=True, shared=bus is not None)
+            self._said = heat_notes(servos, mounts)
+            self._joints = [replace(joint, mount=mounts[joint.name]) for joint in self._joints]
         self.joints = tuple(joint.name for joint in self._joints)
         self._told = [told(joint.mount) for joint in self._joints]
         check_options(mujoco, self.model, self._joints)
         maps = maps_of(self.model, self._joints, controls)
+        self.maps = {one.joint: one for one, joint in zip(maps, self._joints, strict=True) if joint.actuator >= 0}
         crews = crews_of(self._joints, bus)
         treat_friction(self.model, self._joints, joint_friction)
         self._harbour = Harbour(self._joints, crews, int(self.model.nv))
@@ -195,7 +212,8 @@ class ServoDrive:
         -------
         tuple of str
             Sentences: iterations of MuJoCo's solver that were raised, or are too few with `solver="given"`, which is
-            a warning too; energy that appears from nowhere, while a record is kept.
+            a warning too; temperatures that are assumed or not known; energy that appears from nowhere and commands
+            that were clipped, while a record is kept.
 
         Raises
         ------
@@ -207,7 +225,12 @@ class ServoDrive:
             warnings.warn(self._solver_note.words, stacklevel=2)
         if self._of(data).record_words[RECORD.index("row")]:
             return self.result(data).notes
-        return (self._solver_note.words,) if self._solver_note else ()
+        return (*((self._solver_note.words,) if self._solver_note else ()), *self._said)
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be pickled or copied: its servos belong to MuJoCo's data of this process."""
+        raise InputError("pickling or copying of a ServoDrive", allowed="its states, what save(data) returns; a drive "
+                         "is made anew from a model and servos")
 
     def _raise(self, data: Any, code: int) -> None:
         error, self._harbour.error = self._harbour.error, None
@@ -250,11 +273,11 @@ class ServoDrive:
         InputError
             If a joint has no servo, a goal is no finite number, or a pulse no width that fits into a frame.
         """
-        command = self._of(data).command
+        told = goals_in(self._block(data), len(self._joints))
         for name, goal in goals.items():
             k = self._number(name)
             self._told[k].check(name, goal, self._joints[k].mount.model.value_or("electronics.frame_period", 0.02))
-            command[k] = goal
+            told[:, k] = goal, 1.0
             if self._joints[k].command_at >= 0:
                 scale, offset = self._arrays["control_scale"][k], self._arrays["control_offset"][k]
                 data.ctrl[self._joints[k].command_at] = (goal - offset) / scale
@@ -294,7 +317,8 @@ class ServoDrive:
             raise InputError("result of servos", got="no record", allowed="drive.record(data) before the run")
         rows = instance.rows[:words["used"]].copy()
         close_books(self.model, data, instance, [joint.speed_at for joint in self._joints], rows)
-        return Record(self.joints, {joint.name: joint.mount for joint in self._joints}, rows, self._solver_note)
+        return Record(self.joints, {joint.name: joint.mount for joint in self._joints}, rows, self._solver_note,
+                      self._said, self._slides)
 
     def look(self, data: Any, name: str) -> Array:
         """Return a signal (SI) of all servos as they stand after the last tick, in the order of `joints`.
@@ -308,8 +332,15 @@ class ServoDrive:
         return found
 
     def reset(self, data: Any) -> None:
-        """Let the servos begin anew at the next step, at rest where their joints are then, as if time had gone back."""
-        self._block(data)[:] = 0.0
+        """Let the servos begin anew at the next step, at rest where their joints are then, as if time had gone back.
+
+        They keep their commands.
+        """
+        block = self._block(data)
+        goals = goals_in(block, len(self._joints))
+        kept = goals.copy()
+        block[:] = 0.0
+        goals[:] = kept
 
     # --- memory -------------------------------------------------------------------------------------------------------
 
@@ -320,7 +351,7 @@ class ServoDrive:
         state = np.empty(mujoco.mj_stateSize(self.model, kind))
         mujoco.mj_getState(self.model, data, state, kind)
         instance = self._of(data)
-        return DriveState(state, data.qfrc_constraint.copy(), instance.block.copy(), instance.command.copy())
+        return DriveState(state, data.qfrc_constraint.copy(), instance.block.copy())
 
     def restore(self, data: Any, state: DriveState) -> None:
         """Go back to what was saved, in this data or another of the model.
@@ -340,7 +371,6 @@ class ServoDrive:
         mujoco.mj_setState(self.model, data, state.engine, kind)
         data.qfrc_constraint[:] = state.constraint
         instance.block[:] = state.servos
-        instance.command[:] = state.command
         block = self._block(data)
         block[BLOCK.index("serial")], block[BLOCK.index("restored")] = -1.0, 1.0
 

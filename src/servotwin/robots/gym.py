@@ -6,7 +6,9 @@ import contextlib
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from servotwin.errors import InputError, MissingExtraError, ServotwinError, SimulationError
+import numpy as np
+
+from servotwin.errors import InputError, MissingExtraError, ServotwinError, SimulationError, UnknownNameError
 from servotwin.models import Model
 from servotwin.robots.command_map import CommandMap, maps, seats
 from servotwin.robots.drive import ServoDrive
@@ -20,6 +22,8 @@ except ImportError:
     raise MissingExtraError("gymnasium", "robots") from None
 
 _T = TypeVar("_T")
+_LOOKS = {"servo_current": "armature_current", "servo_voltage": "bus_voltage",
+          "servo_temperature": "winding_temperature", "servo_trip": "trip"}
 _LOST = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")  # after each of these MuJoCo starts anew
 
 
@@ -33,7 +37,10 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     the action now says where to go.
 
     The servos begin anew at `reset`. In `qfrc_actuator` and `actuator_force` there is nothing of them: MuJoCo has their
-    torques [N m], or forces [N], among the passive ones, and `info["servo_torque"]` has them after each step.
+    torques [N m], or forces [N], among the passive ones. After each step `info` has them as "servo_torque", currents of
+    the windings as "servo_current" [A], voltages of the supplies as "servo_voltage" [V], temperatures of the windings
+    as "servo_temperature" [K], and as "servo_trip" the protections that act (0: none, 1 overload, 2 current, 3 heat,
+    4 undervoltage), each in the order of `drive.joints`; a signal that not all servos have is left out.
 
     Parameters
     ----------
@@ -50,6 +57,8 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     joint_friction : str
         What to do with damping and friction loss of these joints: "clear" (they stand for the actuator's, and a servo
         has its own), "keep", where they are those of a bearing, or "refuse".
+    assume_heat : bool
+        As of `ServoDrive`.
 
     Attributes
     ----------
@@ -81,9 +90,10 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], servos: Mapping[str, Model | Mount], *, command: Any = None,
-                 bus: Any = None, joint_friction: str = "clear") -> None:
+                 bus: Any = None, joint_friction: str = "clear", assume_heat: bool = True) -> None:
         _check(env, servos)
-        kept = {"servos": dict(servos), "command": command, "bus": bus, "joint_friction": joint_friction}
+        kept = {"servos": dict(servos), "command": command, "bus": bus, "joint_friction": joint_friction,
+                "assume_heat": assume_heat}
         gymnasium.utils.RecordConstructorArgs.__init__(self, **kept)
         gymnasium.Wrapper.__init__(self, env)
         self._kept, model = kept, self._bare.model
@@ -92,7 +102,7 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
         self.maps: dict[str, CommandMap] = maps(model, places, mounts, command)
         self.drive = ServoDrive(
             model, {seat.joint: mounts[seat.key] for seat in places}, joint_friction=joint_friction,
-            bus=_by_joint(bus, {seat.key: seat.joint for seat in places}),
+            assume_heat=assume_heat, bus=_by_joint(bus, {seat.key: seat.joint for seat in places}),
             controls={one.joint: one for one in self.maps.values()})
 
     @property
@@ -113,10 +123,21 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
         if lost:
             raise SimulationError("MUJOCO", float(self.data.time), "MuJoCo has met a number that is not finite, or too "
                                   f"large, and has started anew ({', '.join(lost)})")
-        return observation, reward, terminated, truncated, {**info, "servo_torque": self.drive.torque(self.data)}
+        return observation, reward, terminated, truncated, {**info, **self._seen()}
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Let the environment begin anew, and the servos with it, at rest."""
+        """Let the environment begin anew, and the servos with it, at rest.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            If options are no mapping, or given to an environment that reads none, as those of Gymnasium on MuJoCo.
+        """
+        if options is not None and not isinstance(options, Mapping):
+            raise InputError("options of reset", got=options, allowed="a mapping, or None")
+        if options and not _reads_options(self.env):
+            raise UnknownNameError("option of reset", next(iter(options)), (),
+                                   allowed="none: the environment reads none")
         with contextlib.suppress(ServotwinError):
             self.drive.raise_failure(self.data)  # what went wrong in the episode before
         self.drive.reset(self.data)
@@ -136,6 +157,13 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
             mujoco.set_mjcb_control(before)
         self.drive.raise_failure(self.data)
         return result
+
+    def _seen(self) -> dict[str, Any]:
+        """Return what `info` has of the servos, in the order of `drive.joints`."""
+        seen = {name: self.drive.look(self.data, signal) for name, signal in _LOOKS.items()}
+        seen["servo_trip"] = np.nan_to_num(seen["servo_trip"])  # what has no protection does not trip
+        known = {name: values for name, values in seen.items() if np.isfinite(values).all()}
+        return {"servo_torque": self.drive.torque(self.data), **known}
 
     # --- what shows ---------------------------------------------------------------------------------------------------
 
@@ -160,6 +188,17 @@ class ServoActuated(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.Recor
 
 def _again(kind: type[ServoActuated], env: Any, arguments: dict[str, Any]) -> ServoActuated:
     return kind(env, **arguments)
+
+
+def _reads_options(env: Any) -> bool:
+    """Tell whether an environment may read the options of its reset: those of Gymnasium on MuJoCo do not."""
+    from gymnasium.envs.mujoco import MujocoEnv
+
+    layers = [env]
+    while isinstance(layers[-1], gymnasium.Wrapper):
+        layers.append(layers[-1].env)
+    return any(not type(one).reset.__module__.startswith("gymnasium.") for one in layers) or not isinstance(
+        layers[-1], MujocoEnv)
 
 
 def _check(env: Any, servos: Any) -> None:

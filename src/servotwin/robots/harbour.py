@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import ctypes
-import math
 import threading
 import weakref
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from servotwin.errors import InputError
 from servotwin.robots.crews import Crew, Instance
@@ -20,6 +20,12 @@ _MOST = 4096  # of MuJoCo's data at once
 _FIRST_ROWS = 4096  # of a record
 _SERIALS = 2**40  # ticks of servos in one of them
 _ASK = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+
+
+def goals_in(block: NDArray[np.float64], servos: int) -> NDArray[np.float64]:
+    """Return where a block has goals, and whether they were told: a view, shape (2, servos)."""
+    first = len(BLOCK) + OF_EACH.index("goal") * servos
+    return block[first:first + 2 * servos].reshape(2, servos)
 
 
 class Harbour:
@@ -62,7 +68,7 @@ class Harbour:
         if address not in self._known:
             with self._lock:
                 instance = self._found.get(address) or self._new(address)
-                instance.command[:] = math.nan
+                goals_in(instance.block, len(self._joints))[:] = 0.0
                 self._known[address] = weakref.finalize(data, self._forget, address)
                 self._known[address].atexit = False
         return self._found[address]

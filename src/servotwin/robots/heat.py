@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,6 +16,7 @@ from servotwin.datasheet.warming import WIRE_LIMIT, Masses, thermal_masses
 from servotwin.errors import InputError
 from servotwin.physics import Temperatures, winding_resistance
 from servotwin.physics.thermal import COPPER_COEFFICIENT, copper_loss
+from servotwin.robots.mount import Mount
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -72,6 +74,39 @@ def with_heat(model: Model) -> Model:
     if masses is None or not masses.assumed or "thermal.winding_capacity" not in model.optional:
         return model
     return changed(model, {f"thermal.{name}": getattr(masses, name) for name in _NUMBERS})
+
+
+def warm_mounts(servos: Mapping[str, Model | Mount], *, assume_heat: bool, shared: bool) -> dict[str, Mount]:
+    """Return mounts of servos, with thermal numbers by their mass where that is asked for and possible."""
+    if not isinstance(servos, Mapping) or not servos:
+        raise InputError("servos of a robot", got=servos, allowed="a mapping of joints to models")
+    found = {name: given if isinstance(given, Mount) else Mount(given) for name, given in servos.items()}
+    if not assume_heat:
+        return found
+    warm: dict[int, Model] = {id(mount.model): with_heat(mount.model) for mount in found.values()}
+    known = [model.servo.thermal.winding_capacity is not None for model in warm.values()]
+    if shared and not all(known):  # servos on a shared supply all have thermal masses, or none
+        return found
+    return {name: replace(mount, model=warm[id(mount.model)]) for name, mount in found.items()}
+
+
+def heat_notes(given: Mapping[str, Model | Mount], mounts: Mapping[str, Mount]) -> tuple[str, ...]:
+    """Return sentences on thermal numbers that mounts have and their servos were given without, and on none at all."""
+    assumed, unknown = [], []
+    for joint, mount in mounts.items():
+        servo = given[joint]
+        own = servo.model if isinstance(servo, Mount) else servo
+        if mount.model is not own:
+            assumed.append(joint)
+        elif "thermal.winding_capacity" in own.optional and "winding_temperature" not in own.available:
+            unknown.append(joint)
+    said = []
+    if assumed:
+        said.append(f"thermal numbers of {', '.join(assumed)} are assumed by the servo's mass")
+    if unknown:
+        said.append(f"temperatures of {', '.join(unknown)} are not known: the servo has no thermal numbers, and no "
+                    "mass either, or shares its supply with such a one")
+    return tuple(said)
 
 
 def mean_heat(record: ServoRecord, masses: Masses, since: float, until: float) -> float:

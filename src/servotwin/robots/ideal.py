@@ -8,7 +8,8 @@ they are (Craig, Introduction to Robotics, 3rd ed. 2005, section 7.3, linear fun
 
 The torque is that of inverse dynamics, with rotors and gears that turn with the joint. Joints without a servo, and
 things that lie about, move as they are pushed: there the joints with servos are given an inertia beside which nothing
-counts, and with it the acceleration that they have to have.
+counts, and with it the acceleration that they have to have. A joint that follows those with servos by an equality is
+firm on them, and what it takes counts there (`linkage`).
 
 Where such a robot runs into itself or into what is fixed, nothing yields and no torque makes sense: such contacts are
 told, and their forces do not count.
@@ -25,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, SimulationError
+from servotwin.robots.linkage import Linkage
 from servotwin.robots.motion import Motion
 from servotwin.robots.places import load_mujoco
 from servotwin.units import is_finite
@@ -160,34 +162,38 @@ def ideal_run(model: Any, joints: Sequence[str], motion: Motion, time: Array, *,
     window = blend_window(motion) if window is None else window
     if not (is_finite(window) and window > 0.0):
         raise InputError("window of a blended motion", got=window, allowed="a positive number of seconds")
-    exact, heavy = copy.copy(model), copy.copy(model)
-    numbers = [model.joint(name).id for name in joints]
+    exact, heavy, linkage = copy.copy(model), copy.copy(model), Linkage(model, joints)
+    driven, numbers = slice(len(joints)), [*(model.joint(name).id for name in joints), *linkage.joints]
     angles_at, dofs = model.jnt_qposadr[numbers], model.jnt_dofadr[numbers]
     for each in (exact, heavy):
         each.jnt_limited[numbers] = 0
+        each.eq_active0[linkage.equalities] = 0
         each.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     weights = _HEAVY * np.maximum(model.dof_M0[dofs], _LIGHTEST)
     heavy.dof_armature[dofs] += weights
     data, inverse = mujoco.MjData(heavy), mujoco.MjData(exact)
     others_move = model.nv > len(numbers) or model.nu > 0
     courses = {name: course(motion, name, time, window) if name in motion.angles else
-               _standing(float(data.qpos[at]), len(time)) for name, at in zip(joints, angles_at, strict=True)}
+               _standing(float(data.qpos[at]), len(time)) for name, at in zip(joints, angles_at[driven], strict=True)}
     table = np.array([courses[name] for name in joints])  # joints, (angle, speed, acceleration), times
     torque, poses = np.zeros((len(joints), len(time))), np.zeros((len(time), model.nq))
     firm = _Firm(model, set(dofs.tolist()))
     for k in range(len(time)):
-        data.qpos[angles_at], data.qvel[dofs] = table[:, 0, k], table[:, 1, k]
-        data.qacc[dofs] = table[:, 2, k]
+        for values, places, given in zip((data.qpos, data.qvel, data.qacc), (angles_at, dofs, dofs), table[:, :, k].T,
+                                           strict=True):
+            values[places[driven]] = given
+        shares = linkage.follow(data.qpos, data.qvel, data.qacc)
         data.time = time[k]
         if others_move:
-            data.qfrc_applied[dofs] = weights * table[:, 2, k]
+            data.qfrc_applied[dofs] = weights * data.qacc[dofs]
             mujoco.mj_forward(heavy, data)
         inverse.time = time[k]
         inverse.qpos[:], inverse.qvel[:], inverse.qacc[:] = data.qpos, data.qvel, data.qacc
         mujoco.mj_inverse(exact, inverse)
-        torque[:, k] = inverse.qfrc_inverse[dofs] - data.qfrc_actuator[dofs]
+        forces = inverse.qfrc_inverse[dofs] - data.qfrc_actuator[dofs]
         if inverse.ncon:
-            torque[:, k] += firm.forces(exact, inverse)[dofs]
+            forces += firm.forces(exact, inverse)[dofs]
+        torque[:, k] = forces[driven] + shares.T @ forces[len(joints):]
         poses[k] = data.qpos
         if others_move:
             mujoco.mj_step(heavy, data)

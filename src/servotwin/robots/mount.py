@@ -8,6 +8,7 @@ from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
+from servotwin.robots.coupling import actuators_at_joints, couplings_of, tendon_actuators
 from servotwin.robots.places import load_mujoco
 from servotwin.units import is_finite
 
@@ -95,15 +96,18 @@ def joints_of(model: Any, servos: Mapping[str, Any]) -> list[Joint]:
     Raises
     ------
     InputError
-        If a joint is not there, is neither hinge nor slide, or several actuators move it.
+        If a joint is not there, is neither hinge nor slide, follows another, or several actuators move it.
     """
-    mujoco = load_mujoco()
+    mujoco, couplings = load_mujoco(), couplings_of(model)
     known = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, k) or "" for k in range(model.njnt)]
     found = []
     for name, given in servos.items():
         mount = given if isinstance(given, Mount) else Mount(given)
         if name not in known:
             _refuse(mujoco, model, name, known)
+        if name in couplings:
+            raise InputError(f"servo of joint {name}", got="one of its own",
+                             allowed=f"none: {couplings[name].words}")
         number = known.index(name)
         kind = mujoco.mjtJoint(model.jnt_type[number])
         if kind not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
@@ -125,9 +129,11 @@ def _refuse(mujoco: Any, model: Any, name: str, known: list[str]) -> None:
 
 def _actuator(mujoco: Any, model: Any, name: str, joint: int) -> tuple[int, int]:
     """Return the one actuator at a joint, and the place of its control; −1 where there is none."""
-    at_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-    own = [k for k in range(len(model.actuator_trntype))
-           if int(model.actuator_trntype[k]) in at_joint and model.actuator_trnid[k, 0] == joint]
+    own = [k for k in actuators_at_joints(model) if model.actuator_trnid[k, 0] == joint]
+    pulling = tendon_actuators(model, joint)
+    if pulling:
+        raise InputError(f"actuators of joint {name}", got=f"{', '.join(pulling)} at a tendon of it",
+                         allowed="none beside the servo: leave it out of the model")
     if len(own) > 1:
         names = ", ".join(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, k) or str(k) for k in own)
         raise InputError(f"actuators of joint {name}", got=names, allowed="one, whose control commands the servo")

@@ -28,7 +28,7 @@ def notes_of(run: RobotRun) -> tuple[str, ...]:
     >>> notes_of(run)
     ('goals of joint gripper go from 85.9 to 115 deg, beyond its range in the model, -10 to 100 deg',)
     """
-    said = []
+    said = list(run.said)
     ranges = joint_ranges(run.model)
     for joint in run.motion.joints:
         goals, mount, servo = run.motion.angles[joint], run.mounts[joint], run.mounts[joint].model.servo
@@ -46,7 +46,7 @@ def notes_of(run: RobotRun) -> tuple[str, ...]:
                         f"{_ends(*ranges[joint], slides=slides)}")
     swings = (f"joint {joint} {remark.words}" for joint in run.mounts for remark in run.tracking[joint].remarks
               if remark.kind == NOT_AT_REST)
-    return (*run.remarks, *said, *(touch.words for touch in run.ideal.touches), *run.record.notes, *swings)
+    return (*said, *(touch.words for touch in run.ideal.touches), *run.record.notes, *swings)
 
 
 def _beyond(values: np.ndarray[tuple[int], np.dtype[np.float64]], ends: tuple[float, float], slack: float) -> bool:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +27,36 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
+    import xarray as xr
 
 Array = NDArray[np.float64]
 _COLUMNS = (*KEPT, *Observed._fields)
 _OF_JOINT = {"joint_angle": ("rad", "m"), "joint_command": ("rad", "m"), "joint_torque": ("N m", "N"),
              "joint_work": ("J", "J")}
+_SHOWN = {"rad": (math.degrees(1.0), "deg"), "m": (1e3, "mm"), "s": (1e6, "us")}
+CLIPPED = "commands clipped"
+_ROUNDING = 1e-6  # of a command: what clips it by less tells nothing
 FROM_NOWHERE = "energy from nowhere"
 _NOTICED = 0.01  # of the largest energy: what may appear from nowhere; steps alone make 0.004 of it
+
+
+class Clipped(NamedTuple):
+    """Commands that a servo got otherwise than they were given, at an end of its control, its travel or its program.
+
+    Parameters
+    ----------
+    ticks : int
+        In how many of all.
+    time : float
+        Of the first [s].
+    asked, given : float
+        The command that was changed most, and what became of it [rad, m, or s of a pulse].
+    """
+
+    ticks: int
+    time: float
+    asked: float
+    given: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +152,18 @@ class ServoRecord(Mapping[str, Array]):
         swing = swing_of(looks, np.interp(looks, time, self["output_angle"]))
         return (Remark(NOT_AT_REST, float(time[-1]), **swing._asdict()),) if swing.swing > 0.0 else ()
 
+    @property
+    def clipped(self) -> Clipped | None:
+        """What became of commands beyond the ends that there are; None if all were followed as they were given."""
+        asked, given = (self.columns[:, _COLUMNS.index(name)] for name in ("asked", "command_angle"))
+        off = np.abs(asked - given)
+        changed = np.flatnonzero(off > _ROUNDING * (np.abs(given) + (0.0 if self._told.unit == "s" else 1.0)))
+        if not len(changed):
+            return None
+        most = int(np.argmax(off))
+        at_joint = (self._told.zero + self._told.gain * float(values[most]) for values in (asked, given))
+        return Clipped(len(changed), float(self.time[changed[0]]), *at_joint)
+
     def to_dataframe(self) -> pd.DataFrame:
         """Return all signals (SI) as a pandas DataFrame, indexed by time [s]."""
         try:
@@ -149,6 +184,10 @@ class Record(Mapping[str, ServoRecord]):
         Ends of the ticks [s], which are its `time`, energies, then what is kept of each servo.
     solver_note : SolverNote, optional
         What was done about MuJoCo's solver.
+    said : tuple of str
+        Sentences on what was assumed of the servos.
+    slides : tuple of str
+        Joints that are slides, and no hinges.
 
     Attributes
     ----------
@@ -178,9 +217,11 @@ class Record(Mapping[str, ServoRecord]):
     """
 
     def __init__(self, joints: tuple[str, ...], mounts: Mapping[str, Mount], rows: Array,
-                 solver_note: SolverNote | None = None) -> None:
+                 solver_note: SolverNote | None = None, said: tuple[str, ...] = (),
+                 slides: tuple[str, ...] = ()) -> None:
         self.time, self.energy, self.energy_from_nowhere = (rows[:, k].copy() for k in range(len(ROW)))
-        self._solver_note, width, first = solver_note, len(_COLUMNS), len(ROW)
+        self._solver_note, self._said, self._slides = solver_note, said, slides
+        width, first = len(_COLUMNS), len(ROW)
         parts = [rows[:, first + width * k:first + width * (k + 1)] for k in range(len(joints))]
         still = _still_since(self.time, [part[:, _COLUMNS.index("command_angle")] for part in parts])
         self._servos = {name: ServoRecord(self.time, mounts[name], part, still)
@@ -195,9 +236,10 @@ class Record(Mapping[str, ServoRecord]):
     def remarks(self) -> tuple[Remark, ...]:
         """Return what holds of the whole robot, (kind, time [s]).
 
-        "solver iterations raised" or "few solver iterations" of MuJoCo, "energy from nowhere".
+        "solver iterations raised" or "few solver iterations" of MuJoCo, "energy from nowhere", "commands clipped" of
+        each joint where they were.
         """
-        found = []
+        found = [Remark(CLIPPED, servo.clipped.time) for servo in self._servos.values() if servo.clipped]
         if self._solver_note and len(self.time):
             found.append(Remark(self._solver_note.kind, float(self.time[0])))
         noticed = np.flatnonzero(self.energy_from_nowhere > _NOTICED * self._largest)
@@ -213,13 +255,20 @@ class Record(Mapping[str, ServoRecord]):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The same as sentences."""
-        found = [self._solver_note.words] if self._solver_note else []
+        """The same as sentences, and what was assumed of the servos."""
+        found = [*([self._solver_note.words] if self._solver_note else []), *self._said]
         for time in (remark.time for remark in self.remarks if remark.kind == FROM_NOWHERE):
             most = float(np.nanmax(self.energy_from_nowhere))
             found.append(f"energy from nowhere from {time:.3g} s on: up to {most:.3g} J more than there was and than "
                          f"servos have given, with {self._largest:.3g} J at most in the model: its solver does not "
                          "converge, or its step is too long")
+        for joint, servo in self._servos.items():
+            clipped, (factor, unit) = servo.clipped, _SHOWN.get(
+                servo.unit("joint_command", slides=joint in self._slides), (1.0, ""))
+            if clipped:
+                found.append(f"commands of joint {joint} were clipped in {clipped.ticks} of {len(self.time)} ticks, "
+                             f"from {clipped.time:.3g} s on: {factor * clipped.asked:.4g} {unit} became "
+                             f"{factor * clipped.given:.4g}")
         return tuple(found)
 
     def __getitem__(self, name: str) -> ServoRecord:
@@ -235,19 +284,62 @@ class Record(Mapping[str, ServoRecord]):
         """Return the number of servos."""
         return len(self._servos)
 
-    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return all signals (SI) of all joints as a pandas DataFrame: columns (joint, signal), indexed by time [s].
+
+        Raises
+        ------
+        MissingExtraError
+            If pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError:
+            raise MissingExtraError("pandas", "data") from None
+        found = {(joint, name): servo[name] for joint, servo in self._servos.items() for name in servo.names[1:]}
+        return pd.DataFrame(found, index=pd.Index(self.time, name="time")).rename_axis(
+            columns=["joint", "signal"])
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return all signals (SI) as an xarray Dataset over joint and time [s]; nan where a servo has none of a name.
+
+        Raises
+        ------
+        MissingExtraError
+            If xarray is not installed.
+        """
+        try:
+            import xarray as xr
+        except ImportError:
+            raise MissingExtraError("xarray", "data") from None
+        names = dict.fromkeys(name for servo in self._servos.values() for name in servo.names[1:])
+        absent = np.full(len(self.time), math.nan)
+        units = {name: next(servo.unit(name) for servo in self._servos.values() if name in servo) for name in names}
+        return xr.Dataset(
+            {name: (("joint", "time"), np.array([servo.get(name, absent) for servo in self._servos.values()]),
+                    {} if self._slides and name in _OF_JOINT else {"units": units[name]}) for name in names},
+            coords={"joint": list(self._servos), "time": ("time", self.time, {"units": "s"})})
+
+    def save(self, path: str | Path, *, overwrite: bool = False, every: int = 1) -> None:
         """Write all signals of all joints to a CSV file, `joint.signal` with its unit in each column's name.
+
+        Parameters
+        ----------
+        path : str or Path
+        overwrite : bool
+        every : int
+            Of how many ticks one is written.
 
         Raises
         ------
         OutputExistsError, OutputError
             If the file exists and `overwrite` is false, or it cannot be written.
         """
-        signals, units = {"time": self.time}, {"time": "s"}
+        signals, units = {"time": self.time[::every]}, {"time": "s"}
         for joint, servo in self._servos.items():
             for name in servo.names[1:]:
                 if name in SIGNALS:
-                    signals[f"{joint}.{name}"], units[f"{joint}.{name}"] = servo[name], SIGNALS[name].unit
+                    signals[f"{joint}.{name}"], units[f"{joint}.{name}"] = servo[name][::every], SIGNALS[name].unit
         files.save_csv(path, signals, units, overwrite=overwrite)
 
 

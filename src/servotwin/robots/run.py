@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
+from servotwin.robots.command_map import unused_ranges
+from servotwin.robots.coupling import couple, couplings_of, led
 from servotwin.robots.drive import ServoDrive
-from servotwin.robots.heat import with_heat
+from servotwin.robots.heat import warm_mounts
 from servotwin.robots.ideal import IdealRun, blend_window, ideal_run
 from servotwin.robots.model_file import joint_names, robot_model
 from servotwin.robots.motion import Motion
@@ -57,8 +59,9 @@ class RobotRun:
         The same with ideal actuators, at the same times.
     tracking : mapping of str to Tracking
         How well each joint has followed.
-    remarks : tuple of str
-        What was assumed of its servos.
+    said : tuple of str
+        What was assumed of its servos, and done about the motion and the model, that nobody has asked for; one sentence
+        each.
     """
 
     model: Any
@@ -69,7 +72,7 @@ class RobotRun:
     poses: Array
     ideal: IdealRun
     tracking: Mapping[str, Tracking]
-    remarks: tuple[str, ...] = ()
+    said: tuple[str, ...] = ()
 
     @property
     def time(self) -> Array:
@@ -122,7 +125,8 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     servos : mapping of str to Model or Mount
         By the name of the joint.
     motion : Motion
-        Of these joints; those of which it says nothing hold still. One that was recorded with an SO-100 or SO-101
+        Of these joints; those of which it says nothing hold still. Goals of joints that follow others by an equality of
+        the model are left out, and the others have to move them too. One that was recorded with an SO-100 or SO-101
         says what LeRobot wrote into the registers of servos that have the factory's here: it is assumed, and a note
         says so.
     bus, joint_friction
@@ -163,11 +167,14 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
     if timestep is not None:
         own.opt.timestep = timestep
     mounts = warm_mounts(servos, assume_heat=assume_heat, shared=bus is not None)
-    mounts, remarks = as_motion_says(mounts, motion)
+    mounts, assumed = as_motion_says(mounts, motion)
     for joint, mount in mounts.items():
         supplied(mount.model, supply_of(bus, joint))  # raises before anything is run
+    motion, said = _led_motion(own, motion, mounts)
     _check_joints(motion, mounts, joint_names(own))
-    drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction)
+    controls, ranges = unused_ranges(own, mounts)
+    drive = ServoDrive(own, mounts, bus=bus, joint_friction=joint_friction, controls=controls,
+                       assume_heat=False)  # it is in the mounts
     time = _times(own.opt.timestep, motion.duration, settle)
     with shown(progress, 2 * len(time), "following the motion") as tell:
         data = mujoco.MjData(drive.model)
@@ -180,13 +187,12 @@ def run_motion(model: Any, servos: Mapping[str, Model | Mount], motion: Motion, 
             poses[k] = data.qpos
             if k % _TELL == 0:
                 tell(k)
-        return finished(drive, data, motion, mounts, bus, poses, window=window, remarks=remarks,
-                        tell=lambda k: tell(len(time) + k))
+        done = finished(drive, data, motion, mounts, bus, poses, window=window, tell=lambda k: tell(len(time) + k))
+    return replace(done, said=(*assumed, *said, *ranges))
 
 
 def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mount], bus: Any, poses: Array, *,
-             window: float | None = None, remarks: tuple[str, ...] = (),
-             tell: Callable[[int], object] | None = None) -> RobotRun:
+             window: float | None = None, tell: Callable[[int], object] | None = None) -> RobotRun:
     """Return what servos have done that were recorded in some data, beside the same robot with ideal actuators.
 
     Parameters
@@ -198,8 +204,6 @@ def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, 
         As of `run_motion`.
     poses : ndarray, shape (n, nq)
         At the times of the record.
-    remarks : tuple of str
-        What was assumed of the servos.
     tell : callable, optional
         Is told how many times are done.
     """
@@ -207,7 +211,6 @@ def finished(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, 
     ideal = ideal_run(drive.model, drive.joints, motion, record.time, progress=tell,
                       window=blend_window(motion) if window is None else window)
     return RobotRun(model=drive.model, motion=motion, mounts=mounts, bus=bus, record=record, poses=poses, ideal=ideal,
-                    remarks=remarks,
                     tracking={joint: tracking_of(record[joint], goal_of(motion, joint, record.time, ideal),
                                                  motion.duration) for joint in drive.joints})
 
@@ -223,6 +226,24 @@ def _check(motion: Motion, settle: float, hold: str, timestep: float | None) -> 
         raise InputError("timestep", got=timestep, allowed="a positive number of seconds")
 
 
+def _led_motion(model: Any, motion: Motion, mounts: Mapping[str, Mount]) -> tuple[Motion, tuple[str, ...]]:
+    """Return a motion without joints that follow others, whose actuators are silenced, and sentences on them."""
+    said = []
+    for joint, coupling in couplings_of(model).items():
+        if joint in mounts:
+            continue  # the drive refuses it
+        said.append(coupling.words)
+        said += [f"actuator {name} at {joint} has no force: the joint follows" for name in led(model, joint)]
+        if joint in motion.angles:
+            said.append(f"goals of joint {joint} are left out: it follows")
+    angles = {joint: goals for joint, goals in motion.angles.items()
+              if joint in mounts or joint not in couplings_of(model)}
+    if not angles:
+        raise InputError(f"joints of {motion.source}", got=", ".join(motion.joints),
+                         allowed="one that does not follow others by an equality of the model")
+    return replace(motion, angles=angles), tuple(said)
+
+
 def _check_joints(motion: Motion, mounts: Mapping[str, Mount], joints: Mapping[str, str]) -> None:
     if not joints.keys() >= mounts.keys():
         return  # the drive says what is wrong with them
@@ -236,20 +257,6 @@ def _check_joints(motion: Motion, mounts: Mapping[str, Mount], joints: Mapping[s
         if joint not in mounts:
             raise InputError(f"joint {joint} of {motion.source}", got="no servo at it",
                              allowed=f"joints with servos, {', '.join(mounts)}")
-
-
-def warm_mounts(servos: Mapping[str, Model | Mount], *, assume_heat: bool, shared: bool) -> dict[str, Mount]:
-    """Return mounts of servos, with thermal numbers by their mass where that is asked for and possible."""
-    if not isinstance(servos, Mapping) or not servos:
-        raise InputError("servos of a robot", got=servos, allowed="a mapping of joints to models")
-    found = {name: given if isinstance(given, Mount) else Mount(given) for name, given in servos.items()}
-    if not assume_heat:
-        return found
-    warm: dict[int, Model] = {id(mount.model): with_heat(mount.model) for mount in found.values()}
-    known = [model.servo.thermal.winding_capacity is not None for model in warm.values()]
-    if shared and not all(known):  # servos on a shared supply all have thermal masses, or none
-        return found
-    return {name: replace(mount, model=warm[id(mount.model)]) for name, mount in found.items()}
 
 
 def _times(timestep: float, duration: float, settle: float) -> Array:
@@ -276,6 +283,7 @@ def begin(drive: ServoDrive, data: Any, motion: Motion, mounts: Mapping[str, Mou
         if not mount.model.endless:  # such as a bridge without its chip, which is told no angle
             goals[joint] = float(data.qpos[at])
             _check_travel(joint, mount, goals[joint])
+    couple(model, data.qpos)
     data.time = time
     load_mujoco().mj_forward(model, data)
     drive.record(data)

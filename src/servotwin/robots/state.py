@@ -19,12 +19,9 @@ class DriveState:
     constraint : ndarray, shape (nv,)
         Forces of contacts and limits at the last step, which the servos meet in the next one.
     servos : ndarray
-        What the servos remember.
-    command : ndarray
-        Of joints without an actuator [rad or m].
+        What the servos remember, and what they were told.
     """
 
     engine: NDArray[np.float64]
     constraint: NDArray[np.float64]
     servos: NDArray[np.float64]
-    command: NDArray[np.float64]

@@ -17,13 +17,14 @@ from servotwin.robots.arm import TOOL, Arm
 from servotwin.robots.contour import Contour, contour_error
 from servotwin.robots.controlled import Delayed, DrivePort
 from servotwin.robots.drive import ServoDrive
+from servotwin.robots.heat import warm_mounts
 from servotwin.robots.ideal import ideal_run
 from servotwin.robots.kinematics import JointPath
 from servotwin.robots.motion import Motion
 from servotwin.robots.mount import Mount
 from servotwin.robots.places import load_mujoco
 from servotwin.robots.redundancy import Criterion, LeastMotion
-from servotwin.robots.run import SETTLE, RobotRun, finished, supply_of, warm_mounts
+from servotwin.robots.run import SETTLE, RobotRun, finished, supply_of
 from servotwin.robots.sizing import supplied
 from servotwin.robots.steering import Plain, Steering, known_of
 from servotwin.robots.tasks import ToolPath
@@ -219,7 +220,7 @@ def run_task(arm: Arm, servos: Model | Mapping[str, Model], path: ToolPath, *, c
     if steering.bare:
         mounts = {joint: _bare(mount) for joint, mount in mounts.items()}
     motion = joint_path.motion()
-    drive = ServoDrive(arm.model(), mounts, bus=bus)
+    drive = ServoDrive(arm.model(), mounts, bus=bus, assume_heat=False)
     port = DrivePort(drive, mounts, motion, settle=settle, sensors=steering.sensors(mounts))
     begins = {joint: float(motion.angles[joint][0]) for joint in mounts}
     shafts = _of_shafts(joint_path, mounts)

@@ -214,7 +214,7 @@ def run_waypoints(servos: Sequence[Model] | None = None, waypoints: ArrayLike = 
     own.opt.timestep = frame / steps
     mounts = {name: Mount(model, direction=way) for name, model, way in zip(WHEELS, (left, right), _DIRECTIONS,
                                                                             strict=True)}
-    drive = ServoDrive(own, mounts, bus=bus)
+    drive = ServoDrive(own, mounts, bus=bus, assume_heat=False)
     data = mujoco.MjData(drive.model)
     start = _start_of(pursuit)
     data.qpos[:2], data.qpos[3:7] = start[:2], (math.cos(0.5 * start.heading), 0.0, 0.0, math.sin(0.5 * start.heading))

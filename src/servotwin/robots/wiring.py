@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.robots.command_map import CommandMap
+from servotwin.robots.command_map import CommandMap, own_map
+from servotwin.robots.coupling import silence
 from servotwin.robots.crews import Berth
 from servotwin.robots.mount import Joint
 from servotwin.robots.places import Places
@@ -19,7 +20,6 @@ from servotwin.robots.told import told
 from servotwin.simulation.compile.joints_layout import ARRAYS, DRIVE
 
 Arrays = dict[str, NDArray[Any]]
-_SILENCED = ("gaintype", "biastype", "gainprm", "biasprm", "armature", "damping", "dampingpoly")
 
 
 def longest_tick(joints: Sequence[Joint]) -> tuple[float, str]:
@@ -39,12 +39,12 @@ def check_options(mujoco: Any, model: Any, joints: Sequence[Joint]) -> None:
 
 
 def maps_of(model: Any, joints: Sequence[Joint], controls: Mapping[str, CommandMap] | None) -> list[CommandMap]:
-    """Return what the control of each joint's actuator asks of it: the angle itself unless another map is given.
+    """Return what the control of each joint's actuator asks of it: what it means itself unless another map is given.
 
     Raises
     ------
     UnknownNameError, InputError
-        If a joint has no servo or no actuator, or what is given is no map.
+        If a joint has no servo or no actuator, what is given is no map, or a control range is no angle.
     """
     given, names = dict(controls or {}), [joint.name for joint in joints]
     for name, one in given.items():
@@ -54,13 +54,7 @@ def maps_of(model: Any, joints: Sequence[Joint], controls: Mapping[str, CommandM
             raise InputError(f"control of joint {name}", got=one, allowed="a CommandMap")
         if joints[names.index(name)].actuator < 0:
             raise InputError(f"control of joint {name}", got=str(one), allowed="nothing: it has no actuator")
-    found = []
-    for joint in joints:
-        low, high = -math.inf, math.inf
-        if joint.actuator >= 0 and model.actuator_ctrllimited[joint.command_at]:
-            low, high = model.actuator_ctrlrange[joint.command_at].tolist()
-        found.append(given.get(joint.name) or CommandMap(joint.name, low, high))
-    return found
+    return [given.get(joint.name) or own_map(model, joint) for joint in joints]
 
 
 def arrays_of(joints: Sequence[Joint], berths: Sequence[Berth], maps: Sequence[CommandMap]) -> Arrays:
@@ -87,9 +81,7 @@ def put_into_model(mujoco: Any, model: Any, joints: Sequence[Joint], armature: N
     for joint, own in zip(joints, armature.tolist(), strict=True):
         model.dof_armature[joint.speed_at] = own
         if joint.actuator >= 0:
-            for field in _SILENCED:
-                if hasattr(model, f"actuator_{field}"):
-                    getattr(model, f"actuator_{field}")[joint.actuator] = 0
+            silence(model, joint.actuator)
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -314,6 +314,11 @@ class VectorSimulator:
         self._store.restore(memory, self._torque)
 
     # --- from C -------------------------------------------------------------------------------------------------------
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be pickled or copied: its arrays belong to compiled code of this process."""
+        raise InputError("pickling or copying of a VectorSimulator", allowed="its memory: what save() returns goes "
+                         "into another one of the same arguments by restore()")
 
     def c_entry(self) -> CEntry:
         """Return what a program in C needs to go on with this simulator: an address, a struct and its header.

@@ -64,7 +64,7 @@ _HEAD, _EACH = len(BLOCK), len(OF_EACH)
  _CONSTRAIN, _PUSH, _POTENTIAL, _KINETIC, _STEP, _SLOT, _OWN, _OTHERS, _ANGLE_AT, _SPEED_AT, _COMMAND_AT, _GAIN,
  _ZERO, _ARMATURE, _LOWER, _UPPER, _LOW, _HIGH, _SCALE, _OFFSET, _CONTROL_LOW, _CONTROL_HIGH, _TOLD_GAIN, _TOLD_ZERO,
  _REST, _LONGEST, _KEPT_AT, _MEMORY, _INSTANCES, _ASK) = range(len(DRIVE))
-(_DATA, _KEPT, _ROOM, _COMMAND, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIAL_NOW, _NEW, _ANGLES,
+(_DATA, _KEPT, _ROOM, _RECORD, _GROUPS, _COUNT, _CODE, _CULPRIT, _SERIAL_NOW, _NEW, _ANGLES,
  _ANGLE_COUNT, _BOOKS) = range(len(INSTANCE))
 (_ADVANCE, _TICK, _DURATION, _LOOK, _LANES, _WHICH, _G_ANGLE, _G_SPEED, _G_GOAL, _G_LOAD, _G_INERTIA, _G_REACHED,
  _G_AFTER, _G_STATUS, _G_SEEN, _PIECES, _PIECE_COUNT) = range(len(GROUP))
@@ -72,7 +72,7 @@ _ROW, _CAPACITY, _USED, _KEPT_ROWS = range(len(RECORD))
 _KEEPS, _LAST_TICK, _TOTAL, _FIRST, _WORK, _NOWHERE = range(len(BOOKS))
 _START, _END, _CALLS, _FRESH, _SERIAL, _RESTORED, _HALF = range(len(BLOCK))
 (_R_ANGLE, _R_SPEED, _R_GOAL, _R_LOAD, _R_INERTIA, _R_AFTER, _R_FREE, _R_ACCELERATION, _R_PREDICTED, _R_FOUND,
- _R_ACTUAL, _R_FINAL, _R_FINAL_ACCELERATION, _R_FINAL_SHARE, _R_PASSIVE, _R_PUSHED) = range(len(ROOM))
+ _R_ACTUAL, _R_FINAL, _R_FINAL_ACCELERATION, _R_FINAL_SHARE, _R_ASKED, _R_PASSIVE, _R_PUSHED) = range(len(ROOM))
 
 
 @njit(error_model="numpy")
@@ -242,10 +242,10 @@ def _stand(d, drive, room):
 
 
 @njit(error_model="numpy")
-def _listen(d, drive, instance, block, room):
+def _listen(d, drive, block, room):
     """Put the servos' commands into their room; return whose is not a number, or −1."""
     n = drive[_SERVOS]
-    command_at, command = _words(drive[_COMMAND_AT], (n,)), _numbers(instance[_COMMAND], (n,))
+    command_at, goals = _words(drive[_COMMAND_AT], (n,)), block[_HEAD + 12 * n:_HEAD + 14 * n]
     gain, zero = _numbers(drive[_TOLD_GAIN], (n,)), _numbers(drive[_TOLD_ZERO], (n,))
     low, high = _numbers(drive[_LOW], (n,)), _numbers(drive[_HIGH], (n,))
     scale, offset = _numbers(drive[_SCALE], (n,)), _numbers(drive[_OFFSET], (n,))
@@ -257,10 +257,15 @@ def _listen(d, drive, instance, block, room):
             if not math.isfinite(control):
                 return i
             goal = (offset[i] + scale[i] * min(max(control, least[i]), most[i]) - zero[i]) / gain[i]
-        elif math.isfinite(command[i]):
-            goal = (command[i] - zero[i]) / gain[i]
-        else:  # nobody has said where to go
-            goal = held[i]
+            room[_R_ASKED, i] = (offset[i] + scale[i] * control - zero[i]) / gain[i]
+        else:
+            if goals[n + i] != 0.0:
+                goal = (goals[i] - zero[i]) / gain[i]
+                if not math.isfinite(goal):
+                    return i
+            else:  # nobody has said where to go
+                goal = min(max(held[i], low[i]), high[i])
+            room[_R_ASKED, i] = goal
         room[_R_GOAL, i] = min(max(goal, low[i]), high[i])
     return -1
 
@@ -347,7 +352,7 @@ def _keep(drive, instance, room, torque, time, again):
             i = which[n]
             at = _IN_FRONT + (_OWN_SIGNALS + _SIGNALS) * i
             row[at], row[at + 1], row[at + 2], row[at + 3] = reached[n], room[_R_AFTER, i], room[_R_GOAL, i], torque[i]
-            row[at + 4] = math.nan  # known at the end of the tick
+            row[at + 4], row[at + 5] = room[_R_ASKED, i], math.nan  # the work is known at the end of the tick
             for s in range(_SIGNALS):
                 row[at + _OWN_SIGNALS + s] = seen[n, s]
 
@@ -607,7 +612,7 @@ def _control(m, d, drive_at):
             _complain(instance, NOT_FINITE if culprit >= 0 else TOO_LONG, max(culprit, 0))
             return
         again = _begin(drive, instance, block, room, halves, t, dt)
-        culprit = _listen(d, drive, instance, block, room)
+        culprit = _listen(d, drive, block, room)
         if culprit >= 0:
             _complain(instance, NOT_FINITE, culprit)
             block[_CALLS] = 0.0

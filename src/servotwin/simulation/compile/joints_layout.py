@@ -16,7 +16,7 @@ command of the joint is to the servo, and what it is told before there is one (n
 DRIVE = ("servos", "dofs", "coordinates", "wide", "bodies", "timestep", "integrator", *PLACES, *FUNCTIONS, "slot",
          "own", "others", *ARRAYS, "longest", "kept_at", "memory", "instances", "ask")
 """All that servos share, wherever they are simulated."""
-INSTANCE = ("data", "block", "room", "command", "record", "groups", "count", "code", "culprit", "serial", "fresh",
+INSTANCE = ("data", "block", "room", "record", "groups", "count", "code", "culprit", "serial", "fresh",
             "angles", "angle_count", "books")
 """Servos in one of the engine's data; `room` is for numbers that are worked out anew at each tick. `fresh` is what they
 remember at rest (0: ask Python), in which the words of `angles`, pairs of place and servo, are the angle of a servo."""
@@ -26,7 +26,7 @@ BOOKS = ("kept", "tick", "energy", "first", "work", "nowhere")
 most by which the energy has exceeded both. Behind it stand the work of each servo, and speed and force of each degree
 of freedom, without those of gravity, springs and constraints."""
 ROOM = ("angle", "speed", "goal", "load", "inertia", "after", "free", "acceleration", "predicted", "found",
-        "engine's speed", "final torque", "final acceleration", "final share", "passive", "pushed")
+        "engine's speed", "final torque", "final acceleration", "final share", "asked", "passive", "pushed")
 """Numbers of each servo there, behind the unit rows of their degrees of freedom, those of M⁻¹, all forces, and a square
 for equations. The last two are the passive force of its joint without its torque, and with it."""
 GROUP = ("advance", "tick", "duration", "look", "lanes", "which", "angle", "speed", "goal", "load", "inertia",
@@ -37,8 +37,9 @@ PIECE = ("address", "rows", "stride", "bytes")
 """A part of their memory."""
 RECORD = ("row", "capacity", "used", "rows")
 """What is kept of a run: numbers in a row, rows that there is room for, that there are, and where."""
-KEPT = ("output_angle", "output_speed", "command_angle", "joint_torque", "joint_work")
-"""Of each servo in a row of the record, before what `models.engine.observe` sees."""
+KEPT = ("output_angle", "output_speed", "command_angle", "joint_torque", "asked", "joint_work")
+"""Of each servo in a row of the record, before what `models.engine.observe` sees; "asked" is the command before it was
+clipped."""
 ROW = ("time", "energy", "energy_from_nowhere")
 """What stands first in a row."""
 BLOCK = ("start", "end", "calls", "fresh", "serial", "restored", "half")
@@ -46,10 +47,12 @@ BLOCK = ("start", "end", "calls", "fresh", "serial", "restored", "half")
 it out last, whether it was restored with its constraint forces, and which half of the memories is of its beginning.
 Behind it stand the numbers of `OF_EACH`, the constraint forces that it took, and both halves."""
 _CARRIED = ("known torque", "known acceleration", "share", "reached", "expected")
-OF_EACH = ("torque", *_CARRIED, *(f"{name} before" for name in _CARRIED), "held")
+OF_EACH = ("torque", *_CARRIED, *(f"{name} before" for name in _CARRIED), "held", "goal",
+           "told")
 """Numbers of each servo in a block: its mean torque over the tick; from where on the next torque is predicted, and how
 much of another acceleration of its joint the servo takes up, from 0 (nothing) to 1 (it holds); the angle that it has
-reached at the end of the tick, and the one that the engine should have reached; where it holds before a command."""
+reached at the end of the tick, and the one that the engine should have reached; where it holds before a
+command; what the joint was told to, of one without an actuator, and whether it was (0: not)."""
 
 ASK_NEW, ASK_RESET, ASK_ROOM = range(3)
 """What compiled code asks Python for."""
