@@ -74,6 +74,24 @@ def test_units_as_people_write_them(make, torque, speed):
     assert found["speed"] == pytest.approx(60.0 / 0.23, rel=1e-3)
 
 
+@pytest.mark.parametrize("figures", [
+    ["--at", "6V", "--torque", "1.8 kg/cm", "--speed", "0.11 s/60deg"],
+    ["--at", "6V", "--torque", "25 oz/in", "--speed", "0.11s/60"],
+    ["--torque", "1.8 kg.cm (6V)", "--speed", "0.11sec/60degree (6v)"],
+    ["--torque", "1.8kg/cm @(6 V)", "--speed", "0.11s/60°@6V"],
+    ["--torque", "6V: 1.8 Kg/cm", "--speed", "6V: 0.11s/60º"],
+    ["--torque", "1.8 kgf/cm [6.0V]", "--speed", "0.11 sec / 60deg (6.0V no load)"],
+    ["--torque", "25 oz./in 6V", "--speed", "0.11 seconds per 60 degrees at 6 volts"],
+    ["--at", "6", "--torque", "1.8 kg-cm", "--speed", "60°/0.11s"]])
+def test_figures_as_shops_print_them(make, figures):
+    ended = make("--name", "mine", *figures, "--torque", "1.5 kg/cm @4.8V", "--speed", "0.13s/60 (4.8V)", "--json")
+    assert ended.code == 0
+    assert ended.data["voltages"] == [4.8, 6.0]
+    assert ended.data["stall_torque"] == pytest.approx(1.8e-2 * 9.80665, rel=2e-3)
+    assert ended.data["speed"] == pytest.approx(60.0 / 0.11, rel=1e-9)
+    assert ended.err.count("warning: read kg/cm as kgf cm") == 1
+
+
 def test_json_has_everything_in_si(make, tmp_path):
     found = make(*GOOD, "--out", "mine.toml", "--json").data
     assert found["possible"] is True
