@@ -12,10 +12,11 @@ from servotwin.cli.loop_words import loop_facts
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from servotwin.datasheet import DataSheet, Lift, OperatingPoint, SpeedCurve, VoltageSheet
+    from servotwin.datasheet import DataSheet, Lift, OperatingPoint, SpeedCurve, SpeedMap, VoltageSheet
     from servotwin.parameters import PrintedPoint
     from servotwin.physics._typing import Real
 
+_PULSES = (-400e-6, -200e-6, -100e-6, -50e-6, 50e-6, 100e-6, 200e-6, 400e-6)  # s from neutral, for a table
 _SHARES = (0.25, 0.5, 0.75)  # of the stall torque, whose errors of holding a table shows
 NEVER = "–"
 
@@ -109,7 +110,7 @@ def _speed(speed: float) -> str:
 
 def _standing(part: VoltageSheet) -> list[CurveRow]:
     if not part.holding:  # a servo that turns without end holds nothing
-        return []
+        return [] if part.turning is None else _turning(part.turning, part.still)
     move = NEVER if math.isnan(part.smallest_move) else f"{math.degrees(part.smallest_move):.2f} deg"
     pulse = "" if math.isnan(part.smallest_pulse) else f" ({1e6 * part.smallest_pulse:.1f} us)"
     found = [CurveRow("smallest move", move + pulse)]
@@ -125,6 +126,19 @@ def _standing(part: VoltageSheet) -> list[CurveRow]:
                 "20 Hz and more" if math.isinf(band.frequency) else f"{band.frequency:.1f} Hz")
         found.append(CurveRow(f"bandwidth at {math.degrees(band.amplitude):.0f} deg", said))
     return found
+
+
+def _turning(found: SpeedMap, still: tuple[float, float] | None) -> list[CurveRow]:
+    """Return the pulses at which a servo stands, and its speed at some others."""
+    rows = [CurveRow("stands at", NEVER if still is None else f"{1e6 * still[0]:.0f} to {1e6 * still[1]:.0f} us")]
+    widths = [found.neutral + off for off in _PULSES if found.pulses[0] <= found.neutral + off <= found.pulses[-1]]
+    return rows + [CurveRow(f"speed at {1e6 * width:.0f} us", f"{rpm(float(found.speed(width))):z.1f} rpm")
+                   for width in widths]
+
+
+def rpm(speed: float) -> float:
+    """Return a speed in turns a minute, as servos that turn endlessly are sold by."""
+    return units.from_si(speed, "rpm", "speed")
 
 
 def lift_pairs(lift: Lift) -> list[tuple[str, str]]:
@@ -216,6 +230,9 @@ def _facts(part: VoltageSheet, torque: float | None) -> dict[str, Any]:
         "bandwidth": [{"amplitude": band.amplitude, "frequency": band.frequency,
                        "beyond": math.isinf(band.frequency)} for band in part.bandwidth],
         "printed": [dataclasses.asdict(point) for point in part.printed]}
+    if part.turning is not None:
+        found["turning"] = {"neutral_pulse": part.turning.neutral, "still": part.still,
+                            "pulse_width": part.turning.pulses.tolist(), "output_speed": part.turning.speeds.tolist()}
     if part.loop is not None:
         found["loop"] = loop_facts(part.loop, torque)
     if part.lift is not None:

@@ -43,7 +43,10 @@ def from_sheet(
     title: Annotated[str | None, _of("TEXT", "Name for human readers.")] = None,
     deadband: Annotated[str | None, _of('"8 us"', "Deadband, taken as its full width.")] = None,
     pulse_range: Annotated[str | None, _of('"500-2500 us"', "Pulse widths between which the servo turns.")] = None,
-    travel: Annotated[str | None, _of('"180 deg"', "Angle between these pulses.")] = None,
+    travel: Annotated[str | None, _of('"180 deg"', "Angle between these pulses; endless: as --continuous.")] = None,
+    continuous: Annotated[bool, typer.Option(
+        "--continuous", help="Turns without end: a pulse is a speed, the deadband the pulses at which it stands.",
+        rich_help_panel=_WHOLE)] = False,
     rate: Annotated[str | None, _of('"45 deg/400us"', "Angle per pulse width.")] = None,
     neutral: Annotated[str | None, _of('"1500 us"', "Pulse width at the middle position.")] = None,
     stops: Annotated[str | None, _of('"200 deg"', "Angle from stop to stop.")] = None,
@@ -74,8 +77,8 @@ def from_sheet(
               "stall_current": stall_current, "idle_current": idle_current}
     whole = {"name": name, "title": title, "deadband": deadband, "pulse_range": pulse_range, "travel": travel,
              "rate": rate, "neutral": neutral, "stops": stops, "mass": mass, "gear_ratio": gear_ratio,
-             "backlash": backlash, "motor_type": motor_type, "modulation": modulation, "registers": registers,
-             "source": source, "note": note}
+             "backlash": backlash, "continuous": continuous, "motor_type": motor_type,
+             "modulation": modulation, "registers": registers, "source": source, "note": note}
     typed = [f"--{option.replace('_', '-')}" for option, given in (
         *whole.items(), ("torque", torque), ("speed", speed), ("running-current", running_current),
         ("stall-current", stall_current), ("idle-current", idle_current), ("at", at)) if given]
@@ -113,16 +116,19 @@ def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -
     from servotwin.cli import figures as fig
     from servotwin.errors import InputError
     from servotwin.identification import Sheet
+    from servotwin.identification.sheets.sheet import ENDLESS
     from servotwin.units.quantities import quantity
 
     if not whole["name"]:
         raise InputError("--name is missing", allowed="a short id, such as --name my-servo")
     usual = None if at is None else quantity("--at", at, "voltage", bare=True, positive=True)
+    endless = (whole["travel"] or "").strip().lower() in ENDLESS
     low, high = fig.pulse_range("--pulse-range", whole["pulse_range"]) if whole["pulse_range"] else (None, None)
 
     def one(option: str, dimension: str) -> float | None:
         text = whole[option]
-        return None if text is None else quantity(f"--{option}", text, dimension, positive=True)
+        return None if text is None or (option == "travel" and endless) else quantity(
+            f"--{option}", text, dimension, positive=True)
 
     return Sheet(
         name=whole["name"], title=whole["title"] or "", points=_points(points, usual), pulse_min=low, pulse_max=high,
@@ -131,6 +137,7 @@ def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -
         angle_per_pulse=fig.rate("--rate", whole["rate"]) if whole["rate"] else None,
         gear_reduction=fig.ratio("--gear-ratio", whole["gear_ratio"]) if whole["gear_ratio"] else None,
         motor_type=whole["motor_type"], modulation=whole["modulation"], registers=whole["registers"],
+        continuous=whole["continuous"] or endless,
         source=whole["source"], note=whole["note"])
 
 

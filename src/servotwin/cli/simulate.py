@@ -49,7 +49,7 @@ def simulate(
         "pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
         "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, or add one that the servo lacks, such as "
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, add one that the servo lacks, such as "
         "supply.current_limit=1A; repeatable; with a unit, or in SI units.",
         rich_help_panel=shared.PLANT)] = None,
     register: shared.RegisterOption = None,

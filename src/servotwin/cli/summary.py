@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from servotwin.parameters.quantity import Quantity
     from servotwin.simulation import Result
 
+_LAST = 0.5  # s, or half of a shorter run: over which the speed of a servo that turns endlessly is meant
 _ENERGY = ("winding", "bridge", "brush", "conversion", "friction", "stops", "load", "stored")
 
 
@@ -48,6 +49,8 @@ def facts(result: Result) -> dict[str, Any]:
         "step_metrics": None if metrics is None else dataclasses.asdict(metrics),
         "time_to_target": math.nan if metrics is None else metrics.arrival_time,
         "holding_error": result.holding_error,
+        **({"mean_speed": result.mean("output_speed", result.ended - min(_LAST, 0.5 * result.ended))}
+           if result.model.endless else {}),
         "mean_current": result.mean_current,
         "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
         "energy": dataclasses.asdict(result.energy),
@@ -98,6 +101,8 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     """
     rows = [(label, found[key]) for key, label in (("command", "command"), ("load", "load")) if key in found]
     rows.append((_angle_label(found), f"{_deg(found['final_angle']):z.2f} deg"))
+    if "mean_speed" in found:
+        rows.append(("speed", f"{units.from_si(found['mean_speed'], 'rpm', 'speed'):z.1f} rpm in the mean of the end"))
     rows += _arrival_rows(found)
     rows += _step_rows(found.get("step_metrics"))
     rows.append(("current", f"{found['mean_current']:z.3f} A in the mean, {found['peak_current']:z.3f} A at most"))

@@ -14,6 +14,7 @@ from servotwin.datasheet.curve import SpeedCurve, speed_curve
 from servotwin.datasheet.holding import Held, holding_errors, smallest_move
 from servotwin.datasheet.lift import Lift, lift_of
 from servotwin.datasheet.loop import Loop, loop_of
+from servotwin.datasheet.turning import SpeedMap, is_pulsed, still_pulses, wheel_speed_of
 from servotwin.datasheet.warming import HOT_WINDING, MAGNET_COEFFICIENT, masses_by_mass, thermal_masses
 from servotwin.errors import InputError
 from servotwin.linear import frequency_response
@@ -70,6 +71,10 @@ class VoltageSheet:
         Where a mass was given.
     loop : Loop, optional
         Of a digital servo.
+    turning : SpeedMap, optional
+        Speed over pulse width of a servo that turns endlessly by pulses.
+    still : tuple of float, optional
+        The shortest and the longest pulse at which that stands; None where it always creeps [s].
     """
 
     voltage: float
@@ -82,6 +87,8 @@ class VoltageSheet:
     printed: tuple[PrintedPoint, ...]
     lift: Lift | None
     loop: Loop | None
+    turning: SpeedMap | None = None
+    still: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,10 +207,11 @@ def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: flo
         if lift is not None:
             raise InputError(f"lift by {servo.name}", got="potentiometer.fixed_angle",
                              allowed="a servo that holds an angle")
+        turning = wheel_speed_of(model) if is_pulsed(model) else None
         return VoltageSheet(
             voltage=voltage, cold=cold, hot=speed_curve(at_temperatures(model, warm, magnet), warm),
             smallest_move=math.nan, smallest_pulse=math.nan, holding=(), bandwidth=(), printed=printed, lift=None,
-            loop=None)
+            loop=None, turning=turning, still=None if turning is None else still_pulses(model, turning))
     step = smallest_move(model)
     return VoltageSheet(
         voltage=voltage, cold=cold, hot=speed_curve(at_temperatures(model, warm, magnet), warm),

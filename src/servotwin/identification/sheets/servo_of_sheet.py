@@ -87,9 +87,10 @@ def servo_from_sheet(sheet: Sheet, *, load_friction: bool = True, backlash: bool
     Returns
     -------
     Servo
-        Angle 0 is the middle position. Ranges hold all combinations of what is assumed, all voltages and all sources.
-        A digital servo has a firmware that is assumed, with wide ranges; a bus servo the factory's registers, an
-        encoder at its output, and neither chip nor potentiometer.
+        Angle 0 is the middle position; of one that turns without end the potentiometer stands there. Ranges
+        hold all combinations of what is assumed, all voltages and all sources. A digital servo has a firmware that is
+        assumed, with wide ranges; a bus servo the factory's registers, an encoder at its output, and neither chip nor
+        potentiometer.
 
     Warns
     -----
@@ -133,7 +134,8 @@ def _parts(sheet: Sheet) -> tuple[Callable[[_Made], _Found], ...]:
     if sheet.modulation == "bus":  # a sheet without stops is of one that turns without end
         return (_motor, _gear, _friction, _supply, *((_stops,) if sheet.stop_travel is not None else ()))
     firmware = (_firmware,) if sheet.modulation == "digital" else ()
-    return (_motor, _gear, _friction, _electronics, _potentiometer, *firmware, _supply, _stops)
+    return (_motor, _gear, _friction, _electronics, _potentiometer, *firmware, _supply,
+            *(() if sheet.continuous else (_stops,)))
 
 
 def _quantity(name: str, value: float | Range | str, origin: str, source: str, *,
@@ -285,6 +287,9 @@ def _potentiometer(made: _Made) -> _Found:
     neutral = made.sheet.neutral_pulse or _NEUTRAL
     yield _quantity("potentiometer.feedback_offset", _S_R, "assumed",
                     f"angle 0 at {1e6 * neutral:.4g} us, s_r = 0.85 V/ms, assumed", by=lambda s_r: s_r * neutral)
+    if made.sheet.continuous:
+        yield _quantity("potentiometer.fixed_angle", 0.0, "assumed",
+                        f"turns without end; stands at {1e6 * neutral:.4g} us")
 
 
 def _firmware(made: _Made) -> _Found:
@@ -330,8 +335,9 @@ def _capital(text: str) -> str:
 
 def _notes(made: _Made, found: tuple[Contradiction, ...]) -> str:
     sheet, m = made.sheet, made.motor
-    middle = f"the middle position, {1e6 * (sheet.neutral_pulse or _NEUTRAL):.4g} us"
-    said = [sheet.note.strip(), f"Angle 0 is {'the middle count' if sheet.modulation == 'bus' else middle}."]
+    pulse = f"{1e6 * (sheet.neutral_pulse or _NEUTRAL):.4g} us"
+    said = [sheet.note.strip(), f"Turns without end; its shaft stands at {pulse}." if sheet.continuous else
+            f"Angle 0 is {'the middle count' if sheet.modulation == 'bus' else f'the middle position, {pulse}'}."]
     if sheet.modulation == "digital":
         said.append("Digital: its firmware is assumed, with wide ranges; so are the electronics of an analog chip, "
                     "with which the models of analog servos compute it.")
