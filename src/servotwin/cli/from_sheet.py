@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from servotwin.cli.terminal import emit_json, pairs, show, table
+from servotwin.cli.terminal import emit_json, patience, show, table
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -168,6 +168,7 @@ def _points(given: dict[str, _Figures], usual: float | None) -> tuple[Any, ...]:
 
 
 def _one(sheet: Sheet, how: dict[str, bool], out: Path | None, *, weighed: bool, force: bool, as_json: bool) -> None:
+    from servotwin.cli.from_sheet_words import lines, sheet_facts
     from servotwin.cli.servo_page import parameter_table
     from servotwin.identification import servo_from_sheet, write_servo_text
 
@@ -177,11 +178,12 @@ def _one(sheet: Sheet, how: dict[str, bool], out: Path | None, *, weighed: bool,
         servo = servo_from_sheet(sheet, **how)
     if out is not None:
         write_servo_text(servo, out, overwrite=force)
-    found = _found(sheet, servo)
+    with patience("simulating"):
+        found = sheet_facts(sheet, servo)
     if as_json:
         emit_json({**found, "files": [] if out is None else [str(out)]})
         return
-    parts: list[RenderableType] = [f"{sheet.title} ({sheet.name}), from its sheet", *_motor(found)]
+    parts: list[RenderableType] = [f"{sheet.title} ({sheet.name}), from its sheet", *lines(found)]
     if out is None:
         parts += ["", *parameter_table(found["parameters"])]
     else:
@@ -189,39 +191,8 @@ def _one(sheet: Sheet, how: dict[str, bool], out: Path | None, *, weighed: bool,
     show(*parts)
 
 
-def _found(sheet: Sheet, servo: Servo) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    from servotwin.cli.servo_facts import headline, parameters
-    from servotwin.identification import motor_range, sheet_contradictions
-
-    motor = motor_range(sheet)
-    ranges = {name: asdict(getattr(motor, name)) for name in (
-        "resistance", "output_torque_constant", "gear_efficiency", "no_load_current", "coulomb_torque")}
-    return {**headline(servo), "possible": motor.possible and not sheet_contradictions(sheet),
-            "contradictions": [asdict(one) for one in sheet_contradictions(sheet)],
-            "voltages": [point.supply_voltage for point in sheet.main],
-            "motor": {**ranges, "drop_voltage": motor.drop_voltage}, "notes": servo.notes.strip(),
-            "parameters": parameters(servo)}
-
-
-def _motor(found: dict[str, Any]) -> list[RenderableType]:
-    """Return what the sheet says of the motor, and whether it can be true."""
-    names = {"resistance": ("resistance of the motor's circuit", "ohm"),
-             "output_torque_constant": ("torque per current, at the output", "N m/A"),
-             "gear_efficiency": ("efficiency of the gear", "1"), "no_load_current": ("running current", "A"),
-             "coulomb_torque": ("Coulomb friction, at the output", "N m")}
-    rows = [(words, f"{found['motor'][name]['value']:z.4g}", unit,
-             f"{found['motor'][name]['lower']:z.4g} to {found['motor'][name]['upper']:z.4g}")
-            for name, (words, unit) in names.items()]
-    volts = ", ".join(f"{v:g} V" for v in found["voltages"])
-    return [pairs([("voltages", volts), ("possible", "yes" if found["possible"] else "NO"),
-                   ("flags", "; ".join(found["flags"]) or "none")]),
-            *[one["text"] for one in found["contradictions"]], "",
-            table(("what follows", "value", "unit", "range"), rows)]
-
-
 def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as_json: bool) -> None:
+    from servotwin.cli.from_sheet_words import ranged, sheet_facts
     from servotwin.cli.interrupts import held
     from servotwin.errors import OutputExistsError
     from servotwin.identification import read_sheets, servo_from_sheet, sheet_contradictions, write_servo_text
@@ -239,13 +210,13 @@ def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as
         with held():
             for servo, file in zip(servos, files, strict=True):
                 write_servo_text(servo, file, overwrite=force)
-    rows = [_found(sheet, servo) for sheet, servo in zip(kept, servos, strict=True)]
+    rows = [sheet_facts(sheet, servo, steady=True) for sheet, servo in zip(kept, servos, strict=True)]
     left = [*found.left_out, *(f"{sheet.title}: {sheet_contradictions(sheet)[0].text}" for sheet in refused)]
     if as_json:
         emit_json({"servos": rows, "left_out": left, "files": [str(file) for file in files]})
         return
     show(table(("id", "resistance", "torque per current", "efficiency", "flags"), [
-        (row["id"], *(_ranged(row["motor"][name]) for name in (
+        (row["id"], *(ranged(row["motor"][name]) for name in (
             "resistance", "output_torque_constant", "gear_efficiency")), "; ".join(row["flags"])) for row in rows],
         wraps="flags"), "", *[f"left out: {text}" for text in left],
          *([f"written: {len(files)} servo files to {out}"] if out is not None else []))
@@ -258,7 +229,3 @@ def _folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{out} cannot be written ({error.strerror})") from None
-
-
-def _ranged(found: dict[str, float]) -> str:
-    return f"{found['value']:z.3g} ({found['lower']:z.3g} to {found['upper']:z.3g})"

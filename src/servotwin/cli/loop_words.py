@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from servotwin.cli.span_words import with_span
+
 if TYPE_CHECKING:
     from servotwin.datasheet import Loop, Protection
+    from servotwin.datasheet.guesses import Span
 
 _ZERO_CELSIUS = 273.15
 
@@ -27,21 +30,27 @@ def loop_pairs(loop: Loop, torque: float | None = None) -> list[tuple[str, str]]
     >>> loop_pairs(st.curves(model, bandwidth=False).voltages[0].loop)[0]
     ('stiffness', '33.4 N m/rad (0.584 N m/deg)')
     """
-    stiffness = f"{loop.stiffness:.3g} N m/rad ({math.radians(loop.stiffness):.3g} N m/deg)"
-    zone = f"{_deg(loop.dead_zone)} either way" if loop.dead_zone > 0.0 else "none"
+    guessed = loop.spans
+
+    def angle(name: str) -> str:
+        return _deg(getattr(loop, name), guessed.get(name))
+
+    stiffness = (f"{with_span(loop.stiffness, guessed.get('stiffness'), '.3g', 'N m/rad')} "
+                 f"({math.radians(loop.stiffness):.3g} N m/deg)")
+    zone = f"{angle('dead_zone')} either way" if loop.dead_zone > 0.0 else "none"
     found = [("stiffness", stiffness), ("dead zone", zone)]
     if loop.count > 0.0:
         found.append(("sees its angle in steps of", _deg(loop.count)))
     if loop.minimum_duty > 0.0:
-        found.append(("startup force", f"{_percent(loop.minimum_duty)} of the duty: "
+        found.append(("startup force", f"{_percent(loop.minimum_duty, guessed.get('minimum_duty'))} of the duty: "
                                        f"{loop.motor_torque(loop.minimum_duty):.3g} N m"))
     start = ("no error moves the free shaft" if math.isnan(loop.start_error) else
-             f"an error of {_deg(loop.start_error)} moves the free shaft")
-    found.append(("friction", f"{loop.friction_torque:.3g} N m: a band of {_deg(loop.friction_error)} either way; "
+             f"an error of {angle('start_error')} moves the free shaft")
+    found.append(("friction", f"{loop.friction_torque:.3g} N m: a band of {angle('friction_error')} either way; "
                               f"{start}"))
     found.append(("torque at the cap", f"{loop.cap_torque:.3g} N m of the motor, of which it lifts "
                                        f"{loop.cap_lifts:.3g}, at {_percent(loop.most_duty)} of the duty"))
-    found.append(("reaches the cap at", _deg(loop.cap_error)))
+    found.append(("reaches the cap at", angle("cap_error")))
     if loop.has_integral:
         found.append(("integral", "takes away in time what the load leaves of the error"))
     if torque is not None and torque >= 0.0:
@@ -54,8 +63,9 @@ def _droop(loop: Loop, torque: float) -> str:
     held, lifted = loop.droop(torque)
     if math.isnan(held):
         return "does not hold it"
-    up = f"{_deg(lifted)} after coming up" if not math.isnan(lifted) else "it does not come up"
-    return f"{_deg(held)} where friction helps, {up}"
+    guessed = loop.droop_spans(torque)
+    up = f"{_deg(lifted, guessed.get('lifted'))} after coming up" if not math.isnan(lifted) else "it does not come up"
+    return f"{_deg(held, guessed.get('held'))} where friction helps, {up}"
 
 
 def _protection(each: Protection) -> str:
@@ -84,12 +94,13 @@ def loop_facts(loop: Loop, torque: float | None = None) -> dict[str, Any]:
         "friction_error", "start_error", "cap_error", "cap_torque", "cap_lifts")}
     if torque is not None and torque >= 0.0:
         found["droop"] = dict(zip(("held", "lifted"), loop.droop(torque), strict=True))
-    return found | {"protections": [each._asdict() for each in loop.protections]}
+        found["droop_spans"] = loop.droop_spans(torque)
+    return found | {"spans": loop.spans} | {"protections": [each._asdict() for each in loop.protections]}
 
 
-def _deg(angle: float) -> str:
-    return f"{math.degrees(angle):.2f} deg"
+def _deg(angle: float, span: Span | None = None) -> str:
+    return with_span(math.degrees(angle), span, ".2f", "deg", scale=math.degrees(1.0))
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
+def _percent(share: float, span: Span | None = None) -> str:
+    return with_span(100.0 * share, span, ".3g", "%", scale=100.0)

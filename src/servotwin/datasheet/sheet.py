@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from servotwin.datasheet.conditions import at_temperatures, at_voltage, warned_once
 from servotwin.datasheet.curve import SpeedCurve, speed_curve
-from servotwin.datasheet.holding import Held, holding_errors, smallest_move
+from servotwin.datasheet.guesses import Span, spans, variants
+from servotwin.datasheet.holding import Held, holding_errors, smallest_move, with_spans
 from servotwin.datasheet.lift import Lift, lift_of
 from servotwin.datasheet.loop import Loop, loop_of
 from servotwin.datasheet.turning import SpeedMap, is_pulsed, still_pulses, wheel_speed_of
@@ -71,6 +72,8 @@ class VoltageSheet:
         Where a mass was given.
     loop : Loop, optional
         Of a digital servo.
+    move_span : Span, optional
+        Range of `smallest_move`, where it rests on guesses; those of holding are beside it.
     turning : SpeedMap, optional
         Speed over pulse width of a servo that turns endlessly by pulses.
     still : tuple of float, optional
@@ -87,6 +90,7 @@ class VoltageSheet:
     printed: tuple[PrintedPoint, ...]
     lift: Lift | None
     loop: Loop | None
+    move_span: Span | None = None
     turning: SpeedMap | None = None
     still: tuple[float, float] | None = None
 
@@ -168,9 +172,10 @@ def curves(model: Model, voltage: float | Iterable[float] | None = None, lift: t
         raise InputError("temperature of the hot winding", got=hot, allowed="at least 298.15 K")
     asked = _voltages(model, voltage)
     with warned_once():
-        warm = [at_voltage(model, V) for V in asked]
+        warm, ends = [at_voltage(model, V) for V in asked], variants(model)
         return DataSheet(model=model, voltages=tuple(
-            _at(each, V, lift, hot, bandwidth=bandwidth) for each, V in zip(warm, asked, strict=True)))
+            _at(each, V, lift, hot, [at_voltage(end, V) for end in ends], bandwidth=bandwidth)
+            for each, V in zip(warm, asked, strict=True)))
 
 
 def hot_temperatures(servo: Servo, winding: float) -> Temperatures:
@@ -194,7 +199,7 @@ def _voltages(model: Model, voltage: float | Iterable[float] | None) -> tuple[fl
     return tuple(dict.fromkeys(float(each) for each in found))
 
 
-def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: float, *,
+def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: float, others: Sequence[Model], *,
         bandwidth: bool) -> VoltageSheet:
     servo = model.servo
     masses, cool = thermal_masses(servo), Temperatures(REFERENCE_TEMPERATURE, REFERENCE_TEMPERATURE)
@@ -213,12 +218,18 @@ def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: flo
             smallest_move=math.nan, smallest_pulse=math.nan, holding=(), bandwidth=(), printed=printed, lift=None,
             loop=None, turning=turning, still=None if turning is None else still_pulses(model, turning))
     step = smallest_move(model)
+    moves = spans({"": step}, ({"": smallest_move(other)} for other in others))
     return VoltageSheet(
         voltage=voltage, cold=cold, hot=speed_curve(at_temperatures(model, warm, magnet), warm),
-        smallest_move=step, smallest_pulse=_as_pulse(model, step), holding=holding_errors(model, cold.stall_torque),
-        bandwidth=bandwidths(model) if bandwidth else (),
-        printed=printed,
-        lift=None if lift is None else lift_of(model, *lift), loop=loop_of(model))
+        smallest_move=step, smallest_pulse=_as_pulse(model, step), move_span=moves.get(""),
+        holding=with_spans(holding_errors(model, cold.stall_torque), others),
+        bandwidth=bandwidths(model) if bandwidth else (), printed=printed,
+        lift=None if lift is None else _lift(model, *lift, others), loop=loop_of(model))
+
+
+def _lift(model: Model, mass: float, arm: float, others: Sequence[Model]) -> Lift:
+    found = lift_of(model, mass, arm)
+    return replace(found, held=with_spans([found.held], others, inertia=mass * arm * arm)[0])
 
 
 def _as_pulse(model: Model, angle: float) -> float:

@@ -77,6 +77,7 @@ def rotor_source(motor_type: str, time_60: float) -> str:
     """Return by which rule it is assumed, for people."""
     usual = CORELESS if is_coreless(motor_type) else CORED
     kind = "coreless and brushless" if usual is CORELESS else "iron-core"
-    return (f"no source: J R/K_out^2 of {1e3 * time_constant(motor_type, time_60).value:.3g} ms, over gear_reduction^2; "
+    value = 1e3 * time_constant(motor_type, time_60).value
+    return (f"no source: J R/K_out^2 of {value:.3g} ms, over gear_reduction^2; "
             f"{1e3 * usual.value:g} ms ({1e3 * usual.lower:g} to {1e3 * usual.upper:g}) for {kind} motors, at most "
             f"{SHARE:g} ({MOST_SHARE:g}) of the printed time for 60 degrees")
