@@ -102,6 +102,32 @@ def test_json_has_everything_in_si(make, tmp_path):
     assert names == set(st.load_servo(tmp_path / "mine.toml").names())
 
 
+def test_every_printed_figure_is_simulated_and_what_is_off_is_flagged(make):
+    words = [*GOOD, "--torque", "7 kgf.cm@4.8V", "--speed", "0.3 s/60deg@4.8V", "--idle-current", "8.7 mA@6",
+             "--allow-impossible"]
+    found = make(*words, "--json").data
+    figures = {(figure["name"], figure["voltage"]): figure for figure in found["figures"]}
+    assert set(figures) == {("stall torque", 6.0), ("time for 60 deg", 6.0), ("current without load", 6.0),
+                            ("current at rest", 6.0), ("stall torque", 4.8), ("time for 60 deg", 4.8)}
+    off = figures["stall torque", 4.8]
+    assert off["off"] > 0.15
+    flag = f"stall torque at 4.8 V: {off['simulated']:.3g} N m simulated, 0.686 printed"
+    assert flag in found["flags"]
+    assert flag in " ".join(make(*words).out.split())
+    assert found["motion"]["passes"] < 1.4 * 0.23
+    assert found["motion"]["spans"]["error"][0] < found["motion"]["error"] < found["motion"]["spans"]["error"][1]
+
+
+@pytest.mark.parametrize(("more", "said", "possible"), [
+    ([], "not checked, needs a current", None), (["--stall-current", "3 A"], "yes", True),
+    (["--torque", "20 kgf.cm@4.8V", "--speed", "0.25 s/60deg@4.8V"], "NO", False)])
+def test_a_sheet_without_a_current_is_not_called_possible(make, more, said, possible):
+    words = ["--name", "mine", "--at", "6V", "--torque", "15 kg cm", "--speed", "0.2 s/60deg", *more,
+             "--allow-impossible"]
+    assert f"possible  {said}" in make(*words).out
+    assert make(*words, "--json").data["possible"] is possible
+
+
 def test_plain_leaves_out_what_grows_with_the_load(make, tmp_path):
     make(*GOOD, "--backlash", "1 deg", "--plain", "--out", "mine.toml")
     servo = st.load_servo(tmp_path / "mine.toml")

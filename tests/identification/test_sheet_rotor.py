@@ -140,6 +140,6 @@ def test_a_rotor_that_cannot_be_true_is_flagged():
     servo = load_servo(PAPER)
     assert slow_rotor(servo) is None
     said = slow_rotor(servo.replace({"motor.rotor_inertia": 20.0 * servo.motor.rotor_inertia}))
-    assert said == "rotor: time constant 338 ms, longer than the 230 ms that are printed for 60 deg"
+    assert said == "rotor: time constant 337.7 ms, longer than the 230 ms that are printed for 60 deg"
     assert [name for name in catalog_names() if slow_rotor(load_servo(name))] == []
     assert slow_rotor(st.servo_from_values("a", {"motor": {"rotor_inertia": 1.0}})) is None

@@ -212,8 +212,8 @@ def notes(sheet: DataSheet) -> list[str]:
         found += [f"guessed of its program: {', '.join(guessed)}"] if guessed else []
     behind = guesses(sheet.model) if not sheet.model.endless else ()
     if behind:
-        found.append(f"in brackets: with {', '.join(behind)}, which no source gives, at the ends of their ranges; "
-                     "bandwidths are those of the middle")
+        found.append(f"ranges in brackets: with {', '.join(behind)}, which no source gives, at the ends of theirs; "
+                     "bandwidths have none")
     slow = slow_rotor(servo)
     found += [slow] if slow is not None else []
     if isinstance(sheet.model, BoundedServo):

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from servotwin.identification import Sheet
-    from servotwin.parameters import Servo
 
 _POINT, _WHOLE, _MANY, _OUTPUT = ("At a supply voltage (repeatable)", "Whole servo", "Other ways to give a sheet",
                                   "Result")

@@ -53,7 +53,7 @@ def sheet_facts(sheet: Sheet, servo: Servo, *, steady: bool = False) -> dict[str
 
 
 def lines(found: dict[str, Any]) -> list[RenderableType]:
-    """Return what the sheet says of the motor, whether it can be true, and what the servo does beside what it prints."""
+    """Return what the sheet says of the motor, whether it can be true, and what the servo does beside it."""
     names = {"resistance": ("resistance of the motor's circuit", "ohm"),
              "output_torque_constant": ("torque per current, at the output", "N m/A"),
              "gear_efficiency": ("efficiency of the gear", "1"), "no_load_current": ("running current", "A"),
@@ -87,4 +87,4 @@ def _motion(found: dict[str, Any]) -> list[tuple[str, str]]:
     held = ("does not hold it" if math.isnan(found["error"]) else
             f"{with_span(math.degrees(found['error']), spans.get('error'), '.1f', 'deg', scale=math.degrees(1.0))} off")
     said = [("60 deg from rest", f"{passes}, overshoot {over}"), (f"holding {found['torque']:.2g} N m", held)]
-    return [*said, ("in brackets", "with what is guessed at the ends of its range")] if spans else said
+    return [*said, ("ranges", "with what is guessed at the ends of its own")] if spans else said

@@ -6,10 +6,10 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from servotwin.cli.span_words import with_span
+from servotwin.datasheet.guesses import Span
 
 if TYPE_CHECKING:
     from servotwin.datasheet import Loop, Protection
-    from servotwin.datasheet.guesses import Span
 
 _ZERO_CELSIUS = 273.15
 
@@ -42,8 +42,10 @@ def loop_pairs(loop: Loop, torque: float | None = None) -> list[tuple[str, str]]
     if loop.count > 0.0:
         found.append(("sees its angle in steps of", _deg(loop.count)))
     if loop.minimum_duty > 0.0:
-        found.append(("startup force", f"{_percent(loop.minimum_duty, guessed.get('minimum_duty'))} of the duty: "
-                                       f"{loop.motor_torque(loop.minimum_duty):.3g} N m"))
+        span = guessed.get("minimum_duty")
+        torques = None if span is None else Span(*map(loop.motor_torque, span))
+        found.append(("startup force", f"{_percent(loop.minimum_duty, span)} of the duty: " + with_span(
+            loop.motor_torque(loop.minimum_duty), torques, ".3g", "N m")))
     start = ("no error moves the free shaft" if math.isnan(loop.start_error) else
              f"an error of {angle('start_error')} moves the free shaft")
     found.append(("friction", f"{loop.friction_torque:.3g} N m: a band of {angle('friction_error')} either way; "

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from servotwin.datasheet.guesses import Span
 
 
-def with_span(value: float, span: Span | None, form: str, unit: str, *, scale: float = 1.0) -> str:
+def with_span(value: float, span: Span | None, form: str, unit: str, *, scale: float = 1.0, note: str = "") -> str:
     """Return a value with its unit and, where it rests on guesses, its range behind it.
 
     Parameters
@@ -22,17 +22,21 @@ def with_span(value: float, span: Span | None, form: str, unit: str, *, scale: f
         Of a number, such as ".2f".
     unit : str
     scale : float
+    note : str
+        What stands in brackets behind the value; the range then follows a comma.
 
     Examples
     --------
     >>> from servotwin.datasheet.guesses import Span
     >>> with_span(3.99, Span(0.04, 0.12), ".1f", "deg", scale=57.3), with_span(3.99, None, ".1f", "deg")
     ('4.0 deg (2.3 to 6.9)', '4.0 deg')
-    >>> with_span(0.1, Span(0.1, math.inf), ".1f", "s")
-    '0.1 s (0.1 to never)'
+    >>> with_span(0.1, Span(0.1, math.inf), ".1f", "s", note="within 1 deg")
+    '0.1 s (within 1 deg), 0.1 to never'
     """
-    shown = f"{value:z{form}}"
-    if span is None:
-        return f"{shown} {unit}"
-    low, high = ("never" if math.isinf(end) else f"{scale * end:z{form}}" for end in span)
-    return f"{shown} {unit}" if low == high == shown else f"{shown} {unit} ({low} to {high})"
+    number = f"{value:z{form}}"
+    shown = f"{number} {unit}" + (f" ({note})" if note else "")
+    low, high = (number, number) if span is None else (
+        "never" if math.isinf(end) else f"{scale * end:z{form}}" for end in span)
+    if low == high == number:
+        return shown
+    return f"{shown}, {low} to {high}" if note else f"{shown} ({low} to {high})"

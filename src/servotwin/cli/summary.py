@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from servotwin import units
+from servotwin.cli.span_words import with_span
+from servotwin.datasheet.rotor import slow_rotor
 from servotwin.errors import InputError
 from servotwin.models import MODELS
 from servotwin.simulation.remarks import Remark
@@ -56,10 +58,19 @@ def facts(result: Result) -> dict[str, Any]:
         "energy": dataclasses.asdict(result.energy),
         "remarks": [remark._asdict() for remark in result.remarks],
         "solution": dataclasses.asdict(result.stats),
+        "flags": [slow] if (slow := slow_rotor(result.model.servo)) is not None else [],
         "set": was_set(result.model),
         "assumed": assumed(result.model),
         "ignored": list(result.model.ignored),
     }
+
+
+def figures(found: Mapping[str, Any]) -> dict[str, float]:
+    """Return those of the facts that may rest on guesses, by name."""
+    names = ("final_angle", "time_to_target", "holding_error", "mean_speed", "mean_current", "peak_current")
+    metrics = found["step_metrics"] or {}
+    return {name: found[name] for name in names if name in found} | {
+        name: metrics[name] for name in ("rise_time", "settling_time", "overshoot", "slew_rate") if name in metrics}
 
 
 def model_name(model: Model) -> str:
@@ -100,12 +111,20 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     [('final angle', '180.00 deg'), ('current', '0.200 A in the mean, 1.800 A at most')]
     """
     rows = [(label, found[key]) for key, label in (("command", "command"), ("load", "load")) if key in found]
-    rows.append((_angle_label(found), f"{_deg(found['final_angle']):z.2f} deg"))
+    ranges = found.get("ranges", {})
+
+    def shown(name: str, value: float, form: str, unit: str, dimension: str, note: str = "") -> str:
+        by = units.to_si(1.0, unit, dimension)
+        return with_span(value / by, ranges.get(name), form, unit, scale=1.0 / by, note=note)
+
+    rows.append((_angle_label(found), shown("final_angle", found["final_angle"], ".2f", "deg", "angle")))
     if "mean_speed" in found:
-        rows.append(("speed", f"{units.from_si(found['mean_speed'], 'rpm', 'speed'):z.1f} rpm in the mean of the end"))
-    rows += _arrival_rows(found)
-    rows += _step_rows(found.get("step_metrics"))
-    rows.append(("current", f"{found['mean_current']:z.3f} A in the mean, {found['peak_current']:z.3f} A at most"))
+        rows.append(("speed", f"{shown('mean_speed', found['mean_speed'], '.1f', 'rpm', 'speed')} in the mean of the "
+                              "end"))
+    rows += _arrival_rows(found, shown)
+    rows += _step_rows(found.get("step_metrics"), shown)
+    mean, most = (shown(name, found[name], ".3f", "A", "current") for name in ("mean_current", "peak_current"))
+    rows.append(("current", f"{mean} in the mean, {most} at most"))
     energy = found["energy"]
     parts = [f"{name} {energy[name]:.4g} J" for name in _ENERGY if abs(energy.get(name, 0.0)) > 1e-9]
     rows.append(("energy", f"{energy['supply']:z.4g} J supplied: {', '.join(parts) or 'nothing moved'}"))
@@ -118,8 +137,11 @@ def origin_lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         ("status", f"{found['status'].lower()}, {found['duration']:g} s simulated"),
         *(("remark", Remark(**remark).words) for remark in found["remarks"]),
+        *(("flag", flag) for flag in found.get("flags", ())),
         ("solved", f"{solution['method']}, {solution['motions']} motions, {solution['events']} events"),
         *([("set", names(found["set"]))] if found["set"] else []),
+        *([("ranges", f"with {', '.join(found['guessed'])} at the ends of theirs")]
+          if found.get("ranges") else []),
         ("assumed", names(found["assumed"])),
         ("ignored", names(found["ignored"])),
     ]
@@ -145,30 +167,26 @@ def _angle_label(found: Mapping[str, Any]) -> str:
     return "final motor angle" if found.get("angle") == "motor_angle" else "final angle"
 
 
-def _arrival_rows(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _arrival_rows(found: Mapping[str, Any], shown: Callable[..., str]) -> list[tuple[str, str]]:
     """Return when a servo gets to where a step sends it, and how far off it stands in the end."""
     metrics, rows = found.get("step_metrics"), []
     if metrics is not None and not math.isnan(metrics["target"]):
         arrived = found["time_to_target"]
-        rows.append(("time to get there", f"{1e3 * arrived:.1f} ms (within 1 deg)" if not math.isnan(arrived) else
-                     "does not get within 1 deg"))
+        rows.append(("time to get there", "does not get within 1 deg" if math.isnan(arrived) else
+                     shown("time_to_target", arrived, ".1f", "ms", "time", "within 1 deg")))
     error = found.get("holding_error", math.nan)
-    return rows if math.isnan(error) else [*rows, ("holding error", f"{round(_deg(error), 2) + 0.0:.2f} deg")]
+    return rows if math.isnan(error) else [
+        *rows, ("holding error", shown("holding_error", error, ".2f", "deg", "angle"))]
 
 
-def _step_rows(metrics: Mapping[str, float] | None) -> list[tuple[str, str]]:
+def _step_rows(metrics: Mapping[str, float] | None, shown: Callable[..., str]) -> list[tuple[str, str]]:
     if metrics is None:
         return []
     rows = []
     if not math.isnan(metrics["rise_time"]):
-        rows.append(("rise time", f"{1e3 * metrics['rise_time']:z.1f} ms (10 to 90 %)"))
+        rows.append(("rise time", shown("rise_time", metrics["rise_time"], ".1f", "ms", "time", "10 to 90 %")))
     if not math.isnan(metrics["settling_time"]):
-        rows.append(("settling time", f"{1e3 * metrics['settling_time']:z.1f} ms (2 %)"))
+        rows.append(("settling time", shown("settling_time", metrics["settling_time"], ".1f", "ms", "time", "2 %")))
     if not math.isnan(metrics["overshoot"]):
-        rows.append(("overshoot", f"{100 * metrics['overshoot']:z.2f} %"))
-    speed = units.from_si(metrics["slew_rate"], "deg/s", "speed")
-    return [*rows, ("peak speed", f"{speed:z.1f} deg/s")]
-
-
-def _deg(angle: float) -> float:
-    return units.from_si(angle, "deg", "angle")
+        rows.append(("overshoot", shown("overshoot", metrics["overshoot"], ".2f", "%", "number")))
+    return [*rows, ("peak speed", shown("slew_rate", metrics["slew_rate"], ".1f", "deg/s", "speed"))]

@@ -38,7 +38,7 @@ def slow_rotor(servo: Servo) -> str | None:
     >>> from servotwin.parameters import load_servo
     >>> heavy = load_servo("hitec-hs-755hb").replace({"motor.rotor_inertia": 2e-6})
     >>> slow_rotor(heavy)
-    'rotor: time constant 442 ms, longer than the 230 ms that are printed for 60 deg'
+    'rotor: time constant 441.2 ms, longer than the 230 ms that are printed for 60 deg'
     """
     tau, own = time_constant_of(servo), servo.supply.open_circuit_voltage
     printed = [point for point in printed_points(servo) if point.time_60 and point.supply_voltage is not None]
@@ -47,5 +47,5 @@ def slow_rotor(servo: Servo) -> str | None:
     time_60 = float(min(printed, key=lambda point: abs(float(point.supply_voltage or 0.0) - own)).time_60 or 0.0)
     if tau <= time_60:
         return None
-    return (f"rotor: time constant {1e3 * tau:.3g} ms, longer than the {1e3 * time_60:.3g} ms that are printed for "
+    return (f"rotor: time constant {1e3 * tau:.4g} ms, longer than the {1e3 * time_60:.3g} ms that are printed for "
             "60 deg")
