@@ -74,6 +74,24 @@ def test_units_as_people_write_them(make, torque, speed):
     assert found["speed"] == pytest.approx(60.0 / 0.23, rel=1e-3)
 
 
+@pytest.mark.parametrize("figures", [
+    ["--at", "6V", "--torque", "1.8 kg/cm", "--speed", "0.11 s/60deg"],
+    ["--at", "6V", "--torque", "25 oz/in", "--speed", "0.11s/60"],
+    ["--torque", "1.8 kg.cm (6V)", "--speed", "0.11sec/60degree (6v)"],
+    ["--torque", "1.8kg/cm @(6 V)", "--speed", "0.11s/60°@6V"],
+    ["--torque", "6V: 1.8 Kg/cm", "--speed", "6V: 0.11s/60º"],
+    ["--torque", "1.8 kgf/cm [6.0V]", "--speed", "0.11 sec / 60deg (6.0V no load)"],
+    ["--torque", "25 oz./in 6V", "--speed", "0.11 seconds per 60 degrees at 6 volts"],
+    ["--at", "6", "--torque", "1.8 kg-cm", "--speed", "60°/0.11s"]])
+def test_figures_as_shops_print_them(make, figures):
+    ended = make("--name", "mine", *figures, "--torque", "1.5 kg/cm @4.8V", "--speed", "0.13s/60 (4.8V)", "--json")
+    assert ended.code == 0
+    assert ended.data["voltages"] == [4.8, 6.0]
+    assert ended.data["stall_torque"] == pytest.approx(1.8e-2 * 9.80665, rel=2e-3)
+    assert ended.data["speed"] == pytest.approx(60.0 / 0.11, rel=1e-9)
+    assert ended.err.count("warning: read kg/cm as kgf cm") == 1
+
+
 def test_json_has_everything_in_si(make, tmp_path):
     found = make(*GOOD, "--out", "mine.toml", "--json").data
     assert found["possible"] is True
@@ -82,6 +100,33 @@ def test_json_has_everything_in_si(make, tmp_path):
     assert found["contradictions"] == []
     names = {row["name"] for row in found["parameters"]}
     assert names == set(st.load_servo(tmp_path / "mine.toml").names())
+
+
+def test_every_printed_figure_is_simulated_and_what_is_off_is_flagged(make):
+    words = [*GOOD, "--torque", "7 kgf.cm@4.8V", "--speed", "0.3 s/60deg@4.8V", "--idle-current", "8.7 mA@6",
+             "--allow-impossible"]
+    found = make(*words, "--json").data
+    figures = {(figure["name"], figure["voltage"]): figure for figure in found["figures"]}
+    assert set(figures) == {("stall torque", 6.0), ("time for 60 deg", 6.0), ("current without load", 6.0),
+                            ("current at rest", 6.0), ("stall torque", 4.8), ("time for 60 deg", 4.8)}
+    off = figures["stall torque", 4.8]
+    assert off["off"] > 0.15
+    flag = f"stall torque at 4.8 V: {off['simulated']:.3g} N m simulated, 0.686 printed"
+    assert flag in found["flags"]
+    assert flag in " ".join(make(*words).out.split())
+    assert found["motion"]["passes"] < 1.4 * 0.23
+    low, high = found["motion"]["spans"]["passes"]
+    assert low < found["motion"]["passes"] < high
+
+
+@pytest.mark.parametrize(("more", "said", "possible"), [
+    ([], "not checked, needs a current", None), (["--stall-current", "3 A"], "yes", True),
+    (["--torque", "20 kgf.cm@4.8V", "--speed", "0.25 s/60deg@4.8V"], "NO", False)])
+def test_a_sheet_without_a_current_is_not_called_possible(make, more, said, possible):
+    words = ["--name", "mine", "--at", "6V", "--torque", "15 kg cm", "--speed", "0.2 s/60deg", *more,
+             "--allow-impossible"]
+    assert f"possible  {said}" in make(*words).out
+    assert make(*words, "--json").data["possible"] is possible
 
 
 def test_plain_leaves_out_what_grows_with_the_load(make, tmp_path):

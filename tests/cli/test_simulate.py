@@ -37,7 +37,7 @@ def test_the_summary_says_what_matters(simulate):
     labels = [line.split("  ")[1] for line in ended.out.splitlines()[1:] if not line.startswith("    ")]
     assert labels == ["command", "load", "final angle", "time to get there", "holding error", "rise time",
                       "settling time", "overshoot", "peak speed", "current",
-                      "energy", "status", "solved", "assumed", "ignored"]
+                      "energy", "status", "solved", "ranges", "assumed", "ignored"]
     assert "model pulse" in ended.out
     assert "step 0 to 180 deg at 0.1 s" in ended.out
     assert "closed form" in ended.out

@@ -125,7 +125,8 @@ def test_an_arm_with_play_depends_little_on_the_step(axis):
         followed(links("implicitfast", dt, axis), dict.fromkeys(("shoulder", "elbow"), servo(st.DigitalServo)),
                  arm_goals, 1.2) for dt in (1e-3, 2.5e-4))
     assert np.linalg.norm(tool - finer, axis=0).max() < 1e-3
-    assert np.abs(q - fine)[:, -1].max() < 0.7e-3
+    # Flat, an arm comes to rest anywhere in the play: a seventh of its 8.7 mrad with the rotor of this servo's sheet
+    assert np.abs(q - fine)[:, -1].max() < 1.5e-3
 
 
 @pytest.mark.parametrize("kind", [st.PulseServo, st.BoundedServo, st.DigitalServo])

@@ -71,7 +71,11 @@ def test_a_motion_faster_than_the_servo_without_load_is_too_fast(share, model, r
     if share > 1.0:
         assert f"needs {math.degrees(share * top):.0f} deg/s" in found.verdict
         corner = 0.1 * (1.0 / share - 0.5)  # until which a window of 0.1 s is below that speed
-        assert found.short == pytest.approx(0.2 - 2.0 * corner, abs=0.01)
+        least = 0.2 - 2.0 * corner
+        if model is BUS_SERVO:  # its rotor takes so much to speed up that it is short of torque before
+            assert least < found.short < 0.2
+        else:
+            assert found.short == pytest.approx(least, abs=0.01)
 
 
 def test_in_motion_the_curve_counts_at_its_speed():

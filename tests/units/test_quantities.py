@@ -21,6 +21,21 @@ def test_one_value_in_many_spellings(text, dimension, si):
     assert quantity("x", text, dimension) == pytest.approx(si, rel=1e-15)
 
 
+@pytest.mark.parametrize(("text", "si", "said"), [
+    ("1.8 kg/cm", 1.8e-2 * G, "read kg/cm as kgf cm"), ("1.8Kgf / cm", 1.8e-2 * G, "read Kgf / cm as kgf cm"),
+    ("16.7 oz/in", 0.11792791530, "read oz/in as ozf in"), ("16.7 oz./in.", 0.11792791530, "read oz./in. as ozf in"),
+    ("20 N/cm", 0.2, "read N/cm as N cm")])
+def test_a_torque_written_as_a_quotient_is_read_as_the_product_it_means_and_that_is_said(text, si, said):
+    with pytest.warns(UserWarning, match=f"^{said}$"):
+        assert quantity("x", text, "torque") == pytest.approx(si, rel=1e-9)
+
+
+@pytest.mark.parametrize("text", ["1 kg//cm", "1 /kgcm", "1 kg/m", "1 kg/cm2"])
+def test_other_quotients_are_no_torque(text):
+    with pytest.raises(InputError, match="one of the units N m"):
+        quantity("x", text, "torque")
+
+
 def test_every_unit_reads_as_itself():
     for dimension, known in units.DIMENSIONS.items():
         for unit in known:

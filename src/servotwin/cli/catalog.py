@@ -78,16 +78,18 @@ def check(
 ) -> None:
     """Check a servo file."""
     from servotwin.cli.servo_facts import readiness
+    from servotwin.datasheet.rotor import slow_rotor
     from servotwin.parameters import load_servo
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", UserWarning)
         servo = load_servo(file)
         models = readiness(servo)
+    slow = slow_rotor(servo)
     found = {
         "file": str(file), "id": servo.name, "title": servo.title, "kind": servo.kind, "parameters": len(servo.names()),
         "origins": dict(Counter(servo.source(name).origin for name in servo.names())), "models": models,
-        "warnings": list(dict.fromkeys(str(warning.message) for warning in caught)),
+        "warnings": [*dict.fromkeys(str(warning.message) for warning in caught), *([slow] if slow is not None else [])],
     }
     if as_json:
         emit_json(found)

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin import units
 from servotwin.cli.loop_words import loop_facts
 from servotwin.cli.rest_words import buzz_facts, remedy_words, rest_words
+from servotwin.cli.span_words import with_span
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from servotwin.datasheet import DataSheet, Lift, OperatingPoint, SpeedCurve, VoltageSheet
+    from servotwin.datasheet import DataSheet, Held, Lift, OperatingPoint, SpeedCurve, SpeedMap, VoltageSheet
     from servotwin.parameters import PrintedPoint
     from servotwin.physics._typing import Real
 
+_PULSES = (-400e-6, -200e-6, -100e-6, -50e-6, 50e-6, 100e-6, 200e-6, 400e-6)  # s from neutral, for a table
 _SHARES = (0.25, 0.5, 0.75)  # of the stall torque, whose errors of holding a table shows
 NEVER = "–"
 
@@ -110,15 +112,16 @@ def _speed(speed: float) -> str:
 
 def _standing(part: VoltageSheet) -> list[CurveRow]:
     if not part.holding:  # a servo that turns without end holds nothing
-        return []
-    move = NEVER if math.isnan(part.smallest_move) else f"{math.degrees(part.smallest_move):.2f} deg"
+        return [] if part.turning is None else _turning(part.turning, part.still)
+    move = NEVER if math.isnan(part.smallest_move) else with_span(
+        math.degrees(part.smallest_move), part.move_span, ".2f", "deg", scale=math.degrees(1.0))
     pulse = "" if math.isnan(part.smallest_pulse) else f" ({1e6 * part.smallest_pulse:.1f} us)"
     found = [CurveRow("smallest move", move + pulse)]
     held = {round(each.torque / part.cold.stall_torque, 6): each for each in part.holding}
     for share in _SHARES:
         each = held.get(share)
         if each is not None:
-            said = (f"{math.degrees(each.error):.1f} deg, {each.current:.2f} A" if each.stands else
+            said = (f"{_off(each)}, {each.current:.2f} A" if each.stands else
                     f"does not hold: it trips by {each.trip}" if each.trip else "does not hold")
             found.append(CurveRow(f"holding {each.torque:.2g} N m, error", said))
     for band in part.bandwidth:
@@ -136,6 +139,19 @@ def rest_pairs(part: VoltageSheet) -> list[tuple[str, str]]:
                                               ("would stop it", remedy_words(part.buzz.remedies))) if said]
 
 
+def _turning(found: SpeedMap, still: tuple[float, float] | None) -> list[CurveRow]:
+    """Return the pulses at which a servo stands, and its speed at some others."""
+    rows = [CurveRow("stands at", NEVER if still is None else f"{1e6 * still[0]:.0f} to {1e6 * still[1]:.0f} us")]
+    widths = [found.neutral + off for off in _PULSES if found.pulses[0] <= found.neutral + off <= found.pulses[-1]]
+    return rows + [CurveRow(f"speed at {1e6 * width:.0f} us", f"{rpm(float(found.speed(width))):z.1f} rpm")
+                   for width in widths]
+
+
+def rpm(speed: float) -> float:
+    """Return a speed in turns a minute, as servos that turn endlessly are sold by."""
+    return units.from_si(speed, "rpm", "speed")
+
+
 def lift_pairs(lift: Lift) -> list[tuple[str, str]]:
     """Return what a lift comes to, as pairs of label and text."""
     asked = f"{1e3 * lift.mass:.4g} g on {1e2 * lift.arm:.4g} cm: {lift.torque:.3g} N m where the arm is horizontal"
@@ -147,9 +163,13 @@ def lift_pairs(lift: Lift) -> list[tuple[str, str]]:
     if not lift.held.stands:
         why = f"it trips by {lift.held.trip}" if lift.held.trip else "it sinks"
         return [*found, ("holds", f"not with the arm horizontal: {why}")]
-    found.append(("current holding", f"{lift.held.current:.2f} A, {math.degrees(lift.held.error):.1f} deg below its "
-                                     "command"))
+    found.append(("current holding", f"{lift.held.current:.2f} A, {_off(lift.held)} below its command"))
     return [*found, ("after ten minutes", _warm(lift))]
+
+
+def _off(held: Held) -> str:
+    """Return how far a load pulls a servo off its command."""
+    return with_span(math.degrees(held.error), held.span, ".1f", "deg", scale=math.degrees(1.0))
 
 
 def _lifts(lift: Lift) -> str:
@@ -184,6 +204,8 @@ def _while(seconds: float) -> str:
 def notes(sheet: DataSheet) -> list[str]:
     """Return what one has to know to read a sheet: flags of what the maker prints, and what the model is."""
     from servotwin.datasheet.conditions import highest_voltage
+    from servotwin.datasheet.guesses import guesses
+    from servotwin.datasheet.rotor import slow_rotor
     from servotwin.models import BoundedServo, DigitalServo
     from servotwin.parameters import printed_flags
 
@@ -197,6 +219,12 @@ def notes(sheet: DataSheet) -> list[str]:
         guessed = [name.removeprefix("firmware.") for name in servo.names()
                    if name.startswith("firmware.") and servo.source(name).origin == "assumed"]
         found += [f"guessed of its program: {', '.join(guessed)}"] if guessed else []
+    behind = guesses(sheet.model) if not sheet.model.endless else ()
+    if behind:
+        found.append(f"ranges in brackets: with {', '.join(behind)}, which no source gives, at the ends of theirs; "
+                     "bandwidths have none")
+    slow = slow_rotor(servo)
+    found += [slow] if slow is not None else []
     if isinstance(sheet.model, BoundedServo):
         found.append("computed as a bounded servo, with the mean voltage of its pulses")
     return found + [f"its sheet: {flag}" for flag in printed_flags(servo) if flag != servo.kind]
@@ -221,10 +249,14 @@ def _facts(part: VoltageSheet, torque: float | None) -> dict[str, Any]:
     found: dict[str, Any] = {
         "supply_voltage": part.voltage, "cold": _curve(part.cold, torque), "hot": _curve(part.hot, torque),
         "smallest_move": part.smallest_move, "smallest_pulse": part.smallest_pulse,
+        "smallest_move_span": part.move_span,
         "holding": [each._asdict() for each in part.holding],
         "bandwidth": [{"amplitude": band.amplitude, "frequency": band.frequency,
                        "beyond": math.isinf(band.frequency)} for band in part.bandwidth],
         "printed": [dataclasses.asdict(point) for point in part.printed]}
+    if part.turning is not None:
+        found["turning"] = {"neutral_pulse": part.turning.neutral, "still": part.still,
+                            "pulse_width": part.turning.pulses.tolist(), "output_speed": part.turning.speeds.tolist()}
     if part.loop is not None:
         found["loop"] = loop_facts(part.loop, torque)
     if part.buzz is not None:

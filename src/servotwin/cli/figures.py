@@ -10,6 +10,12 @@ from servotwin.units import in_letters, to_si
 from servotwin.units.quantities import bare_unit, number_and_unit, quantity, unit_named
 from servotwin.units.words import UNSIGNED
 
+_VOLTS = rf"(?P<volts>{UNSIGNED})\s*(?i:v|volts?)(?i:\s*(?:dc))?(?i:[\s,]*(?:no|without)[\s-]*load)?"
+# behind the figure, in brackets or not, and in front of it: "(6V)", "@(6.8 V)", "at 6v", "6.0 V", "6V: ..."
+_VOLTAGES = (re.compile(rf"\s*(?P<figure>\S.*?)\s*@?\s*[(\[]\s*(?:@|(?i:at)\b)?\s*{_VOLTS}\s*[)\]]\s*"),
+             re.compile(rf"\s*(?P<figure>\S.*?)(?:\s*@|\s+(?i:at)\b|\s)\s*{_VOLTS}\s*"),
+             re.compile(rf"\s*{_VOLTS}\s*[:=]\s*(?P<figure>\S.*?)\s*"))
+
 
 def speed(option: str, text: str) -> float:
     """Return a speed in rad/s; sheets print the time for 60 degrees.
@@ -23,12 +29,18 @@ def speed(option: str, text: str) -> float:
     --------
     >>> round(speed("--speed", "0.23 s/60deg"), 3), round(speed("--speed", "60 rpm"), 3)
     (4.553, 6.283)
+    >>> round(speed("--speed", "0.23s/60"), 3), round(speed("--speed", "60 degrees in 0.23 sec"), 3)
+    (4.553, 4.553)
     """
     allowed = "0.23 s/60deg, or a number with deg/s, rad/s or rpm"
-    number, unit = number_and_unit(text) or (math.nan, "")
+    plain = re.sub(r"\s+(?:per|in)\s+", "/", text)
+    number, unit = number_and_unit(plain) or (math.nan, "")
+    turned = re.fullmatch(rf"deg(?:rees?)?/({UNSIGNED})s(?:ecs?|econds?)?", re.sub(r"\s", "", in_letters(unit)).lower())
     try:
-        if re.fullmatch(r"s(ec)?/60(deg(rees?)?)", bare_unit(unit)):
+        if re.fullmatch(r"s(ecs?|econds?)?/60(deg(rees?)?)?", bare_unit(unit)):
             value = math.pi / 3.0 / number if number else math.nan
+        elif turned:
+            value = math.radians(number) / float(turned[1]) if float(turned[1]) else math.nan
         else:
             value = to_si(number, unit_named(unit, "speed"), "speed")
     except UnitError:
@@ -118,7 +130,13 @@ def without_voltage(option: str, text: str, usual: float | None) -> tuple[str, f
     --------
     >>> without_voltage("--torque", "1.29 N m @ 6.0", None), without_voltage("--torque", "13 kgf.cm at 6V", None)
     (('1.29 N m', 6.0), ('13 kgf.cm', 6.0))
+    >>> without_voltage("--speed", "0.17sec/60degree (6v, no load)", None)
+    ('0.17sec/60degree', 6.0)
     """
+    for form in _VOLTAGES:
+        found = form.fullmatch(text)
+        if found is not None:
+            return found["figure"], quantity(option, f"{found['volts']} V", "voltage", positive=True)
     front, at, back = (part.strip() for part in re.sub(r"\s+at\s+", "@", text, count=1).partition("@"))
     if not at:
         if usual is None:

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from servotwin.cli.terminal import emit_json, pairs, show, table
+from servotwin.cli.terminal import emit_json, patience, show, table
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from servotwin.identification import Sheet
-    from servotwin.parameters import Servo
 
 _POINT, _WHOLE, _MANY, _OUTPUT = ("At a supply voltage (repeatable)", "Whole servo", "Other ways to give a sheet",
                                   "Result")
@@ -43,7 +42,10 @@ def from_sheet(
     title: Annotated[str | None, _of("TEXT", "Name for human readers.")] = None,
     deadband: Annotated[str | None, _of('"8 us"', "Deadband, taken as its full width.")] = None,
     pulse_range: Annotated[str | None, _of('"500-2500 us"', "Pulse widths between which the servo turns.")] = None,
-    travel: Annotated[str | None, _of('"180 deg"', "Angle between these pulses.")] = None,
+    travel: Annotated[str | None, _of('"180 deg"', "Angle between these pulses; endless: as --continuous.")] = None,
+    continuous: Annotated[bool, typer.Option(
+        "--continuous", help="Turns without end: a pulse is a speed, the deadband the pulses at which it stands.",
+        rich_help_panel=_WHOLE)] = False,
     rate: Annotated[str | None, _of('"45 deg/400us"', "Angle per pulse width.")] = None,
     neutral: Annotated[str | None, _of('"1500 us"', "Pulse width at the middle position.")] = None,
     stops: Annotated[str | None, _of('"200 deg"', "Angle from stop to stop.")] = None,
@@ -74,8 +76,8 @@ def from_sheet(
               "stall_current": stall_current, "idle_current": idle_current}
     whole = {"name": name, "title": title, "deadband": deadband, "pulse_range": pulse_range, "travel": travel,
              "rate": rate, "neutral": neutral, "stops": stops, "mass": mass, "gear_ratio": gear_ratio,
-             "backlash": backlash, "motor_type": motor_type, "modulation": modulation, "registers": registers,
-             "source": source, "note": note}
+             "backlash": backlash, "continuous": continuous, "motor_type": motor_type,
+             "modulation": modulation, "registers": registers, "source": source, "note": note}
     typed = [f"--{option.replace('_', '-')}" for option, given in (
         *whole.items(), ("torque", torque), ("speed", speed), ("running-current", running_current),
         ("stall-current", stall_current), ("idle-current", idle_current), ("at", at)) if given]
@@ -113,16 +115,19 @@ def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -
     from servotwin.cli import figures as fig
     from servotwin.errors import InputError
     from servotwin.identification import Sheet
+    from servotwin.identification.sheets.sheet import ENDLESS
     from servotwin.units.quantities import quantity
 
     if not whole["name"]:
         raise InputError("--name is missing", allowed="a short id, such as --name my-servo")
     usual = None if at is None else quantity("--at", at, "voltage", bare=True, positive=True)
+    endless = (whole["travel"] or "").strip().lower() in ENDLESS
     low, high = fig.pulse_range("--pulse-range", whole["pulse_range"]) if whole["pulse_range"] else (None, None)
 
     def one(option: str, dimension: str) -> float | None:
         text = whole[option]
-        return None if text is None else quantity(f"--{option}", text, dimension, positive=True)
+        return None if text is None or (option == "travel" and endless) else quantity(
+            f"--{option}", text, dimension, positive=True)
 
     return Sheet(
         name=whole["name"], title=whole["title"] or "", points=_points(points, usual), pulse_min=low, pulse_max=high,
@@ -131,6 +136,7 @@ def _sheet(points: dict[str, _Figures], whole: dict[str, Any], at: str | None) -
         angle_per_pulse=fig.rate("--rate", whole["rate"]) if whole["rate"] else None,
         gear_reduction=fig.ratio("--gear-ratio", whole["gear_ratio"]) if whole["gear_ratio"] else None,
         motor_type=whole["motor_type"], modulation=whole["modulation"], registers=whole["registers"],
+        continuous=whole["continuous"] or endless,
         source=whole["source"], note=whole["note"])
 
 
@@ -161,6 +167,7 @@ def _points(given: dict[str, _Figures], usual: float | None) -> tuple[Any, ...]:
 
 
 def _one(sheet: Sheet, how: dict[str, bool], out: Path | None, *, weighed: bool, force: bool, as_json: bool) -> None:
+    from servotwin.cli.from_sheet_words import lines, sheet_facts
     from servotwin.cli.servo_page import parameter_table
     from servotwin.identification import servo_from_sheet, write_servo_text
 
@@ -170,11 +177,12 @@ def _one(sheet: Sheet, how: dict[str, bool], out: Path | None, *, weighed: bool,
         servo = servo_from_sheet(sheet, **how)
     if out is not None:
         write_servo_text(servo, out, overwrite=force)
-    found = _found(sheet, servo)
+    with patience("simulating"):
+        found = sheet_facts(sheet, servo)
     if as_json:
         emit_json({**found, "files": [] if out is None else [str(out)]})
         return
-    parts: list[RenderableType] = [f"{sheet.title} ({sheet.name}), from its sheet", *_motor(found)]
+    parts: list[RenderableType] = [f"{sheet.title} ({sheet.name}), from its sheet", *lines(found)]
     if out is None:
         parts += ["", *parameter_table(found["parameters"])]
     else:
@@ -182,39 +190,8 @@ def _one(sheet: Sheet, how: dict[str, bool], out: Path | None, *, weighed: bool,
     show(*parts)
 
 
-def _found(sheet: Sheet, servo: Servo) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    from servotwin.cli.servo_facts import headline, parameters
-    from servotwin.identification import motor_range, sheet_contradictions
-
-    motor = motor_range(sheet)
-    ranges = {name: asdict(getattr(motor, name)) for name in (
-        "resistance", "output_torque_constant", "gear_efficiency", "no_load_current", "coulomb_torque")}
-    return {**headline(servo), "possible": motor.possible and not sheet_contradictions(sheet),
-            "contradictions": [asdict(one) for one in sheet_contradictions(sheet)],
-            "voltages": [point.supply_voltage for point in sheet.main],
-            "motor": {**ranges, "drop_voltage": motor.drop_voltage}, "notes": servo.notes.strip(),
-            "parameters": parameters(servo)}
-
-
-def _motor(found: dict[str, Any]) -> list[RenderableType]:
-    """Return what the sheet says of the motor, and whether it can be true."""
-    names = {"resistance": ("resistance of the motor's circuit", "ohm"),
-             "output_torque_constant": ("torque per current, at the output", "N m/A"),
-             "gear_efficiency": ("efficiency of the gear", "1"), "no_load_current": ("running current", "A"),
-             "coulomb_torque": ("Coulomb friction, at the output", "N m")}
-    rows = [(words, f"{found['motor'][name]['value']:z.4g}", unit,
-             f"{found['motor'][name]['lower']:z.4g} to {found['motor'][name]['upper']:z.4g}")
-            for name, (words, unit) in names.items()]
-    volts = ", ".join(f"{v:g} V" for v in found["voltages"])
-    return [pairs([("voltages", volts), ("possible", "yes" if found["possible"] else "NO"),
-                   ("flags", "; ".join(found["flags"]) or "none")]),
-            *[one["text"] for one in found["contradictions"]], "",
-            table(("what follows", "value", "unit", "range"), rows)]
-
-
 def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as_json: bool) -> None:
+    from servotwin.cli.from_sheet_words import ranged, sheet_facts
     from servotwin.cli.interrupts import held
     from servotwin.errors import OutputExistsError
     from servotwin.identification import read_sheets, servo_from_sheet, sheet_contradictions, write_servo_text
@@ -232,13 +209,13 @@ def _many(path: Path, how: dict[str, bool], out: Path | None, *, force: bool, as
         with held():
             for servo, file in zip(servos, files, strict=True):
                 write_servo_text(servo, file, overwrite=force)
-    rows = [_found(sheet, servo) for sheet, servo in zip(kept, servos, strict=True)]
+    rows = [sheet_facts(sheet, servo, steady=True) for sheet, servo in zip(kept, servos, strict=True)]
     left = [*found.left_out, *(f"{sheet.title}: {sheet_contradictions(sheet)[0].text}" for sheet in refused)]
     if as_json:
         emit_json({"servos": rows, "left_out": left, "files": [str(file) for file in files]})
         return
     show(table(("id", "resistance", "torque per current", "efficiency", "flags"), [
-        (row["id"], *(_ranged(row["motor"][name]) for name in (
+        (row["id"], *(ranged(row["motor"][name]) for name in (
             "resistance", "output_torque_constant", "gear_efficiency")), "; ".join(row["flags"])) for row in rows],
         wraps="flags"), "", *[f"left out: {text}" for text in left],
          *([f"written: {len(files)} servo files to {out}"] if out is not None else []))
@@ -251,7 +228,3 @@ def _folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{out} cannot be written ({error.strerror})") from None
-
-
-def _ranged(found: dict[str, float]) -> str:
-    return f"{found['value']:z.3g} ({found['lower']:z.3g} to {found['upper']:z.3g})"

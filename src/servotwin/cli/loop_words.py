@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from servotwin.cli.span_words import with_span
+from servotwin.datasheet.guesses import Span
+
 if TYPE_CHECKING:
     from servotwin.datasheet import Loop, Protection
 
@@ -27,20 +30,26 @@ def loop_pairs(loop: Loop, torque: float | None = None) -> list[tuple[str, str]]
     >>> loop_pairs(st.curves(model, bandwidth=False).voltages[0].loop)[0]
     ('stiffness', '32.3 N m/rad (0.564 N m/deg)')
     """
-    stiffness = f"{loop.stiffness:.3g} N m/rad ({math.radians(loop.stiffness):.3g} N m/deg)"
-    zone = f"{_deg(loop.dead_zone)} either way" if loop.dead_zone > 0.0 else "none"
+    guessed = loop.spans
+
+    def angle(name: str) -> str:
+        return _deg(getattr(loop, name), guessed.get(name))
+
+    stiffness = (f"{with_span(loop.stiffness, guessed.get('stiffness'), '.3g', 'N m/rad')} "
+                 f"({math.radians(loop.stiffness):.3g} N m/deg)")
+    zone = f"{angle('dead_zone')} either way" if loop.dead_zone > 0.0 else "none"
     found = [("stiffness", stiffness), ("dead zone", zone)]
     if loop.count > 0.0:
         found.append(("sees its angle in steps of", _deg(loop.count)))
     if loop.minimum_duty > 0.0:
         found.append(("startup force", _startup(loop)))
     start = ("no error moves the free shaft" if math.isnan(loop.start_error) else
-             f"an error of {_deg(loop.start_error)} moves the free shaft")
-    found.append(("friction", f"{loop.friction_torque:.3g} N m: a band of {_deg(loop.friction_error)} either way; "
+             f"an error of {angle('start_error')} moves the free shaft")
+    found.append(("friction", f"{loop.friction_torque:.3g} N m: a band of {angle('friction_error')} either way; "
                               f"{start}"))
     found.append(("torque at the cap", f"{loop.cap_torque:.3g} N m of the motor, of which it lifts "
                                        f"{loop.cap_lifts:.3g}, at {_percent(loop.most_duty)} of the duty"))
-    found.append(("reaches the cap at", _deg(loop.cap_error)))
+    found.append(("reaches the cap at", angle("cap_error")))
     if loop.has_integral:
         found.append(("integral", "takes away in time what the load leaves of the error"))
     if torque is not None and torque >= 0.0:
@@ -52,7 +61,9 @@ def loop_pairs(loop: Loop, torque: float | None = None) -> list[tuple[str, str]]
 def _startup(loop: Loop) -> str:
     """Return the torque of the smallest duty, and that it moves the free shaft where it exceeds friction."""
     torque, friction = loop.motor_torque(loop.minimum_duty), loop.friction_torque
-    said = f"{_percent(loop.minimum_duty)} of the duty: {torque:.3g} N m"
+    span = loop.spans.get("minimum_duty")
+    torques = None if span is None else Span(*map(loop.motor_torque, span))
+    said = f"{_percent(loop.minimum_duty, span)} of the duty: {with_span(torque, torques, '.3g', 'N m')}"
     if not loop.startup_moves:
         return said
     return f"{said}, more than the friction of {friction:.3g} N m: every duty that is not 0 moves the free shaft"
@@ -62,8 +73,9 @@ def _droop(loop: Loop, torque: float) -> str:
     held, lifted = loop.droop(torque)
     if math.isnan(held):
         return "does not hold it"
-    up = f"{_deg(lifted)} after coming up" if not math.isnan(lifted) else "it does not come up"
-    return f"{_deg(held)} where friction helps, {up}"
+    guessed = loop.droop_spans(torque)
+    up = f"{_deg(lifted, guessed.get('lifted'))} after coming up" if not math.isnan(lifted) else "it does not come up"
+    return f"{_deg(held, guessed.get('held'))} where friction helps, {up}"
 
 
 def _protection(each: Protection) -> str:
@@ -92,12 +104,13 @@ def loop_facts(loop: Loop, torque: float | None = None) -> dict[str, Any]:
         "friction_error", "start_error", "startup_moves", "cap_error", "cap_torque", "cap_lifts")}
     if torque is not None and torque >= 0.0:
         found["droop"] = dict(zip(("held", "lifted"), loop.droop(torque), strict=True))
-    return found | {"protections": [each._asdict() for each in loop.protections]}
+        found["droop_spans"] = loop.droop_spans(torque)
+    return found | {"spans": loop.spans} | {"protections": [each._asdict() for each in loop.protections]}
 
 
-def _deg(angle: float) -> str:
-    return f"{math.degrees(angle):.2f} deg"
+def _deg(angle: float, span: Span | None = None) -> str:
+    return with_span(math.degrees(angle), span, ".2f", "deg", scale=math.degrees(1.0))
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
+def _percent(share: float, span: Span | None = None) -> str:
+    return with_span(100.0 * share, span, ".3g", "%", scale=100.0)

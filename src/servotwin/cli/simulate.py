@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from servotwin.simulation import Result
 
 _LOOKED_AT = 3.0  # s of a servo that does not rest, for what would stop it
+_LONGEST_RANGED = 5.0  # s: beyond it the ranges of guesses would take too long
 _MOST_FRAMES = 1e6  # they take an hour, and each is kept for metrics and energy
 
 
@@ -50,7 +52,7 @@ def simulate(
         "pendulum=MASS:LENGTH or MASS:LENGTH:HANGING_DEG, spring=STIFFNESS or STIFFNESS:REST_DEG, "
         "recorded=FILE.csv (columns time_s, torque_Nm).", rich_help_panel=shared.PLANT)] = None,
     change: Annotated[list[str] | None, typer.Option(
-        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, or add one that the servo lacks, such as "
+        "--set", metavar="GROUP.NAME=VALUE", help="Change a parameter, add one that the servo lacks, such as "
         "supply.current_limit=1A; repeatable; with a unit, or in SI units.",
         rich_help_panel=shared.PLANT)] = None,
     register: shared.RegisterOption = None,
@@ -78,6 +80,8 @@ def simulate(
     made = model_of(servo, model, change or [], register=register or [])
     result = _run(made, words, load or [], duration, output_step, seed)
     found = _write(result, targets, force=force)
+    if duration <= _LONGEST_RANGED:
+        found |= _ranges(result, words.signal(duration), found, load or [], seed)
     found |= {"remedies": _remedies(result), "command": words.described(duration),
               "load": load_words.described(load or []), "files": [str(target.path) for target in targets]}
     _report(found, as_json=as_json)
@@ -153,6 +157,26 @@ def _remedies(result: Result) -> list[dict[str, Any]]:
     with patience("looking for what would stop it"):
         found = buzz(model, result.load, result.command, duration=min(result.ended, rest.since + _LOOKED_AT))
     return [remedy._asdict() for remedy in found.remedies]
+
+
+def _ranges(result: Result, signal: Signal, found: dict[str, Any], load: list[str], seed: int) -> dict[str, Any]:
+    """Return the ranges of what rests on guesses, and these."""
+    from servotwin.cli.load_words import load_from
+    from servotwin.cli.summary import facts, figures
+    from servotwin.datasheet.guesses import guesses, spans, variants
+    from servotwin.simulation import simulate as run
+
+    others = []
+    with patience("simulating with guesses at the ends of their ranges"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # said of the servo as it is
+        for each in variants(result.model, rotor=True):
+            other = run(each, signal, duration=float(result.time[-1]), load=load_from(load, each), seed=seed,
+                        output_times=[0.0, float(result.time[-1])])
+            others.append(figures(facts(other)))
+    own = figures(found)
+    nowhere = dict.fromkeys(own, math.nan)
+    return {"ranges": spans(own, [nowhere | other for other in others]),
+            "guessed": list(guesses(result.model, rotor=True))}
 
 
 def _report(found: dict[str, Any], *, as_json: bool) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from servotwin import units
 from servotwin.cli.rest_words import remedy_words, rest_words
+from servotwin.cli.span_words import with_span
+from servotwin.datasheet.rotor import slow_rotor
 from servotwin.errors import InputError
 from servotwin.models import MODELS
 from servotwin.simulation.remarks import Remark
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from servotwin.simulation import Result
 
 NONE = "-"
+_LAST = 0.5  # s, or half of a shorter run: over which the speed of a servo that turns endlessly is meant
 _ENERGY = ("winding", "bridge", "brush", "conversion", "friction", "stops", "load", "stored")
 
 
@@ -52,15 +55,26 @@ def facts(result: Result) -> dict[str, Any]:
         "time_to_target": math.nan if metrics is None else metrics.arrival_time,
         "holding_error": result.holding_error,
         "rest": None if result.rest is None else result.rest._asdict(),
+        **({"mean_speed": result.mean("output_speed", result.ended - min(_LAST, 0.5 * result.ended))}
+           if result.model.endless else {}),
         "mean_current": result.mean_current,
         "peak_current": result.peak("armature_current") if metrics is None else metrics.peak_current,
         "energy": dataclasses.asdict(result.energy),
         "remarks": [remark.facts for remark in result.remarks],
         "solution": dataclasses.asdict(result.stats),
+        "flags": [slow] if (slow := slow_rotor(result.model.servo)) is not None else [],
         "set": was_set(result.model),
         "assumed": assumed(result.model),
         "ignored": list(result.model.ignored),
     }
+
+
+def figures(found: Mapping[str, Any]) -> dict[str, float]:
+    """Return those of the facts that may rest on guesses, by name."""
+    names = ("final_angle", "time_to_target", "holding_error", "mean_speed", "mean_current", "peak_current")
+    metrics = found["step_metrics"] or {}
+    return {name: found[name] for name in names if name in found} | {
+        name: metrics[name] for name in ("rise_time", "settling_time", "overshoot", "slew_rate") if name in metrics}
 
 
 def model_name(model: Model) -> str:
@@ -101,11 +115,21 @@ def lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     [('final angle', '180.00 deg'), ('current', '0.200 A in the mean, 1.800 A at most')]
     """
     rows = [(label, found[key]) for key, label in (("command", "command"), ("load", "load")) if key in found]
-    rows.append((_angle_label(found), f"{_deg(found['final_angle']):z.2f} deg"))
-    rows += _arrival_rows(found)
-    rows += _step_rows(found.get("step_metrics"))
+    ranges = found.get("ranges", {})
+
+    def shown(name: str, value: float, form: str, unit: str, dimension: str, note: str = "") -> str:
+        by = units.to_si(1.0, unit, dimension)
+        return with_span(value / by, ranges.get(name), form, unit, scale=1.0 / by, note=note)
+
+    rows.append((_angle_label(found), shown("final_angle", found["final_angle"], ".2f", "deg", "angle")))
+    if "mean_speed" in found:
+        rows.append(("speed", f"{shown('mean_speed', found['mean_speed'], '.1f', 'rpm', 'speed')} in the mean of the "
+                              "end"))
+    rows += _arrival_rows(found, shown)
+    rows += _step_rows(found.get("step_metrics"), shown)
     rows += _rest_rows(found)
-    rows.append(("current", f"{found['mean_current']:z.3f} A in the mean, {found['peak_current']:z.3f} A at most"))
+    mean, most = (shown(name, found[name], ".3f", "A", "current") for name in ("mean_current", "peak_current"))
+    rows.append(("current", f"{mean} in the mean, {most} at most"))
     energy = found["energy"]
     parts = [f"{name} {energy[name]:.4g} J" for name in _ENERGY if abs(energy.get(name, 0.0)) > 1e-9]
     rows.append(("energy", f"{energy['supply']:z.4g} J supplied: {', '.join(parts) or 'nothing moved'}"))
@@ -118,8 +142,11 @@ def origin_lines(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         ("status", f"{found['status'].lower()}, {found['duration']:g} s simulated"),
         *(("remark", Remark(**remark).words) for remark in found["remarks"]),
+        *(("flag", flag) for flag in found.get("flags", ())),
         ("solved", f"{solution['method']}, {solution['motions']} motions, {solution['events']} events"),
         *([("set", names(found["set"]))] if found["set"] else []),
+        *([("ranges", f"with {', '.join(found['guessed'])} at the ends of theirs")]
+          if found.get("ranges") else []),
         ("assumed", names(found["assumed"])),
         ("ignored", names(found["ignored"])),
     ]
@@ -145,28 +172,29 @@ def _angle_label(found: Mapping[str, Any]) -> str:
     return "final motor angle" if found.get("angle") == "motor_angle" else "final angle"
 
 
-def _arrival_rows(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _arrival_rows(found: Mapping[str, Any], shown: Callable[..., str]) -> list[tuple[str, str]]:
     """Return when a servo gets to where a step sends it, and how far off it stands in the end."""
     metrics, rows = found.get("step_metrics"), []
     if metrics is not None and not math.isnan(metrics["target"]):
         arrived, near = found["time_to_target"], f"within {_deg(metrics['arrival_band']):.2g} deg"
-        rows.append(("time to get there", f"{1e3 * arrived:.1f} ms ({near})" if not math.isnan(arrived) else
-                     f"does not get {near}"))
+        rows.append(("time to get there", f"does not get {near}" if math.isnan(arrived) else
+                     shown("time_to_target", arrived, ".1f", "ms", "time", near)))
     error = found.get("holding_error", math.nan)
-    return rows if math.isnan(error) else [*rows, ("holding error", f"{round(_deg(error), 2) + 0.0:.2f} deg")]
+    return rows if math.isnan(error) else [
+        *rows, ("holding error", shown("holding_error", error, ".2f", "deg", "angle"))]
 
 
-_STEP_ROWS = (("rise_time", "rise time", 1e3, ".1f", "ms (10 to 90 %)"), ("settling_time", "settling time", 1e3, ".1f",
-              "ms (2 %)"), ("overshoot", "overshoot", 1e2, ".2f", "%"))
+_STEP_ROWS = (("rise_time", "rise time", ".1f", "ms", "time", "10 to 90 %"),
+              ("settling_time", "settling time", ".1f", "ms", "time", "2 %"),
+              ("overshoot", "overshoot", ".2f", "%", "number", ""))
 
 
-def _step_rows(metrics: Mapping[str, float] | None) -> list[tuple[str, str]]:
+def _step_rows(metrics: Mapping[str, float] | None, shown: Callable[..., str]) -> list[tuple[str, str]]:
     if metrics is None:
         return []
-    rows = [(label, NONE if math.isnan(metrics[name]) else f"{factor * metrics[name]:z{form}} {unit}")
-            for name, label, factor, form, unit in _STEP_ROWS]
-    speed = units.from_si(metrics["slew_rate"], "deg/s", "speed")
-    return [*rows, ("peak speed", f"{speed:z.1f} deg/s")]
+    rows = [(label, NONE if math.isnan(metrics[name]) else shown(name, metrics[name], form, unit, dimension, note))
+            for name, label, form, unit, dimension, note in _STEP_ROWS]
+    return [*rows, ("peak speed", shown("slew_rate", metrics["slew_rate"], ".1f", "deg/s", "speed"))]
 
 
 def _rest_rows(found: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -9,11 +9,14 @@ import numpy as np
 
 from servotwin import loads, physics, signals
 from servotwin.datasheet.conditions import changed
+from servotwin.datasheet.guesses import Span, spans
 from servotwin.models import DigitalServo, mid_travel
 from servotwin.models.outputs import warm_plant
 from servotwin.simulation.simulator import simulate
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from servotwin.models import Model
@@ -44,6 +47,8 @@ class Held(NamedTuple):
         Mean of i² R in the winding [W].
     trip : str
         What a digital servo trips by under it, "overload" or "current"; empty where it does not.
+    span : Span, optional
+        Range of `error`, where it rests on guesses; computed by `with_spans`.
     """
 
     torque: float
@@ -51,6 +56,7 @@ class Held(NamedTuple):
     current: float
     heat: float
     trip: str = ""
+    span: Span | None = None
 
     @property
     def stands(self) -> bool:
@@ -86,6 +92,22 @@ def holding_errors(model: Model, stall_torque: float, shares: tuple[float, ...] 
                    ) -> tuple[Held, ...]:
     """Return how a servo holds shares of its stall torque [N m]."""
     return tuple(hold(model, share * stall_torque) for share in shares)
+
+
+def with_spans(held: Sequence[Held], others: Sequence[Model], *, inertia: float = 0.0) -> tuple[Held, ...]:
+    """Return how a servo holds some torques with the ranges of its errors.
+
+    Parameters
+    ----------
+    held : sequence of Held
+    others : sequence of Model
+        The servo with its guesses at the ends of their ranges.
+    inertia : float
+        Of the load [kg m²].
+    """
+    found = spans({str(k): each.error for k, each in enumerate(held)}, (
+        {str(k): hold(other, each.torque, inertia=inertia).error for k, each in enumerate(held)} for other in others))
+    return tuple(each._replace(span=found.get(str(k))) for k, each in enumerate(held))
 
 
 def smallest_move(model: Model) -> float:

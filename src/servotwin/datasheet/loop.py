@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from servotwin.datasheet.guesses import Span, spanned
 from servotwin.errors import InputError
 from servotwin.loads import as_load
 from servotwin.models import DigitalServo
@@ -28,6 +29,10 @@ if TYPE_CHECKING:
 
 _FINEST = 1e-12  # rad
 _MOST_TORQUE = 1e3  # times the stalled motor's: where the search for what friction holds ends
+
+
+_GUESSED = ("stiffness", "dead_zone", "minimum_duty", "friction_error", "start_error", "cap_error", "cap_torque",
+            "cap_lifts")
 
 
 class Standing(NamedTuple):
@@ -109,13 +114,22 @@ class Loop:
     model: DigitalServo
 
     def __post_init__(self) -> None:
-        if not isinstance(self.model, DigitalServo):
-            raise InputError("model of a loop", got=type(self.model).__name__, allowed="DigitalServo")
+        _program(self.model)
 
     @cached_property
     def stiffness(self) -> float:
         """Torque of the motor per error, between dead zone and cap: k_p (V − V_ce0) K_out/R [N m/rad]."""
         return float(self.model.loop_stiffness())
+
+    @cached_property
+    def spans(self) -> dict[str, Span]:
+        """Ranges of those of its numbers that rest on guesses, by name."""
+        return spanned(self.model, lambda model: {name: getattr(Loop(_program(model)), name) for name in _GUESSED})
+
+    def droop_spans(self, torque: float) -> dict[str, Span]:
+        """Return the ranges of the droops for a torque [N m] that rest on guesses: "held" and "lifted"."""
+        return spanned(self.model, lambda model: dict(zip(
+            ("held", "lifted"), Loop(_program(model)).droop(torque), strict=True)))
 
     @cached_property
     def dead_zone(self) -> float:
@@ -299,6 +313,13 @@ class Loop:
             half = 0.5 * (low_ + high_)
             low_, high_ = (low_, half) if so(half) else (half, high_)
         return high_
+
+
+def _program(model: Model) -> DigitalServo:
+    """Return the same model: what guesses change of a digital servo is one."""
+    if not isinstance(model, DigitalServo):
+        raise InputError("model of a loop", got=type(model).__name__, allowed="DigitalServo")
+    return model
 
 
 def loop_of(model: Model) -> Loop | None:

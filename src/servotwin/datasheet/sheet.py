@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from servotwin.datasheet.buzz import Buzz, buzz
+from servotwin.datasheet.buzzing import Buzz, buzz
 from servotwin.datasheet.conditions import at_temperatures, at_voltage, warned_once
 from servotwin.datasheet.curve import SpeedCurve, speed_curve
-from servotwin.datasheet.holding import Held, holding_errors, smallest_move
+from servotwin.datasheet.guesses import Span, spans, variants
+from servotwin.datasheet.holding import Held, holding_errors, smallest_move, with_spans
 from servotwin.datasheet.lift import Lift, lift_of
 from servotwin.datasheet.loop import Loop, loop_of
+from servotwin.datasheet.turning import SpeedMap, is_pulsed, still_pulses, wheel_speed_of
 from servotwin.datasheet.warming import HOT_WINDING, MAGNET_COEFFICIENT, masses_by_mass, thermal_masses
 from servotwin.errors import InputError
 from servotwin.linear import frequency_response
@@ -74,6 +76,12 @@ class VoltageSheet:
         Of a digital servo.
     buzz : Buzz, optional
         How the servo drives at rest without a load; none of one that turns without end.
+    move_span : Span, optional
+        Range of `smallest_move`, where it rests on guesses; those of holding are beside it.
+    turning : SpeedMap, optional
+        Speed over pulse width of a servo that turns endlessly by pulses.
+    still : tuple of float, optional
+        The shortest and the longest pulse at which that stands; None where it always creeps [s].
     """
 
     voltage: float
@@ -87,6 +95,9 @@ class VoltageSheet:
     lift: Lift | None
     loop: Loop | None
     buzz: Buzz | None = None
+    move_span: Span | None = None
+    turning: SpeedMap | None = None
+    still: tuple[float, float] | None = None
 
     def __repr__(self) -> str:
         return f"VoltageSheet({self.voltage:g} V, stall {self.cold.stall_torque:.3g} N m)"
@@ -180,9 +191,10 @@ def curves(model: Model, voltage: float | Iterable[float] | None = None, lift: t
         raise InputError("temperature of the hot winding", got=hot, allowed="at least 298.15 K")
     asked = _voltages(model, voltage)
     with warned_once():
-        warm = [at_voltage(model, V) for V in asked]
+        warm, ends = [at_voltage(model, V) for V in asked], variants(model)
         return DataSheet(model=model, voltages=tuple(
-            _at(each, V, lift, hot, bandwidth=bandwidth) for each, V in zip(warm, asked, strict=True)))
+            _at(each, V, lift, hot, [at_voltage(end, V) for end in ends], bandwidth=bandwidth)
+            for each, V in zip(warm, asked, strict=True)))
 
 
 def hot_temperatures(servo: Servo, winding: float) -> Temperatures:
@@ -206,7 +218,7 @@ def _voltages(model: Model, voltage: float | Iterable[float] | None) -> tuple[fl
     return tuple(dict.fromkeys(float(each) for each in found))
 
 
-def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: float, *,
+def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: float, others: Sequence[Model], *,
         bandwidth: bool) -> VoltageSheet:
     servo = model.servo
     masses, cool = thermal_masses(servo), Temperatures(REFERENCE_TEMPERATURE, REFERENCE_TEMPERATURE)
@@ -219,17 +231,24 @@ def _at(model: Model, voltage: float, lift: tuple[float, float] | None, hot: flo
         if lift is not None:
             raise InputError(f"lift by {servo.name}", got="potentiometer.fixed_angle",
                              allowed="a servo that holds an angle")
+        turning = wheel_speed_of(model) if is_pulsed(model) else None
         return VoltageSheet(
             voltage=voltage, cold=cold, hot=speed_curve(at_temperatures(model, warm, magnet), warm),
             smallest_move=math.nan, smallest_pulse=math.nan, holding=(), bandwidth=(), printed=printed, lift=None,
-            loop=None)
+            loop=None, turning=turning, still=None if turning is None else still_pulses(model, turning))
     step = smallest_move(model)
+    moves = spans({"": step}, ({"": smallest_move(other)} for other in others))
     return VoltageSheet(
         voltage=voltage, cold=cold, hot=speed_curve(at_temperatures(model, warm, magnet), warm),
-        smallest_move=step, smallest_pulse=_as_pulse(model, step), holding=holding_errors(model, cold.stall_torque),
-        bandwidth=bandwidths(model) if bandwidth else (),
-        printed=printed,
-        lift=None if lift is None else lift_of(model, *lift), loop=loop_of(model), buzz=buzz(model))
+        smallest_move=step, smallest_pulse=_as_pulse(model, step), move_span=moves.get(""),
+        holding=with_spans(holding_errors(model, cold.stall_torque), others),
+        bandwidth=bandwidths(model) if bandwidth else (), printed=printed,
+        lift=None if lift is None else _lift(model, *lift, others), loop=loop_of(model), buzz=buzz(model))
+
+
+def _lift(model: Model, mass: float, arm: float, others: Sequence[Model]) -> Lift:
+    found = lift_of(model, mass, arm)
+    return replace(found, held=with_spans([found.held], others, inertia=mass * arm * arm)[0])
 
 
 def _as_pulse(model: Model, angle: float) -> float:

@@ -104,7 +104,8 @@ class Servo:
         stops = [name for name in self.names() if name.startswith("stops.")]
         if stops and self.potentiometer.fixed_angle is not None:
             raise ParameterError("potentiometer.fixed_angle", got=f"{stops[0]} beside it",
-                                 allowed="one of the two: a servo that turns without end has no stops")
+                                 allowed="one of the two: a servo that turns without end has no stops (stops=none, or "
+                                 "Servo.continuous, takes them away)")
 
     def _quantity(self, name: str) -> Quantity:
         group, key = check_name(name)

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from servotwin.datasheet.turning import is_pulsed
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.base import PULSE_RANGE
 from servotwin.robots.model_file import joint_names
 from servotwin.robots.mount import Joint, Mount, joints_of
 from servotwin.robots.places import load_mujoco
-from servotwin.robots.told import is_pulsed, told
+from servotwin.robots.told import told
 from servotwin.simulation import VectorSimulator
 from servotwin.units import is_finite
 

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.datasheet.turning import is_pulsed
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models import Model
 from servotwin.parameters.groups import Supply
 from servotwin.robots.mount import Joint
-from servotwin.robots.told import is_pulsed, told
+from servotwin.robots.told import told
 from servotwin.simulation import VectorSimulator
 from servotwin.simulation.c_entry import CEntry
 from servotwin.simulation.compile.joints_layout import BOOKS, GROUP, INSTANCE, RECORD, ROOM

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
+from servotwin.datasheet.turning import is_pulsed
 from servotwin.errors import InputError
-from servotwin.models import DigitalServo
 from servotwin.models.switched import SwitchedServo
 
 if TYPE_CHECKING:
-    from servotwin.models import Model
     from servotwin.robots.mount import Mount
 
 
@@ -54,8 +53,3 @@ def told(mount: Mount) -> Told:
     if is_pulsed(model):
         return Told("pulse_width", 1.0, 0.0, model.neutral_pulse, "s")
     return Told("command_angle", 1.0, 0.0, model.value("potentiometer.fixed_angle"), "1")
-
-
-def is_pulsed(model: Model) -> bool:
-    """Tell whether a servo turns endlessly by pulses: then it is told their width."""
-    return model.endless and not (isinstance(model, DigitalServo) and model.takes_goals)

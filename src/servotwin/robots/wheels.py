@@ -1,4 +1,4 @@
-"""Wheels on servos that turn endlessly: speed over pulse width, and where a robot believes that they have taken it."""
+"""Wheels on servos that turn endlessly, and where a robot believes that they have taken it."""
 
 from __future__ import annotations
 
@@ -7,23 +7,18 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from servotwin import loads, signals
+from servotwin import loads
+from servotwin.datasheet import SpeedMap, wheel_speed_of
+from servotwin.datasheet.turning import endless
 from servotwin.errors import InputError
-from servotwin.loads import Load, Part
-from servotwin.models import Model, PulseServo
-from servotwin.models.switched import SwitchedServo
+from servotwin.loads import Load
+from servotwin.models import PulseServo
 from servotwin.parameters import Servo, load_servo
-from servotwin.robots.told import is_pulsed
-from servotwin.simulation.simulator import simulate
 from servotwin.units import is_finite
 
-Array = NDArray[np.float64]
+__all__ = ["Odometry", "Pose", "SpeedMap", "endless", "inertia_at_wheel", "wheel_servo", "wheel_speed_of", "worn"]
 NEUTRAL = 1.5  # rad: where the potentiometer of a rebuilt servo stands, near the middle of its range; assumed
-_ERRORS = np.concatenate([np.geomspace(1e-6, 1.2e-4, 28), np.geomspace(1.4e-4, 6e-4, 8)])  # s from the neutral pulse
-_SETTLE, _LOOK = 0.5, 0.4  # s: a map's speeds are means of the last whole frames after it
-_SLOW = 1e-9  # rad/s
 
 
 def wheel_servo(servo: Servo | str = "hitec-hs-755hb", fixed_angle: float = NEUTRAL) -> PulseServo:
@@ -76,125 +71,6 @@ def worn(model: PulseServo, *, neutral: float = 0.0, torque: float = 1.0) -> Pul
         "potentiometer.fixed_angle": model.value("potentiometer.fixed_angle") + neutral / per_angle,
         "motor.torque_constant": torque * model.value("motor.torque_constant"),
         "motor.back_emf_constant": torque * model.value("motor.back_emf_constant")}))
-
-
-@dataclass(frozen=True, eq=False)
-class SpeedMap:
-    """How fast a wheel's servo turns over the width of its pulse, once it has settled.
-
-    Parameters
-    ----------
-    pulses : ndarray, shape (n,)
-        Increasing widths [s].
-    speeds : ndarray, shape (n,)
-        Mean speeds of the output shaft [rad/s], of which none is less than the one before.
-    neutral : float
-        The pulse at which it stands for certain [s].
-
-    Raises
-    ------
-    InputError
-        If the arrays do not go together, a width does not increase or a speed falls.
-
-    Examples
-    --------
-    >>> line = SpeedMap(np.array([1.4e-3, 1.49e-3, 1.51e-3, 1.6e-3]), np.array([-2.0, 0.0, 0.0, 2.0]), 1.5e-3)
-    >>> round(1e6 * line.pulse(1.0)), round(1e6 * line.pulse(0.0)), round(float(line.speed(1.555e-3)), 9), line.most
-    (1555, 1500, 1.0, 2.0)
-    """
-
-    pulses: Array
-    speeds: Array
-    neutral: float
-
-    def __post_init__(self) -> None:
-        """Check."""
-        t, w = self.pulses, self.speeds
-        if t.ndim != 1 or t.shape != w.shape or len(t) < 3:
-            raise InputError("map of a wheel's speed", got=f"arrays of shape {t.shape} and {w.shape}",
-                             allowed="two of the same length, at least 3")
-        if np.any(np.diff(t) <= 0.0) or np.any(np.diff(w) < 0.0) or not w[0] < 0.0 < w[-1]:
-            raise InputError("map of a wheel's speed", got="pulses or speeds that do not increase",
-                             allowed="increasing pulses, speeds from backward to forward that do not fall")
-
-    @property
-    def most(self) -> float:
-        """The speed that it reaches both ways [rad/s]."""
-        return float(min(-self.speeds[0], self.speeds[-1]))
-
-    def speed(self, pulse: float | Array) -> Array:
-        """Return the speed [rad/s] at a pulse [s]; beyond the table that of its end."""
-        return np.asarray(np.interp(pulse, self.pulses, self.speeds))[()]
-
-    def pulse(self, speed: float) -> float:
-        """Return the pulse [s] for a speed [rad/s]; the neutral one for 0, and the end for more than there is."""
-        if speed == 0.0:
-            return self.neutral
-        side = np.flatnonzero(self.speeds * speed > _SLOW * abs(speed))
-        one = slice(side[0] - 1, None) if speed > 0.0 else slice(None, side[-1] + 2)  # and the last that stands
-        w, t = self.speeds[one], self.pulses[one]
-        kept = np.concatenate([[True], np.diff(w) > 0.0]) if speed > 0.0 else np.concatenate([np.diff(w) > 0.0, [True]])
-        return float(np.interp(speed, w[kept], t[kept]))
-
-
-def wheel_speed_of(model: Model, load: Load | Part | None = None, *, seed: int = 0) -> SpeedMap:
-    """Measure how fast a servo that turns endlessly goes over the width of its pulse.
-
-    It is simulated under constant pulses on both sides of its neutral one, half a second each until it has settled;
-    what counts is the mean over the whole frames of the 0.4 s after that. Noise of the potentiometer is left out.
-
-    Parameters
-    ----------
-    model : PulseServo, PulseServoInductive or DigitalServo
-        With `potentiometer.fixed_angle`, told by pulses.
-    load : Load, optional
-        On its shaft: an inertia makes the bursts near the neutral pulse move it less.
-    seed : int
-
-    Returns
-    -------
-    SpeedMap
-
-    Raises
-    ------
-    InputError
-        If the servo does not turn endlessly, or not by pulses.
-
-    Examples
-    --------
-    >>> speeds = wheel_speed_of(wheel_servo())
-    >>> round(speeds.most, 2), round(float(speeds.speed(speeds.pulse(2.0))), 6)
-    (4.65, 2.0)
-    """
-    servo = endless(model)
-    quiet = type(model)(model.servo.replace({"potentiometer.noise": None}))
-    frame = servo.frame_period
-    end = _SETTLE + max(1, round(_LOOK / frame)) * frame
-    neutral = servo.neutral_pulse
-    pulses = neutral + np.concatenate([-_ERRORS[::-1], [0.0], _ERRORS])
-    pulses = pulses[(pulses > 1e-5) & (pulses < frame - 1e-5) & _accepted(servo, pulses)]
-    speeds = []
-    for width in pulses.tolist():
-        q = simulate(quiet, signals.constant(1e6 * width, unit="us"), duration=end, load=load,
-                     output_times=[_SETTLE, end], seed=seed)["output_angle"]
-        speeds.append(float(q[1] - q[0]) / (end - _SETTLE))
-    found = np.array(speeds)
-    found[np.abs(found) < _SLOW] = 0.0
-    return SpeedMap(pulses, np.maximum.accumulate(found), neutral)  # beyond full drive they differ by rounding
-
-
-def _accepted(model: SwitchedServo, pulses: Array) -> NDArray[np.bool_]:
-    low, high = (model.value_or(f"electronics.pulse_width_{end}", usual) for end, usual in (
-        ("min", 0.0), ("max", math.inf)))
-    return np.asarray((pulses >= low) & (pulses <= high))
-
-
-def endless(model: Model) -> SwitchedServo:
-    """Return a model, or raise InputError unless it turns endlessly by pulses."""
-    if not isinstance(model, SwitchedServo) or not is_pulsed(model):
-        raise InputError("servo of a wheel", got=model, allowed="one that turns endlessly by pulses, such as "
-                         "PulseServo(servo.continuous(...))")
-    return model
 
 
 class Pose(NamedTuple):

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from servotwin.errors import UnitError
 
 _DEG = math.pi / 180.0
-# micro sign and Greek mu, ohm sign and Greek omega, both dots, degree, square -> as in the table below
+# micro sign and Greek mu, ohm sign and Greek omega, both dots, degree and two signs typed for it, square -> as below
 _SPELLINGS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u2126": "ohm", "\u03a9": "ohm", "\u00b7": " ",
-                            "\u22c5": " ", "\u00b0": "deg", "\u00b2": "2"})
+                            "\u22c5": " ", "\u00b0": "deg", "\u00ba": "deg", "\u02da": "deg", "\u00b2": "2"})
 _GRAVITY = 9.80665  # standard gravity, m/s^2 (CGPM 1901), for kgf
 _POUND, _INCH = 0.45359237, 0.0254  # kg, m: the international pound and inch of 1959
 

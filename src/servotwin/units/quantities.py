@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from contextlib import suppress
 
 from servotwin.errors import InputError, UnitError
@@ -39,6 +40,13 @@ def bare_unit(unit: str) -> str:
 def unit_named(unit: str, dimension: str) -> str:
     """Return what `DIMENSIONS` calls a unit: kgf.cm, kg-cm and kgf cm are the same, but mega is not milli.
 
+    A torque that is written as a quotient is read as the product that it can only mean.
+
+    Warns
+    -----
+    UserWarning
+        If a torque is written as a quotient, such as kg/cm.
+
     Raises
     ------
     UnitError
@@ -51,11 +59,23 @@ def unit_named(unit: str, dimension: str) -> str:
     """
     known = DIMENSIONS[dimension]
     plain, bare = in_letters(unit).replace(" / ", "/"), bare_unit(unit)
-    found = plain if plain in known else next((name for name in known if bare_unit(name) == bare), None)
-    if found is None and (word := unit_word(bare)) is not None and word[0] in known:
-        found = word[0]
+    found = plain if plain in known else _by_letters(bare, dimension)
+    quotient = found is None and dimension == "torque" and re.fullmatch(r"[^/]+/[^/]+", bare) is not None
+    if quotient:
+        found = _by_letters(bare.replace("/", ""), dimension)
     if found is None or (unit.startswith("M") and found.startswith("m")):
         raise UnitError(f"unit of a {dimension}", got=unit, allowed=", ".join(known))
+    if quotient:
+        warnings.warn(f"read {unit} as {found}", stacklevel=2)
+    return found
+
+
+def _by_letters(bare: str, dimension: str) -> str | None:
+    """Return the unit of a dimension that these letters write, None where there is none."""
+    known = DIMENSIONS[dimension]
+    found = next((name for name in known if bare_unit(name) == bare), None)
+    if found is None and (word := unit_word(bare)) is not None and word[0] in known:
+        found = word[0]
     return found
 
 

@@ -21,7 +21,7 @@ _WORDS: dict[str, dict[str, str]] = {
     "voltage": {"V": "v volt volts", "mV": "mv millivolt millivolts"},
     "current": {"A": "a amp amps ampere amperes", "mA": "ma milliamp milliamps milliampere milliamperes"},
     "torque": {"N m": "nm newtonmeter", "mN m": "mnm", "N cm": "ncm", "kgf cm": "kgcm kgfcm", "gf cm": "gfcm",
-               "ozf in": "ozfin ozin"},
+               "ozf in": "ozfin ozin ozinch ozfinch"},
     "temperature": {"K": "k kelvin"},
     "frequency": {"Hz": "hz hertz"},
     "mass": {"kg": "kg kilogram", "g": "g gram"},

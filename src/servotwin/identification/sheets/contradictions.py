@@ -274,7 +274,8 @@ def torque_question(sheet: Sheet) -> str | None:
 def _silent(sheet: Sheet) -> Sequence[str]:
     missing = [] if sheet.modulation == "bus" else [words for words, there in (
         ("deadband", sheet.deadband is not None), ("pulse range", sheet.pulse_min is not None),
-        ("travel", any(x is not None for x in (sheet.travel, sheet.angle_per_pulse)))) if not there]
+        ("travel", any(x is not None for x in (sheet.travel, sheet.angle_per_pulse))))
+        if not there and not (sheet.continuous and words != "deadband")]
     said = [f"{', '.join(missing)} not given"] if missing else []
     if len({point.supply_voltage for point in sheet.main}) == 1:
         said.append("one voltage only")

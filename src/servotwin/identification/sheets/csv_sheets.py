@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from servotwin.errors import InputError, UnknownNameError
-from servotwin.identification.sheets.sheet import Sheet, SheetPoint
+from servotwin.identification.sheets.sheet import ENDLESS, Sheet, SheetPoint
 from servotwin.tables import read_table
 
 _DEG = math.pi / 180.0
@@ -49,7 +49,8 @@ def read_sheets(path: str | Path) -> SheetList:
     path : str or Path
         A header, and one row for each servo and voltage; an empty cell is not printed. Columns: maker, model, type, V,
         stall_torque_Nm, speed_s_per_60deg, noload_running_current_A, stall_current_A, idle_current_A, deadband_us,
-        pulse_range_us (500-2500), travel_deg, deg_per_us, mass_g, gear_ratio, backlash_deg, neutral_us,
+        pulse_range_us (500-2500), travel_deg (of a servo that turns without
+        end: endless), deg_per_us, mass_g, gear_ratio, backlash_deg, neutral_us,
         stop_travel_deg, motor_type, source, note; model, V, stall_torque_Nm and speed_s_per_60deg are needed.
 
     Raises
@@ -103,7 +104,9 @@ def _sheet(path: Path, title: str, rows: list[tuple[int, Mapping[str, str]]]) ->
         where = f"{path}: line {line}"
         source = source or row.get("source", "")
         for column, (name, by) in _WHOLE.items():
-            if row.get(column) and name not in whole:
+            if column == "travel_deg" and row.get(column, "").lower() in ENDLESS:
+                whole["continuous"] = True
+            elif row.get(column) and name not in whole:
                 whole[name] = _number(where, column, row[column]) * by
         for name in ("motor_type", "note"):
             whole.setdefault(name, row.get(name, ""))

@@ -12,12 +12,14 @@ from typing import Any
 from servotwin.errors import InputError
 from servotwin.identification.sheets.contradictions import (
     Contradiction,
+    seconds,
     sheet_contradictions,
     sheet_flags,
     torque_question,
 )
 from servotwin.identification.sheets.firmware_of_sheet import digital_firmware
 from servotwin.identification.sheets.motor_range import MotorRange, Range, motor_range
+from servotwin.identification.sheets.rotor import assumed_inertia, rotor_source
 from servotwin.identification.sheets.sheet import Sheet
 from servotwin.identification.sheets.sheet_file import sheet_table
 from servotwin.parameters import GROUPS, KINDS, REGISTER_FAMILIES, Quantity, Servo, unit_of
@@ -28,9 +30,6 @@ _S_R = Range(value=850.0, lower=700.0, upper=1000.0)  # V/s
 _CLASS = "no source: prior for servos of this class"
 _K = Range(value=120.0, lower=60.0, upper=200.0)
 _FRAME = 0.02  # s
-_ROTOR = Range(value=5.73980e-8, lower=1.27551e-8, upper=2.55102e-7)  # kg m2: 1e-3 to 2e-2 at an output geared 280:1
-_SMALL_ROTOR = Range(value=7.71e-9, lower=4e-9, upper=3e-8)
-_SMALL = 0.025  # kg
 _REDUCTION = Range(value=280.0, lower=150.0, upper=400.0)
 _BEYOND = (10.0, 15.0, 20.0)  # degrees from the electrical travel to a stop
 _DEG = math.pi / 180.0
@@ -87,9 +86,10 @@ def servo_from_sheet(sheet: Sheet, *, load_friction: bool = True, backlash: bool
     Returns
     -------
     Servo
-        Angle 0 is the middle position. Ranges hold all combinations of what is assumed, all voltages and all sources.
-        A digital servo has a firmware that is assumed, with wide ranges; a bus servo the factory's registers, an
-        encoder at its output, and neither chip nor potentiometer.
+        Angle 0 is the middle position; of one that turns without end the potentiometer stands there. Ranges
+        hold all combinations of what is assumed, all voltages and all sources. A digital servo has a firmware that is
+        assumed, with wide ranges; a bus servo the factory's registers, an encoder at its output, and neither chip nor
+        potentiometer.
 
     Warns
     -----
@@ -133,7 +133,8 @@ def _parts(sheet: Sheet) -> tuple[Callable[[_Made], _Found], ...]:
     if sheet.modulation == "bus":  # a sheet without stops is of one that turns without end
         return (_motor, _gear, _friction, _supply, *((_stops,) if sheet.stop_travel is not None else ()))
     firmware = (_firmware,) if sheet.modulation == "digital" else ()
-    return (_motor, _gear, _friction, _electronics, _potentiometer, *firmware, _supply, _stops)
+    return (_motor, _gear, _friction, _electronics, _potentiometer, *firmware, _supply,
+            *(() if sheet.continuous else (_stops,)))
 
 
 def _quantity(name: str, value: float | Range | str, origin: str, source: str, *,
@@ -162,11 +163,11 @@ def _motor(made: _Made) -> _Found:
     for key, said in (("torque_constant", "K_out over gear_reduction"), ("back_emf_constant", "as torque_constant")):
         yield _quantity(f"motor.{key}", m.output_torque_constant, origin, f"{made.relations}; {said}",
                         by=lambda x: x / N)
-    small = made.sheet.mass is not None and made.sheet.mass < _SMALL
-    J = _SMALL_ROTOR if small else _ROTOR
-    yield _quantity("motor.rotor_inertia", J, "assumed", "the rotor of the MG90 measured by OpenServoCore" if small else
-                    "no source: 1e-3 to 2e-2 kg m2 at an output geared down 280 times")
-    w_m = float(made.sheet.nominal.no_load_speed or 1.0) * N
+    w = float(made.sheet.nominal.no_load_speed or 1.0)
+    kind, time_60, w_m = made.sheet.motor_type, seconds(w), w * N
+    yield _quantity("motor.rotor_inertia", assumed_inertia(kind, time_60, m.output_torque_constant.value,
+                                                           m.resistance.value), "assumed",
+                    rotor_source(kind, time_60), by=lambda x: x / N**2)
     yield _quantity("motor.motor_viscous_friction", Range(value=0.0, lower=0.0, upper=0.3 * _friction_of(made).value / (
         N * w_m)), "assumed", "the no-load current counts all loss as Coulomb friction; upper end: 30 % of it viscous")
 
@@ -285,6 +286,9 @@ def _potentiometer(made: _Made) -> _Found:
     neutral = made.sheet.neutral_pulse or _NEUTRAL
     yield _quantity("potentiometer.feedback_offset", _S_R, "assumed",
                     f"angle 0 at {1e6 * neutral:.4g} us, s_r = 0.85 V/ms, assumed", by=lambda s_r: s_r * neutral)
+    if made.sheet.continuous:
+        yield _quantity("potentiometer.fixed_angle", 0.0, "assumed",
+                        f"turns without end; stands at {1e6 * neutral:.4g} us")
 
 
 def _firmware(made: _Made) -> _Found:
@@ -330,8 +334,9 @@ def _capital(text: str) -> str:
 
 def _notes(made: _Made, found: tuple[Contradiction, ...]) -> str:
     sheet, m = made.sheet, made.motor
-    middle = f"the middle position, {1e6 * (sheet.neutral_pulse or _NEUTRAL):.4g} us"
-    said = [sheet.note.strip(), f"Angle 0 is {'the middle count' if sheet.modulation == 'bus' else middle}."]
+    pulse = f"{1e6 * (sheet.neutral_pulse or _NEUTRAL):.4g} us"
+    said = [sheet.note.strip(), f"Turns without end; its shaft stands at {pulse}." if sheet.continuous else
+            f"Angle 0 is {'the middle count' if sheet.modulation == 'bus' else f'the middle position, {pulse}'}."]
     if sheet.modulation == "digital":
         said.append("Digital: its firmware is assumed, with wide ranges; so are the electronics of an analog chip, "
                     "with which the models of analog servos compute it.")

@@ -12,6 +12,8 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.parameters import REGISTER_FAMILIES
 
 MODULATIONS = ("analog", "digital", "bus", "")
+ENDLESS = ("endless", "continuous")
+"""What stands for the travel of a servo that turns without end."""
 _USUAL_VOLTAGE = 6.0  # where makers print most
 # What no servo has, from the smallest to the largest: a figure outside it is one in another unit
 _PLAUSIBLE: dict[str, tuple[float, float, str]] = {
@@ -111,6 +113,8 @@ class Sheet:
     motor_type : str
         Such as ``"3-pole"`` or ``"coreless"``.
     modulation : {"analog", "digital", "bus", ""}
+    continuous : bool
+        Whether it turns without end; it then has no travel, no angle per pulse width and no stops.
     registers : {"feetech-sts", "dynamixel-x", "dynamixel-mx", "dynamixel-ax", ""}
         Of a bus servo, and only of one: whose registers it has; the firmware is the factory's.
     source : str
@@ -148,6 +152,7 @@ class Sheet:
     backlash: float | None = None
     motor_type: str = ""
     modulation: str = ""
+    continuous: bool = False
     registers: str = ""
     source: str = ""
     sources: Mapping[str, str] = field(default_factory=dict)
@@ -164,6 +169,7 @@ class Sheet:
             raise _no_family(self.registers)
         if self.modulation != "bus" and self.registers:
             raise InputError("registers", got=self.registers, allowed='nothing, for modulation is not "bus"')
+        self._check_endless()
         if (self.pulse_min is None) != (self.pulse_max is None) or not (self.pulse_min or 0.0) < (self.pulse_max or 1):
             raise InputError("pulse range", got=f"{self.pulse_min} to {self.pulse_max} s",
                              allowed="two pulse widths, the shorter one first")
@@ -174,6 +180,17 @@ class Sheet:
         object.__setattr__(self, "sources", MappingProxyType(dict(self.sources)))
         object.__setattr__(self, "title", self.title or self.name)
         self._check_points()
+
+    def _check_endless(self) -> None:
+        if not self.continuous:
+            return
+        if self.modulation == "bus":
+            raise InputError("continuous", got='modulation "bus"', allowed="analog or digital: the registers of a bus "
+                             "servo say whether it turns without end")
+        for name in ("travel", "angle_per_pulse", "stop_travel"):
+            if getattr(self, name) is not None:
+                raise InputError(f"{name.replace('_', ' ')} of a servo that turns without end", got=getattr(self, name),
+                                 allowed="none")
 
     def _check_points(self) -> None:
         if self.main:

@@ -14,7 +14,7 @@ from servotwin.parameters import GROUPS, KINDS, Quantity, Servo, dimension_of, u
 from servotwin.parameters.sheet_table import ELSE, POINT, WHOLE, figure, printed
 
 _FLAGS, _NOTE = "flags", "note"
-_WORDS = ("motor_type", "modulation", "registers")
+_WORDS = ("motor_type", "modulation", "continuous", "registers")
 # parameters whose SI unit makes awkward numbers
 _UNITS = {"motor.armature_inductance": "mH", "motor.torque_constant": "mN m/A", "motor.back_emf_constant": "mV s/rad",
           "motor.rotor_inertia": "g cm2", "gear.backlash": "deg", "gear.output_inertia": "g cm2",
@@ -75,7 +75,8 @@ def sheet_of(servo: Servo) -> Sheet:
         raise InputError(f"[sheet] {ELSE} of {servo.name!r}", got=rows, allowed=f"tables [[sheet.{ELSE}]]")
     points = [_read_point(servo, row) for row in (table, *rows)]
     source = points[0].source
-    values |= {name: str(table.get(name, "")) for name in _WORDS}
+    values |= {name: str(table.get(name, "")) for name in _WORDS if name != "continuous"}
+    values["continuous"] = table.get("continuous") is True
     return Sheet(
         name=servo.name, title=servo.title, source=source, points=tuple(points),
         sources={name: said for name, said in sources.items() if said != source}, note=str(table.get(_NOTE, "")),
@@ -168,6 +169,8 @@ def _toml(value: Any) -> str:
         return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
     return _text(value) if isinstance(value, str) else repr(value)
 
 
