@@ -11,7 +11,7 @@ from servotwin import signals
 from servotwin.datasheet.conditions import at_voltage
 from servotwin.datasheet.full_drive import FullDrive
 from servotwin.datasheet.guesses import Span, spans, variants
-from servotwin.datasheet.holding import hold, smallest_move
+from servotwin.datasheet.holding import hold, smallest_stir
 from servotwin.datasheet.rotor import slow_rotor
 from servotwin.datasheet.turning import is_pulsed, still_pulses, wheel_speed_of
 from servotwin.errors import InputError
@@ -245,7 +245,7 @@ def _deadband(model: Model) -> float:
         still = still_pulses(model, wheel_speed_of(model))
         return math.nan if still is None else still[1] - still[0]
     slope, p = model.servo.electronics.one_shot_slope, model.servo.potentiometer.feedback_gain
-    return math.nan if slope is None or p is None else 2.0 * slope * p * smallest_move(model)
+    return math.nan if slope is None or p is None else 2.0 * slope * p * smallest_stir(model)
 
 
 def _angle_at(model: Model, pulse: float) -> float:

@@ -15,7 +15,7 @@ from servotwin.models.outputs import warm_plant
 from servotwin.simulation.simulator import simulate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -29,6 +29,8 @@ _FURTHEST_STEP = math.radians(20.0)
 _WAIT, _MEAN = 1.0, 0.1  # s, after which a command has been followed or not, and over which the angle is averaged
 _FOLLOWED = 0.5  # of the command
 _HALVINGS = 18
+_SOON = 0.2  # s, in which a command either moves the shaft or does not
+_STIRRED = 1e-9  # rad
 _TRIPS = "trips by "  # begins the events of a protection
 
 
@@ -115,14 +117,30 @@ def smallest_move(model: Model) -> float:
 
     It has a second for that. The potentiometer's noise is left out: with it every command moves a little now and then.
     """
+    return _least_step(model, _follows)
+
+
+def smallest_stir(model: Model) -> float:
+    """Return the smallest step that moves the free shaft at all: half of the deadband, and what friction adds [rad]."""
+    return _least_step(model, _stirs)
+
+
+def _least_step(model: Model, does: Callable[[Model, float, float], bool]) -> float:
     free, start = _without_stops(model), mid_travel(model)
     low, high = 0.0, _FURTHEST_STEP
-    if not _follows(free, start, high):
+    if not does(free, start, high):
         return math.nan
     for _ in range(_HALVINGS):
         half = 0.5 * (low + high)
-        low, high = (low, half) if _follows(free, start, half) else (half, high)
+        low, high = (low, half) if does(free, start, half) else (half, high)
     return high
+
+
+def _stirs(model: Model, start: float, step: float) -> bool:
+    result = simulate(model, signals.step(start, start + step, at=0.0, unit="rad"), duration=_SOON,
+                      output_times=[0.0, _SOON])
+    before, after = result["output_angle"].tolist()
+    return bool(abs(after - before) > _STIRRED)
 
 
 def _follows(model: Model, start: float, step: float) -> bool:
