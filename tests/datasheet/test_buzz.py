@@ -9,7 +9,9 @@ from servotwin.datasheet import buzz
 from servotwin.errors import InputError
 from servotwin.models import mid_travel
 
-ANALOG, STEP, LOAD = st.PulseServo(st.load_servo("towerpro-sg90")), st.signals.step(0.0, 20.0, at=0.1, unit="deg"), 0.02
+STEP = st.signals.step(0.0, 20.0, at=0.1, unit="deg")
+ANALOG = st.PulseServo(st.load_servo("hitec-hs-755hb").replace(
+    {"electronics.stretcher_gain": 1000.0, "electronics.off_state": "coast"}))
 LEROBOT = {"D_Coefficient": 32, "Maximum_Acceleration": 254, "Acceleration": 254}
 
 
@@ -17,14 +19,19 @@ def rest(model, command, load, duration):
     return st.simulate(model, command, load=load, duration=duration).rest
 
 
-def test_the_deadband_that_stops_an_analog_servo():
-    found = buzz(ANALOG, st.loads.Constant(LOAD), STEP, duration=1.5)
-    assert found.rest == rest(ANALOG, STEP, st.loads.Constant(LOAD), 1.5)
-    (remedy,) = (one for one in found.remedies if one.name == "electronics.deadband")
-    assert remedy.now == ANALOG.servo.electronics.deadband < remedy.needed
-    for share, restless in ((1.0, False), (0.9, True)):
-        changed = st.PulseServo(ANALOG.servo.replace({remedy.name: share * remedy.needed}))
-        assert rest(changed, STEP, st.loads.Constant(LOAD), 1.5).restless == restless
+def test_each_number_that_stops_an_analog_servo_from_hunting():
+    """Coasting between pulses and far too stiff it swings; a step of the search back, 9 %, is not enough."""
+    found = buzz(ANALOG, command=STEP, duration=2.5)
+    assert found.rest == rest(ANALOG, STEP, None, 2.5)
+    assert math.degrees(found.rest.swing) > 3.0
+    needed = {remedy.name: remedy for remedy in found.remedies}
+    assert set(needed) == {"electronics.deadband", "load.coulomb_torque", "electronics.stretcher_gain"}
+    for name, remedy in needed.items():
+        step = 2.0**0.125 if remedy.needed < remedy.now else 2.0**-0.125
+        for value, restless in ((remedy.needed, False), (step * remedy.needed, True)):
+            load = st.loads.Coulomb(value) if name.startswith("load") else None
+            model = ANALOG if load else st.PulseServo(ANALOG.servo.replace({name: value}))
+            assert rest(model, STEP, load, 2.5).restless == restless, (name, value)
 
 
 def test_a_bus_servo_whose_output_shaft_has_no_friction():

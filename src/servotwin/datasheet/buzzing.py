@@ -88,9 +88,10 @@ def buzz(model: Model, load: Load | Part | None = None, command: Signal | None =
     Examples
     --------
     >>> import servotwin as st
-    >>> step = st.signals.step(0.0, 20.0, at=0.1, unit="deg")
-    >>> found = buzz(st.PulseServo(st.load_servo("hitec-hs-311")), st.loads.Constant(0.1), step, duration=1.5)
-    >>> found.rest.buzzes, found.remedies[0].name
+    >>> servo = st.load_servo("hitec-hs-755hb").replace(
+    ...     {"electronics.stretcher_gain": 1000.0, "electronics.off_state": "coast"})
+    >>> found = buzz(st.PulseServo(servo))
+    >>> found.rest.swing > 0.0, found.remedies[0].name
     (True, 'electronics.deadband')
     """
     if not isinstance(model, PulseServo | PulseServoInductive | BoundedServo | DigitalServo) or model.endless:
