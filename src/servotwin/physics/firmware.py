@@ -182,14 +182,14 @@ def started_duty(duty: float, minimum_duty: float) -> float:
     Returns
     -------
     float or array
-        u + sgn(u) times the minimum; 0 where u is [1].
+        u + sgn(u) times the minimum; 0 where u is, but for what rounding leaves of terms that cancel [1].
 
     Examples
     --------
-    >>> started_duty(-0.25, 0.25), started_duty(0.0, 0.25)
-    (-0.5, 0.0)
+    >>> started_duty(-0.25, 0.25), started_duty(0.0, 0.25), started_duty(0.1 + 0.2 - 0.3, 0.25)
+    (-0.5, 0.0, 0.0)
     """
-    if duty == 0.0:
+    if abs(duty) <= NEARLY * minimum_duty:
         return 0.0
     return duty + math.copysign(minimum_duty, duty)
 
