@@ -48,6 +48,7 @@ class Servo(NamedTuple):
     coasts: float = 0.0  # 1: the bridge opens between drives
     play: float = 0.0  # rad, motor to output
     wheel: float = 0.0  # kg m², of what is behind the play
+    bearing: float = 0.06  # of the smaller dry friction: what of it acts on the output inside the play
     wiper_play: float = 0.0  # rad, output to potentiometer
     zero: float = 0.64e-3  # s, length of the one-shot at q = 0
     slope: float = 573e-6  # s/rad, s_µ
@@ -126,15 +127,16 @@ def _budget(s: Servo, side: float, at_rest: bool, motor: float, external: float)
 
 @njit(cache=True)
 def _rate(s: Servo, load: Load, J: float, q: float, w: float, side: float, forth: float, back: float,
-          carries: bool) -> float:
-    """Acceleration of motor and what it carries, while it slides towards `side`."""
+          carries: bool, less: float) -> float:
+    """Acceleration of motor and what it carries, sliding towards `side`; `less` of the friction is elsewhere."""
     motor = _motor(s, w, forth, back)
     external = _external(load, q, w) if carries else 0.0
-    return (motor + external - s.B * w - side * _budget(s, side, False, motor, external)) / J
+    return (motor + external - s.B * w - side * (_budget(s, side, False, motor, external) - less)) / J
 
 
 @njit(cache=True)
-def _slide(s: Servo, load: Load, J: float, q: float, w: float, forth: float, back: float, carries: bool, h: float):
+def _slide(s: Servo, load: Load, J: float, q: float, w: float, forth: float, back: float, carries: bool, h: float,
+           less: float = 0.0):
     """Angle and speed after a step of the motor and what it carries; it sticks where friction holds it."""
     side = math.copysign(1.0, w)
     if w == 0.0:
@@ -142,12 +144,12 @@ def _slide(s: Servo, load: Load, J: float, q: float, w: float, forth: float, bac
         external = _external(load, q, 0.0) if carries else 0.0
         push = motor + external
         side = math.copysign(1.0, push)
-        if abs(push) <= _budget(s, side, True, motor, external):
+        if abs(push) <= _budget(s, side, True, motor, external) - less:
             return q, 0.0
-    first = _rate(s, load, J, q, w, side, forth, back, carries)
+    first = _rate(s, load, J, q, w, side, forth, back, carries, less)
     if w == 0.0 and first * side <= 0.0:
         return q, 0.0
-    second = _rate(s, load, J, q + h * w, w + h * first, side, forth, back, carries)
+    second = _rate(s, load, J, q + h * w, w + h * first, side, forth, back, carries, less)
     end = w + 0.5 * h * (first + second)
     if end * side <= 0.0:
         return q + 0.5 * h * w * abs(w) / max(abs(w - end), 1e-300), 0.0
@@ -155,11 +157,19 @@ def _slide(s: Servo, load: Load, J: float, q: float, w: float, forth: float, bac
 
 
 @njit(cache=True)
-def _fall(load: Load, J: float, q: float, w: float, h: float):
-    """Angle and speed after a step of an output that the motor does not touch."""
-    first = _external(load, q, w) / J
-    second = _external(load, q + h * w, w + h * first) / J
+def _fall(load: Load, J: float, q: float, w: float, h: float, dry: float):
+    """Angle and speed after a step of an output that the motor does not touch; its bearing may hold it."""
+    side = math.copysign(1.0, w)
+    if w == 0.0:
+        push = _external(load, q, 0.0)
+        side = math.copysign(1.0, push)
+        if abs(push) <= dry:
+            return q, 0.0
+    first = (_external(load, q, w) - side * dry) / J
+    second = (_external(load, q + h * w, w + h * first) - side * dry) / J
     end = w + 0.5 * h * (first + second)
+    if dry > 0.0 and w != 0.0 and end * side <= 0.0:
+        return q + 0.5 * h * w * abs(w) / max(abs(w - end), 1e-300), 0.0
     return q + 0.5 * h * (w + end), end
 
 
@@ -167,8 +177,9 @@ def _fall(load: Load, J: float, q: float, w: float, h: float):
 def _two_bodies(s: Servo, load: Load, body, forth: float, back: float, h: float) -> None:
     """Advance motor (0, 1) and output (2, 3), which touch at side `body[4]` of the play, or do not (0)."""
     J_o = s.wheel + load.inertia
-    apart_m, w_m = _slide(s, load, s.J, body[0], body[1], forth, back, False, h)
-    apart_o, w_o = _fall(load, J_o, body[2], body[3], h)
+    behind = s.bearing * min(s.forward, s.backward)
+    apart_m, w_m = _slide(s, load, s.J, body[0], body[1], forth, back, False, h, behind)
+    apart_o, w_o = _fall(load, J_o, body[2], body[3], h, behind)
     if body[4] != 0.0 and body[4] * (w_m - w_o) >= 0.0:  # left to themselves they would not draw apart
         body[0], body[1] = _slide(s, load, s.J + J_o, body[0], body[1], forth, back, True, h)
         body[2], body[3] = body[0] - 0.5 * body[4] * s.play, body[1]

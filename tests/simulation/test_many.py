@@ -52,6 +52,8 @@ def with_its_group(name):
         return SERVO.replace({"friction.stribeck_speed": 8.0, "friction.breakaway_ratio": 1.5})
     if name == "gear.damping":
         return SERVO.replace({"gear.stiffness": ABSENT["gear.stiffness"]})
+    if name == "friction.bearing_coulomb_torque":
+        return SERVO.replace({part: ABSENT[part] for part in ("gear.backlash", "gear.output_inertia")})
     if name == "friction.stribeck_speed":
         return SERVO.replace({"friction.breakaway_ratio": 1.5})
     return SERVO.replace({part: ABSENT[part] for part in HEAT}) if name.startswith("thermal.") else SERVO

@@ -7,6 +7,7 @@ import pytest
 
 import servotwin as st
 from reference.drivetrain_cases import TERMS, command_of, load_of, random_case, servo_of
+from reference.drivetrain_laws import make_plant
 
 DURATION = 0.15
 TIMES = np.linspace(0.0, DURATION, 16)
@@ -24,6 +25,7 @@ def cases(terms, count):
     made = [random_case(seed, frozenset(terms)).replace(
         potentiometer__linearity_angle=ANGLES, potentiometer__linearity_error=ERRORS,
         electronics__stretcher_time_constant=None) for seed in range(count)]
+    made = [case.replace(friction__bearing_coulomb_torque=make_plant(case.values, case.load).bearing) for case in made]
     return [replace(case, duration=DURATION, initial={}) for case in made]
 
 
