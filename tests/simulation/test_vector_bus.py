@@ -241,3 +241,19 @@ def test_ticks_of_a_program_come_once_when_times_count_anew():
         for sims in both:
             sims.advance(1e-3, command_angle=1.2)
     assert both[0]["output_angle"][0] == pytest.approx(both[1]["output_angle"][0], abs=1e-12)
+
+
+def test_a_limp_servo_on_a_bus_meets_its_teeth_once():
+    """Its diodes block: teeth that meet parted by the torque of a current that the bus does not drive, without end."""
+    servo = st.feetech_sts("lerobot", servo="feetech-sts3215-12v")
+    battery = st.Supply(open_circuit_voltage=12.0, internal_resistance=0.1)
+    sims = st.VectorSimulator(st.DigitalServo(servo), lanes=3, load=st.loads.Inertia(4e-3), bus=battery)
+    for way in (1.0, -1.0):
+        sims.reset(command_angle=0.0)
+        sims.set(torque_enable=True)
+        for k in range(100):  # it turns, goes limp, and its output falls onto the tooth before it
+            if k == 40:
+                sims.set(torque_enable=[False, True, True])
+            sims.advance(2e-3, command_angle=[way, 0.3 + 0.02 * k, -0.3 - 0.02 * k],
+                         external_torque=[0.0 if k < 40 else -0.1 * way, 0.1, -0.1])
+            assert (sims.status == 0).all()

@@ -22,6 +22,7 @@ from servotwin.models.terms.source import Source
 from servotwin.physics import bridge, motor, supply
 
 _EDGE = 1e-8  # of a limit: so near to it the sum of currents counts as being there
+_BLOCKS = 1e300  # V
 
 # What the source does: it follows its resistance, gives its most, has broken down, or takes nothing back.
 FOLLOWING, LIMITED, BROKEN_DOWN, KEEPING = range(4)
@@ -38,6 +39,15 @@ def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
         numbers.motor, Bridge(D, R, path.off, path.silence, path.V_br, path.pwm, path.one_way),
         Source(source.V, 0.0, math.inf), numbers.follower, numbers.shaft, numbers.friction, numbers.load,
         numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
+
+
+def blocked(numbers: Numbers) -> Numbers:
+    """Return a servo whose diodes block: no voltage of the bus drives a current in it, whatever its speed jumps to."""
+    path = numbers.bridge
+    return Numbers(
+        numbers.motor, Bridge(_BLOCKS, path.R_drive, path.off, path.silence, path.V_br, path.pwm, path.one_way),
+        numbers.source, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play,
+        numbers.sensor, numbers.heat, numbers.elastic)
 
 
 def sign_on_bus(drive: float, y: Vector) -> float:

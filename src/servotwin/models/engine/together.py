@@ -284,7 +284,10 @@ def arrive(shared: Any, mates: Any) -> Mode:
     if whose < 0:
         return mode_of(mates[0].mode)
     mate = mates[whose]
-    mode, y = guards.cross(numbers_of(mate.numbers), mode_of(mate.mode), kind, shared_source.behind(mate, V),
+    numbers = numbers_of(mate.numbers)
+    if mate.returns > 0 and mate.mode.zone == NO_CURRENT:  # teeth that meet would part by a torque that there is not
+        numbers = shared_source.blocked(numbers)
+    mode, y = guards.cross(numbers, mode_of(mate.mode), kind, shared_source.behind(mate, V),
                            piece_value(piece_of(mate.tau), shared.end), vector_of(mate.y))
     put_vector(mate.y, y)
     return Mode(shared_source.let_through(mate, mode.zone), mode.contact, mode.mesh, mode.motor, mode.share)
