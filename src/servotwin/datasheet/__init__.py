@@ -43,3 +43,7 @@ def __getattr__(name: str) -> Any:
     if name in _FILES:
         return getattr(import_module(f"servotwin.datasheet.{_FILES[name]}"), name)
     raise AttributeError(f"module 'servotwin.datasheet' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__
