@@ -1,0 +1,32 @@
+"""What a derived module does not contain, so that it can be printed in a language with fixed types and no heap."""
+
+import ast
+
+import pytest
+
+from servotwin.simulation import bus_run, lane_runs, vector_calls
+from servotwin.simulation.compile.derive import derive
+
+RECIPES = (bus_run.PLAIN_BUSES, bus_run.ALL_BUSES, bus_run.DIGITAL_BUSES, lane_runs.ALL_RUNS, lane_runs.PLAIN_RUNS,
+           lane_runs.ALL_DIGITAL, lane_runs.LOOK_DIGITAL, lane_runs.BY_TICKS, vector_calls.TICKS)
+
+
+@pytest.fixture(scope="module", params=RECIPES, ids=lambda recipe: recipe.name)
+def functions(request):
+    return [node for node in ast.parse(derive(request.param)).body if isinstance(node, ast.FunctionDef)]
+
+
+def leaves(node):
+    if isinstance(node, ast.If):
+        return bool(node.orelse) and leaves(node.body[-1]) and leaves(node.orelse[-1])
+    return isinstance(node, ast.Return | ast.Break | ast.Continue)
+
+
+def test_every_statement_can_be_reached(functions):
+    for function in functions:
+        for node in ast.walk(function):
+            for body in (getattr(node, "body", []), getattr(node, "orelse", [])):
+                if isinstance(body, list):
+                    assert not any(leaves(statement) for statement in body[:-1]), function.name
+            if isinstance(node, ast.If | ast.IfExp):
+                assert not isinstance(node.test, ast.Constant), function.name
