@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine import bus, controller, crew, tape
 from servotwin.models.engine.buses import Buses, Tables
-from servotwin.models.engine.memory import Memory, forgotten, origin_of, resumed
+from servotwin.models.engine.memory import Memories, Memory, forgotten, origin_of, resumed
 from servotwin.models.engine.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
 from servotwin.models.engine.seats import ROOM, Mate, Seat, Shared, put_shared
 from servotwin.models.engine.step import DIVERGED
@@ -25,7 +25,7 @@ from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.models.terms.source import Source
 from servotwin.simulation.compile import Recipe, is_compiled, kernels
 from servotwin.simulation.engine import Plan, State
-from servotwin.simulation.lane_memory import RECORD
+from servotwin.simulation.lane_memory import nothing_yet
 from servotwin.simulation.lane_runs import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS, programs_of
 
 Array = NDArray[np.float64]
@@ -246,19 +246,19 @@ def _tiles_of(kind: type[Any], values: Sequence[Any]) -> NDArray[Any]:
     return tiles
 
 
-def _records_of(memories: Sequence[Memory]) -> NDArray[Any]:
+def _records_of(memories: Sequence[Memory]) -> Memories:
     """Return memories as records."""
-    records = np.zeros(len(memories), RECORD)
-    for record, memory in zip(records, memories, strict=True):
+    found = nothing_yet(len(memories))
+    for record, firm, memory in zip(*found, memories, strict=True):
         _put(record, memory)
-    return records
+        own = memory.firm[0]
+        _put(firm, own if hasattr(own, "_fields") else control.frozen(own))
+    return found
 
 
 def _put(record: Any, values: Any) -> None:
     for (name, _), value in zip(fields_of(type(values)), values, strict=True):
         if hasattr(value, "_fields"):
             _put(record[name], value)
-        elif name == "firm":  # one in a sequence
-            _put(record[name], value[0] if hasattr(value[0], "_fields") else control.frozen(value[0]))
-        else:
+        elif name in (record.dtype.names or ()):  # what programs remember stands elsewhere
             record[name] = value

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from servotwin.models.engine import bus, controller, crew, runs, step
 from servotwin.models.engine.memory import (
     Inputs,
+    Memories,
     Memory,
     in_force,
+    memory_at,
     origin_of,
     put_memory,
     silent_now,
     since,
 )
 from servotwin.models.engine.observe import observed, on_bus, told_by
-from servotwin.models.engine.runs import memory_at
 from servotwin.models.engine.seats import drive_of
 from servotwin.models.engine.sights import put
 from servotwin.models.engine.step import COMPLETED
@@ -50,7 +51,7 @@ class Buses(NamedTuple):
 
     which: Indices
     first: Indices
-    records: Any
+    memories: Memories
     joined: Indices
     shared: Any
     status: Indices
@@ -82,7 +83,7 @@ def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, dura
                 controller.pause(inputs[n], memories[n])
         for n in range(len(places)):
             j = places[n]
-            put_memory(buses.records[j], memories[n])
+            put_memory(buses.memories.rows[j], memories[n])
             buses.joined[j], buses.ended[j] = joined[n], when
             if status != COMPLETED and status != bus.PAUSED:
                 buses.status[j] = status
@@ -94,7 +95,7 @@ def _seated(lanes: Lanes, buses: Buses, places: list[int], inputs: list[Inputs],
     for n in range(len(places)):
         lane = buses.which[places[n]]
         crew.sit(seats[n], numbers_of(lanes, lane), chip_of(lanes, lane), inputs[n])
-    return [memory_at(lanes, buses.records, j) for j in places]
+    return [memory_at(buses.memories, j) for j in places]
 
 
 def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
