@@ -13,12 +13,13 @@ import numpy as np
 
 from servotwin.models.engine import loop_tiles, tiles
 from servotwin.models.engine.buses import Buses, Tables
-from servotwin.models.engine.memory import Memory
+from servotwin.models.engine.memory import Memories, Memory
 from servotwin.models.engine.records import record_of, rows_of
 from servotwin.models.engine.seats import Mate, Seat, Shared
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.compile.derive import Recipe
@@ -51,12 +52,13 @@ def _tuple(kind: Any, default: Kind, **fields: Kind) -> Tuple:
     return Tuple(tuple(fields.get(name, default) for name in kind._fields), kind.__name__, kind._fields)
 
 
-_NUMBERS, _MEMORIES = _records(rows_of(Numbers, np.float64)), _records(record_of(Memory))
+_NUMBERS, _ROWS = _records(rows_of(Numbers, np.float64)), _records(record_of(Memory))
+_MEMORIES = _tuple(Memories, _ROWS, firms=_records(record_of(Firm)))
 _LANES = _tuple(
     Lanes, _INDICES, numbers=_NUMBERS, chips=_records(rows_of(Chip, np.float64)), start=_TABLE, torque=_FLOATS,
     pieces=_TABLE, edges=_FLOATS, accuracy=FLOAT64, firmware=_records(record_of(Firmware)))
 _TABLES = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
-_BUSES = _tuple(Buses, _INDICES, records=_MEMORIES, shared=_records(record_of(Shared)), ended=_FLOATS)
+_BUSES = _tuple(Buses, _INDICES, memories=_MEMORIES, shared=_records(record_of(Shared)), ended=_FLOATS)
 _SEATS, _MATES = _records(record_of(Seat)), _records(record_of(Mate))
 _TAPE = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
 _RECORDED = (_TABLE, _INDICES, _INDICES)  # rows of torques, where those of a lane begin, and how many there are
@@ -70,7 +72,7 @@ _GOING = (_LANES, _TABLE, *_RECORDED, _INDICES, _FLOATS, _FLOATS, _INDICES, _CUB
 _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
     "runs:start": (_LANES, _INDICES, _MEMORIES), "runs:go_on": (*_GOING, _FLOATS),
     "loops:go_on": (*_GOING, _records(loop_tiles.TILE_TYPE)),
-    "calm:go": (_LANES, _INDICES, _FLOATS, _SMALLS, _MEMORIES, _INDICES),
+    "calm:go": (_LANES, _INDICES, _FLOATS, _SMALLS, _ROWS, _INDICES),
     "ending:look_at_lanes": (BOOL, _LANES, *_RECORDED, FLOAT64, _TABLE, _FLOATS, _SMALLS),
     "sights:one_by_one": (_LANES, _TABLE, *_RECORDED, _INDICES, _MEMORIES, _TABLE),
     "buses:go_on": (_LANES, _TABLES, _BUSES, INT64, INT64, FLOAT64, FLOAT64, _SEATS, _MATES, _TAPE),
@@ -81,14 +83,14 @@ _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
     "lane_ticks:gather": (_INDICES, _SMALLS, _FLOATS, _INDICES, _MEMORIES, _INDICES, _INDICES, _INDICES, _FLOATS,
                           _MEMORIES),
     "lane_ticks:put": (_INDICES, _MEMORIES, _MEMORIES),
-    "lane_ticks:note_failures": (_INDICES, _INDICES, _FLOATS, _MEMORIES, _SMALLS, _FLOATS),
-    "lane_ticks:forget_motions": (_MEMORIES,),
-    "lane_ticks:impose_on_records": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, _MEMORIES),
-    "lane_ticks:show_records": (_INDICES, _MEMORIES, _TABLE),
-    "lane_ticks:read_clocks": (_INDICES, _SMALLS, _FLOATS, _MEMORIES, _FLOATS),
+    "lane_ticks:note_failures": (_INDICES, _INDICES, _FLOATS, _ROWS, _SMALLS, _FLOATS),
+    "lane_ticks:forget_motions": (_ROWS,),
+    "lane_ticks:impose_on_records": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, _ROWS),
+    "lane_ticks:show_records": (_INDICES, _ROWS, _TABLE),
+    "lane_ticks:read_clocks": (_INDICES, _SMALLS, _FLOATS, _ROWS, _FLOATS),
     "lane_ticks:take_status": (_INDICES, _SMALLS, _INDICES),
-    "lane_ticks:note_lost_buses": (_INDICES, _INDICES, _MEMORIES, _SMALLS, _FLOATS),
-    "lane_ticks:break_up": (_INDICES, _records(record_of(Shared)), _MEMORIES),
+    "lane_ticks:note_lost_buses": (_INDICES, _INDICES, _ROWS, _SMALLS, _FLOATS),
+    "lane_ticks:break_up": (_INDICES, _records(record_of(Shared)), _ROWS),
 }
 
 
