@@ -13,7 +13,7 @@ from servotwin.models.engine import loop_tiles, tape
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.tape import Tape
 from servotwin.simulation import lane_runs
-from servotwin.simulation.compile import Recipe
+from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.compile.layout import GIVEN, STAGES
 from servotwin.simulation.lane_memory import RECORD
@@ -176,6 +176,6 @@ class _Alone:
         shared = (store.columns, *store.inputs, lanes, durations, _NONE, self._first, self._outputs, records, how)
         calls = [call_of(recipe, "go_on", *shared, at),
                  call_of(TICKS, "note_failures", lanes, how, at, records, store.status, store.ended)]
-        if recipe == lane_runs.PLAIN_DIGITAL:
+        if recipe == lane_runs.PLAIN_DIGITAL and not is_plain():
             calls.insert(0, call_of(lane_runs.BY_TICKS, "go_on", *shared, loop_tiles.tile_room()))
         return calls

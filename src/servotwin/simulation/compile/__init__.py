@@ -13,10 +13,12 @@ from types import ModuleType
 from servotwin import physics
 from servotwin.models import engine, terms
 from servotwin.simulation.compile import derive as derive_module
+from servotwin.simulation.compile.backend import is_plain
 from servotwin.simulation.compile.derive import Recipe, derive, surroundings
+from servotwin.simulation.compile.plain import plain_kernels
 from servotwin.simulation.compile.storage import is_stored, key_of, loaded, stored
 
-__all__ = ["Recipe", "is_compiled", "kernels", "source_key"]
+__all__ = ["Recipe", "is_compiled", "is_plain", "kernels", "source_key"]
 
 _lock = threading.Lock()
 
@@ -24,10 +26,11 @@ _lock = threading.Lock()
 def kernels(recipe: Recipe) -> ModuleType:
     """Return the derived module, with the recipe's entries compiled when they are first called.
 
-    The first time on a machine a line on standard error says that this takes a while.
+    The first time on a machine a line on standard error says that this takes a while. In plain Python nothing is
+    compiled.
     """
     with _lock:
-        return _kernels(recipe)
+        return plain_kernels(recipe) if is_plain() else _kernels(recipe)
 
 
 @cache

@@ -6,17 +6,18 @@ are those that Python calls, compiled once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ctypes
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.simulation.compile import Recipe, kernels, source_key
+from servotwin.simulation.compile import Recipe, is_plain, kernels, plain, source_key
+from servotwin.simulation.compile.derive import derive, surroundings
 from servotwin.simulation.compile.storage import key_of, loaded, stored
 
 _HEAD = """# Derived from servotwin's kernels; do not edit.
@@ -72,12 +73,34 @@ class Call:
 
 def call_of(recipe: Recipe, entry: str, *arguments: Any, returns: bool = False) -> Call:
     """Return a call of a kernel; it returns the kernel's whole number where that `returns` one, else 1."""
+    if is_plain():
+        return _plain_call(getattr(kernels(recipe), entry), arguments, returns)
     block = _Block()
     text = ", ".join(block.put(argument) for argument in arguments)
     line = f"return kernel({text})" if returns else f"kernel({text})\n    return 1"
     size = len(block.words)
     rest = (entry, tuple(block.imports), tuple(block.makers), size, line)
     return Call(_compiled(recipe, rest), np.array(block.words, np.int64), arguments)
+
+
+def _plain_call(kernel: Callable[..., Any], arguments: tuple[Any, ...], returns: bool) -> Call:
+    """Return a call of a kernel in plain Python, which has its arguments without words."""
+    def call(_: int) -> int:
+        found = kernel(*(_as_now(argument) for argument in arguments))
+        return int(found) if returns else 1
+
+    callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(call)
+    return Call(plain.address(callback), np.zeros(1, np.int64), (callback, *arguments))
+
+
+def _as_now(argument: Any) -> Any:
+    """Return what a kernel gets for an argument at this moment."""
+    if isinstance(argument, Now):
+        value = argument.array[argument.place]
+        return bool(value != 0.0) if argument.truth else value
+    if isinstance(argument, Some):
+        return argument.array[:argument.number[0]]
+    return argument
 
 
 @dataclass
@@ -146,10 +169,24 @@ def _compiled(recipe: Recipe, rest: tuple[str, tuple[str, ...], tuple[str, ...],
     return int(loaded(path).call.address)
 
 
+TICK = Recipe("tick", ("servotwin.simulation.compile.tick:advance",))
+JOINTS = Recipe("joints", tuple(f"servotwin.simulation.compile.joints:{name}" for name in ("control", "step")))
+_LAST_LINES = {TICK: """
+from numba import cfunc, types
+advance_at = cfunc(types.int32(types.int64), cache=True, error_model="numpy")(advance.py_func)
+""", JOINTS: """
+from numba import cfunc, types
+control_at = cfunc(types.void(types.int64, types.int64), cache=True, error_model="numpy")(control.py_func)
+step_at = cfunc(types.int64(*[types.int64] * 4), cache=True, error_model="numpy")(step.py_func)
+"""}
+
+
 @cache
 def tick_address() -> int:
     """Return the address of the C function `int servotwin_advance(servotwin_tick *tick)`."""
-    return int(_module("tick", "layout", _TICK).entry.address)
+    if is_plain():
+        return plain.address_of(kernels(TICK).advance, ctypes.c_int32, ctypes.c_int64)
+    return int(_module(TICK).advance_at.address)
 
 
 @cache
@@ -159,27 +196,18 @@ def joint_addresses() -> tuple[int, int]:
     They are `void control(const mjModel *m, mjData *d)` and
     `long long step(long long *drive, const mjModel *m, mjData *d, long long steps)`.
     """
-    module = _module("joints", "joints_layout", _JOINTS)
-    return int(module.at_callback.address), int(module.stepping.address)
+    if is_plain():
+        own, word = kernels(JOINTS), ctypes.c_int64
+        return plain.address_of(own.control, None, word, word), plain.address_of(own.step, word, *[word] * 4)
+    module = _module(JOINTS)
+    return int(module.control_at.address), int(module.step_at.address)
 
 
-def _module(name: str, layout: str, entries: str) -> ModuleType:
-    """Return a file of this folder as a compiled module, with its entries for C."""
-    text, *others = (Path(__file__).with_name(f"{file}.py").read_text(encoding="utf-8")
-                     for file in (name, layout, "intrinsics"))
-    path, _ = stored(f"servotwin_{name}_{key_of(source_key(), text, entries, *others)}", lambda: text + entries)
+def _module(recipe: Recipe) -> ModuleType:
+    """Return the text of this folder as a compiled module, with its entries for C."""
+    text = derive(recipe) + _LAST_LINES[recipe]
+    path, _ = stored(f"servotwin_{recipe.name}_{key_of(source_key(), surroundings(recipe), text)}", lambda: text)
     return loaded(path)
-
-
-_TICK = """
-
-entry = cfunc(types.int32(types.int64), cache=True, error_model="numpy")(advance)
-"""
-_JOINTS = """
-
-at_callback = cfunc(types.void(types.int64, types.int64), cache=True, error_model="numpy")(control)
-stepping = cfunc(types.int64(*[types.int64] * 4), cache=True, error_model="numpy")(step)
-"""
 
 
 def program(chains: Sequence[Sequence[Call]]) -> NDArray[np.int64]:

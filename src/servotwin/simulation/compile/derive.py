@@ -1,4 +1,4 @@
-"""Derive one module that numba can compile and cache from the kernels and laws, mechanically.
+"""Derive one module from the kernels and laws, mechanically, that numba can compile and plain Python can run.
 
 Starting from the entries, every function that is called is collected from its own module under the name
 `package_module__function`; constants come along by value, classes are imported from where they are. A kernel is changed
@@ -27,7 +27,8 @@ from servotwin.simulation.compile.rewriting import (
     local_names,
 )
 
-_INTRINSICS, _LINKING = (f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking"))
+_INTRINSICS, _LINKING, _ADDRESSES = (
+    f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking", "addresses"))
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest", "floor")  # single instructions in the vector form
 _LONG = 12  # a tuple of more numbers is a table
 
@@ -65,19 +66,21 @@ class Recipe:
     present: tuple[str, ...] = ()
 
 
-def derive(recipe: Recipe) -> str:
-    """Return the source text of the derived module."""
+def derive(recipe: Recipe, compiled: bool = True) -> str:
+    """Return the source text of the derived module, which numba compiles or plain Python runs."""
     work = Derivation(recipe)
     names = [work.function(*entry.split(":")) for entry in recipe.entries]
-    lines = ["# Derived from servotwin's kernels; do not edit.", "import math", "", "import numpy as np",
-             "from numba import njit", "", f"from {_LINKING} import Part", ""]
-    lines += [f"from {module} import {name} as {alias}" for alias, (module, name) in sorted(work.imports.items())]
+    lines = ["# Derived from servotwin's kernels; do not edit.", "import math", "", "import numpy as np", ""]
+    lines += ["from numba import njit", "", f"from {_LINKING} import Part", ""] if compiled else []
+    for alias, (module, name) in sorted(work.imports.items()):
+        home = _INTRINSICS if compiled and module in (ELEMENTARY, _ADDRESSES) else module
+        lines.append(f"from {home} import {name} as {alias}")
     lines += ["", f"_f = np.{'float32' if recipe.single else 'float64'}", ""]
     lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
     for flat in work.order:
         options = _options(recipe, flat in names, work.functions[flat])
         options += ', fastmath={"reassoc"}' if recipe.vector and flat in work.in_any_order else ""
-        lines += ["", "", f"@njit({options})", work.functions[flat]]
+        lines += ["", "", *([f"@njit({options})"] if compiled else []), work.functions[flat]]
     lines += ["", *(f"{entry.split(':')[1]} = {flat}" for entry, flat in zip(recipe.entries, names, strict=True)), ""]
     return "\n".join(lines)
 
@@ -134,9 +137,10 @@ class Derivation:
         module, name = function.__module__, function.__name__
         if hasattr(function, "text"):
             return self._generated(function)
-        if self.recipe.vector and module == ELEMENTARY and name.lstrip("_") in _PRIMITIVES:
-            flat = flat_name(_INTRINSICS, name.lstrip("_"))
-            self.imports[flat] = (_INTRINSICS, name.lstrip("_"))
+        primitive = self.recipe.vector and module == ELEMENTARY and name in _PRIMITIVES
+        if primitive or module == _ADDRESSES:
+            flat = flat_name(module, name)
+            self.imports[flat] = (module, name)
             return flat
         return self.function(module, name)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from llvmlite import ir
-from numba import from_dtype, types
+from numba import from_dtype, njit, types
 from numba.core.cgutils import raw_memcpy
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
@@ -138,7 +138,7 @@ def called(_typing, function, words):
 
 
 @intrinsic
-def told(_typing, function, arguments):
+def told(_typing, function, *arguments):
     """Call the function at an address with some words, and return its word, which counts where it has one."""
     word = types.int64
 
@@ -148,7 +148,7 @@ def told(_typing, function, arguments):
         kind = ir.FunctionType(ir.IntType(64), [value.type for value in some])
         return builder.call(builder.inttoptr(function, kind.as_pointer()), some)
 
-    return word(word, arguments), generate
+    return word(word, types.StarArgTuple.from_types([word] * len(arguments))), generate
 
 
 @intrinsic
@@ -191,3 +191,37 @@ def active(_typing):
         return builder.load(_kept_word(builder))
 
     return types.int64(), generate
+
+
+_words_at, _numbers_at, _rows_at, _bytes_at, _halves_at = (array_maker(*kind, True) for kind in (
+    ("<i8", 1), ("<f8", 1), ("<f8", 2), ("|i1", 1), ("<i4", 1)))
+
+
+@njit(error_model="numpy")
+def words(address, count):
+    """Return so many whole numbers of 64 bits at an address."""
+    return _words_at(address, (count,))
+
+
+@njit(error_model="numpy")
+def numbers(address, count):
+    """Return so many floats at an address."""
+    return _numbers_at(address, (count,))
+
+
+@njit(error_model="numpy")
+def rows(address, count, width):
+    """Return a table of floats at an address."""
+    return _rows_at(address, (count, width))
+
+
+@njit(error_model="numpy")
+def bytes_at(address, count):
+    """Return so many whole numbers of 8 bits at an address."""
+    return _bytes_at(address, (count,))
+
+
+@njit(error_model="numpy")
+def halves(address, count):
+    """Return so many whole numbers of 32 bits at an address."""
+    return _halves_at(address, (count,))
