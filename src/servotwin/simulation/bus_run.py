@@ -23,7 +23,7 @@ from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.models.terms.source import Source
-from servotwin.simulation.compile import Recipe, is_compiled, kernels
+from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.engine import Plan, State
 from servotwin.simulation.lane_memory import nothing_yet
 from servotwin.simulation.lane_runs import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS, programs_of
@@ -74,7 +74,7 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
         written.used[:] = 0
         try:
             status, when = way.go_on(until, written)
-        except ArithmeticError:  # numbers beyond what a float holds
+        except (ArithmeticError, ValueError):  # numbers beyond what a float holds
             status, when = DIVERGED, float(written.motions[:written.used[0], tape.UNTIL].max(initial=when))
         part = [rows[:used].copy() for rows, used in zip(written[:3], written.used.tolist(), strict=True)]
         part[0][:, tape.FIRST] += count
@@ -114,6 +114,8 @@ def not_plain(numbers: Numbers) -> Any:
 
 def _worth_it(recipe: Recipe, frames: float) -> bool:
     """Tell whether so many frames of servos, with those before, are worth compiled kernels."""
+    if is_plain():
+        return False
     done = _frames_run.get(recipe.name, 0.0) + frames * (_INTEGRATED if recipe is ALL_BUSES else 1)
     if done >= COMPILES_FROM or (done >= LOADS_FROM and is_compiled(recipe)):
         done = math.inf

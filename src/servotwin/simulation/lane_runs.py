@@ -16,7 +16,7 @@ from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.friction import straight
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.physics.laws import array_form
-from servotwin.simulation.compile import Recipe, kernels
+from servotwin.simulation.compile import Recipe, is_plain, kernels
 from servotwin.simulation.first_ticks import to_first_ticks
 from servotwin.simulation.lane_memory import flat, memories_of, nothing_yet, taken
 from servotwin.simulation.lanes import ALL_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
@@ -179,9 +179,12 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
 
 
 def go_on(recipe: Recipe, *arguments: Any) -> None:
-    """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads."""
+    """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads.
+
+    In plain Python all go from tick to tick one by one.
+    """
     *shared, ended = arguments
-    if recipe == PLAIN_DIGITAL:
+    if recipe == PLAIN_DIGITAL and not is_plain():
         to_first_ticks(kernels(recipe), *shared)
         kernels(BY_TICKS).go_on(*shared, loop_tiles.tile_room())
     kernels(recipe).go_on(*shared, ended)
@@ -251,7 +254,7 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     by_bands = _either(banded, slack & np.logical_not(braked))
     loose = _without(played, alone, striding, coiled, own.varies != 0.0) if pulsed else False
     side: Any = False
-    if pulsed and not curved:
+    if pulsed and not curved and not is_plain():  # without a compiler a tile has no worth
         side = (_without(True, alone) & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
                 & (bridge.silence.coast == bridge.off.coast) & ((own.varies == 0.0) | _straight(own)))
     if dtype == "float32":  # what is not zero has to stay so

@@ -14,7 +14,7 @@ from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.tape import Tape
 from servotwin.simulation import lane_runs
-from servotwin.simulation.compile import Recipe
+from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.compile.layout import GIVEN, STAGES
 from servotwin.simulation.lane_memory import nothing_yet
@@ -181,6 +181,6 @@ class _Alone:
         shared = (store.columns, *store.inputs, lanes, durations, _NONE, self._first, self._outputs, self.memories, how)
         calls = [call_of(recipe, "go_on", *shared, at),
                  call_of(TICKS, "note_failures", lanes, how, at, self.memories.rows, store.status, store.ended)]
-        if recipe == lane_runs.PLAIN_DIGITAL:
+        if recipe == lane_runs.PLAIN_DIGITAL and not is_plain():
             calls.insert(0, call_of(lane_runs.BY_TICKS, "go_on", *shared, loop_tiles.tile_room()))
         return calls

@@ -1,24 +1,30 @@
-"""Compile the kernels: derive them, print them as C, build or find their libraries, call them."""
+"""Kernels: derived from the engine, printed as C, found or built as libraries, called from Python and from C."""
 
 from __future__ import annotations
 
 import threading
+import warnings
 from functools import cache
 from typing import Any
 
-from servotwin.simulation.compile.building import is_ready, source_key
+from servotwin.simulation.compile.backend import is_plain, use_plain
+from servotwin.simulation.compile.building import WAY_OUT, is_ready, source_key
 from servotwin.simulation.compile.derive import Recipe
 from servotwin.simulation.compile.library import loaded
+from servotwin.simulation.compile.plain import plain_kernels
 
-__all__ = ["Recipe", "is_compiled", "kernels", "source_key"]
+__all__ = ["Recipe", "is_compiled", "is_plain", "kernels", "source_key"]
 
 _lock = threading.Lock()
 
 
 def kernels(recipe: Recipe) -> Any:
-    """Return the kernels of a recipe, each under the name of its entry."""
+    """Return the kernels of a recipe, each under the name of its entry.
+
+    Where there is neither a library nor a compiler they run in plain Python from then on, which is said once.
+    """
     with _lock:
-        return _kernels(recipe)
+        return plain_kernels(recipe) if is_plain() else _kernels(recipe)
 
 
 def is_compiled(recipe: Recipe) -> bool:
@@ -28,4 +34,10 @@ def is_compiled(recipe: Recipe) -> bool:
 
 @cache
 def _kernels(recipe: Recipe) -> Any:
-    return loaded(recipe)
+    found = loaded(recipe)
+    if found is None:
+        use_plain()
+        warnings.warn(f"no C compiler: many servos run in plain Python, a hundred times slower. {WAY_OUT}",
+                      RuntimeWarning, stacklevel=4)
+        return plain_kernels(recipe)
+    return found

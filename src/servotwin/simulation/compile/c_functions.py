@@ -10,7 +10,7 @@ from servotwin.simulation.compile.kinds import FLOAT64, INT8, INT32, INT64, Arra
 class Primitive(NamedTuple):
     """A function of Python that C has an expression for.
 
-    `text` gets the arguments, `{s}` is "f" where they have 32 bits; `result` is None where it is that of the
+    `text` gets the arguments, `n` is their number less one; `{s}` is "f" where they have 32 bits; `result` is None where it is that of the
     arguments; it `writes` where it changes memory.
     """
 
@@ -25,8 +25,8 @@ PRIMITIVES = {
     "floor": Primitive("FLOOR{s}({0})"),
     "words": Primitive("words({0}, {1})", Array(INT64, 1)), "numbers": Primitive("numbers({0}, {1})", Array(FLOAT64, 1)),
     "rows": Primitive("rows({0}, {1}, {2})", Array(FLOAT64, 2)), "bytes_at": Primitive("bytes_at({0}, {1})", Array(INT8, 1)),
-    "halves": Primitive("halves({0}, {1})", Array(INT32, 1)), "called": Primitive("called({0}, {1})", INT64, True),
-    "told": Primitive("TOLD{n}({all})", INT64, True), "copied": Primitive("copied({0}, {1}, {2})", None, True),
+    "halves": Primitive("halves({0}, {1})", Array(INT32, 1)), "called": Primitive("TOLD(told_1, {0}, {1})", INT64, True),
+    "told": Primitive("TOLD(told_{n}, {all})", INT64, True), "copied": Primitive("copied({0}, {1}, {2})", None, True),
     "activate": Primitive("activate({0})", None, True), "active": Primitive("active()", INT64),
 }
 """Of `models.engine.elementary`, single instructions in the vector form, and of `compile.addresses`."""

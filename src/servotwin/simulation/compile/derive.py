@@ -53,6 +53,8 @@ class Recipe:
         Constants that nothing will be equal to.
     present : tuple of str
         Numbers of terms that are positive in all that will run ("firmware.T_c").
+    by_numbers : bool
+        Whether C calls the entries with their whole numbers, instead of with words.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Recipe:
     absent: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     present: tuple[str, ...] = ()
+    by_numbers: bool = False
 
 
 @dataclass(frozen=True, eq=False)

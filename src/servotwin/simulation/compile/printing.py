@@ -190,7 +190,7 @@ class _Text:
         if not high.isdigit():
             first, high = f"{first}, {counter}_end = {high}", f"{counter}_end"
         lines = [f"for ({first}; {counter} {sign} {high}; {counter}{on}) {{"]
-        if counter != name:
+        if counter != name and node.target.id in self._variables.read:
             lines.append(f"{_INDENT}{name} = {counter};")
         return [*lines, *self._inner(node.body), "}"]
 
@@ -641,7 +641,7 @@ class _Text:
             texts = [self._as(argument, kind) for argument in node.args]
         else:
             texts = [self.of(argument) for argument in node.args]
-        return primitive.text.format(*texts, s="f" * (kind == FLOAT32), n=len(texts), all=", ".join(texts))
+        return primitive.text.format(*texts, s="f" * (kind == FLOAT32), n=len(texts) - 1, all=", ".join(texts))
 
     def _of_math(self, node: ast.Call, name: str) -> str:
         kinds = [self._kind(argument) for argument in node.args]

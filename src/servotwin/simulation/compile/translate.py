@@ -75,7 +75,8 @@ def translated(derived: Derived, signatures: Sequence[tuple[str, tuple[Kind, ...
         function = module.specialised(derived.entries[name], kinds)
         symbol = printer.types.fresh(f"servotwin_{name}")
         called = printer.name_of(function)
-        texts.append(_entry(printer.types, symbol, called, kinds, function.result))
+        make = _entry_by_numbers if derived.recipe.by_numbers else _entry
+        texts.append(make(printer.types, symbol, called, kinds, function.result))
         entries.append(Entry(name, symbol, kinds, _letters(function.result)))
     types = printer.types
     parts = [f"/* Printed by servotwin from its kernels: {derived.recipe.name}. */", header(), *types.structs,
@@ -119,6 +120,12 @@ def _entry(types: Types, symbol: str, called: str, kinds: tuple[Kind, ...], resu
     unused = [] if reading.place or len(lines) > 2 else ["    (void)w;"]
     return "\n".join([f"EXPORTED int64_t {symbol}(int64_t *w);", f"EXPORTED int64_t {symbol}(int64_t *w) {{", *unused,
                       *lines, "}", ""])
+
+
+def _entry_by_numbers(types: Types, symbol: str, called: str, kinds: tuple[Kind, ...], result: Kind | None) -> str:
+    names = [f"word_{k}" for k in range(len(kinds))]
+    head = f"EXPORTED int64_t {symbol}({', '.join(f'int64_t {name}' for name in names)})"
+    return "\n".join([f"{head};", f"{head} {{", *_returning(types, f"{called}({', '.join(names)})", result, 0), "}", ""])
 
 
 def _returning(types: Types, call: str, result: Kind | None, place: int) -> list[str]:
