@@ -30,3 +30,12 @@ def test_every_statement_can_be_reached(functions):
                     assert not any(leaves(statement) for statement in body[:-1]), function.name
             if isinstance(node, ast.If | ast.IfExp):
                 assert not isinstance(node.test, ast.Constant), function.name
+
+
+def test_no_list_grows_and_no_field_has_a_name_that_is_looked_up(functions):
+    for function in functions:
+        for node in (part for statement in function.body for part in ast.walk(statement)):
+            assert not isinstance(node, ast.ListComp | ast.Starred), function.name
+            if isinstance(node, ast.List):
+                assert len(node.elts) == 1, function.name  # times how many there are
+            assert not (isinstance(node, ast.Constant) and isinstance(node.value, str)), function.name

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import bus, controller, crew, tape
-from servotwin.models.engine.buses import Buses, Tables
-from servotwin.models.engine.memory import Memories, Memory, forgotten, origin_of, resumed
+from servotwin.models.engine.buses import Buses
+from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
 from servotwin.models.engine.seats import ROOM, Mate, Seat, Shared, put_shared
 from servotwin.models.engine.step import DIVERGED
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import at_start
+from servotwin.models.engine.told import Tables
 from servotwin.models.terms import control
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.firmware import Firmware
@@ -144,10 +145,12 @@ class Plainly:
     """
 
     def __init__(self, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
-        self._joined, self._shared = [-1 for _ in plans], object_of(Shared)
+        self._shared = object_of(Shared)
         put_shared(self._shared, at_start(source))
         self._seats, self._mates = ([object_of(kind) for _ in range(n * len(plans))] for kind, n in (
             (Seat, 1), (Mate, 2)))
+        for k, seat in enumerate(self._seats):
+            seat.place, seat.joined = k, -1
         self.begin(plans, states)
 
     def begin(self, plans: Sequence[Plan], states: Sequence[State]) -> None:
@@ -160,14 +163,20 @@ class Plainly:
     def break_up(self, source: Source) -> None:
         """Let nobody move together, and every motion begin anew: numbers of a servo, or the source, are others now."""
         self.memories = [forgotten(memory) for memory in self.memories]
-        self._joined = [-1 for _ in self._joined]
+        for seat in self._seats:
+            seat.joined = -1
         put_shared(self._shared, at_start(source))
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
         """Go on to a time [s]; return a status and when."""
-        ends = [until - origin_of(memory) for memory in self.memories]
-        return bus.through(self._inputs, self.memories, ends, self._joined, self._shared, self._seats, self._mates,
-                           written)
+        for seat, memory in zip(self._seats, self.memories, strict=True):
+            crew.remember(seat, memory)
+            seat.until = until - seat.origin
+        firms = [memory.firm[0] for memory in self.memories]
+        status, when = bus.through(self._inputs, firms, len(firms), self._shared, self._seats, self._mates, written)
+        self.memories = [crew.memory_in(seat, firms)._replace(firm=memory.firm)
+                         for seat, memory in zip(self._seats, self.memories, strict=True)]
+        return status, when
 
 
 class _Compiled:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.buses import Buses, Tables
+from servotwin.models.engine.buses import Buses
 from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.records import columns_of
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import APART
+from servotwin.models.engine.told import Tables
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.bus_run import not_plain, recipe_of, room_of, shared_of
 from servotwin.simulation.bus_supply import Supplies, source_of

@@ -115,6 +115,8 @@ class Rewriting(ast.NodeTransformer):
 
     def _truth(self, node: ast.expr) -> bool | None:
         """Return whether a condition holds for all that a recipe is for; None where it depends."""
+        if isinstance(node, ast.Name) and node.id == "PLAIN":  # what plain Python alone does
+            return False
         if not self._work.recipe.absent and not self._work.recipe.never:
             return None
         if isinstance(node, ast.BoolOp):
