@@ -179,10 +179,7 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
 
 
 def go_on(recipe: Recipe, *arguments: Any) -> None:
-    """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads.
-
-    In plain Python all go from tick to tick one by one.
-    """
+    """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads."""
     *shared, ended = arguments
     if recipe == PLAIN_DIGITAL and not is_plain():
         to_first_ticks(kernels(recipe), *shared)

@@ -64,9 +64,9 @@ _callbacks: list[Any] = []
 def _quiet(entry: FunctionType) -> Callable[..., Any]:
     """Return a kernel that divides by zero without a word."""
     @wraps(entry)
-    def run(*arguments: Any) -> Any:
+    def run(*arguments: Any, **named: Any) -> Any:
         with np.errstate(all="ignore"):
-            return entry(*arguments)
+            return entry(*arguments, **named)
 
     return run
 
