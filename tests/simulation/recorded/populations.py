@@ -142,7 +142,7 @@ TRAIN = st.signals.pulse_train([0.003 + 0.018 * k + 0.001 * (k % 3) for k in ran
                                [1900.0, 1250.0, 1500.0, 1700.0] * 4 + [1000.0, 1600.0])
 CHIRP = st.signals.chirp(mean=1500.0, amplitude=300.0, start_frequency=1.0, end_frequency=8.0, duration=0.5, unit="us")
 MIXED = {"electronics.off_state": ["brake", "coast"], "load.spring.stiffness": [0.0, 0.0, 0.1],
-         "supply.current_limit": [9.0, 9.0, 9.0, 9.0, 1.2]}
+         "friction.load_friction": [0.0, 0.0, 0.0, 0.0, 0.08]}
 PULSE, INDUCTIVE, BOUNDED, PROGRAMMED = st.PulseServo, st.PulseServoInductive, st.BoundedServo, st.DigitalServo
 
 LANES = {

@@ -143,7 +143,8 @@ def recorded(name: str, run: Callable[..., Found]) -> tuple[dict[str, Any], Foun
 def write(names: list[str]) -> None:
     """Run some sets, or all, and write the files; those that are not named stay."""
     warnings.simplefilter("ignore")
-    began, (text, places, values) = time.process_time(), loaded() if names else ({"sets": {}}, {}, {})
+    began = time.process_time()
+    text, places, values = loaded() if names and TEXT.exists() else ({"sets": {}}, {}, {})
     for name in names or SETS:
         text["sets"][name], places[name], values[name] = recorded(name, SETS[name])
     text["sets"] = {name: text["sets"][name] for name in SETS if name in text["sets"]}
