@@ -21,9 +21,9 @@ pytestmark = pytest.mark.compiles
 
 def cases():
     """Return a case for each set, whose name says what is compared."""
-    for name, one in TEXT["sets"].items():
-        tolerance = tolerance_of(name, one, EXACT)
-        yield pytest.param(name, tolerance, id=f"{name}: {f'to {tolerance:.0e}' if tolerance else 'all bits'}")
+    tolerances = {name: tolerance_of(name, one, EXACT) for name, one in TEXT["sets"].items()}
+    return [pytest.param(name, tolerance, id=f"{name}: {f'to {tolerance:.0e}' if tolerance else 'all bits'}")
+            for name, tolerance in tolerances.items()]
 
 
 def test_all_sets_and_all_recipes_are_recorded():
