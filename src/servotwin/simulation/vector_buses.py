@@ -69,9 +69,9 @@ class BusSet:
                             shared_of([source_of(supplies.supplies[k]) for k in buses]), np.zeros(count, np.int64),
                             np.zeros(count))
         none = np.zeros(numbers.count, np.int64)
-        curve = numbers.curve
-        self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, curve, none,
-                              none + curve.shape[1])
+        angles, errors = numbers.curve
+        self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, angles, errors, none,
+                             none + len(angles))
         self.rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(buses) // _WORTH)))]
 
     def advance(self, columns: Lanes, duration: float, status: NDArray[np.int8], ended: Array) -> None:

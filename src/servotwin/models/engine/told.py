@@ -19,7 +19,8 @@ class Tables(NamedTuple):
     torques: Floats
     torque_first: Indices
     torque_count: Indices
-    curves: Floats
+    angles: Floats
+    errors: Floats
     curve_first: Indices
     curve_count: Indices
 
@@ -41,6 +42,7 @@ def inputs_at(told: Any, seat: Any) -> Inputs:
 
 def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
     """Return what a lane is told, and what hangs on its shaft."""
-    first = tables.torque_first[lane]
-    curve = tables.curves[:, tables.curve_first[lane]:tables.curve_first[lane] + tables.curve_count[lane]]
+    first, start = tables.torque_first[lane], tables.curve_first[lane]
+    end = start + tables.curve_count[lane]
+    curve = (tables.angles[start:end], tables.errors[start:end])
     return runs.inputs_of(lanes, curve, tables.torques[first:first + tables.torque_count[lane]], lane)

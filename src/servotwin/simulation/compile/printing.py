@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -83,6 +84,8 @@ class _Text:
         """Return the function under this name."""
         own = self._own
         heads, lines = [], []
+        body = self._block(own.node.body, 1)
+        used = set(re.findall(r"(?<![\w.>])[A-Za-z_]\w*", " ".join(body)))  # members of structs apart
         for argument, kind in zip(own.names, own.arguments, strict=True):
             there, c_name = own.local[argument], identifier(argument)
             changed = argument in own.stored
@@ -97,9 +100,8 @@ class _Text:
                 lines.append(f"{_INDENT}{self._types.declared(there, c_name)} = {value};")
             else:
                 heads.append(self._types.declared(kind, c_name))
-            if argument not in self._variables.read:
+            if c_name not in used:
                 lines.append(f"{_INDENT}(void){c_name};")
-        body = self._block(own.node.body, 1)
         returned = self._types.of(own.result)
         head = f"{self._lead()} {returned}{'' if returned.endswith('*') else ' '}{name}({', '.join(heads) or 'void'})"
         return "\n".join([f"{head} {{", *lines, *body, "}", ""])

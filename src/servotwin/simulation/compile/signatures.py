@@ -12,11 +12,12 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from servotwin.models.engine import loop_tiles, tiles
-from servotwin.models.engine.buses import Buses, Tables
+from servotwin.models.engine.buses import Buses
 from servotwin.models.engine.memory import Memories, Memory
 from servotwin.models.engine.records import record_of, rows_of
 from servotwin.models.engine.seats import Mate, Seat, Shared
 from servotwin.models.engine.tape import Tape
+from servotwin.models.engine.told import Tables
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
@@ -57,7 +58,7 @@ _MEMORIES = _tuple(Memories, _ROWS, firms=_records(record_of(Firm)))
 _LANES = _tuple(
     Lanes, _INDICES, numbers=_NUMBERS, chips=_records(rows_of(Chip, np.float64)), start=_TABLE, torque=_FLOATS,
     pieces=_TABLE, edges=_FLOATS, accuracy=FLOAT64, firmware=_records(record_of(Firmware)))
-_TABLES = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
+_TABLES = _tuple(Tables, _INDICES, torques=_TABLE, angles=_FLOATS, errors=_FLOATS)
 _BUSES = _tuple(Buses, _INDICES, memories=_MEMORIES, shared=_records(record_of(Shared)), ended=_FLOATS)
 _SEATS, _MATES = _records(record_of(Seat)), _records(record_of(Mate))
 _TAPE = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
