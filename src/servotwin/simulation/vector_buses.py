@@ -71,7 +71,7 @@ class BusSet:
         none = np.zeros(numbers.count, np.int64)
         curve = numbers.curve
         self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, curve, none,
-                              none + curve.shape[1])
+                              none + len(curve))
         self.rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(buses) // _WORTH)))]
 
     def advance(self, columns: Lanes, duration: float, status: NDArray[np.int8], ended: Array) -> None:

@@ -41,6 +41,6 @@ def inputs_at(told: Any, seat: Any) -> Inputs:
 
 def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
     """Return what a lane is told, and what hangs on its shaft."""
-    first = tables.torque_first[lane]
-    curve = tables.curves[:, tables.curve_first[lane]:tables.curve_first[lane] + tables.curve_count[lane]]
-    return runs.inputs_of(lanes, curve, tables.torques[first:first + tables.torque_count[lane]], lane)
+    first, start = tables.curve_first[lane], tables.torque_first[lane]
+    return runs.inputs_of(lanes, tables.curves[first:first + tables.curve_count[lane]],
+                          tables.torques[start:start + tables.torque_count[lane]], lane)
