@@ -71,9 +71,9 @@ class BusSet:
                             shared_of([source_of(supplies.supplies[k]) for k in buses]), np.zeros(count, np.int64),
                             np.zeros(count))
         none = np.zeros(numbers.count, np.int64)
-        angles, errors = numbers.curve
-        self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, angles, errors, none,
-                             none + len(angles))
+        curve = numbers.curve
+        self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, curve, none,
+                              none + len(curve))
         self._calls: list[Call] = []
         self._look: Call | None = None
         self.rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(buses) // _WORTH)))]
