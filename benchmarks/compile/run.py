@@ -138,7 +138,7 @@ def record(side: Side, parts: list[str]) -> None:
     for part, found in times.items():
         least = kept["seconds"].setdefault(part, {})
         for name, seconds in found.items():
-            least[name] = min(float(f"{seconds:.4g}"), least.get(name, seconds))
+            least[name] = float(f"{min(seconds, least.get(name, seconds)):.4g}")
     seconds = {part: kept["seconds"][part] for part in PARTS if part in kept["seconds"]}
     FILE.write_text(json.dumps(head | {"seconds": seconds}, indent=1) + "\n", encoding="utf-8")
     show(list(seconds), seconds, {}, f"recorded now into {FILE.name}, in the column 'this'")
