@@ -13,19 +13,6 @@ settings.register_profile("shared machine", suppress_health_check=[HealthCheck.t
 settings.load_profile("shared machine")
 
 
-@pytest.hookimpl(trylast=True)
-def pytest_collection_modifyitems(items):
-    """Where two processes share the tests, let each begin with other kernels, so that none is compiled twice.
-
-    xdist gives each process one half of the list to begin with.
-    """
-    compiling = [item for item in items if item.get_closest_marker("compiles")]
-    others = [item for item in items if not item.get_closest_marker("compiles")]
-    one, two = compiling[::2], compiling[1::2]
-    middle = max(len(items) // 2 - len(one), 0)
-    items[:] = [*one, *others[:middle], *two, *others[middle:]]
-
-
 @pytest.fixture(scope="session")
 def servo():
     return st.load_servo("hitec-hs-755hb")

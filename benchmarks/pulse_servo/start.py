@@ -27,8 +27,6 @@ def main() -> None:
             first = fresh(program, cache)
             later = min(fresh(program, cache) for _ in range(5))
             print(f"  {dtype}: first call after installation {first:6.2f} s, later start-ups {later:5.2f} s")
-        numba = min(fresh("import numba", cache) for _ in range(3))
-        print(f"  import numba alone {numba:.2f} s")
 
 
 if __name__ == "__main__":

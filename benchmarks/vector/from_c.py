@@ -1,4 +1,4 @@
-"""What a tick costs where compiled code calls the entry of a `VectorSimulator`: in C, and in a loop of numba's."""
+"""What a tick costs where a program in C calls the entry of a `VectorSimulator`."""
 
 import ctypes
 import shutil
@@ -55,29 +55,6 @@ def in_c(folder: Path) -> Loop:
     return timed
 
 
-def in_numba() -> Loop:
-    """Return what times a tick of 1 ms in a loop that numba has compiled [s]."""
-    import numba
-
-    def timed(sims: st.VectorSimulator, arrays: dict[str, np.ndarray]) -> float:
-        entry = sims.c_entry()
-        tick, advance = entry.tick(1e-3, **arrays), ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)(entry.address)
-
-        @numba.njit
-        def run(address: int, width: np.ndarray, ticks: int) -> int:
-            bad = 0
-            for k in range(ticks):
-                if k % 200 == 0:
-                    width[:] = 1.7e-3 if k // 200 % 2 else 1.2e-3
-                bad |= advance(address)
-            return bad
-
-        given = ctypes.addressof(tick), arrays["pulse_width"], TICKS
-        assert run(*given) == 0
-        return best(lambda: run(*given), 7) / TICKS
-    return timed
-
-
 def table(models: dict[str, st.PulseServo], python: float, peer: float | None) -> None:
     """Print what ticks of 1 ms cost, beside Python's of one lane and `mj_step` [s]."""
     print(f"{'a tick of 1 ms, from compiled code':36} {'us':>9} {'us a lane':>10} {'mj_step over it':>16}")
@@ -86,15 +63,13 @@ def table(models: dict[str, st.PulseServo], python: float, peer: float | None) -
         ratio = "" if peer is None else f"{peer * lanes / time:15.1f}x"
         print(f"{name:36} {1e6 * time:9.3f} {1e6 * time / lanes:10.4f} {ratio}")
     row("Python's advance, 1 lane", 1, python)
+    if shutil.which("cc") is None:
+        print("from C: left out, because cc is not found")
+        return
     with tempfile.TemporaryDirectory() as folder:
-        loops = {"numba": in_numba()}
-        if shutil.which("cc") is None:
-            print("C: left out, because cc is not found")
-        else:
-            loops = {"C": in_c(Path(folder)), **loops}
-        for name, loop in loops.items():
-            for lanes, whose, what in ROWS if name == "C" else ROWS[1:3]:
-                sims, (out, imposed) = st.VectorSimulator(models[whose], lanes), ASKED[what]
-                arrays = {"pulse_width": np.full(lanes, 1.2e-3), **{signal: np.zeros(lanes) for signal in out},
-                          **{member: np.full(lanes, value) for member, value in imposed.items()}}
-                row(f"{name}, {lanes} {whose}: {what}", lanes, loop(sims, arrays))
+        loop = in_c(Path(folder))
+        for lanes, whose, what in ROWS:
+            sims, (out, imposed) = st.VectorSimulator(models[whose], lanes), ASKED[what]
+            arrays = {"pulse_width": np.full(lanes, 1.2e-3), **{signal: np.zeros(lanes) for signal in out},
+                      **{member: np.full(lanes, value) for member, value in imposed.items()}}
+            row(f"{lanes} {whose}: {what}", lanes, loop(sims, arrays))

@@ -38,7 +38,6 @@ def test_a_task_with_ideal_actuators(robot, tmp_path):
     assert "Redundancy" in page
 
 
-@pytest.mark.compiles
 def test_a_task_with_servos(robot, tmp_path):
     ended = robot("two-link", "--payload", "50g", "--supply", "6V:0.1ohm", "--json", *SMALL)
     assert ended.code == 0, ended.err

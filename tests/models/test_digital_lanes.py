@@ -10,7 +10,6 @@ from servotwin.errors import InputError
 
 from .digital_servos import COUNT, digital, feetech
 
-pytestmark = pytest.mark.compiles
 
 TIMES = np.sort(np.random.default_rng(0).uniform(0.0, 0.4, 80))
 NAMES = ("output_angle", "output_speed", "duty", "goal_angle", "reference_angle", "trip", "drive", "armature_current",

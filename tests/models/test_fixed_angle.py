@@ -107,7 +107,6 @@ def test_it_starts_anywhere_and_that_changes_nothing_but_the_angle(wheel):
     np.testing.assert_allclose(far["output_speed"], near["output_speed"], rtol=0.0, atol=1e-11)
 
 
-@pytest.mark.compiles
 def test_it_turns_through_hundreds_of_revolutions_as_evenly_as_at_first(wheel):
     # 1000 s in lanes, of which the first seconds are those of the servo alone
     model, command = st.PulseServo(wheel), st.signals.constant(1560.0, unit="us")
@@ -255,7 +254,6 @@ TIMES = np.linspace(0.0, 0.6, 25)
 WHEELS = [NEUTRAL - 0.05, NEUTRAL, NEUTRAL + 0.05]
 
 
-@pytest.mark.compiles
 @pytest.mark.parametrize("name", [
     pytest.param(name, marks=pytest.mark.slow) if name == "play" else name for name in WAYS])
 def test_lanes_are_the_servo_alone(servo, name):
@@ -273,7 +271,6 @@ def test_lanes_are_the_servo_alone(servo, name):
     assert lanes.remarks == ()
 
 
-@pytest.mark.compiles
 @pytest.mark.parametrize("name", ["plain", "worn, with noise"])
 def test_a_vector_simulator_turns_on_as_a_simulator_does(servo, name):
     changes, load = WAYS[name]
@@ -298,7 +295,6 @@ def test_a_vector_simulator_turns_on_as_a_simulator_does(servo, name):
         widths = np.roll(widths, 1)
 
 
-@pytest.mark.compiles
 @pytest.mark.parametrize(("gain", "noise", "load"), [
     (None, 0.0, None), (0.5, 0.0, None), (0.5, 1e-3, None),
     pytest.param(0.5, 1e-3, st.loads.Pendulum(mass=0.1, length=0.1), marks=pytest.mark.slow)])
@@ -316,7 +312,6 @@ def test_digital_lanes_are_the_servo_alone(gain, noise, load):
             np.testing.assert_allclose(lanes[signal][k], one[signal], rtol=1e-8, atol=1e-9, err_msg=signal)
 
 
-@pytest.mark.compiles
 def test_a_study_of_it_has_metrics_that_need_no_angle_command(wheel):
     command, asked = st.signals.step(1500.0, 1600.0, at=0.1, unit="us"), {
         "duration": 0.3, "lanes": 8, "vary": {"potentiometer.fixed_angle": "normal:2%"}}
@@ -326,7 +321,6 @@ def test_a_study_of_it_has_metrics_that_need_no_angle_command(wheel):
         st.sweep(st.PulseServo(wheel), command, metrics=["rms_error"], **asked)
 
 
-@pytest.mark.compiles
 def test_the_angle_where_it_stands_may_change_between_calls(wheel):
     sims = st.VectorSimulator(st.PulseServo(wheel), lanes=3)
     sims.reset(pulse_width=neutral_pulse(wheel))

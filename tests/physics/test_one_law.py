@@ -157,7 +157,6 @@ def test_laws_that_change_together_change_all_paths_of_all_cases_alike(runs, nam
 
 
 @pytest.mark.slow
-@pytest.mark.compiles  # for minutes, and so first
 def test_laws_that_change_together_change_compiled_kernels_alike(runs):
     """All cases have shown that the derived text follows its laws: here it is compiled, in each way that there is."""
     found, _ = runs.scaled([name for name in SCALED if name != "play"], "compiled", *COMPILED)

@@ -4,7 +4,7 @@
 frames by a clock of its own, and the servo answers. Everything is SI, at the output shaft, and right-continuous.
 Heun's rule with steps of 10 µs: drives that begin or end within a step count for the share of it that they fill.
 
-It is imported as `reference.rig` everywhere, never relatively: numba keeps compiled code under the name of its module.
+It is imported as `reference.rig` everywhere, never relatively: it is compiled as a kernel is, under that name.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from servotwin.simulation.compile import Recipe, kernels
 
 Array = NDArray[np.float64]
 
@@ -82,14 +83,12 @@ class Recording(NamedTuple):
     true_angle: Array
 
 
-@njit(cache=True)
 def _external(load: Load, q: float, w: float) -> float:
     """Torque of the load on the shaft in +q."""
     pull = load.gravity * math.sin(q - load.hanging) if load.gravity != 0.0 else 0.0
     return -load.torque - pull - load.viscous * w
 
 
-@njit(cache=True)
 def _current(s: Servo, w: float, sign: float) -> float:
     """Armature current while driven (sign ±1) or off (0); none where the voltage does not exceed what is lost."""
     if sign != 0.0:
@@ -102,7 +101,6 @@ def _current(s: Servo, w: float, sign: float) -> float:
     return 0.0 if abs(x) <= lost else (x - math.copysign(lost, x)) / R
 
 
-@njit(cache=True)
 def _motor(s: Servo, w: float, forth: float, back: float) -> float:
     """Mean motor torque of a step of which shares are driven forward and backward; beyond 1 `forth` is a duty + 10."""
     if forth > 1.5:
@@ -115,7 +113,6 @@ def _motor(s: Servo, w: float, forth: float, back: float) -> float:
     return s.K * i
 
 
-@njit(cache=True)
 def _budget(s: Servo, side: float, at_rest: bool, motor: float, external: float) -> float:
     """Dry friction that resists motion towards `side`."""
     coulomb = s.forward if side > 0.0 else s.backward
@@ -125,7 +122,6 @@ def _budget(s: Servo, side: float, at_rest: bool, motor: float, external: float)
             + abs(s.motor_share * motor - s.external_share * external))
 
 
-@njit(cache=True)
 def _rate(s: Servo, load: Load, J: float, q: float, w: float, side: float, forth: float, back: float,
           carries: bool, less: float) -> float:
     """Acceleration of motor and what it carries, sliding towards `side`; `less` of the friction is elsewhere."""
@@ -134,7 +130,6 @@ def _rate(s: Servo, load: Load, J: float, q: float, w: float, side: float, forth
     return (motor + external - s.B * w - side * (_budget(s, side, False, motor, external) - less)) / J
 
 
-@njit(cache=True)
 def _slide(s: Servo, load: Load, J: float, q: float, w: float, forth: float, back: float, carries: bool, h: float,
            less: float = 0.0):
     """Angle and speed after a step of the motor and what it carries; it sticks where friction holds it."""
@@ -156,7 +151,6 @@ def _slide(s: Servo, load: Load, J: float, q: float, w: float, forth: float, bac
     return q + 0.5 * h * (w + end), end
 
 
-@njit(cache=True)
 def _fall(load: Load, J: float, q: float, w: float, h: float, dry: float):
     """Angle and speed after a step of an output that the motor does not touch; its bearing may hold it."""
     side = math.copysign(1.0, w)
@@ -173,8 +167,7 @@ def _fall(load: Load, J: float, q: float, w: float, h: float, dry: float):
     return q + 0.5 * h * (w + end), end
 
 
-@njit(cache=True)
-def _two_bodies(s: Servo, load: Load, body, forth: float, back: float, h: float) -> None:
+def _two_bodies(s: Servo, load: Load, body: Array, forth: float, back: float, h: float) -> None:
     """Advance motor (0, 1) and output (2, 3), which touch at side `body[4]` of the play, or do not (0)."""
     J_o = s.wheel + load.inertia
     behind = s.bearing * min(s.forward, s.backward)
@@ -192,7 +185,6 @@ def _two_bodies(s: Servo, load: Load, body, forth: float, back: float, h: float)
         body[2] = body[0] - 0.5 * body[4] * s.play
 
 
-@njit(cache=True)
 def _duty(s: Servo, width: float, q: float) -> float:
     """Duty of a processor that multiplies its error."""
     if s.digital_counts > 0.0:
@@ -201,11 +193,13 @@ def _duty(s: Servo, width: float, q: float) -> float:
     return 0.0 if abs(error) <= s.digital_deadband else min(max(s.digital_gain * error, -1.0), 1.0)
 
 
-@njit(cache=True)
-def _run(s: Servo, load: Load, edges, widths, times, start: float, angle: float, h: float):
-    """Angles at sorted times; `widths` are the pulses at the edges, nan where one is lost."""
-    out = np.empty(times.size)
-    body = np.array([angle, 0.0, angle, 0.0, 0.0])
+def _run(s: Servo, load: Load, edges: Array, widths: Array, times: Array, start: float, angle: float, h: float,
+         body: Array, out: Array) -> None:
+    """Put angles at sorted times into `out`; `widths` are the pulses at the edges, nan where one is lost.
+
+    `body` has room for five numbers, all 0 at first.
+    """
+    body[0] = body[2] = angle
     carried = s.J + load.inertia + s.wheel
     wiper, frame, done = angle, 0, 0
     sign, until = 0.0, -1e300  # of the drive
@@ -259,7 +253,9 @@ def _run(s: Servo, load: Load, edges, widths, times, start: float, angle: float,
             share = max(times[done] - (end - h), 0.0) / h  # before the start it rests
             out[done] = q + share * (body[2] - q)
             done += 1
-    return out
+
+
+_COMPILED = Recipe("rig", ("reference.rig:_run",))
 
 
 def angles(servo: Servo, load: Load, edges: Array, widths: Array, times: Array, *, start: float = 0.0,
@@ -271,9 +267,11 @@ def angles(servo: Servo, load: Load, edges: Array, widths: Array, times: Array, 
     first = widths[np.isfinite(widths)][0]
     begin = (first - servo.zero) / servo.slope if angle is None else angle
     order = np.argsort(times, kind="stable")
-    found = np.empty(len(times))
-    found[order] = _run(servo, load, np.asarray(edges, float), np.asarray(widths, float), np.asarray(times)[order],
-                        start, begin, step)
+    found, ordered = np.empty(len(times)), np.empty(len(times))
+    kernels(_COMPILED)._run(
+        Servo(*map(float, servo)), Load(*map(float, load)), np.asarray(edges, float), np.asarray(widths, float),
+        np.asarray(times, float)[order], float(start), float(begin), step, np.zeros(5), ordered)
+    found[order] = ordered
     return found
 
 

@@ -11,7 +11,6 @@ JOINT = f"""<mujoco><option timestep="0.0005" gravity="0 0 0"/><worldbody><body>
   <inertial pos="0 0 0" mass="1" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/></body></worldbody></mujoco>"""
 
 
-@pytest.mark.compiles
 def test_it_moves_as_simulated_alone():
     servo = st.load_servo("hitec-hs-755hb")
     drive = st.robots.ServoDrive(mujoco.MjModel.from_xml_string(JOINT), {"j": st.AveragedServo(servo)})

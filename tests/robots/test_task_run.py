@@ -41,7 +41,6 @@ def test_the_inverse_of_the_papers_servo_is_exact_at_its_joints(joints):
     assert plain.ideal_contour.largest < 1e-6
 
 
-@pytest.mark.compiles
 @pytest.mark.parametrize("name", ["feedforward", "pid", "computed-torque", "observer"])
 def test_every_controller_is_better_than_none(joints, name):
     plain = done(joints, st.PulseServo(SERVO)).metrics

@@ -277,29 +277,6 @@ def test_bad_arrays_are_one_clear_line(servo, name):
 # --- who calls --------------------------------------------------------------------------------------------------------
 
 
-def test_a_callback_of_numba(servo):
-    """As an engine's control callback: compiled code that knows an address alone."""
-    import numba
-
-    sims, python = (st.VectorSimulator(st.PulseServo(servo), LANES) for _ in range(2))
-    entry, widths, angle = sims.c_entry(), np.linspace(1.2e-3, 1.8e-3, LANES), np.empty(LANES)
-    tick = entry.tick(1e-3, pulse_width=widths, output_angle=angle)
-    advance = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)(entry.address)
-
-    @numba.cfunc(numba.types.int64(numba.types.intp, numba.types.int64))
-    def control(address, ticks):
-        bad = 0
-        for _ in range(ticks):
-            bad += advance(address)
-        return bad
-
-    assert control.ctypes(ctypes.addressof(tick), 250) == 0
-    for _ in range(250):
-        python.advance(1e-3, pulse_width=widths)
-    same(sims, python)
-    np.testing.assert_array_equal(angle, python["output_angle"])
-
-
 PROGRAM = """
 #include <stddef.h>
 #include "servotwin.h"

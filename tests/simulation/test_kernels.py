@@ -1,8 +1,4 @@
-"""Each compiled form on its own: who takes it, and that it moves a servo as `simulate` does.
-
-Compiling is most of what the tests cost on a machine that has not done it yet. With the mark `compiles` these go first,
-and two processes that share the tests begin with different ones (tests/conftest.py).
-"""
+"""Each compiled form on its own: who takes it, and that it moves a servo as `simulate` does."""
 
 import numpy as np
 import pytest
@@ -30,7 +26,6 @@ FORMS = {
 }
 
 
-@pytest.mark.compiles
 @pytest.mark.parametrize("name", FORMS)
 def test_each_compiled_form_moves_a_servo_as_it_should(servo, monkeypatch, name):
     changes, load, dtype, tolerance = FORMS[name]

@@ -16,7 +16,6 @@ from simulation.recorded.record import differences, loaded, same_machine, tolera
 
 TEXT, PLACES, VALUES = loaded()
 EXACT = same_machine(TEXT)
-pytestmark = pytest.mark.compiles
 
 
 def cases():

@@ -28,7 +28,6 @@ CASES = {
     "with play": (PLAY | {"friction.load_friction_motor": 0.06, "friction.load_friction_external": 0.1},
                   st.loads.Inertia(1e-3), REGULATOR, st.PulseServo),
 }
-pytestmark = pytest.mark.compiles
 
 
 def sims_of(servo, name, lanes=4, **more):

@@ -76,7 +76,7 @@ def test_study_and_summary_say_what_was_done(folder, study):
     assert said["definition"]["vary"]["load.inertia"] == "uniform:0..2e-3"
     assert said["definition"]["parameters"]["motor.armature_resistance"] == pytest.approx(3.04101)
     assert said["definition"]["servotwin"] == st.__version__
-    assert set(said["versions"]) == {"python", "numpy", "scipy", "numba"}
+    assert set(said["versions"]) == {"python", "numpy", "scipy"}
     assert len(said["sha256"]) == 64
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["metrics"]["rise_time"]["quantiles"]["0.5"] == study.quantiles()["rise_time"][0.5]

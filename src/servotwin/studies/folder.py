@@ -25,7 +25,7 @@ Column = NDArray[Any]
 STUDY, SUMMARY = "study.json", "summary.json"
 _FOLLOWING = ("parameters_sha256", "chunk")  # from all the others
 _MOST_NAMED = 6  # of what differs
-_LIBRARIES = ("numpy", "scipy", "numba")
+_LIBRARIES = ("numpy", "scipy")
 
 
 class Folder:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import inspect
 import json
 import os
 import shutil
@@ -19,6 +20,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
@@ -92,7 +94,9 @@ def built(recipe: Recipe) -> Iterator[Built]:
 
 def _index(recipe: Recipe) -> str:
     """Return the name of the file that says what was printed of these sources."""
-    return f"{recipe.name}-{key_of(source_key(), repr(recipe))}.json"
+    homes = {entry.split(":")[0] for entry in recipe.entries}
+    others = [inspect.getsource(import_module(home)) for home in sorted(homes) if not home.startswith("servotwin.")]
+    return f"{recipe.name}-{key_of(source_key(), repr(recipe), *others)}.json"
 
 
 def _read(path: Path) -> dict[str, Any] | None:

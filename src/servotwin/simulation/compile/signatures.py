@@ -10,6 +10,7 @@ from types import FunctionType
 from typing import Any, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 from servotwin.models.engine import loop_tiles, tiles
 from servotwin.models.engine.buses import Buses
@@ -148,7 +149,7 @@ def _tiles_of(recipe: Recipe) -> list[tuple[str, int]]:
 
 
 def annotated(function: FunctionType) -> tuple[Kind, ...]:
-    """Return what a function of numbers, and of named tuples of numbers, is called with.
+    """Return what a function of numbers, of named tuples of numbers, and of arrays of one dimension is called with.
 
     Raises
     ------
@@ -161,12 +162,13 @@ def annotated(function: FunctionType) -> tuple[Kind, ...]:
 
 
 def _hinted(function: str, name: str, hint: Any) -> Kind:
-    numbers: dict[Any, Kind] = {float: FLOAT64, int: INT64, bool: BOOL}
+    numbers: dict[Any, Kind] = {float: FLOAT64, int: INT64, bool: BOOL, NDArray[np.float64]: _FLOATS,
+                                NDArray[np.int64]: _INDICES}
     if hint in numbers:
         return numbers[hint]
     if hasattr(hint, "_fields"):
         return _named(function, hint)
-    raise TranslationError(function, name, "an entry that takes arrays or records has a line in `signatures`")
+    raise TranslationError(function, name, "an entry that takes records, or arrays of several dimensions, has a line in `signatures`")
 
 
 @cache
