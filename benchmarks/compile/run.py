@@ -123,8 +123,8 @@ def show(parts: list[str], now: Times, before: Times, peer: str) -> None:
 
 
 def commit_of(checkout: Path) -> str:
-    """Return the commit of a checkout."""
-    return subprocess.run(["git", "-C", str(checkout), "rev-parse", "--short", "HEAD"], stdout=subprocess.PIPE,
+    """Return the last commit of a checkout that changed the package."""
+    return subprocess.run(["git", "-C", str(checkout), "log", "-1", "--format=%h", "--", "src"], stdout=subprocess.PIPE,
                           text=True, check=True).stdout.strip()
 
 
