@@ -16,11 +16,12 @@ from servotwin.simulation.compile.library import Function
 from servotwin.simulation.compile.translate import translated
 
 INNER = np.dtype((np.record, [("x", "f8"), ("row", "f8", (3,))]))
-OUTER = np.dtype((np.record, [("n", "i8"), ("flag", "?"), ("y", "f4"), ("inner", INNER), ("table", "f8", (2, 3))]))
+OUTER = np.dtype((np.record, [("n", "i8"), ("signs", "?", (4,)), ("y", "f4"), ("inner", INNER), ("table", "f8", (2, 3))]))
+PACKED = np.dtype((np.record, [("k", "i1"), ("x", "f8"), ("flag", "?"), ("y", "f4")]))
 KINDS = {
     "float": FLOAT64, "int": INT64, "bool": BOOL, "floats": Array(FLOAT64, 1), "table": Array(FLOAT64, 2),
     "cube": Array(FLOAT64, 3), "ints": Array(INT64, 1), "bytes": Array(INT8, 1), "halves": Array(INT32, 1),
-    "flags": Array(BOOL, 1), "singles": Array(FLOAT32, 1), "outers": Array(Record(OUTER), 1)}
+    "flags": Array(BOOL, 1), "singles": Array(FLOAT32, 1), "outers": Array(Record(OUTER), 1), "packed": Array(Record(PACKED), 1)}
 """What an annotation of an argument says."""
 STRICT = ("-Wall", "-Wextra", "-Werror")
 

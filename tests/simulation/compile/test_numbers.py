@@ -39,7 +39,7 @@ def down(a: float): return math.floor(a)
 def up(a: float): return math.ceil(a)
 def whole_of_whole(a: int): return (round(a), int(a), math.floor(a), math.ceil(a), float(a), bool(a))
 def truth(a: float, b: int): return (bool(a), bool(b), not a, not b, 1 if a else 0, 1 if b else 0)
-def nothing(a: float): return (-a, 0.0 * a, -0.0, a + -0.0, math.copysign(1.0, -0.0 * a))
+def nothing(a: float): return (-a, 0.0 * a, -0.0, a + -0.0, math.copysign(1.0, -a if a == a else 1.0))
 def chosen(a: int, b: float): return a if b > 0 else b
 def said(a: float): return (math.isfinite(a), math.isnan(a), math.isinf(a), math.pi * 2, math.inf, -math.inf, math.nan)
 def literals(): return (1e-310, 5e-324, 1.7976931348623157e308, 0.1, 1e22, 123456789012345678, -9223372036854775807, 1e400)

@@ -266,7 +266,7 @@ def header_words(whole: float, words: int, w: int, clamped: float, two_power: in
     word_of, float_of, floor_div, llabs = 1, 2, 3, -4
     return (int(whole), words // 2, w % 3, int(clamped), two_power, PACKED, math.floor(FLOOR), word_of, float_of, floor_div, abs(llabs))
 def own_words(n: int, a: float):
-    i_end, at_1, over_1, value_1, value_2, n_given, double_, record, table, is_in, in_order = n, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
+    i_end, at_1, over_1, value_1, value_2, n_given, double_, record, table, is_in, in_order = int(n), 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
     power_2, min_double, tuple_2, as_tuple_2, helper_2, row_1 = 12, 13, 14, 15, 16, 17
     total = 0
     double = 1

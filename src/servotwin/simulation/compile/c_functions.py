@@ -10,8 +10,8 @@ from servotwin.simulation.compile.kinds import FLOAT64, INT8, INT32, INT64, Arra
 class Primitive(NamedTuple):
     """A function of Python that C has an expression for.
 
-    `text` gets the arguments, `n` is their number less one; `{s}` is "f" where they have 32 bits; `result` is None where it is that of the
-    arguments; it `writes` where it changes memory.
+    `text` gets the arguments, `n` is their number less one; `{s}` is "f" where they have 32 bits; `result` is None
+    where it is that of the arguments; it `writes` where it changes memory.
     """
 
     text: str
@@ -35,6 +35,8 @@ MATH = {name: name for name in (
     "sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "tanh", "atan", "atan2", "atanh", "asin", "acos",
     "sinh", "cosh", "asinh", "copysign", "hypot", "fmod", "pow")}
 """Functions of `math` that C's library has under the same name, for 32 bits with an f behind it."""
+OF_TWO = ("atan2", "copysign", "hypot", "fmod", "pow")
+"""Those of them that take two numbers."""
 ROUNDED = {"floor": "FLOOR", "ceil": "CEIL"}
 """Functions of `math` that return a whole number."""
 TRUTHS = {"isfinite": "isfinite", "isnan": "isnan", "isinf": "isinf"}

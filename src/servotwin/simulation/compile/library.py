@@ -80,7 +80,7 @@ class Function:
             return returned if self.result else None
         if self.result == "b":
             return returned != 0
-        return _read(iter(self.result), iter(words[self.size:]))
+        return _read(self.result, words[self.size:])
 
 
 def _read(result: str, words: NDArray[np.int64]) -> Any:

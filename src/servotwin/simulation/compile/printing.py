@@ -65,7 +65,7 @@ class Printer:
         """Return the name of a function in C, printing it where that has not been done."""
         if function not in self._names:
             text = _Text(self, function)
-            self._names[function] = self.types.fresh(function.node.name)
+            self._names[function] = self.types.fresh(identifier(function.node.name))
             self.functions.append(text.whole(self._names[function]))
         return self._names[function]
 
@@ -212,10 +212,11 @@ class _Text:
             lines.append(f"const {self._types.of(each)} {over}_all[] = {{{', '.join(parts)}}};")
             value, count = f"{over}_all[{counter}]", str(len(parts))
         else:
-            assert isinstance(kind, Array)  # noqa: S101 - `Specialised` has seen to it
-            lines = [f"const {self._types.of(kind)} {over} = {self.of(node.iter)};"]
-            each = kind.element
-            value, count = f"{'&' * isinstance(each, Record)}{over}.p[{counter}]", f"{over}.n[0]"
+            assert isinstance(kind, (Array, Fixed))  # noqa: S101 - `Specialised` has seen to it
+            array = kind if isinstance(kind, Array) else Array(kind.element, 1)
+            lines = [f"const {self._types.of(array)} {over} = {self._as(node.iter, array)};"]
+            value, each = self._item(over, array, [counter])
+            count = f"{over}.n[0]"
         store = [_INDENT * 2 + line for line in self._stored(node.target, value, each)]
         return ["{", *(_INDENT + line for line in lines),
                 f"{_INDENT}for (int64_t {counter} = 0; {counter} < {count}; {counter}++) {{", *store,
@@ -224,6 +225,8 @@ class _Text:
     def _assign(self, node: ast.Assign) -> list[str]:
         if list_length(node.value, self._own.space):
             return self._filled(node)
+        for target in node.targets:
+            self._settled_targets(target)
         if len(node.targets) == 1:
             (target,) = node.targets
             if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
@@ -259,6 +262,7 @@ class _Text:
 
     def _at_once(self, targets: ast.Tuple, values: ast.Tuple) -> list[str]:
         """Return assignments of several values, which are all worked out before the first is stored."""
+        self._settled_targets(targets)
         stored: set[str] = set()
         apart = True
         for target, value in zip(targets.elts, values.elts, strict=True):
@@ -283,6 +287,10 @@ class _Text:
                 lines += self._stored(target, name, kind)
         return lines
 
+    def _settled_targets(self, target: ast.expr) -> None:
+        if self._writes(target):
+            raise self._own.refused(target, "a call that changes records or arrays gets a statement of its own")
+
     @staticmethod
     def _constant(kind: Kind) -> str:
         return "" if isinstance(kind, (Record, Fixed)) else "const "
@@ -305,24 +313,29 @@ class _Text:
             return self._all(target, text, kind)
         if isinstance(there, Record):
             return [f"*{bracketed(self.of(target))} = *{bracketed(text)};"]
-        if isinstance(there, Fixed):
+        if isinstance(there, Fixed) and kind == there:
             return [f"memcpy({self.of(target)}, {text}, {there.count} * sizeof({self._types.element(there.element)}));"]
-        if isinstance(there, Array):
+        if isinstance(there, (Array, Fixed)):
             return self._all(target, text, kind)
         return [f"{self.of(target)} = {self._types.converted(text, kind, there)};"]
 
     def _all(self, target: ast.expr, text: str, kind: Kind | None) -> list[str]:
         """Return the loop that gives all elements of an array a value, or those of another array."""
-        there, name, counter = self._kind(target), self._fresh("row"), self._fresh("at")
-        assert isinstance(there, Array)  # noqa: S101
-        if there.dimensions != 1:
+        own, name, counter = self._kind(target), self._fresh("row"), self._fresh("at")
+        assert isinstance(own, (Array, Fixed))  # noqa: S101
+        if dimensions(own) != 1:
             raise self._own.refused(target, "a row is stored at once, or a number")
-        lines = [f"const {self._types.of(there)} {name} = {self.of(target)};"]
+        there = Array(own.element, 1)
+        lines = [f"const {self._types.of(there)} {name} = {self._types.converted(self.of(target), own, there)};"]
         if isinstance(kind, Scalar):
             value = self._fresh("value")
             lines.append(f"const {self._types.of(kind)} {value} = {text};")
             one = value
         else:
+            if isinstance(kind, Array) and kind.element == there.element:  # it may be part of the same array
+                size = f"(size_t){name}.n[0] * sizeof *{name}.p"
+                return ["{", *(_INDENT + line for line in lines),
+                        f"{_INDENT}memmove({name}.p, {member(text, 'p')}, {size});", "}"]
             other = self._fresh("row")
             lines.append(f"const {self._types.of(there)} {other} = {self._types.converted(text, kind, there)};")
             kind, one = there.element, f"{other}.p[{counter}]"
@@ -345,6 +358,8 @@ class _Text:
     def _augmented(self, node: ast.AugAssign) -> list[str]:
         target, kind = node.target, self._kind(node.target)
         assert isinstance(kind, Scalar)  # noqa: S101
+        if self._writes(target) or (self._writes(node.value) and not isinstance(target, ast.Name)):
+            raise self._own.refused(node, "a call that changes records or arrays gets a statement of its own")
         if isinstance(target, ast.Name):
             kind = self._own.local[target.id]
             if target.id not in self._variables.read:
@@ -375,7 +390,7 @@ class _Text:
 
     def _fresh(self, name: str) -> str:
         self._count += 1
-        return f"{name}_{self._count}"
+        return f"{name.rstrip('_')}_{self._count}"
 
     def _truth(self, node: ast.expr) -> str:
         """Return an expression as a condition."""
@@ -438,7 +453,8 @@ class _Text:
         lengths = self._lengths(text, owner)
         texts = []
         for place, each in zip(places, lengths, strict=False):
-            known = constant_int(place, {})
+            known = constant_int(place, {} if isinstance(place, ast.Name) and place.id in self._own.local
+                                 else self._own.space)
             texts.append(f"{each} - {-known}" if known is not None and known < 0 else self.of(place))
         return self._item(text, owner, texts)[0]
 
@@ -482,29 +498,44 @@ class _Text:
 
     def _binary(self, node: ast.BinOp) -> str:
         self._in_order([node.left, node.right], node)
-        left, right, kind = self._kind(node.left), self._kind(node.right), self._kind(node)
+        kind = self._kind(node)
         if isinstance(kind, Tuple):
             return self._joined(node, kind)
+        left, right = self._kind(node.left), self._kind(node.right)
         if isinstance(node.op, ast.Pow):
             return self._power(node, kind)
         if isinstance(node.op, (ast.FloorDiv, ast.Mod)):
             return self._divided(node, kind)
         a, b = self._as(node.left, kind), self._as(node.right, kind)
+        known = constant_int(node.right, {})
+        if isinstance(node.op, (ast.LShift, ast.RShift)) and (known is None or not 0 <= known < 64):
+            return f"moved_{'left' if isinstance(node.op, ast.LShift) else 'right'}({a}, {b})"
         if isinstance(node.op, ast.LShift):
             return f"(int64_t)((uint64_t){bracketed(a)} << {bracketed(b)})"
         if isinstance(node.op, ast.RShift):
             return f"((int64_t){bracketed(a)} >> {bracketed(b)})"
-        if kind == INT64 and isinstance(node.left, ast.Constant) and isinstance(node.right, ast.Constant):
+        if kind == INT64 and self._is_short(node.left) and self._is_short(node.right):
             a = f"(int64_t){bracketed(a)}"
         if kind == BOOL and left == right == BOOL:
             return f"(({a}) {_ARITHMETIC[type(node.op)]} ({b}))"
         return f"({a} {_ARITHMETIC[type(node.op)]} {b})"
 
+    def _is_short(self, node: ast.expr) -> bool:
+        """Tell whether C would calculate with fewer bits than 64: with what constants alone make."""
+        if isinstance(node, ast.UnaryOp):
+            return self._is_short(node.operand)
+        if isinstance(node, ast.IfExp):
+            return self._is_short(node.body) and self._is_short(node.orelse)
+        if isinstance(node, ast.Call):
+            return isinstance(node.func, ast.Name) and node.func.id == "len"
+        return isinstance(node, ast.Constant) or (isinstance(node, ast.Name) and node.id not in self._own.local)
+
     def _joined(self, node: ast.BinOp, kind: Tuple) -> str:
+        self._once(node.left, node.right)
         left = self._kind(node.left)
         assert isinstance(left, Tuple)  # noqa: S101
         parts = [self._types.part(self.of(node.left), left, k) for k in range(len(left.elements))]
-        right = self._kind(node.right)
+        right = self._own.kinds.get(node.right)
         if isinstance(right, Tuple):
             parts += [self._types.part(self.of(node.right), right, k) for k in range(len(right.elements))]
         else:
@@ -518,7 +549,7 @@ class _Text:
             return f"{'floor_div' if down else 'floor_mod'}({a}, {b})"
         if kind == FLOAT32:
             raise self._own.refused(node, "a float32 is divided and rounded in two steps")
-        return f"floor({a} / {b})" if down else f"mod_float({a}, {b})"
+        return f"{'floor_div_float' if down else 'mod_float'}({a}, {b})"
 
     def _power(self, node: ast.BinOp, kind: Kind | None) -> str:
         exponent = node.right.value if isinstance(node.right, ast.Constant) else None
@@ -529,6 +560,8 @@ class _Text:
                 return f"static inline {kind.c} {name}({kind.c} x) {{ return {body}; }}"
 
             return f"{self._types.helper(('power', kind, exponent), f'power_{exponent}', make)}({self._as(node.left, kind)})"
+        if kind == INT64:
+            return f"whole_power({self._as(node.left, kind)}, {exponent})"
         return f"pow{'f' * (kind == FLOAT32)}({self._as(node.left, kind)}, {self._as(node.right, kind)})"
 
     def _unary(self, node: ast.UnaryOp) -> str:
@@ -547,6 +580,9 @@ class _Text:
     def _compare(self, node: ast.Compare) -> str:
         sides = [node.left, *node.comparators]
         self._in_order(sides, node)
+        if len(node.ops) == 2 and (self._writes(node.comparators[1]) or any(
+                isinstance(part, ast.Subscript) for part in ast.walk(node.comparators[1]))):
+            raise self._own.refused(node, "a chain that ends with an index or a call is written with `and`")
         if len(node.ops) == 1:
             return f"({self._one_comparison(node.ops[0], node.left, node.comparators[0])})"
         if len(node.ops) != 2 or not all(type(op) in _ORDER for op in node.ops):
@@ -585,7 +621,8 @@ class _Text:
         def make(name: str) -> str:
             parts = [self._types.equal("x", kind, self._types.part("y", other, k), element)
                      for k, element in enumerate(other.elements)]
-            return f"static inline bool {name}({type_} x, {options} y) {{ return {' || '.join(parts)}; }}"
+            condition = " || ".join(parts) or "(void)x, (void)y, false"
+            return f"static inline bool {name}({type_} x, {options} y) {{ return {condition}; }}"
 
         return f"{self._types.helper(('in', kind, other), 'is_in', make)}({self.of(left)}, {self.of(right)})"
 
@@ -651,6 +688,8 @@ class _Text:
         text = ", ".join(self._as(argument, kind) for argument in node.args)
         single = "f" * (kind == FLOAT32)
         if name in c_functions.ROUNDED:
+            if kinds[0] not in (FLOAT64, FLOAT32):
+                return self._as(node.args[0], INT64)
             return f"whole({c_functions.ROUNDED[name]}{single}({text}))"
         if name in c_functions.TRUTHS:
             return f"({c_functions.TRUTHS[name]}({text}) != 0)"
@@ -665,8 +704,10 @@ class _Text:
             return self._as(argument, own)
         if name == "bool":
             return self._types.converted(self.of(argument), kind, BOOL)
+        if name in ("int", "round") and kind not in (FLOAT64, FLOAT32):
+            return self._as(argument, INT64)
         if name == "int":
-            return f"whole({self.of(argument)})" if kind in (FLOAT64, FLOAT32) else self._as(argument, INT64)
+            return f"whole({self.of(argument)})"
         if name == "round":
             return f"whole(NEAREST({self._as(argument, FLOAT64)}))"
         if name == "len":
@@ -682,6 +723,7 @@ class _Text:
         """Return the least or largest of some values, as Python finds it: the first one where others are no better."""
         assert isinstance(own, Scalar)  # noqa: S101
         if len(node.args) == 1 and isinstance(first, Tuple):
+            self._once(node.args[0])
             text = self.of(node.args[0])
             parts = [self._types.converted(self._types.part(text, first, k), kind, own)
                      for k, kind in enumerate(first.elements)]
@@ -700,15 +742,31 @@ class _Text:
 
     def _in_order(self, parts: Sequence[ast.expr], node: ast.expr) -> None:
         """Refuse what Python works out from left to right, and C in any order, where that makes a difference."""
-        writing = [part for part in parts if any(n in self._own.calls and self._own.calls[n].writes
-                                                 for n in ast.walk(part) if isinstance(n, ast.Call))]
-        if writing and any(part is not writing[0] and not _is_settled(part) for part in parts):
+        writing = [part for part in parts if self._writes(part)]
+        if writing and any(part is not writing[0] and not self._is_settled(part) for part in parts):
             raise self._own.refused(node, "a call that changes records or arrays gets a statement of its own")
 
+    def _once(self, *parts: ast.expr) -> None:
+        """Refuse what would be called more than once."""
+        if any(map(self._writes, parts)):
+            raise self._own.refused(parts[0], "a call that changes records or arrays gets a statement of its own")
 
-def _is_settled(node: ast.expr) -> bool:
-    """Tell whether no call could change a value."""
-    return not any(isinstance(part, (ast.Call, ast.Subscript)) for part in ast.walk(node))
+    def _writes(self, node: ast.expr) -> bool:
+        """Tell whether an expression calls what changes records or arrays."""
+        for part in ast.walk(node):
+            if isinstance(part, ast.Call) and part in self._own.calls and self._own.calls[part].writes:
+                return True
+            if isinstance(part, ast.Call) and isinstance(part.func, ast.Name):
+                primitive = c_functions.PRIMITIVES.get(self._own.module.derived.primitives.get(part.func.id, ""))
+                if primitive is not None and primitive.writes:
+                    return True
+        return False
+
+    def _is_settled(self, node: ast.expr) -> bool:
+        """Tell whether no call could change a value."""
+        return not any(isinstance(part, (ast.Call, ast.Subscript)) or (
+            isinstance(part, ast.Attribute) and isinstance(self._own.kinds.get(part.value), Record)
+            and isinstance(self._own.kinds.get(part), Scalar)) for part in ast.walk(node))
 
 
 def _calls(node: ast.expr) -> bool:
