@@ -213,6 +213,8 @@ class Types:
         return f"static const {self.of(kind)} {name} = {self._initial(kind, value)};"
 
     def _initial(self, kind: Kind | None, value: Any) -> str:
+        if isinstance(kind, Array):
+            return self.literal(value)[1:-1].removeprefix(f"({self.of(kind)})")  # what is static needs no type once more
         if not isinstance(kind, Tuple):
             return self.literal(value)
         inner = ", ".join(self._initial(each, x) for each, x in zip(kind.elements, value, strict=True)) or "0"

@@ -49,9 +49,9 @@ class Module:
     def specialised(self, name: str, arguments: tuple[Kind, ...]) -> Specialised:
         """Return a function with the kinds of all that is in it."""
         key = (name, arguments)
+        if name in self._open:
+            raise NotTranslatable(name, f"{name}(...)", "a kernel does not call itself: a loop takes its place")
         if key not in self.known:
-            if name in self._open:
-                raise NotTranslatable(name, f"{name}(...)", "a kernel does not call itself: a loop takes its place")
             self._open.append(name)
             self.known[key] = Specialised(self, self.derived.functions[name], arguments)
             self.known[key].settle()

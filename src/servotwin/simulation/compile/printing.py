@@ -382,6 +382,10 @@ class _Text:
             return self._own.local[node.id]
         return self._own.kinds[node]
 
+    def _known(self, node: ast.expr) -> int | None:
+        """Return a whole number that is a constant."""
+        return constant_int(node, {} if isinstance(node, ast.Name) and node.id in self._own.local else self._own.space)
+
     def _as(self, node: ast.expr, kind: Kind | None) -> str:
         """Return an expression as a value of a kind."""
         if kind in (FLOAT64, FLOAT32) and isinstance(node, ast.Constant) and self._kind(node) == INT64:
@@ -442,8 +446,7 @@ class _Text:
         if isinstance(index, ast.Slice):
             return self._slice(text, owner, index)
         if isinstance(owner, Tuple):
-            place = constant_int(index, {} if isinstance(index, ast.Name) and index.id in self._own.local
-                                 else self._own.space)
+            place = self._known(index)
             if place is not None:
                 return self._types.part(text, owner, place % len(owner.elements))
             text = self._types.converted(text, owner, Tuple(owner.elements))
@@ -453,8 +456,7 @@ class _Text:
         lengths = self._lengths(text, owner)
         texts = []
         for place, each in zip(places, lengths, strict=False):
-            known = constant_int(place, {} if isinstance(place, ast.Name) and place.id in self._own.local
-                                 else self._own.space)
+            known = self._known(place)
             texts.append(f"{each} - {-known}" if known is not None and known < 0 else self.of(place))
         return self._item(text, owner, texts)[0]
 
@@ -507,7 +509,7 @@ class _Text:
         if isinstance(node.op, (ast.FloorDiv, ast.Mod)):
             return self._divided(node, kind)
         a, b = self._as(node.left, kind), self._as(node.right, kind)
-        known = constant_int(node.right, {})
+        known = self._known(node.right)
         if isinstance(node.op, (ast.LShift, ast.RShift)) and (known is None or not 0 <= known < 64):
             return f"moved_{'left' if isinstance(node.op, ast.LShift) else 'right'}({a}, {b})"
         if isinstance(node.op, ast.LShift):
@@ -580,8 +582,7 @@ class _Text:
     def _compare(self, node: ast.Compare) -> str:
         sides = [node.left, *node.comparators]
         self._in_order(sides, node)
-        if len(node.ops) == 2 and (self._writes(node.comparators[1]) or any(
-                isinstance(part, ast.Subscript) for part in ast.walk(node.comparators[1]))):
+        if len(node.ops) == 2 and (self._writes(sides[2]) or _guarded(sides)):
             raise self._own.refused(node, "a chain that ends with an index or a call is written with `and`")
         if len(node.ops) == 1:
             return f"({self._one_comparison(node.ops[0], node.left, node.comparators[0])})"
@@ -767,6 +768,14 @@ class _Text:
         return not any(isinstance(part, (ast.Call, ast.Subscript)) or (
             isinstance(part, ast.Attribute) and isinstance(self._own.kinds.get(part.value), Record)
             and isinstance(self._own.kinds.get(part), Scalar)) for part in ast.walk(node))
+
+
+def _guarded(sides: Sequence[ast.expr]) -> bool:
+    """Tell whether the first comparison says if there is what the second one asks for: C works out both."""
+    inside = {part for side in sides for index in ast.walk(side) if isinstance(index, ast.Subscript)
+              for part in ast.walk(index.slice) if isinstance(part, ast.Name)}
+    compared = {part.id for side in sides[:2] for part in ast.walk(side) if isinstance(part, ast.Name) and part not in inside}
+    return any(part.id in compared for part in ast.walk(sides[2]) if isinstance(part, ast.Name) and part in inside)
 
 
 def _calls(node: ast.expr) -> bool:
