@@ -446,9 +446,9 @@ class _Text:
         if isinstance(index, ast.Slice):
             return self._slice(text, owner, index)
         if isinstance(owner, Tuple):
-            place = self._known(index)
-            if place is not None:
-                return self._types.part(text, owner, place % len(owner.elements))
+            known = self._known(index)
+            if known is not None:
+                return self._types.part(text, owner, known % len(owner.elements))
             text = self._types.converted(text, owner, Tuple(owner.elements))
             return f"{member(text, 'v')}[{self.of(index)}]"
         assert isinstance(owner, (Array, Fixed))  # noqa: S101
