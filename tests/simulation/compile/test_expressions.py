@@ -1,6 +1,10 @@
-"""Random expressions: C works out what Python works out, bit by bit."""
+"""Random expressions: C works out what Python works out, bit by bit.
+
+What chooses between a float and a whole number is left out: in C it is a float, and 0.0 has a sign, which 0 has not.
+"""
 
 import ast
+import math
 
 import hypothesis.strategies as st
 import pytest
@@ -36,8 +40,8 @@ def grown(floats, ints, bools):
     real = st.one_of(
         st.builds("({} {} {})".format, floats, st.sampled_from("+-*/") | st.sampled_from(["//", "%"]), numbers),
         st.builds("({} / {})".format, whole, whole), st.builds("(-{})".format, floats), st.builds("abs({})".format, floats),
-        st.builds("{}({}, {}, {})".format, st.sampled_from(["min", "max"]), floats, numbers, floats),
-        st.builds("({} if {} else {})".format, floats, bools, numbers), st.builds("float({})".format, numbers),
+        st.builds("{}({}, {}, {})".format, st.sampled_from(["min", "max"]), floats, floats, floats),
+        st.builds("({} if {} else {})".format, floats, bools, floats), st.builds("float({})".format, numbers),
         st.builds("math.copysign({}, {})".format, floats, floats), st.builds("(({}, {})[{} & 1])".format, floats, floats, ints))
     integer = st.one_of(
         st.builds("({} {} {})".format, whole, st.sampled_from(["+", "-", "*", "//", "%"]), ints),
@@ -82,8 +86,6 @@ def seen(value):
 def carefully(expression, values):
     """Return the value in Python; an error where a whole number becomes too large for any comparison with floats."""
     tree = ast.fix_missing_locations(Sizes().visit(ast.parse(expression, mode="eval")))
-    import math
-
     return eval(compile(tree, "expression", "eval"), {"math": math, "_seen": seen}, dict(values))
 
 

@@ -37,7 +37,7 @@ _TAKEN = frozenset(
     "floor_div_float whole_power moved_left moved_right whole clamped words numbers rows bytes_at halves copied "
     "activate active active_word float_of word_of two_power two_powerf binary_exponent binary_exponentf isfinite isnan "
     "isinf floor fabs fabsf llabs memcpy memmove".split()) | {name + end for name in MATH for end in ("", "f")}
-_OURS = re.compile(r"\w*_(\d+|end|given|)|(as|equal|slice_of|array|min|max)_\w+|in_order|is_in|record|table")
+_OURS = re.compile(r"\w+_(\d+|end|given|)|(as|equal|slice_of|array|min|max)_\w+|in_order|is_in|record|table")
 """Names that are made here: of types, tables, helpers, and of what a statement needs beside its variables."""
 _NAMED = ((FLOAT64, 1), (FLOAT64, 2), (INT64, 1), (INT8, 1), (INT32, 1))  # arrays that the header knows
 
