@@ -16,12 +16,14 @@ from servotwin.simulation.compile.library import Function
 from servotwin.simulation.compile.translate import translated
 
 INNER = np.dtype((np.record, [("x", "f8"), ("row", "f8", (3,))]))
-OUTER = np.dtype((np.record, [("n", "i8"), ("signs", "?", (4,)), ("y", "f4"), ("inner", INNER), ("table", "f8", (2, 3))]))
+OUTER = np.dtype((np.record, [("n", "i8"), ("signs", "?", (4,)), ("y", "f4"), ("inner", INNER), ("table", "f8", (2,
+    3))]))
 PACKED = np.dtype((np.record, [("k", "i1"), ("x", "f8"), ("flag", "?"), ("y", "f4")]))
 KINDS = {
     "float": FLOAT64, "int": INT64, "bool": BOOL, "floats": Array(FLOAT64, 1), "table": Array(FLOAT64, 2),
     "cube": Array(FLOAT64, 3), "ints": Array(INT64, 1), "bytes": Array(INT8, 1), "halves": Array(INT32, 1),
-    "flags": Array(BOOL, 1), "singles": Array(FLOAT32, 1), "outers": Array(Record(OUTER), 1), "packed": Array(Record(PACKED), 1)}
+    "flags": Array(BOOL, 1), "singles": Array(FLOAT32, 1), "outers": Array(Record(OUTER), 1),
+        "packed": Array(Record(PACKED), 1)}
 """What an annotation of an argument says."""
 STRICT = ("-Wall", "-Wextra", "-Werror")
 
@@ -61,7 +63,8 @@ class Both:
         source, library = folder / "by_hand.c", folder / "by_hand.so"
         source.write_text(translation.text)
         command = compilers()[0].library_command(source, library, own.recipe.vector, "x86-64-v2")
-        done = subprocess.run([*(part for part in command if part != "-w" or not strict), *STRICT[:3 * strict]], check=False, text=True,
+        done = subprocess.run([*(part for part in command if part != "-w" or not strict), *STRICT[:3 * strict]],
+            check=False, text=True,
                               capture_output=True, env=compilers()[0].environment())
         assert done.returncode == 0, done.stderr
         self._library = ctypes.CDLL(str(library))

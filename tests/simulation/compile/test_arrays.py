@@ -11,7 +11,8 @@ LAST, SECOND = -1, -2
 def sizes(x: floats, t: table, c: cube):
     m, n = t.shape
     return (len(x), len(t), len(c), x.size, t.size, c.size, m, n, c.shape[2], t.shape, len(c[0]), c[0].shape)
-def at_the_end(x: floats, t: table): return (x[-1], x[-2], t[-1, 0], t[0, -2], t[-1][-1], x[LAST], t[SECOND, LAST], x[len(x) - 1])
+def at_the_end(x: floats, t: table): return (x[-1], x[-2], t[-1, 0], t[0, -2], t[-1][-1], x[LAST], t[SECOND, LAST],
+    x[len(x) - 1])
 def elements(x: floats, t: table, c: cube, i: int):
     row = t[i]
     plane = c[i]
@@ -80,9 +81,11 @@ def shifted(x: floats, y: floats):
     y[:-1] = y[1:]
     x[0:2] = y[1:3]
 def of_32_bits(s: singles):
-    return (s[0] * s[1] + s[2], -s[0] / s[1], min(s[0], s[1]), abs(s[1]), s[0] < s[1], round(s[1]), int(s[1]), float(s[0]) / 3)
+    return (s[0] * s[1] + s[2], -s[0] / s[1], min(s[0], s[1]), abs(s[1]), s[0] < s[1], round(s[1]), int(s[1]),
+        float(s[0]) / 3)
 def of_small_whole(b: bytes, h: halves):
-    return (int(b[0]) * int(b[1]) * 1000000, int(h[0]) ** 2, -b[0], ~h[0], b[0] // 7, h[1] % 5, abs(b[0]), int(b[0]) << 40, max(b[0], h[0]))
+    return (int(b[0]) * int(b[1]) * 1000000, int(h[0]) ** 2, -b[0], ~h[0], b[0] // 7, h[1] % 5, abs(b[0]),
+        int(b[0]) << 40, max(b[0], h[0]))
 def filled(n: int):
     square = [0.0] * 5
     whole = [n] * 3
@@ -113,7 +116,8 @@ def through_calls(x: floats, n: ints):
 def records(o: outers, k: int):
     one = o[k]
     row = one.inner.row
-    return (one.n, one.signs[2], one.y, one.inner.x, one.inner.row[1], row[-1], one.table[1, 2], one.table[0][1], o[-1].n, len(o), len(row),
+    return (one.n, one.signs[2], one.y, one.inner.x, one.inner.row[1], row[-1], one.table[1, 2], one.table[0][1],
+        o[-1].n, len(o), len(row),
             len(o[1:]), one.table.shape)
 def records_written(o: outers, k: int):
     one = o[k]
@@ -172,7 +176,8 @@ CASES = {
     "written": [(VALUES, TABLE, WHOLE, SMALL, HALVES, FLAGS, SINGLES, k) for k in (0, 2)],
     "shifted": [(VALUES, WHOLE * 1.5)], "of_32_bits": [(SINGLES,)], "of_small_whole": [(SMALL, HALVES)],
     "filled": [(0,), (3,)], "through_calls": [(VALUES, WHOLE)], "records": [(OUTERS, k) for k in range(3)],
-    "records_written": [(OUTERS, 1), (OUTERS, 2)], "record_copied": [(OUTERS,)], "of_odd_size": [(ODD,)], "swapped_fields": [(OUTERS,)],
+    "records_written": [(OUTERS, 1), (OUTERS, 2)], "record_copied": [(OUTERS,)], "of_odd_size": [(ODD,)],
+        "swapped_fields": [(OUTERS,)],
     "in_their_order": [(OUTERS,)]}
 
 

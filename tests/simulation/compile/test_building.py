@@ -44,7 +44,7 @@ def ended(process):
     assert process.returncode == 0, errors
     number, way = output.split()
     assert float(number) == pytest.approx(WANTED, rel=1e-14)
-    return way, [line for line in errors.splitlines() if line and not line.startswith("  ")]  # the line that warns apart
+    return way, [line for line in errors.splitlines() if line and not line.startswith("  ")]  # of a warning, its text
 
 
 def run(folder, **more):
@@ -102,9 +102,11 @@ BAD = {
     "fails without a word": (("exit 3",), "it ended with 3"),
     "makes nothing": (("exit 0",), "it made no library"),
     "is killed half way": (('for a; do last=$o; o=$a; done; kill -9 $$',), "it ended with -9"),
-    "writes rubbish": (('while [ "$1" != -o ]; do shift; done; echo rubbish > "$2"',), "file too short|invalid ELF header"),
+    "writes rubbish": (('while [ "$1" != -o ]; do shift; done; echo rubbish > "$2"',),
+        "file too short|invalid ELF header"),
     "hangs": (("sleep 60 & wait",), "it took more than 0.5 s"),
-    "writes a program": (('while [ "$1" != -o ]; do shift; done; echo "int main(void) { return 0; }" > m.c; cc m.c -o "$2"',),
+    "writes a program": (('while [ "$1" != -o ]; do shift; done', 'echo "int main(void) { return 0; }" > m.c',
+                          'cc m.c -o "$2"'),
                          "cannot dynamically load|undefined symbol|position-independent"),
 }
 
@@ -128,7 +130,7 @@ def test_a_compiler_of_no_use_is_said_and_kernels_run_in_plain_python(name, tmp_
 def test_without_any_compiler(tmp_path, monkeypatch):
     hiding = SCRIPT.replace("import sys\n", "import sys\nimport importlib.util\n"
                             "find = importlib.util.find_spec\n"
-                            "importlib.util.find_spec = lambda name, *a: None if name == 'ziglang' else find(name, *a)\n")
+                            "importlib.util.find_spec = lambda name: None if name == 'ziglang' else find(name)\n")
     monkeypatch.setitem(globals(), "SCRIPT", hiding)
     way, errors = run(tmp_path / "cache", SERVOTWIN_CC="", PATH=str(tmp_path))
     assert way == "plain"
@@ -191,7 +193,8 @@ def test_a_library_without_the_kernel_is_made_anew_for_the_next_process(folder):
     assert run(folder) == ("compiled", [])
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"text": 5, "functions": []}', '{"text": "x", "functions": 7}',
+@pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"text": 5, "functions": []}',
+    '{"text": "x", "functions": 7}',
                                   '{"text": "x", "functions": [["a"]]}', '{"name": "of another program"}', "\0\0"])
 def test_an_index_of_no_use_is_written_anew(folder, text):
     index = only(folder, "*.json")
@@ -327,12 +330,20 @@ def test_an_edited_docstring_compiles_nothing_and_edited_code_does(tmp_path):
 # --- threads ----------------------------------------------------------------------------------------------------------
 
 
+COUNTING = """
+def count(n: int):
+    state = 1
+    for k in range(n):
+        state = (state * 1103515245 + k) & 2147483647
+    return state
+"""
+
+
 def test_threads_run_kernels_at_the_same_time(tmp_path):
     """While a kernel counts, Python goes on in another thread."""
     from simulation.compile.by_hand import Both
 
-    both = Both("def count(n: int):\n    state = 1\n    for k in range(n):\n        state = (state * 1103515245 + k) & 2147483647\n"
-                "    return state", tmp_path)
+    both = Both(COUNTING, tmp_path)
     span, moments = [], []
 
     def work():

@@ -15,7 +15,8 @@ from simulation.compile.by_hand import Both, same
 TREES = 40  # in a text, which is compiled at once
 BIG = 2**52  # whole numbers beyond it are not told apart as floats
 NUMBERS = {
-    "float": st.floats(allow_subnormal=True) | st.sampled_from([0.0, -0.0, 0.5, 1.5, -2.5, 1e300, float("inf"), float("nan")]),
+    "float": st.floats(allow_subnormal=True) | st.sampled_from([0.0, -0.0, 0.5, 1.5, -2.5, 1e300, float("inf"),
+        float("nan")]),
     "int": st.integers(-100, 100) | st.integers(-2**40, 2**40) | st.sampled_from([0, 1, -1, 63, 64, 2**31 - 1, -2**31]),
     "bool": st.booleans()}
 ARGUMENTS = (("a", "float"), ("b", "float"), ("m", "int"), ("n", "int"), ("c", "bool"), ("d", "bool"))
@@ -23,7 +24,9 @@ ARGUMENTS = (("a", "float"), ("b", "float"), ("m", "int"), ("n", "int"), ("c", "
 
 def literal(value):
     text = repr(value)
-    return {"inf": "math.inf", "-inf": "(-math.inf)", "nan": "math.nan"}.get(text, f"({text})" if text[0] == "-" else text)
+    if text in ("inf", "-inf", "nan"):
+        return f"(-math.{text[1:]})" if text[0] == "-" else f"math.{text}"
+    return f"({text})" if text[0] == "-" else text
 
 
 def leaves(kind):
@@ -39,15 +42,18 @@ def grown(floats, ints, bools):
     order = st.sampled_from(["<", "<=", ">", ">=", "==", "!="])
     real = st.one_of(
         st.builds("({} {} {})".format, floats, st.sampled_from("+-*/") | st.sampled_from(["//", "%"]), numbers),
-        st.builds("({} / {})".format, whole, whole), st.builds("(-{})".format, floats), st.builds("abs({})".format, floats),
+        st.builds("({} / {})".format, whole, whole), st.builds("(-{})".format, floats), st.builds("abs({})".format,
+            floats),
         st.builds("{}({}, {}, {})".format, st.sampled_from(["min", "max"]), floats, floats, floats),
         st.builds("({} if {} else {})".format, floats, bools, floats), st.builds("float({})".format, numbers),
-        st.builds("math.copysign({}, {})".format, floats, floats), st.builds("(({}, {})[{} & 1])".format, floats, floats, ints))
+        st.builds("math.copysign({}, {})".format, floats, floats), st.builds("(({}, {})[{} & 1])".format, floats,
+            floats, ints))
     integer = st.one_of(
         st.builds("({} {} {})".format, whole, st.sampled_from(["+", "-", "*", "//", "%"]), ints),
         st.builds("({} {} {})".format, ints, st.sampled_from("&|^"), whole), st.builds("(~{})".format, whole),
         st.builds("({} {} {})".format, ints, st.sampled_from(["<<", ">>"]), small), st.builds("(-{})".format, whole),
-        st.builds("({} >> ({} & 127))".format, ints, ints), st.builds("({} ** {})".format, whole, st.sampled_from("0123456")),
+        st.builds("({} >> ({} & 127))".format, ints, ints), st.builds("({} ** {})".format, whole,
+            st.sampled_from("0123456")),
         st.builds("abs({})".format, ints), st.builds("{}({}, {})".format, st.sampled_from(["min", "max"]), ints, whole),
         st.builds("({} if {} else {})".format, ints, bools, whole),
         st.builds("{}({})".format, st.sampled_from(["int", "round", "math.floor", "math.ceil"]), numbers))

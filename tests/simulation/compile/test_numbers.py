@@ -20,7 +20,8 @@ def of_truths(a: bool, b: bool): return (a + b, a - b, a * b, a & b, a | b, a ^ 
 def bits(a: int, b: int): return (a & b, a | b, a ^ b, ~a, a & -b)
 def to_the_left(a: int, b: int): return a << b
 def to_the_right(a: int, b: int): return a >> b
-def constants(a: int): return (2147483647 + 1 + a, -2147483647 - 2, MANY * MANY, (5 if a > 0 else 2147483647) + 2147483647,
+def constants(a: int): return (2147483647 + 1 + a, -2147483647 - 2, MANY * MANY,
+    (5 if a > 0 else 2147483647) + 2147483647,
                                -MANY * MANY, 65536 * 65536 * a, 1 << 40, MANY * MANY * 1.0, len((a, a)) + 2147483647)
 def powers(a: int): return (a ** 0, a ** 1, a ** 2, a ** 3, a ** 4, a ** 5, a ** 7, (a ** 5) % 7)
 def powers_of_floats(a: float): return (a ** 0, a ** 1, a ** 2, a ** 5, a ** 0.5, a ** 1.5)
@@ -42,7 +43,8 @@ def truth(a: float, b: int): return (bool(a), bool(b), not a, not b, 1 if a else
 def nothing(a: float): return (-a, 0.0 * a, -0.0, a + -0.0, math.copysign(1.0, -a if a == a else 1.0))
 def chosen(a: int, b: float): return a if b > 0 else b
 def said(a: float): return (math.isfinite(a), math.isnan(a), math.isinf(a), math.pi * 2, math.inf, -math.inf, math.nan)
-def literals(): return (1e-310, 5e-324, 1.7976931348623157e308, 0.1, 1e22, 123456789012345678, -9223372036854775807, 1e400)
+def literals(): return (1e-310, 5e-324, 1.7976931348623157e308, 0.1, 1e22, 123456789012345678, -9223372036854775807,
+    1e400)
 def last_places(a: int): return (9007199254740993 + a, a * 3 // 2)
 '''
 WHOLE = (0, 1, -1, 2, 3, -3, 7, -7, 2**31, -2**31 - 1, 2**40 + 1, -2**52)
@@ -65,7 +67,8 @@ CASES = {
     "of_truths": pairs((True, False)), "bits": pairs(WHOLE),
     "to_the_left": [(a, b) for a in (0, 1, -1, 5, -5) for b in (0, 1, 7, 31, 32, 40)],
     "to_the_right": [(a, b) for a in WHOLE for b in (0, 1, 7, 32, 62, 63, 64, 100)],
-    "constants": [(1,), (0,)], "powers": [(a,) for a in SMALL_WHOLE], "powers_of_floats": [(a,) for a in (0.5, 2.0, 4.0, 0.0)],
+    "constants": [(1,), (0,)], "powers": [(a,) for a in SMALL_WHOLE], "powers_of_floats": [(a,) for a in (0.5, 2.0,
+        4.0, 0.0)],
     "below": pairs(FLOATS), "between": list(itertools.product(FLOATS[::3], FLOATS[::2], FLOATS[1::3])),
     "between_whole": [(1, 1.5, 2), (1, 2.0, 2), (1, NAN, 2), (-5, -5.0, -5)],
     "one_of": [(a, b) for a in (1, 2, 3, 5) for b in (1.0, 2.5, 2.0, NAN)], "pair_in": [(1, 2.0), (3, 4.0), (1, 4.0)],
@@ -74,7 +77,8 @@ CASES = {
     "to_even": [(a,) for a in (0.5, 1.5, 2.5, -0.5, -1.5, 2.4999, 1e15 + 0.5, -3.7, 4503599627370497.5)],
     "whole": [(a,) for a in FLOATS], "down": [(a,) for a in FLOATS], "up": [(a,) for a in FLOATS],
     "whole_of_whole": [(a,) for a in (0, 1, -5, 2**53 + 1)], "truth": [(a, b) for a in FLOATS for b in (0, 2, 256)],
-    "nothing": [(a,) for a in FLOATS], "chosen": [(3, 1.0), (3, -1.5)], "said": [(a,) for a in FLOATS], "literals": [()],
+    "nothing": [(a,) for a in FLOATS], "chosen": [(3, 1.0), (3, -1.5)], "said": [(a,) for a in FLOATS],
+        "literals": [()],
     "last_places": [(0,), (5,)]}
 
 
@@ -93,9 +97,11 @@ def test_c_calculates_as_python_does(both, name):
 
 
 @pytest.mark.parametrize(("name", "arguments", "instead"), [
-    *((name, (number,), LOWEST) for name in ("whole", "down", "up", "to_even") for number in (NAN, INF, -INF, 1e300, -1e300)),
+    *((name, (number,), LOWEST) for name in ("whole", "down", "up", "to_even") for number in (NAN, INF, -INF, 1e300,
+        -1e300)),
     ("floor_of", (5, 0), 0), ("floor_of", (-5, 0), 0), ("floor_of", (0, 0), 0), ("rest_of", (5, 0), 0),
-    ("floor_of", (LOWEST, -1), LOWEST), ("rest_of", (LOWEST, -1), 0), ("quotient", (5, 0), INF), ("quotient", (-5, 0), -INF),
+    ("floor_of", (LOWEST, -1), LOWEST), ("rest_of", (LOWEST, -1), 0), ("quotient", (5, 0), INF), ("quotient", (-5, 0),
+        -INF),
     ("quotient", (0, 0), NAN), ("rest_of_floats", (5.0, 0.0), NAN)])
 def test_what_has_no_result_in_python_has_a_certain_one_in_c(both, name, arguments, instead):
     assert same(both.compiled(name, *arguments), instead)

@@ -1,4 +1,4 @@
-"""All recipes: their text is plain C99, of which no compiler complains, and the checks of compilers find nothing in it."""
+"""All recipes: their text is plain C99, no compiler complains of it, and what compilers check finds nothing in it."""
 
 import os
 import re
@@ -16,7 +16,8 @@ from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.translate import header
 
-RECIPES = {recipe.name: recipe for module in (lane_runs, bus_run, vector_calls, calls) for value in vars(module).values()
+RECIPES = {recipe.name: recipe for module in (lane_runs, bus_run, vector_calls, calls)
+           for value in vars(module).values()
            for recipe in (value.values() if isinstance(value, dict) else (value,)) if isinstance(recipe, Recipe)}
 STRICT = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fopenmp-simd", "-ffp-contract=off", "-c")
 ROOT = Path(__file__).parents[3]
@@ -33,7 +34,8 @@ def test_no_compiler_complains(name, compiler, tmp_path):
     text = printed(RECIPES[name]).text
     (tmp_path / "kernels.c").write_text(text)
     caches = {f"ZIG_{kind}_CACHE_DIR": str(tmp_path / "zig") for kind in ("LOCAL", "GLOBAL")}
-    done = subprocess.run([*COMPILERS[compiler], *STRICT, "-o", str(tmp_path / "kernels.o"), str(tmp_path / "kernels.c")],
+    done = subprocess.run([*COMPILERS[compiler], *STRICT, "-o", str(tmp_path / "kernels.o"),
+        str(tmp_path / "kernels.c")],
                           check=False, capture_output=True, text=True, env=caches | os.environ)
     assert done.returncode == 0, done.stderr
     assert not done.stderr
@@ -75,7 +77,8 @@ def test_such_checks_find_what_is_wrong(body, fault, tmp_path):
         "import sys\nimport numpy as np\n"
         f"sys.path.insert(0, {str(ROOT / 'tests')!r})\n"
         "from simulation.compile.by_hand import Both\n"
-        f"both = Both({f'def f(x: floats, n: int):{chr(10)}    {body}'!r}, __import__('pathlib').Path({str(tmp_path)!r}))\n"
+        "from pathlib import Path\n"
+        f"both = Both({f'def f(x: floats, n: int):{chr(10)}    {body}'!r}, Path({str(tmp_path)!r}))\n"
         "both.compiled('f', np.zeros(4), 5)\n")
     done = subprocess.run([sys.executable, str(script)], check=False, capture_output=True, text=True,
                           env=checking(tmp_path))
@@ -93,5 +96,6 @@ def checking(folder):
 
 def sanitized(*arguments, folder):
     """Run tests with kernels that are checked, as `dev.py sanitize` does."""
-    return subprocess.run([sys.executable, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *arguments], check=False,
+    return subprocess.run([sys.executable, "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", *arguments],
+        check=False,
                           capture_output=True, text=True, cwd=ROOT, env=checking(folder))

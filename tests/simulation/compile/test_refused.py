@@ -1,12 +1,12 @@
-"""What has no form in C is refused before a compiler sees it: the error names function and line, and says what to write."""
+"""What has no form in C is refused before a compiler sees it: the error says where, and what to write instead."""
 
 import time
 
 import pytest
 
-from simulation.compile.by_hand import translate
 from servotwin.simulation.compile import building
 from servotwin.simulation.compile.kinds import NotTranslatable
+from simulation.compile.by_hand import translate
 
 BEFORE = '''
 TABLE = np.array((0.5, 1.5, 2.5))
@@ -26,7 +26,8 @@ def nothing(x):
 '''
 # What is written, in a function of these arguments; the line that is named; what the error says to write instead
 CASES = {
-    "list comprehension": ("x: float", "y = [k * x for k in range(3)]", "[k * x for k in range(3)]", "a list gets its room"),
+    "list comprehension": ("x: float", "y = [k * x for k in range(3)]", "[k * x for k in range(3)]",
+        "a list gets its room"),
     "generator": ("x: float", "return sum(k * x for k in range(3))", "(k * x for k in range(3))", "gets its room"),
     "list": ("x: float", "y = [x, x]", "[x, x]", "gets its room"),
     "dict": ("x: float", "y = {1: x}", "{1: x}", "a kernel has numbers"),
@@ -48,7 +49,8 @@ CASES = {
     "yield": ("x: float", "yield x", "yield x", "a kernel has numbers"),
     "match": ("n: int", "match n:\n    case 1:\n        pass", "match n:", "a kernel has assignments"),
     "lambda": ("x: float", "f = lambda y: y", "lambda y: y", "a kernel has numbers"),
-    "nested function": ("x: float", "def inner(y): return y\nreturn inner(x)", "def inner(y):", "a kernel has assignments"),
+    "nested function": ("x: float", "def inner(y): return y\nreturn inner(x)", "def inner(y):",
+        "a kernel has assignments"),
     "walrus": ("x: float", "return (y := x)", "(y := x)", "a kernel has numbers"),
     "recursion": ("n: int", "return f(n - 1) if n > 0 else 0", "f(", "a loop takes its place"),
     "star in a call": ("x: float", "t = (x, x)\nreturn plus(*t)", "plus(*t)", "one by one"),
@@ -104,11 +106,15 @@ CASES = {
     "float into whole numbers": ("n: ints", "n[0] = 0.5", "n[0]", "it gets a float64, and holds"),
     "else of a loop": ("n: int", "for k in range(n):\n    pass\nelse:\n    n = 1", "for k in range(n):", "no else"),
     "loop over a number": ("n: int", "for k in n:\n    pass", "for k in n:", "a range, a tuple or an array"),
-    "two calls that write": ("x: floats", "return change(x) + change(x)", "change(x) + change(x)", "a statement of its own"),
-    "a call that writes beside an index": ("x: floats", "return x[0] + change(x)", "x[0] + change(x)", "a statement of its own"),
-    "a call that writes beside a field": ("o: outers", "return (o[0].n, bump(o[0]))", "(o[0].n, bump(o[0]))", "of its own"),
+    "two calls that write": ("x: floats", "return change(x) + change(x)", "change(x) + change(x)",
+        "a statement of its own"),
+    "a call that writes beside an index": ("x: floats", "return x[0] + change(x)", "x[0] + change(x)",
+        "a statement of its own"),
+    "a call that writes beside a field": ("o: outers", "return (o[0].n, bump(o[0]))", "(o[0].n, bump(o[0]))",
+        "of its own"),
     "a call that writes in an index": ("x: floats, n: ints", "x[change(n)] = 1.0", "x[change(n)]", "of its own"),
-    "a call that writes at the end of a chain": ("x: floats", "return 1 < 2 < change(x)", "1 < 2 < change(x)", "with `and`"),
+    "a call that writes at the end of a chain": ("x: floats", "return 1 < 2 < change(x)", "1 < 2 < change(x)",
+        "with `and`"),
     "a call that writes what is added to": ("x: floats", "x[0] += change(x)", "x[0] += change(x)", "of its own"),
     "a call that writes, repeated": ("x: floats", "return (change(x),) * 2", "(change(x),)", "of its own"),
     "value of what returns nothing": ("x: floats", "y = nothing(x)", "y = nothing(x)", "there is no value"),

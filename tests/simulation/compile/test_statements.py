@@ -261,12 +261,15 @@ def c_words(double: float, register: int, auto: bool):
             bool_, INFINITY, NAN, NULL, math.inf, -math.nan)
 def c_functions(exp: float, log: float, I: float, y0: float, index: int):
     floor, pow, fabs, memcpy, fmod, sqrt = exp + 1, log, I, y0, 2.0, 9.0
-    return (math.exp(exp), math.log(log), I, y0, index, floor, pow ** 0.5, abs(fabs), memcpy % fmod, math.sqrt(sqrt), 7.5 // 2)
+    return (math.exp(exp), math.log(log), I, y0, index, floor, pow ** 0.5, abs(fabs), memcpy % fmod, math.sqrt(sqrt),
+        7.5 // 2)
 def header_words(whole: float, words: int, w: int, clamped: float, two_power: int, PACKED: int, FLOOR: float):
     word_of, float_of, floor_div, llabs = 1, 2, 3, -4
-    return (int(whole), words // 2, w % 3, int(clamped), two_power, PACKED, math.floor(FLOOR), word_of, float_of, floor_div, abs(llabs))
+    return (int(whole), words // 2, w % 3, int(clamped), two_power, PACKED, math.floor(FLOOR), word_of, float_of,
+        floor_div, abs(llabs))
 def own_words(n: int, a: float):
-    i_end, at_1, over_1, value_1, value_2, n_given, double_, record, table, is_in, in_order = int(n), 2, 3, 4, 5, 6, 7, 8, 9, 10, 11
+    i_end, at_1, over_1, value_1, value_2, n_given, double_ = int(n), 2, 3, 4, 5, 6, 7
+    record, table, is_in, in_order = 8, 9, 10, 11
     power_2, min_double, tuple_2, as_tuple_2, helper_2, row_1 = 12, 13, 14, 15, 16, 17
     total = 0
     double = 1
@@ -287,11 +290,13 @@ CASES = {
     "nested_in_one_name": [(1,), (4,)], "own_bound": [(0,), (-2,)], "twice_in_one_name": [(0,), (5,)],
     "left": [(1,), (5,), (12,)], "over_tuples": [(1.5,), (-0.3,)], "while_it_lasts": [(1,), (27,), (97,)],
     "early": [(-1.0,), (0.5,), (3.0,), (50.0,), (500.0,), (math.nan,)], "in_branches": [(1.0,), (-1.0,), (-9.0,)],
-    "kept_from_round_to_round": [(0,), (1,), (6,)], "kept_behind_a_branch": [(0,), (8,)], "kept_in_inner_loops": [(1,), (5,)],
+    "kept_from_round_to_round": [(0,), (1,), (6,)], "kept_behind_a_branch": [(0,), (8,)],
+        "kept_in_inner_loops": [(1,), (5,)],
     "kept_in_a_while": [(2,), (9,)], "made_anew": [(0,), (6,)], "widened": [(0,), (5,)], "argument_widened": [(3, 1.5)],
     "shortened": [(5, 0.25, True), (-9, 1e9, False)], "of_kinds": [(1.5, 3, True)], "ignored": [(1.5, 3)],
     "names_alike": [(0.5, 2, True)], "truths": [(1.0, 2), (-1.0, 2), (1.0, 0), (math.nan, 1)], "only_a_pass": [()],
-    "c_words": [(1.5, 2, True)], "c_functions": [(0.3, 2.0, -3.0, 7.5, 4)], "header_words": [(2.5, 7, 8, -3.5, 1, 2, -1.5)],
+    "c_words": [(1.5, 2, True)], "c_functions": [(0.3, 2.0, -3.0, 7.5, 4)], "header_words": [(2.5, 7, 8, -3.5, 1, 2,
+        -1.5)],
     "own_words": [(4, 1.5)]}
 
 

@@ -1,6 +1,5 @@
 """Kernels in WebAssembly do what they do natively, bit by bit, where both have the same functions of libm."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import pytest
 
 import servotwin as st
 from servotwin.simulation import lane_runs
+from servotwin.simulation.compile import compilers
 from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.kinds import Array, Tuple
 from servotwin.simulation.compile.library import Function
@@ -90,17 +90,13 @@ def programs(tmp_path_factory):
                        "-ffp-contract=off", "-fwrapv", "-fno-strict-aliasing", "-fno-sanitize=undefined",
                        f"-DKERNEL=servotwin_{name}", "-o", str(program), str(folder / "kernels.c"),
                        str(HARNESS / "replay.c"), "-lm"]
-            subprocess.run(command, check=True, env=os.environ | {
-                "ZIG_LOCAL_CACHE_DIR": str(folder / "zig"), **ZIG})
+            subprocess.run(command, check=True, env=compilers.Compiler((), "").environment())
     return found
 
 
-ZIG = {"ZIG_GLOBAL_CACHE_DIR": str(Path(os.environ.get("SERVOTWIN_CACHE_DIR", "/tmp")) / "zig")}
-
-
 def replayed(program, target, before):
-    command = ["node", "--no-warnings", str(HARNESS / "run.mjs"), str(program)] if target == TARGETS[0] else [str(program)]
-    return subprocess.run(command, input=before, check=True, capture_output=True).stdout
+    runner = ("node", "--no-warnings", str(HARNESS / "run.mjs")) if target == TARGETS[0] else ()
+    return subprocess.run([*runner, str(program)], input=before, check=True, capture_output=True).stdout
 
 
 def test_wasm_gives_the_same_bits(calls, programs):

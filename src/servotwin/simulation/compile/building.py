@@ -220,7 +220,8 @@ def _compiled(recipe: Recipe, text: str, compiler: Compiler, path: Path) -> str 
         source.write_text(text, encoding="utf-8")
         said = Path(aside) / "said.txt"
         try:
-            ended = _run(compiler.library_command(source, library, recipe.vector, level()), compiler.environment(), said)
+            command = compiler.library_command(source, library, recipe.vector, level())
+            ended = _run(command, compiler.environment(), said)
         except subprocess.TimeoutExpired:
             return f"it took more than {_LONGEST:g} s"
         if ended != 0 or not library.exists():

@@ -126,7 +126,7 @@ class Types:
                 element = own.element if isinstance(own, Fixed) else own
                 body.append(f"{self.element(element)} {identifier(name)}{length};")
             self._names[kind] = name = self.fresh("record")
-            if sum((dtype.fields or {})[name][0].itemsize for name in dtype.names or ()) != dtype.itemsize:
+            if sum(dtype[name].itemsize for name in dtype.names or ()) != dtype.itemsize:
                 raise NotTranslatable("", str(dtype), "a record has no gaps between its fields")
             attribute = "" if _aligned(dtype) else "PACKED "
             self.structs.append(f"typedef struct {attribute}{{ {' '.join(body)} }} {name};\n"
@@ -214,7 +214,7 @@ class Types:
 
     def _initial(self, kind: Kind | None, value: Any) -> str:
         if isinstance(kind, Array):
-            return self.literal(value)[1:-1].removeprefix(f"({self.of(kind)})")  # what is static needs no type once more
+            return self.literal(value)[1:-1].removeprefix(f"({self.of(kind)})")  # the table says its type
         if not isinstance(kind, Tuple):
             return self.literal(value)
         inner = ", ".join(self._initial(each, x) for each, x in zip(kind.elements, value, strict=True)) or "0"

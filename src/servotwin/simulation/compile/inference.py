@@ -186,8 +186,7 @@ class Specialised:
         else:
             self.writes = self.writes or not self._is_own(target)
             there = self.of(target)
-            root = self._root(target)
-            if isinstance(root, ast.Name) and root.id not in self.local and root.id not in self.stored:
+            if self._is_constant(self._root(target)):
                 raise self.refused(target, "constants of a module are not written to")
             if isinstance(target, (ast.Attribute, ast.Subscript)) and isinstance(self.kinds.get(target.value), Tuple):
                 raise self.refused(target, "a tuple is made anew: what is in it does not change")
@@ -198,6 +197,9 @@ class Specialised:
         """Tell whether a target is part of a list of this function."""
         root = self._root(target)
         return isinstance(root, ast.Name) and root.id in self.owned
+
+    def _is_constant(self, node: ast.expr) -> bool:
+        return isinstance(node, ast.Name) and node.id not in self.local and node.id not in self.stored
 
     @staticmethod
     def _root(node: ast.expr) -> ast.expr:
@@ -454,9 +456,7 @@ class Specialised:
                 for argument, kind in zip(ordered, known, strict=True)):
             self.writes = True
         for argument, kind in zip(ordered, known, strict=True):
-            root = self._root(argument)
-            if called.writes and isinstance(kind, Array) and isinstance(root, ast.Name) and root.id in self.space and not (
-                    root.id in self.local):
+            if called.writes and isinstance(kind, Array) and self._is_constant(self._root(argument)):
                 raise self.refused(node, "constants of a module are not written to")
         return called.result
 

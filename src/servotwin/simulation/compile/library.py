@@ -167,7 +167,7 @@ def loaded(recipe: Recipe) -> Kernels | None:
 
 
 def _is_cut_off(path: Path) -> bool:
-    """Tell whether a library of Linux lacks its end, where its table of sections is: to load it would end the process."""
+    """Tell whether a library of Linux lacks its end, with its table of sections: to load it would end the process."""
     with path.open("rb") as file:
         head = file.read(64)
         size = file.seek(0, 2)

@@ -32,7 +32,6 @@ from servotwin.simulation.compile.kinds import (
     Scalar,
     Tuple,
     leaves,
-    of_value,
     united,
 )
 from servotwin.simulation.compile.variables import Variables
@@ -774,7 +773,8 @@ def _guarded(sides: Sequence[ast.expr]) -> bool:
     """Tell whether the first comparison says if there is what the second one asks for: C works out both."""
     inside = {part for side in sides for index in ast.walk(side) if isinstance(index, ast.Subscript)
               for part in ast.walk(index.slice) if isinstance(part, ast.Name)}
-    compared = {part.id for side in sides[:2] for part in ast.walk(side) if isinstance(part, ast.Name) and part not in inside}
+    compared = {part.id for side in sides[:2] for part in ast.walk(side)
+                if isinstance(part, ast.Name) and part not in inside}
     return any(part.id in compared for part in ast.walk(sides[2]) if isinstance(part, ast.Name) and part in inside)
 
 

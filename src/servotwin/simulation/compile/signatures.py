@@ -17,8 +17,8 @@ from servotwin.models.engine.memory import Memories, Memory
 from servotwin.models.engine.records import record_of, rows_of
 from servotwin.models.engine.seats import Mate, Seat, Shared
 from servotwin.models.engine.tape import Tape
-from servotwin.models.engine.told import Tables
 from servotwin.models.engine.tiles import Lanes, Outputs
+from servotwin.models.engine.told import Tables
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
