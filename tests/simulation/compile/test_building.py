@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -362,6 +363,26 @@ def test_threads_run_kernels_at_the_same_time(tmp_path):
     within = [each for each in moments if begin + 0.2 * (end - begin) < each < end - 0.2 * (end - begin)]
     assert len(within) > 3
     assert found == [both.compiled("count", 100_000_000)]
+
+
+@pytest.mark.compiles
+def test_simulators_in_threads_give_the_same_bits(servo):
+    model = servotwin.PulseServo(servo)
+
+    def angles(lanes):
+        own = servotwin.VectorSimulator(model, lanes=lanes, load=servotwin.loads.Inertia(1e-3), seed=3)
+        own.reset(pulse_width=1.5e-3)
+        found = []
+        for k in range(200):
+            own.advance(1e-3, pulse_width=1.2e-3 + 3e-6 * k)
+            found.append(own["output_angle"].tobytes())
+        return found
+
+    lanes = (64, 65, 64)
+    alone = [angles(each) for each in lanes]
+    with ThreadPoolExecutor(len(lanes)) as pool:
+        assert list(pool.map(angles, lanes)) == alone
+    assert len(set(alone[0])) == 200
 
 
 def test_threads_that_ask_for_a_kernel_at_once_get_the_same(tmp_path, monkeypatch):
