@@ -22,6 +22,7 @@ TASKS = {
     "paper": "set up, then write the report of the paper to paper-report/ (main job)",
     "test": "set up, then run the tests (10 minutes, far more on a machine that has compiled nothing yet)",
     "validation": "set up, then run the slow tests: validation and coverage, browser (20 minutes more)",
+    "sanitize": "set up, then run kernels with what gcc checks of memory and arithmetic (or the tests that are named)",
     "check": "set up, then lint, types, import rules",
     "examples": "set up, then run every script of examples/",
     "docs": "set up, then build the documentation to docs/_build/",
@@ -70,6 +71,16 @@ def validation(arguments: list[str]) -> None:
     test(["-m", "slow", *arguments])
 
 
+def sanitize(arguments: list[str]) -> None:
+    """Run tests with kernels that end the process where they read or write what is not theirs, or overflow (gcc)."""
+    found = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
+    os.environ |= {
+        "SERVOTWIN_CC": str(ROOT / "tests/simulation/compile/harness/sanitizing-cc"),
+        "SERVOTWIN_CACHE_DIR": os.environ.get("SERVOTWIN_CACHE_DIR", str(ROOT / ".venv" / "sanitized")),
+        "LD_PRELOAD": found.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
+    run("python", "-m", "pytest", "-n", "0", *(arguments or ["tests/simulation/test_recorded_numbers.py"]))
+
+
 def check(arguments: list[str]) -> None:
     """Lint, types and import rules."""
     run("ruff", "check", "--no-cache", ".")  # a cached verdict does not see that a new folder changed what is ours
@@ -108,7 +119,7 @@ def main(arguments: list[str]) -> None:
         for script in sorted((ROOT / "benchmarks").glob("*/run.py")):
             run("python", str(script), *rest)
     elif task != "setup":
-        {"test": test, "validation": validation, "check": check, "examples": examples}[task](rest)
+        {"test": test, "validation": validation, "sanitize": sanitize, "check": check, "examples": examples}[task](rest)
 
 
 if __name__ == "__main__":

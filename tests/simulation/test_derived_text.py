@@ -13,7 +13,7 @@ RECIPES = (bus_run.PLAIN_BUSES, bus_run.ALL_BUSES, bus_run.DIGITAL_BUSES, lane_r
 
 @pytest.fixture(scope="module", params=RECIPES, ids=lambda recipe: recipe.name)
 def functions(request):
-    return [node for node in ast.parse(derive(request.param)).body if isinstance(node, ast.FunctionDef)]
+    return list(derive(request.param).functions.values())
 
 
 def leaves(node):

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any
 
 from servotwin.simulation.compile.backend import is_plain, use_plain
-from servotwin.simulation.compile.building import WAY_OUT, is_ready, source_key
+from servotwin.simulation.compile.building import WAY_OUT, is_ready, problems, source_key
 from servotwin.simulation.compile.derive import Recipe
 from servotwin.simulation.compile.library import loaded
 from servotwin.simulation.compile.plain import plain_kernels
@@ -37,7 +37,7 @@ def _kernels(recipe: Recipe) -> Any:
     found = loaded(recipe)
     if found is None:
         use_plain()
-        warnings.warn(f"no C compiler: many servos run in plain Python, a hundred times slower. {WAY_OUT}",
+        warnings.warn(f"{'; '.join(problems)}: many servos run in plain Python, a hundred times slower. {WAY_OUT}",
                       RuntimeWarning, stacklevel=4)
         return plain_kernels(recipe)
     return found

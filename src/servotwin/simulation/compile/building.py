@@ -13,10 +13,10 @@ import inspect
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -34,6 +34,7 @@ from servotwin.simulation.compile.translate import Translation, translated
 
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 _LONGEST = 600.0  # s that a compiler may take
+problems: list[str] = []  # why there is no library, as far as this process has found out
 WAY_OUT = ("install a C compiler (gcc or clang) or the package ziglang (pip install 'servotwin[compile]'); "
            "SERVOTWIN_CC names another one")
 
@@ -76,14 +77,20 @@ def is_ready(recipe: Recipe) -> bool:
 def built(recipe: Recipe) -> Iterator[Built]:
     """Return libraries of a recipe, the one to be tried first; made, where there is none, when it is asked for.
 
-    It is for the next one to try if one cannot be loaded: it was made for another C library, say.
+    If one cannot be loaded, the next one is asked for: it was made for another C library, say, or is no library at all.
     """
+    useless: set[Path] = set()
     for find in (_shipped, _known):
         found = find(recipe)
         if found is not None:
             yield found
+            useless.add(found.path)
+    if not compilers():
+        named = os.environ.get("SERVOTWIN_CC")
+        problems.append(f"SERVOTWIN_CC names no program ({named})" if named else "no C compiler")
+        return
     for folder in _folders():
-        found = _made(recipe, folder)
+        found = _made(recipe, folder, useless)
         if found is not None:
             yield found
             return
@@ -105,7 +112,13 @@ def _read(path: Path) -> dict[str, Any] | None:
         said = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return said if isinstance(said, dict) and {"text", "functions"} <= said.keys() else None
+    return said if isinstance(said, dict) and isinstance(said.get("text"), str) and _are_functions(
+        said.get("functions")) else None
+
+
+def _are_functions(said: Any) -> bool:
+    return isinstance(said, list) and all(
+        isinstance(one, list) and len(one) == 2 and all(isinstance(part, str) for part in one) for one in said)
 
 
 def shipped_folder() -> Path:
@@ -178,22 +191,23 @@ def _temporary() -> Path:
     return Path(folder)
 
 
-def _made(recipe: Recipe, folder: Path) -> Built | None:
-    """Print a recipe and compile it; None where no compiler does."""
-    if not compilers():
-        return None
+def _made(recipe: Recipe, folder: Path, useless: set[Path]) -> Built | None:
+    """Print a recipe and compile it, also where there is a library of no use; None where no compiler does."""
     translation = printed(recipe)
     text = key_of(translation.text)
     said = {"text": text, "functions": [[entry.symbol, entry.result] for entry in translation.entries]}
     for compiler in compilers():
         path = folder / _library(recipe, text, compiler)
-        with _alone(path):
-            problem = None if path.exists() else _compiled(recipe, translation.text, compiler, path)
-        if problem is None:
-            _write(folder / _index(recipe), json.dumps(said))
-            return Built(path, _functions(said))
-        warnings.warn(f"servotwin: {' '.join(compiler.command)} cannot compile the kernels: {problem}",
-                      RuntimeWarning, stacklevel=2)
+        try:
+            with _alone(path):
+                there = path.exists() and path not in useless
+                problem = None if there else _compiled(recipe, translation.text, compiler, path)
+            if problem is None:
+                _write(folder / _index(recipe), json.dumps(said))
+                return Built(path, _functions(said))
+        except OSError as error:
+            problem = str(error)
+        problems.append(f"{' '.join(compiler.command)} cannot compile the kernels ({problem})")
     return None
 
 
@@ -208,18 +222,37 @@ def _compiled(recipe: Recipe, text: str, compiler: Compiler, path: Path) -> str 
     with tempfile.TemporaryDirectory(prefix=".making-", dir=path.parent, ignore_cleanup_errors=True) as aside:
         source, library = Path(aside) / f"{recipe.name}.c", Path(aside) / f"made{_SUFFIX}"
         source.write_text(text, encoding="utf-8")
+        said = Path(aside) / "said.txt"
         try:
-            done = subprocess.run(compiler.library_command(source, library, recipe.vector, level()), check=False,
-                                  capture_output=True, text=True, errors="replace", timeout=_LONGEST, cwd=aside,
-                                  env=compiler.environment(), stdin=subprocess.DEVNULL)
-        except (OSError, subprocess.TimeoutExpired) as error:
-            return str(error)
-        if done.returncode != 0 or not library.exists():
-            lines = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines()
-            return lines[0].strip() if lines else f"it ended with {done.returncode}"
+            command = compiler.library_command(source, library, recipe.vector, level())
+            ended = _run(command, compiler.environment(), said)
+        except subprocess.TimeoutExpired:
+            return f"it took more than {_LONGEST:g} s"
+        if ended != 0 or not library.exists():
+            all_lines = said.read_text(encoding="utf-8", errors="replace").splitlines()
+            lines = [line for line in all_lines if "error" in line] or [line for line in all_lines if line.strip()]
+            return lines[0].strip() if lines else f"it ended with {ended}" if ended else "it made no library"
         with contextlib.suppress(PermissionError):  # Windows: another process has made it, and loaded it already
             os.replace(library, path)
     return None
+
+
+def _run(command: list[str], environment: dict[str, str], said: Path) -> int:
+    """Run a compiler in the folder of what it says; those that it has started end with it, by force if need be.
+
+    A pipe would be waited for as long as one of them holds it.
+    """
+    with said.open("w") as file, subprocess.Popen(command, cwd=said.parent, env=environment, stdin=subprocess.DEVNULL,
+                                                  stdout=file, stderr=file, start_new_session=True) as process:
+        try:
+            return process.wait(_LONGEST)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                if sys.platform == "win32":
+                    process.kill()
+                else:
+                    os.killpg(process.pid, signal.SIGKILL)
+            raise
 
 
 @cache

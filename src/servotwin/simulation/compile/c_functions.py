@@ -39,6 +39,8 @@ MATH = {name: name for name in (
     "sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "tanh", "atan", "atan2", "atanh", "asin", "acos",
     "sinh", "cosh", "asinh", "copysign", "hypot", "fmod", "pow")}
 """Functions of `math` that C's library has under the same name, for 32 bits with an f behind it."""
+OF_TWO = ("atan2", "copysign", "hypot", "fmod", "pow")
+"""Those of them that take two numbers."""
 ROUNDED = {"floor": "FLOOR", "ceil": "CEIL"}
 """Functions of `math` that return a whole number."""
 TRUTHS = {"isfinite": "isfinite", "isnan": "isnan", "isinf": "isinf"}

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
 
+from servotwin.simulation.compile.c_functions import MATH
 from servotwin.simulation.compile.inference import field_kind
 from servotwin.simulation.compile.kinds import (
     BOOL,
@@ -21,6 +23,7 @@ from servotwin.simulation.compile.kinds import (
     Kind,
     Record,
     Scalar,
+    TranslationError,
     Tuple,
     of_value,
 )
@@ -28,14 +31,20 @@ from servotwin.simulation.compile.kinds import (
 _TAKEN = frozenset(
     "auto bool break case char const continue default do double else enum extern false float for goto if inline int "
     "long main register restrict return short signed sizeof static struct switch true typedef union unsigned void "
-    "volatile while floor_div floor_mod mod_float whole clamped words numbers rows bytes_at halves called copied "
-    "activate active two_power two_powerf binary_exponent binary_exponentf isfinite isnan isinf".split())
+    "volatile while int8_t int32_t int64_t uint32_t uint64_t size_t intptr_t INT64_C UINT64_C INT64_MIN INT64_MAX NAN "
+    "INFINITY NULL EXPORTED SMALL INLINED PACKED FMA FMAf NEAREST NEARESTf FLOOR FLOORf CEIL CEILf AS_TEXT PRAGMA "
+    "SUM_IN_ANY_ORDER CHECKED_SIZE TOLD told_1 told_2 told_3 told_4 told_5 told_6 told_7 floor_div floor_mod mod_float "
+    "floor_div_float whole_power moved_left moved_right whole clamped words numbers rows bytes_at halves copied "
+    "activate active active_word float_of word_of two_power two_powerf binary_exponent binary_exponentf isfinite isnan "
+    "isinf floor fabs fabsf llabs memcpy memmove".split()) | {name + end for name in MATH for end in ("", "f")}
+_OURS = re.compile(r"\w+_(\d+|end|given|)|(as|equal|slice_of|array|min|max)_\w+|in_order|is_in|record|table")
+"""Names that are made here: of types, tables, helpers, and of what a statement needs beside its variables."""
 _NAMED = ((FLOAT64, 1), (FLOAT64, 2), (INT64, 1), (INT8, 1), (INT32, 1))  # arrays that the header knows
 
 
 def identifier(name: str) -> str:
     """Return a name as C may have it."""
-    return f"{name}_" if name in _TAKEN else name
+    return f"{name}_" if name in _TAKEN or _OURS.fullmatch(name) else name
 
 
 class Types:
@@ -46,12 +55,16 @@ class Types:
         self.tables: list[str] = []
         self.helpers: list[str] = []
         self._names: dict[Any, str] = {}
-        self._used: dict[str, int] = {}
+        self._used = set(_TAKEN)
 
     def fresh(self, name: str) -> str:
         """Return a name that nothing has yet."""
-        self._used[name] = self._used.get(name, 0) + 1
-        return name if self._used[name] == 1 else f"{name}_{self._used[name]}"
+        free, number = name, 1
+        while free in self._used:
+            number += 1
+            free = f"{name}_{number}"
+        self._used.add(free)
+        return free
 
     # --- types --------------------------------------------------------------------------------------------------------
 
@@ -113,6 +126,8 @@ class Types:
                 element = own.element if isinstance(own, Fixed) else own
                 body.append(f"{self.element(element)} {identifier(name)}{length};")
             self._names[kind] = name = self.fresh("record")
+            if sum(dtype[name].itemsize for name in dtype.names or ()) != dtype.itemsize:
+                raise TranslationError("", str(dtype), "a record has no gaps between its fields")
             attribute = "" if _aligned(dtype) else "PACKED "
             self.structs.append(f"typedef struct {attribute}{{ {' '.join(body)} }} {name};\n"
                                 f"CHECKED_SIZE({name}, {dtype.itemsize});")
@@ -202,6 +217,8 @@ class Types:
         return f"static const {self.of(kind)} {name} = {self._initial(kind, value)};"
 
     def _initial(self, kind: Kind | None, value: Any) -> str:
+        if isinstance(kind, Array):
+            return self.literal(value)[1:-1].removeprefix(f"({self.of(kind)})")  # the table says its type
         if not isinstance(kind, Tuple):
             return self.literal(value)
         inner = ", ".join(self._initial(each, x) for each, x in zip(kind.elements, value, strict=True)) or "0"

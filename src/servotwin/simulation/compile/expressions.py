@@ -57,6 +57,10 @@ class Expressions:
             return self._own.local[node.id]
         return self._own.kinds[node]
 
+    def _known(self, node: ast.expr) -> int | None:
+        """Return a whole number that is a constant."""
+        return constant_int(node, {} if isinstance(node, ast.Name) and node.id in self._own.local else self._own.space)
+
     def as_(self, node: ast.expr, kind: Kind | None) -> str:
         """Return an expression as a value of a kind."""
         if kind in (FLOAT64, FLOAT32) and isinstance(node, ast.Constant) and self.kind(node) == INT64:
@@ -66,7 +70,7 @@ class Expressions:
     def fresh(self, name: str) -> str:
         """Return the name of another variable of the function, for which Python has none."""
         self._count += 1
-        return f"{name}_{self._count}"
+        return f"{name.rstrip('_')}_{self._count}"
 
     def truth(self, node: ast.expr) -> str:
         """Return an expression as a condition."""
@@ -115,18 +119,17 @@ class Expressions:
         if isinstance(index, ast.Slice):
             return self._slice(text, owner, index)
         if isinstance(owner, Tuple):
-            place = constant_int(index, {} if isinstance(index, ast.Name) and index.id in self._own.local
-                                 else self._own.space)
-            if place is not None:
-                return self._types.part(text, owner, place % len(owner.elements))
+            known = self._known(index)
+            if known is not None:
+                return self._types.part(text, owner, known % len(owner.elements))
             text = self._types.converted(text, owner, Tuple(owner.elements))
             return f"{member(text, 'v')}[{self.of(index)}]"
         places = index.elts if isinstance(index, ast.Tuple) else [index]
         lengths = self._lengths(text, owner)
         texts = []
-        for index, length in zip(places, lengths, strict=False):
-            known = constant_int(index, {})
-            texts.append(f"{length} - {-known}" if known is not None and known < 0 else self.of(index))
+        for place, length in zip(places, lengths, strict=False):
+            known = self._known(place)
+            texts.append(f"{length} - {-known}" if known is not None and known < 0 else self.of(place))
         return self.item(text, owner, texts)[0]
 
     def item(self, text: str, owner: Array | Fixed, places: list[str]) -> tuple[str, Kind]:
@@ -168,28 +171,43 @@ class Expressions:
 
     def _binary(self, node: ast.BinOp) -> str:
         self._in_order([node.left, node.right], node)
-        left, right, kind = self.kind(node.left), self.kind(node.right), self.kind(node)
+        kind = self.kind(node)
         if isinstance(kind, Tuple):
             return self._joined(node, kind)
+        left, right = self.kind(node.left), self.kind(node.right)
         if isinstance(node.op, ast.Pow):
             return self._power(node, kind)
         if isinstance(node.op, (ast.FloorDiv, ast.Mod)):
             return self._divided(node, kind)
         a, b = self.as_(node.left, kind), self.as_(node.right, kind)
+        known = self._known(node.right)
+        if isinstance(node.op, (ast.LShift, ast.RShift)) and (known is None or not 0 <= known < 64):
+            return f"moved_{'left' if isinstance(node.op, ast.LShift) else 'right'}({a}, {b})"
         if isinstance(node.op, ast.LShift):
             return f"(int64_t)((uint64_t){bracketed(a)} << {bracketed(b)})"
         if isinstance(node.op, ast.RShift):
             return f"((int64_t){bracketed(a)} >> {bracketed(b)})"
-        if kind == INT64 and isinstance(node.left, ast.Constant) and isinstance(node.right, ast.Constant):
+        if kind == INT64 and self._is_short(node.left) and self._is_short(node.right):
             a = f"(int64_t){bracketed(a)}"
         if kind == BOOL and left == right == BOOL:
             return f"(({a}) {ARITHMETIC[type(node.op)]} ({b}))"
         return f"({a} {ARITHMETIC[type(node.op)]} {b})"
 
+    def _is_short(self, node: ast.expr) -> bool:
+        """Tell whether C would calculate with fewer bits than 64: with what constants alone make."""
+        if isinstance(node, ast.UnaryOp):
+            return self._is_short(node.operand)
+        if isinstance(node, ast.IfExp):
+            return self._is_short(node.body) and self._is_short(node.orelse)
+        if isinstance(node, ast.Call):
+            return isinstance(node.func, ast.Name) and node.func.id == "len"
+        return isinstance(node, ast.Constant) or (isinstance(node, ast.Name) and node.id not in self._own.local)
+
     def _joined(self, node: ast.BinOp, kind: Tuple) -> str:
+        self._once(node.left, node.right)
         left = self.kind(node.left)
         parts = [self._types.part(self.of(node.left), left, k) for k in range(len(left.elements))]
-        right = self.kind(node.right)
+        right = self._own.kinds.get(node.right)
         if isinstance(right, Tuple):
             parts += [self._types.part(self.of(node.right), right, k) for k in range(len(right.elements))]
         else:
@@ -203,7 +221,7 @@ class Expressions:
             return f"{'floor_div' if down else 'floor_mod'}({a}, {b})"
         if kind == FLOAT32:
             raise self._own.refused(node, "a float32 is divided and rounded in two steps")
-        return f"floor({a} / {b})" if down else f"mod_float({a}, {b})"
+        return f"{'floor_div_float' if down else 'mod_float'}({a}, {b})"
 
     def _power(self, node: ast.BinOp, kind: Any) -> str:
         exponent = node.right.value if isinstance(node.right, ast.Constant) else None
@@ -215,6 +233,8 @@ class Expressions:
 
             name = self._types.helper(("power", kind, exponent), f"power_{exponent}", make)
             return f"{name}({self.as_(node.left, kind)})"
+        if kind == INT64:
+            return f"whole_power({self.as_(node.left, kind)}, {exponent!r})"
         return f"pow{'f' * (kind == FLOAT32)}({self.as_(node.left, kind)}, {self.as_(node.right, kind)})"
 
     def _unary(self, node: ast.UnaryOp) -> str:
@@ -233,6 +253,8 @@ class Expressions:
     def _compare(self, node: ast.Compare) -> str:
         sides = [node.left, *node.comparators]
         self._in_order(sides, node)
+        if len(node.ops) == 2 and (self.writes(sides[2]) or _guarded(sides)):
+            raise self._own.refused(node, "a chain that ends with an index or a call is written with `and`")
         if len(node.ops) == 1:
             return f"({self._one_comparison(node.ops[0], node.left, node.comparators[0])})"
         if len(node.ops) != 2 or not all(type(op) in _ORDER for op in node.ops):
@@ -267,7 +289,8 @@ class Expressions:
         def make(name: str) -> str:
             parts = [self._types.equal("x", kind, self._types.part("y", other, k), element)
                      for k, element in enumerate(other.elements)]
-            return f"static inline bool {name}({type_} x, {options} y) {{ return {' || '.join(parts)}; }}"
+            condition = " || ".join(parts) or "(void)x, (void)y, false"
+            return f"static inline bool {name}({type_} x, {options} y) {{ return {condition}; }}"
 
         return f"{self._types.helper(('in', kind, other), 'is_in', make)}({self.of(left)}, {self.of(right)})"
 
@@ -331,6 +354,8 @@ class Expressions:
         text = ", ".join(self.as_(argument, kind) for argument in node.args)
         single = "f" * (kind == FLOAT32)
         if name in c_functions.ROUNDED:
+            if kinds[0] not in (FLOAT64, FLOAT32):
+                return self.as_(node.args[0], INT64)
             return f"whole({c_functions.ROUNDED[name]}{single}({text}))"
         if name in c_functions.TRUTHS:
             return f"({c_functions.TRUTHS[name]}({text}) != 0)"
@@ -345,8 +370,10 @@ class Expressions:
             return self.as_(argument, own)
         if name == "bool":
             return self._types.converted(self.of(argument), kind, BOOL)
+        if name in ("int", "round") and kind not in (FLOAT64, FLOAT32):
+            return self.as_(argument, INT64)
         if name == "int":
-            return f"whole({self.of(argument)})" if kind in (FLOAT64, FLOAT32) else self.as_(argument, INT64)
+            return f"whole({self.of(argument)})"
         if name == "round":
             return f"whole(NEAREST({self.as_(argument, FLOAT64)}))"
         if name == "len":
@@ -360,6 +387,7 @@ class Expressions:
     def _extreme(self, node: ast.Call, name: str, first: Kind | None, own: Any) -> str:
         """Return the least or largest of some values, as Python finds it: the first one where others are no better."""
         if len(node.args) == 1 and isinstance(first, Tuple):
+            self._once(node.args[0])
             text = self.of(node.args[0])
             parts = [self._types.converted(self._types.part(text, first, k), kind, own)
                      for k, kind in enumerate(first.elements)]
@@ -378,15 +406,40 @@ class Expressions:
 
     def _in_order(self, parts: Sequence[ast.expr], node: ast.expr) -> None:
         """Refuse what Python works out from left to right, and C in any order, where that makes a difference."""
-        writing = [part for part in parts if any(n in self._own.calls and self._own.calls[n].writes
-                                                 for n in ast.walk(part) if isinstance(n, ast.Call))]
-        if writing and any(part is not writing[0] and not _is_settled(part) for part in parts):
+        writing = [part for part in parts if self.writes(part)]
+        if writing and any(part is not writing[0] and not self._is_settled(part) for part in parts):
             raise self._own.refused(node, "a call that changes records or arrays gets a statement of its own")
 
+    def _once(self, *parts: ast.expr) -> None:
+        """Refuse what would be called more than once."""
+        if any(map(self.writes, parts)):
+            raise self._own.refused(parts[0], "a call that changes records or arrays gets a statement of its own")
 
-def _is_settled(node: ast.expr) -> bool:
-    """Tell whether no call could change a value."""
-    return not any(isinstance(part, (ast.Call, ast.Subscript)) for part in ast.walk(node))
+    def writes(self, node: ast.expr) -> bool:
+        """Tell whether an expression calls what changes records or arrays."""
+        for part in ast.walk(node):
+            if isinstance(part, ast.Call) and part in self._own.calls and self._own.calls[part].writes:
+                return True
+            if isinstance(part, ast.Call) and isinstance(part.func, ast.Name):
+                primitive = c_functions.PRIMITIVES.get(self._own.module.derived.primitives.get(part.func.id, ""))
+                if primitive is not None and primitive.writes:
+                    return True
+        return False
+
+    def _is_settled(self, node: ast.expr) -> bool:
+        """Tell whether no call could change a value."""
+        return not any(isinstance(part, (ast.Call, ast.Subscript)) or (
+            isinstance(part, ast.Attribute) and isinstance(self._own.kinds.get(part.value), Record)
+            and isinstance(self._own.kinds.get(part), Scalar)) for part in ast.walk(node))
+
+
+def _guarded(sides: Sequence[ast.expr]) -> bool:
+    """Tell whether the first comparison says if there is what the second one asks for: C works out both."""
+    inside = {part for side in sides for index in ast.walk(side) if isinstance(index, ast.Subscript)
+              for part in ast.walk(index.slice) if isinstance(part, ast.Name)}
+    compared = {part.id for side in sides[:2] for part in ast.walk(side)
+                if isinstance(part, ast.Name) and part not in inside}
+    return any(part.id in compared for part in ast.walk(sides[2]) if isinstance(part, ast.Name) and part in inside)
 
 
 def by_pointer(kind: Kind | None) -> bool:

@@ -7,6 +7,7 @@ each, which is found by going through its statements until nothing changes any m
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -43,13 +44,18 @@ class Module:
     def __init__(self, derived: Derived) -> None:
         self.derived = derived
         self.known: dict[tuple[str, tuple[Kind, ...]], Specialised] = {}
+        self._open: list[str] = []  # functions that are looked at, each called by the one before
 
     def specialised(self, name: str, arguments: tuple[Kind, ...]) -> Specialised:
         """Return a function with the kinds of all that is in it."""
         key = (name, arguments)
+        if name in self._open:
+            raise TranslationError(name, f"{name}(...)", "a kernel does not call itself: a loop takes its place")
         if key not in self.known:
+            self._open.append(name)
             self.known[key] = Specialised(self, self.derived.functions[name], arguments)
             self.known[key].settle()
+            self._open.pop()
         return self.known[key]
 
 
@@ -85,6 +91,8 @@ class Specialised:
 
     def __post_init__(self) -> None:
         self.names = [argument.arg for argument in self.node.args.args]
+        if self.node.args.vararg or self.node.args.kwarg or len(self.names) != len(self.arguments):
+            raise self.refused(self.node, "arguments are named one by one")
         self.local |= dict(zip(self.names, self.arguments, strict=True))
         self.stored = {n.id for n in ast.walk(self.node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
 
@@ -100,8 +108,21 @@ class Specialised:
             self.calls.clear()
             self._block(self.node.body)
             if before == (self.local, self.result, self.writes):
+                self._check()
                 return
         raise self.refused(self.node, "the kinds of its variables do not settle")
+
+    def _check(self) -> None:
+        """Refuse what has no value where one is needed."""
+        for node in ast.walk(self.node):
+            if isinstance(node, ast.Assign) and not list_length(node.value, self.space) and (
+                    self.kinds.get(node.value) is None):
+                raise self.refused(node, "there is no value: a function returns none, or its kind is not known")
+            if isinstance(node, ast.Return) and self.result is not None and (
+                    node.value is None or self.kinds.get(node.value) is None):
+                raise self.refused(node, "a function returns a value everywhere, or nowhere")
+        if self.result is not None and not leaves(self.node.body[-1]):
+            raise self.refused(self.node.body[-1], "a function that returns a value ends with a return")
 
     def refused(self, node: ast.AST, instead: str) -> TranslationError:
         """Return the error for a piece of text."""
@@ -119,10 +140,14 @@ class Specialised:
 
     def _return(self, node: ast.Return) -> None:
         if node.value is not None and not (isinstance(node.value, ast.Constant) and node.value.value is None):
-            self.result = self._united(self.result, self.of(node.value), node)
+            kind = self.of(node.value)
+            if self.owned and kind is not None and _in_memory(kind):
+                raise self.refused(node, "a list ends with its function: give an array to it instead")
+            self.result = self._united(self.result, kind, node)
 
     def _expression(self, node: ast.Expr) -> None:
-        self.of(node.value)
+        if not isinstance(node.value, ast.Constant):
+            self.of(node.value)
 
     def _assign(self, node: ast.Assign) -> None:
         value = node.value
@@ -134,12 +159,14 @@ class Specialised:
             self._put(target, kind, value)
 
     def _list(self, node: Any, length: int) -> None:
-        ((target,), (element,)) = node.targets, node.value.left.elts
-        kind = self.of(element)
-        if not isinstance(target, ast.Name):
-            raise self.refused(node, "a list of a constant length has a name of its own")
+        target, elements = node.targets[0], node.value.left.elts
+        if not isinstance(target, ast.Name) or len(node.targets) > 1 or len(elements) != 1:
+            raise self.refused(node, "a list of a constant length has a name of its own, and one value for all")
+        kind = self.of(elements[0])
         self.owned.add(target.id)
         if kind is not None:
+            if self.local.get(target.id) not in (None, Fixed(kind, (length,))):
+                raise self.refused(node, "a list stays what it is: another one has another name")
             self.local[target.id] = Fixed(kind, (length,))
 
     def _augmented(self, node: ast.AugAssign) -> None:
@@ -158,14 +185,26 @@ class Specialised:
         else:
             self.writes = self.writes or not self._is_own(target)
             there = self.of(target)
+            if self._is_constant(self._root(target)):
+                raise self.refused(target, "constants of a module are not written to")
+            if isinstance(target, (ast.Attribute, ast.Subscript)) and isinstance(self.kinds.get(target.value), Tuple):
+                raise self.refused(target, "a tuple is made anew: what is in it does not change")
             if kind is not None and there is not None and not fits(kind, there):
                 raise self.refused(target, f"it gets {told(kind)}, and holds {told(there)}")
 
     def _is_own(self, target: ast.expr) -> bool:
         """Tell whether a target is part of a list of this function."""
-        while isinstance(target, (ast.Subscript, ast.Attribute)):
-            target = target.value
-        return isinstance(target, ast.Name) and target.id in self.owned
+        root = self._root(target)
+        return isinstance(root, ast.Name) and root.id in self.owned
+
+    def _is_constant(self, node: ast.expr) -> bool:
+        return isinstance(node, ast.Name) and node.id not in self.local and node.id not in self.stored
+
+    @staticmethod
+    def _root(node: ast.expr) -> ast.expr:
+        while isinstance(node, (ast.Subscript, ast.Attribute)):
+            node = node.value
+        return node
 
     def _element(self, kind: Kind | None, place: int, count: int, node: ast.AST) -> Kind | None:
         if kind is None:
@@ -208,7 +247,7 @@ class Specialised:
             for element in over.elements:
                 each = self._united(each, element, node)
             return each
-        if isinstance(over, (Array, Fixed)):
+        if isinstance(over, Array) or (isinstance(over, Fixed) and len(over.shape) == 1):
             return _row(over, 1)
         raise self.refused(node, "a loop goes over a range, a tuple or an array")
 
@@ -232,7 +271,10 @@ class Specialised:
         return of_value(self.space[node.id])
 
     def _constant(self, node: ast.Constant) -> Kind | None:
-        return of_value(node.value)
+        kind = of_value(node.value)
+        if kind is None:
+            raise self.refused(node, "the constants of a kernel are float64, int64 and truth values")
+        return kind
 
     def _tuple(self, node: ast.Tuple) -> Kind | None:
         return self._tuple_of([self.of(element) for element in node.elts])
@@ -244,6 +286,8 @@ class Specialised:
 
     def _attribute(self, node: ast.Attribute) -> Kind | None:
         if isinstance(node.value, ast.Name) and node.value.id == "math":
+            if not isinstance(getattr(math, node.attr, None), float):
+                raise self.refused(node, "of `math` there are functions, which are called, and numbers")
             return FLOAT64
         owner = self.of(node.value)
         if owner is None:
@@ -330,6 +374,8 @@ class Specialised:
             if kind not in _WHOLE:
                 raise self.refused(node, "bits are those of whole numbers")
             return INT64
+        if isinstance(op, ast.Pow) and kind in _WHOLE and not _is_whole_constant(node):
+            raise self.refused(node, "a whole number has a constant power that is not negative: math.pow gives a float")
         if isinstance(op, (ast.Div, ast.Pow)):
             return _power(kind, node) if isinstance(op, ast.Pow) else FLOAT64 if kind in _WHOLE else kind
         if not isinstance(op, (ast.Add, ast.Sub, ast.Mult, ast.FloorDiv, ast.Mod)):
@@ -356,6 +402,8 @@ class Specialised:
         for left, op, right in zip(kinds, node.ops, kinds[1:], strict=False):
             if left is None or right is None:
                 continue
+            if isinstance(op, (ast.Is, ast.IsNot)):
+                raise self.refused(node, "numbers are equal, or not: == and !=")
             if isinstance(op, (ast.In, ast.NotIn)):
                 if not isinstance(right, Tuple):
                     raise self.refused(node, "`in` asks for one of a tuple")
@@ -392,7 +440,10 @@ class Specialised:
         return self._built_in(node, name, kinds)
 
     def _own_call(self, node: ast.Call, name: str) -> Kind | None:
-        ordered = ordered_arguments(self.module.derived.functions[name], node)
+        try:
+            ordered = ordered_arguments(self.module.derived.functions[name], node)
+        except TypeError as error:
+            raise self.refused(node, str(error)) from None
         kinds = [self.of(argument) for argument in ordered]
         known = tuple(kind for kind in kinds if kind is not None)
         if len(known) < len(kinds):
@@ -403,6 +454,9 @@ class Specialised:
                 isinstance(kind, (Record, Array, Fixed, Tuple)) and not self._is_own(argument)
                 for argument, kind in zip(ordered, known, strict=True)):
             self.writes = True
+        for argument, kind in zip(ordered, known, strict=True):
+            if called.writes and isinstance(kind, Array) and self._is_constant(self._root(argument)):
+                raise self.refused(node, "constants of a module are not written to")
         return called.result
 
     def _named_tuple(self, node: ast.Call, kind: Any) -> Kind | None:
@@ -425,16 +479,24 @@ class Specialised:
 
     def _of_math(self, node: ast.Call, name: str) -> Kind | None:
         kinds = [self.of(argument) for argument in node.args]
+        if name not in (*c_functions.MATH, *c_functions.ROUNDED, *c_functions.TRUTHS):
+            raise self.refused(node, f"math.{name} has no line in c_functions.MATH")
+        self._arguments(node, kinds, 2 if name in c_functions.OF_TWO else 1)
         if name in c_functions.TRUTHS:
             return BOOL
-        if name in c_functions.ROUNDED:
-            return INT64
-        if name in c_functions.MATH:
-            return self._widest(kinds)
-        raise self.refused(node, f"math.{name} has no line in c_functions.MATH")
+        return INT64 if name in c_functions.ROUNDED else self._widest(kinds)
+
+    def _arguments(self, node: ast.Call, kinds: Sequence[Kind | None], count: int) -> None:
+        """Refuse a call of a function of numbers with anything else."""
+        if node.keywords or len(kinds) != count or not all(kind is None or isinstance(kind, Scalar) for kind in kinds):
+            raise self.refused(node, f"it takes {'one number' if count == 1 else 'two numbers'}")
 
     def _built_in(self, node: ast.Call, name: str, kinds: Sequence[Kind | None]) -> Kind | None:
         (first, *_) = kinds or [None]
+        if name in ("int", "round", "float", "_f", "bool", "abs"):
+            self._arguments(node, kinds, 1)
+        if name == "len" and (len(kinds) != 1 or isinstance(first, (Scalar, Record))):
+            raise self.refused(node, "tuples and arrays have a length")
         if name in ("int", "round", "len"):
             return INT64
         if name in ("float", "_f"):
@@ -445,6 +507,8 @@ class Specialised:
             return INT64 if first in _WHOLE else first
         if name in ("min", "max"):
             values = first.elements if len(kinds) == 1 and isinstance(first, Tuple) else kinds
+            if node.keywords or len(values) < 2 or not all(kind is None or isinstance(kind, Scalar) for kind in values):
+                raise self.refused(node, "it takes numbers, or a tuple of them")
             widest: Kind | None = None
             for kind in values:
                 widest = self._united(widest, kind, node)
@@ -516,9 +580,25 @@ def field_kind(record: Record, name: str) -> Kind:
 
 
 def _power(kind: Kind | None, node: ast.AST) -> Kind | None:
-    exponent = node.right if isinstance(node, ast.BinOp) else None
-    whole = isinstance(exponent, ast.Constant) and isinstance(exponent.value, int)
+    whole = _is_whole_constant(node)
     return kind if whole and kind not in _WHOLE else INT64 if whole else FLOAT32 if kind == FLOAT32 else FLOAT64
+
+
+def _is_whole_constant(node: ast.AST) -> bool:
+    exponent = node.right if isinstance(node, ast.BinOp) else None
+    return isinstance(exponent, ast.Constant) and isinstance(exponent.value, int)
+
+
+def _in_memory(kind: Kind) -> bool:
+    return any(map(_in_memory, kind.elements)) if isinstance(kind, Tuple) else isinstance(kind, (Array, Fixed))
+
+
+def leaves(node: ast.stmt) -> bool:
+    """Tell whether nothing behind a statement is reached."""
+    if isinstance(node, ast.If):
+        return bool(node.orelse) and leaves(node.body[-1]) and leaves(node.orelse[-1])
+    endless = isinstance(node, ast.While) and isinstance(node.test, ast.Constant) and bool(node.test.value)
+    return isinstance(node, ast.Return) or (endless and not any(isinstance(part, ast.Break) for part in ast.walk(node)))
 
 
 def constant_int(node: ast.expr, space: dict[str, Any]) -> int | None:
@@ -545,8 +625,14 @@ def is_range(node: ast.expr) -> bool:
 def ordered_arguments(function: ast.FunctionDef, call: ast.Call) -> list[ast.expr]:
     """Return what a call gives a derived function, in the order of its arguments, defaults included."""
     names = [argument.arg for argument in function.args.args]
+    known = set(names[len(call.args):])
+    if len(call.args) > len(names) or not {k.arg for k in call.keywords} <= known:
+        raise TypeError(f"{function.name} takes {', '.join(names) or 'nothing'}")
     given = dict(zip(names, call.args, strict=False)) | {k.arg: k.value for k in call.keywords}
     defaults = dict(zip(names[::-1], function.args.defaults[::-1], strict=False))
+    missing = [name for name in names if name not in given and name not in defaults]
+    if missing:
+        raise TypeError(f"{', '.join(missing)} of {function.name} is missing")
     return [given.get(name) or defaults[name] for name in names]
 
 

@@ -10,7 +10,8 @@
 #else
 #define EXPORTED __attribute__((visibility("default")))
 #endif
-#define INLINED static inline __attribute__((always_inline))
+#define SMALL static inline __attribute__((unused))
+#define INLINED static inline __attribute__((always_inline, unused))
 #define PACKED __attribute__((packed))
 #define FMA(a, b, c) __builtin_fma(a, b, c)
 #define FMAf(a, b, c) __builtin_fmaf(a, b, c)
@@ -32,19 +33,19 @@ typedef struct { int8_t *p; int64_t n[1]; } array_int8_t_1;
 typedef struct { int32_t *p; int64_t n[1]; } array_int32_t_1;
 
 /* Memory at addresses, and functions there. */
-static inline array_int64_t_1 words(int64_t address, int64_t count) {
+SMALL array_int64_t_1 words(int64_t address, int64_t count) {
     return (array_int64_t_1){(int64_t *)(intptr_t)address, {count}};
 }
-static inline array_double_1 numbers(int64_t address, int64_t count) {
+SMALL array_double_1 numbers(int64_t address, int64_t count) {
     return (array_double_1){(double *)(intptr_t)address, {count}};
 }
-static inline array_double_2 rows(int64_t address, int64_t count, int64_t width) {
+SMALL array_double_2 rows(int64_t address, int64_t count, int64_t width) {
     return (array_double_2){(double *)(intptr_t)address, {count, width}};
 }
-static inline array_int8_t_1 bytes_at(int64_t address, int64_t count) {
+SMALL array_int8_t_1 bytes_at(int64_t address, int64_t count) {
     return (array_int8_t_1){(int8_t *)(intptr_t)address, {count}};
 }
-static inline array_int32_t_1 halves(int64_t address, int64_t count) {
+SMALL array_int32_t_1 halves(int64_t address, int64_t count) {
     return (array_int32_t_1){(int32_t *)(intptr_t)address, {count}};
 }
 typedef int64_t told_1(int64_t), told_2(int64_t, int64_t), told_3(int64_t, int64_t, int64_t),
@@ -52,46 +53,67 @@ typedef int64_t told_1(int64_t), told_2(int64_t, int64_t), told_3(int64_t, int64
     told_6(int64_t, int64_t, int64_t, int64_t, int64_t, int64_t),
     told_7(int64_t, int64_t, int64_t, int64_t, int64_t, int64_t, int64_t);
 #define TOLD(kind, function, ...) (((kind *)(intptr_t)(function))(__VA_ARGS__))
-static inline void copied(int64_t to, int64_t of, int64_t size) {
+SMALL void copied(int64_t to, int64_t of, int64_t size) {
     memcpy((void *)(intptr_t)to, (const void *)(intptr_t)of, (size_t)size);
 }
 static int64_t active_word;
-static inline void activate(int64_t word) {
+SMALL void activate(int64_t word) {
     active_word = word;
 }
-static inline int64_t active(void) {
+SMALL int64_t active(void) {
     return active_word;
 }
 /* Whole numbers are divided as Python divides them; by 0 the quotient is 0. */
-static inline int64_t floor_div(int64_t a, int64_t b) {
+SMALL int64_t floor_div(int64_t a, int64_t b) {
     if (b == 0 || b == -1)
         return b == 0 ? 0 : (int64_t)(0 - (uint64_t)a);
     return a / b - (a % b != 0 && (a < 0) != (b < 0));
 }
-static inline int64_t floor_mod(int64_t a, int64_t b) {
+SMALL int64_t floor_mod(int64_t a, int64_t b) {
     if (b == 0 || b == -1)
         return 0;
     const int64_t rest = a % b;
     return rest != 0 && (rest < 0) != (b < 0) ? rest + b : rest;
 }
-static inline double mod_float(double a, double b) {
+SMALL double mod_float(double a, double b) {
     const double rest = fmod(a, b);
-    return rest != 0 && (rest < 0) != (b < 0) ? rest + b : rest;
+    if (rest == 0)
+        return copysign(0.0, b);
+    return (rest < 0) != (b < 0) ? rest + b : rest;
+}
+SMALL double floor_div_float(double a, double b) {
+    const double rest = fmod(a, b);
+    const double times = (a - rest) / b - (rest != 0 && (rest < 0) != (b < 0));
+    const double down = floor(times);
+    return times == 0 ? copysign(0.0, a / b) : times - down > 0.5 ? down + 1 : down;
+}
+SMALL int64_t whole_power(int64_t x, int64_t n) {
+    uint64_t found = 1;
+    for (int64_t k = 0; k < n; k++)
+        found *= (uint64_t)x;
+    return (int64_t)found;
+}
+/* Bits that leave a word are lost, also where all of them do. */
+SMALL int64_t moved_left(int64_t x, int64_t n) {
+    return n < 0 || n > 63 ? 0 : (int64_t)((uint64_t)x << n);
+}
+SMALL int64_t moved_right(int64_t x, int64_t n) {
+    return x >> (n < 0 || n > 63 ? 63 : n);
 }
 /* The whole number that x is, towards zero; what none holds, nan too, is the lowest one. */
-static inline int64_t whole(double x) {
+SMALL int64_t whole(double x) {
     return x >= -9223372036854775808.0 && x < 9223372036854775808.0 ? (int64_t)x : INT64_MIN;
 }
-static inline int64_t clamped(int64_t k, int64_t n) {
+SMALL int64_t clamped(int64_t k, int64_t n) {
     k += k < 0 ? n : 0;
     return k < 0 ? 0 : k > n ? n : k;
 }
-static inline double float_of(int64_t word) {
+SMALL double float_of(int64_t word) {
     double x;
     memcpy(&x, &word, sizeof x);
     return x;
 }
-static inline int64_t word_of(double x) {
+SMALL int64_t word_of(double x) {
     int64_t word;
     memcpy(&word, &x, sizeof word);
     return word;

@@ -107,6 +107,8 @@ Kind = Scalar | Tuple | Record | Array | Fixed
 
 def of_dtype(dtype: np.dtype[Any]) -> Kind:
     """Return the kind of a number or a record of numpy."""
+    if not dtype.names and dtype.str not in SCALARS:
+        raise TranslationError("", str(dtype), "arrays hold float64, float32, int64, int32, int8, bool or records")
     return Record(dtype) if dtype.names else SCALARS[dtype.str]
 
 
@@ -115,7 +117,7 @@ def of_value(value: object) -> Kind | None:
     if isinstance(value, (bool, np.bool_)):
         return BOOL
     if isinstance(value, (int, np.int64)):
-        return INT64
+        return INT64 if -2**63 <= value < 2**63 else None
     if isinstance(value, np.float32):
         return FLOAT32
     if isinstance(value, float):

@@ -5,15 +5,17 @@ from __future__ import annotations
 import ctypes
 import inspect
 import struct
+import sys
 from collections.abc import Callable, Sequence
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.simulation.compile.building import Built, built
+from servotwin.simulation.compile.building import Built, built, problems
 from servotwin.simulation.compile.derive import Recipe
 from servotwin.simulation.compile.kinds import (
     BOOL,
@@ -159,10 +161,23 @@ def loaded(recipe: Recipe) -> Kernels | None:
     """Return the kernels of a recipe; None where no library can be had."""
     for made in built(recipe):
         try:
+            if _is_cut_off(made.path):
+                raise OSError(f"{made.path} is cut off")
             return Kernels(recipe, ctypes.CDLL(str(made.path)), made)
-        except (OSError, AttributeError):  # of another C library, or not what its name says
-            continue
+        except (OSError, AttributeError, ValueError) as error:  # of another C library, or not what its name says
+            problems.append(str(error))
     return None
+
+
+def _is_cut_off(path: Path) -> bool:
+    """Tell whether a library of Linux lacks its end, with its table of sections: to load it would end the process."""
+    with path.open("rb") as file:
+        head = file.read(64)
+        size = file.seek(0, 2)
+    if len(head) < 64 or head[:4] != b"\x7fELF":
+        return False
+    start, (each, count) = int.from_bytes(head[40:48], sys.byteorder), struct.unpack_from("2H", head, 58)
+    return bool(size < start + each * count)
 
 
 # --- arguments --------------------------------------------------------------------------------------------------------

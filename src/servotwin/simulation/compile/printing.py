@@ -7,11 +7,12 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from servotwin.simulation.compile.c_types import Types, bracketed, identifier
+from servotwin.simulation.compile.c_types import Types, bracketed, identifier, member
 from servotwin.simulation.compile.expressions import ARITHMETIC, Expressions, by_pointer
 from servotwin.simulation.compile.inference import (
     Specialised,
     constant_int,
+    dimensions,
     is_range,
     list_length,
 )
@@ -54,7 +55,7 @@ class Printer:
         """Return the name of a function in C, printing it where that has not been done."""
         if function not in self._names:
             text = _Text(self, function)
-            self._names[function] = self.types.fresh(function.node.name)
+            self._names[function] = self.types.fresh(identifier(function.node.name))
             self.functions.append(text.whole(self._names[function]))
         return self._names[function]
 
@@ -202,9 +203,10 @@ class _Text(Expressions):
             lines.append(f"const {self._types.of(each)} {over}_all[] = {{{', '.join(parts)}}};")
             value, count = f"{over}_all[{counter}]", str(len(parts))
         else:
-            lines = [f"const {self._types.of(kind)} {over} = {self.of(node.iter)};"]
-            each = kind.element
-            value, count = f"{'&' * isinstance(each, Record)}{over}.p[{counter}]", f"{over}.n[0]"
+            array = kind if isinstance(kind, Array) else Array(kind.element, 1)
+            lines = [f"const {self._types.of(array)} {over} = {self.as_(node.iter, array)};"]
+            value, each = self.item(over, array, [counter])
+            count = f"{over}.n[0]"
         store = [_INDENT * 2 + line for line in self._stored(node.target, value, each)]
         return ["{", *(_INDENT + line for line in lines),
                 f"{_INDENT}for (int64_t {counter} = 0; {counter} < {count}; {counter}++) {{", *store,
@@ -213,6 +215,8 @@ class _Text(Expressions):
     def _assign(self, node: ast.Assign) -> list[str]:
         if list_length(node.value, self._own.space):
             return self._filled(node)
+        for target in node.targets:
+            self._settled_targets(target)
         if len(node.targets) == 1:
             (target,) = node.targets
             if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
@@ -244,6 +248,7 @@ class _Text(Expressions):
 
     def _at_once(self, targets: ast.Tuple, values: ast.Tuple) -> list[str]:
         """Return assignments of several values, which are all worked out before the first is stored."""
+        self._settled_targets(targets)
         stored: set[str] = set()
         apart = True
         for target, value in zip(targets.elts, values.elts, strict=True):
@@ -267,6 +272,10 @@ class _Text(Expressions):
                 lines += self._stored(target, name, kind)
         return lines
 
+    def _settled_targets(self, target: ast.expr) -> None:
+        if self.writes(target):
+            raise self._own.refused(target, "a call that changes records or arrays gets a statement of its own")
+
     @staticmethod
     def _constant(kind: Kind) -> str:
         return "" if isinstance(kind, (Record, Fixed)) else "const "
@@ -288,23 +297,28 @@ class _Text(Expressions):
             return self._all(target, text, kind)
         if isinstance(there, Record):
             return [f"*{bracketed(self.of(target))} = *{bracketed(text)};"]
-        if isinstance(there, Fixed):
+        if isinstance(there, Fixed) and kind == there:
             return [f"memcpy({self.of(target)}, {text}, {there.count} * sizeof({self._types.element(there.element)}));"]
-        if isinstance(there, Array):
+        if isinstance(there, (Array, Fixed)):
             return self._all(target, text, kind)
         return [f"{self.of(target)} = {self._types.converted(text, kind, there)};"]
 
     def _all(self, target: ast.expr, text: str, kind: Kind | None) -> list[str]:
         """Return the loop that gives all elements of an array a value, or those of another array."""
-        there, name, counter = self.kind(target), self.fresh("row"), self.fresh("at")
-        if there.dimensions != 1:
+        own, name, counter = self.kind(target), self.fresh("row"), self.fresh("at")
+        if dimensions(own) != 1:
             raise self._own.refused(target, "a row is stored at once, or a number")
-        lines = [f"const {self._types.of(there)} {name} = {self.of(target)};"]
+        there = Array(own.element, 1)
+        lines = [f"const {self._types.of(there)} {name} = {self._types.converted(self.of(target), own, there)};"]
         if isinstance(kind, Scalar):
             value = self.fresh("value")
             lines.append(f"const {self._types.of(kind)} {value} = {text};")
             one = value
         else:
+            if isinstance(kind, Array) and kind.element == there.element:  # it may be part of the same array
+                size = f"(size_t){name}.n[0] * sizeof *{name}.p"
+                return ["{", *(_INDENT + line for line in lines),
+                        f"{_INDENT}memmove({name}.p, {member(text, 'p')}, {size});", "}"]
             other = self.fresh("row")
             lines.append(f"const {self._types.of(there)} {other} = {self._types.converted(text, kind, there)};")
             kind, one = there.element, f"{other}.p[{counter}]"
@@ -325,6 +339,8 @@ class _Text(Expressions):
 
     def _augmented(self, node: Any) -> list[str]:
         target, kind = node.target, self.kind(node.target)
+        if self.writes(target) or (self.writes(node.value) and not isinstance(target, ast.Name)):
+            raise self._own.refused(node, "a call that changes records or arrays gets a statement of its own")
         if isinstance(target, ast.Name):
             kind = self._own.local[target.id]
             if target.id not in self._variables.read:

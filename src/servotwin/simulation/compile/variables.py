@@ -88,6 +88,8 @@ class Variables:
                  and isinstance(n.target, ast.Name) and n.target.id == name]
         inside: set[ast.AST] = set()
         for loop in loops:
+            if any(n in loops for statement in loop.body for n in ast.walk(statement)):
+                return False  # behind the inner one it has the value of that
             inside |= {n for statement in loop.body for n in ast.walk(statement)} | {loop.target}
         return bool(loops) and all(n in inside and (isinstance(n.ctx, ast.Load) or n in {x.target for x in loops})
                                    for n in ast.walk(self._own.node) if isinstance(n, ast.Name) and n.id == name)
