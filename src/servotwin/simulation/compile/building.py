@@ -90,9 +90,15 @@ def built(recipe: Recipe) -> Iterator[Built]:
 # --- what is known ----------------------------------------------------------------------------------------------------
 
 
-def _index(recipe: Recipe) -> str:
+def index_name(recipe: Recipe) -> str:
     """Return the name of the file that says what was printed of these sources."""
     return f"{recipe.name}-{key_of(source_key(), repr(recipe))}.json"
+
+
+def index(translation: Translation) -> dict[str, Any]:
+    """Return what this file says."""
+    functions = [[entry.symbol, entry.result] for entry in translation.entries]
+    return {"text": key_of(translation.text), "functions": functions}
 
 
 def _read(path: Path) -> dict[str, Any] | None:
@@ -111,7 +117,7 @@ def shipped_folder() -> Path:
 
 def _shipped(recipe: Recipe) -> Built | None:
     """Return the library that came with the package, for the highest level that this processor has."""
-    said = _read(shipped_folder() / _index(recipe))
+    said = _read(shipped_folder() / index_name(recipe))
     if said is None:
         return None
     for name in levels():
@@ -123,7 +129,7 @@ def _shipped(recipe: Recipe) -> Built | None:
 
 def _known(recipe: Recipe) -> Built | None:
     """Return the library in the cache."""
-    said = _read(cache_folder() / _index(recipe))
+    said = _read(cache_folder() / index_name(recipe))
     if said is None:
         return None
     for compiler in compilers():
@@ -180,14 +186,13 @@ def _made(recipe: Recipe, folder: Path) -> Built | None:
         return None
     translation = printed(recipe)
     text = key_of(translation.text)
-    said = {"text": text, "functions": [[entry.symbol, entry.result] for entry in translation.entries]}
     for compiler in compilers():
         path = folder / _library(recipe, text, compiler)
         with _alone(path):
             problem = None if path.exists() else _compiled(recipe, translation.text, compiler, path)
         if problem is None:
-            _write(folder / _index(recipe), json.dumps(said))
-            return Built(path, _functions(said))
+            _write(folder / index_name(recipe), json.dumps(index(translation)))
+            return Built(path, _functions(index(translation)))
         warnings.warn(f"servotwin: {' '.join(compiler.command)} cannot compile the kernels: {problem}",
                       RuntimeWarning, stacklevel=2)
     return None
