@@ -46,7 +46,7 @@ def compiled(recipe: Recipe, compiler: Compiler, targets: Sequence[Target], fold
         into = folder / target.tag
         (into / index_name(recipe)).write_text(json.dumps(index(translation)), encoding="utf-8")
         command = (*compiler.command, *(("-target", target.triple) if target.triple else ()))
-        for level in target.levels:
+        for level in target.levels_for(recipe):
             made = Path(tempfile.mkdtemp(dir=folder)) / f"{recipe.name}-{level}{target.suffix}"
             call = replace(compiler, command=command).library_command(source, made, recipe.vector, level)
             done = subprocess.run(call, capture_output=True, text=True, check=False, cwd=made.parent,
@@ -124,7 +124,7 @@ def main() -> None:
         for target in targets:
             wheel = packed(unpacked, folder / target.tag, target, given.out)
             size = wheel.stat().st_size
-            print(f"{wheel}: {size / 1e6:.1f} MB, {' and '.join(target.levels)}; "
+            print(f"{wheel}: {size / 1e6:.1f} MB, {', '.join(target.levels)}; "
                   f"{'of this machine' if target == own else 'compiled, not run'}", flush=True)
             if size > MOST:
                 sys.exit(f"make.py: a wheel has at most {MOST / 1e6:.0f} MB")

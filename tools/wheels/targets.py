@@ -6,9 +6,11 @@ import sys
 import sysconfig
 from dataclasses import dataclass, replace
 
+from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.compilers import level, system
 
-X86_LEVELS = ("x86-64-v2", "x86-64-v3")  # v4 is a third faster at best, and one wheel in three larger
+X86_LEVELS = ("x86-64-v2", "x86-64-v3", "x86-64-v4")
+_FOR_LANES = "x86-64-v4"  # twice as many lanes in a vector; one lane after the other is as fast at the level below
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,10 @@ class Target:
     suffix: str
     levels: tuple[str, ...]
     tag: str
+
+    def levels_for(self, recipe: Recipe) -> tuple[str, ...]:
+        """Return the levels that a recipe gains from."""
+        return tuple(level for level in self.levels if recipe.vector or level != _FOR_LANES)
 
 
 TARGETS = {
