@@ -19,11 +19,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from targets import TARGETS, Target, host
+
 from servotwin.simulation.compile import Recipe, source_key
 from servotwin.simulation.compile.building import index, index_name, printed, shipped_folder
 from servotwin.simulation.compile.compilers import Compiler, compilers
 from servotwin.simulation.recipes import all_recipes
-from targets import TARGETS, Target, host
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = ("src", "pyproject.toml", "README.md", "LICENSE")
@@ -69,10 +70,10 @@ def pure(folder: Path) -> Path:
     run("pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps", "--wheel-dir", str(folder), str(copy))
     run("wheel", "unpack", "--dest", str(folder / "pure"), *map(str, folder.glob("*.whl")))
     (unpacked,) = (folder / "pure").iterdir()
-    key = subprocess.run([sys.executable, "-c", "from servotwin.simulation.compile import source_key as key; print(key())"],
-                         stdout=subprocess.PIPE, text=True, check=True, cwd=folder,
-                         env=os.environ | {"PYTHONPATH": str(unpacked)}).stdout.strip()
-    if key != source_key():
+    code = "from servotwin.simulation.compile import source_key as key; print(key())"
+    key = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, check=True, cwd=folder,
+                         env=os.environ | {"PYTHONPATH": str(unpacked)})
+    if key.stdout.strip() != source_key():
         sys.exit("make.py: the sources in the wheel are others than those that kernels are printed from")
     return unpacked
 
