@@ -7,6 +7,7 @@ versions, and runs the task in it.
 
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 import venv
@@ -27,6 +28,7 @@ TASKS = {
     "examples": "set up, then run every script of examples/",
     "docs": "set up, then build the documentation to docs/_build/",
     "bench": "set up, then print the benchmark tables",
+    "wheel": "set up, then make the wheel for this machine in dist/, and try it where nothing compiles; --all: for all",
 }
 
 
@@ -51,6 +53,8 @@ def setup() -> None:
         except (subprocess.CalledProcessError, OSError, ImportError):
             sys.exit("dev.py: this Python cannot make virtual environments (on Debian: apt install python3-venv)")
     install("dev")
+    if not any(map(shutil.which, ("clang", "gcc", "cc"))):
+        install("compile")
     STAMP.write_text(wanted.hexdigest())
 
 
@@ -99,6 +103,15 @@ def examples(arguments: list[str]) -> None:
             sys.exit(done.returncode)
 
 
+def wheel(arguments: list[str]) -> None:
+    """Make the wheel for this machine and try it; with `--all` make those for all machines, and try none."""
+    install("wheels")
+    shutil.rmtree(ROOT / "dist", ignore_errors=True)
+    run("python", "tools/wheels/make.py", *arguments)
+    if "--all" not in arguments:
+        run("python", "tools/wheels/try_wheel.py", *map(str, (ROOT / "dist").glob("*.whl")))
+
+
 def main(arguments: list[str]) -> None:
     """Set up, then do one task."""
     if tuple(map(int, sys.version.split(".")[:2])) < (3, 11):  # said in one line, not by pip
@@ -115,11 +128,12 @@ def main(arguments: list[str]) -> None:
         run("python", "-m", "sphinx", "-W", "-q", "-b", "html", "docs", "docs/_build/html", *rest)
         print("docs/_build/html/index.html")
     elif task == "bench":
-        install("peers")
+        install("peers,compile")  # clang of one version, which the numbers are said for
         for script in sorted((ROOT / "benchmarks").glob("*/run.py")):
             run("python", str(script), *rest)
     elif task != "setup":
-        {"test": test, "validation": validation, "sanitize": sanitize, "check": check, "examples": examples}[task](rest)
+        {"test": test, "validation": validation, "sanitize": sanitize, "check": check, "examples": examples,
+         "wheel": wheel}[task](rest)
 
 
 if __name__ == "__main__":

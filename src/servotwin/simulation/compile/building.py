@@ -99,11 +99,17 @@ def built(recipe: Recipe) -> Iterator[Built]:
 # --- what is known ----------------------------------------------------------------------------------------------------
 
 
-def _index(recipe: Recipe) -> str:
+def index_name(recipe: Recipe) -> str:
     """Return the name of the file that says what was printed of these sources."""
     homes = {entry.split(":")[0] for entry in recipe.entries}
     others = [inspect.getsource(import_module(home)) for home in sorted(homes) if not home.startswith("servotwin.")]
     return f"{recipe.name}-{key_of(source_key(), repr(recipe), *others)}.json"
+
+
+def index(translation: Translation) -> dict[str, Any]:
+    """Return what this file says."""
+    functions = [[entry.symbol, entry.result] for entry in translation.entries]
+    return {"text": key_of(translation.text), "functions": functions}
 
 
 def _read(path: Path) -> dict[str, Any] | None:
@@ -128,7 +134,7 @@ def shipped_folder() -> Path:
 
 def _shipped(recipe: Recipe) -> Built | None:
     """Return the library that came with the package, for the highest level that this processor has."""
-    said = _read(shipped_folder() / _index(recipe))
+    said = _read(shipped_folder() / index_name(recipe))
     if said is None:
         return None
     for name in levels():
@@ -140,7 +146,7 @@ def _shipped(recipe: Recipe) -> Built | None:
 
 def _known(recipe: Recipe) -> Built | None:
     """Return the library in the cache."""
-    said = _read(cache_folder() / _index(recipe))
+    said = _read(cache_folder() / index_name(recipe))
     if said is None:
         return None
     for compiler in compilers():
@@ -194,8 +200,7 @@ def _temporary() -> Path:
 def _made(recipe: Recipe, folder: Path, useless: set[Path]) -> Built | None:
     """Print a recipe and compile it, also where there is a library of no use; None where no compiler does."""
     translation = printed(recipe)
-    text = key_of(translation.text)
-    said = {"text": text, "functions": [[entry.symbol, entry.result] for entry in translation.entries]}
+    text, said = key_of(translation.text), index(translation)
     for compiler in compilers():
         path = folder / _library(recipe, text, compiler)
         try:
@@ -203,7 +208,7 @@ def _made(recipe: Recipe, folder: Path, useless: set[Path]) -> Built | None:
                 there = path.exists() and path not in useless
                 problem = None if there else _compiled(recipe, translation.text, compiler, path)
             if problem is None:
-                _write(folder / _index(recipe), json.dumps(said))
+                _write(folder / index_name(recipe), json.dumps(said))
                 return Built(path, _functions(said))
         except OSError as error:
             problem = str(error)
