@@ -163,7 +163,9 @@ def loaded(recipe: Recipe) -> Kernels | None:
         try:
             if _is_cut_off(made.path):
                 raise OSError(f"{made.path} is cut off")
-            return Kernels(recipe, ctypes.CDLL(str(made.path)), made)
+            found = Kernels(recipe, ctypes.CDLL(str(made.path)), made)
+            problems.clear()
+            return found
         except (OSError, AttributeError, ValueError) as error:  # of another C library, or not what its name says
             problems.append(str(error))
     return None
