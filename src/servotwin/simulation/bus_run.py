@@ -19,14 +19,16 @@ from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import at_start
 from servotwin.models.terms import control
-from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.firmware import Firmware
-from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.source import Source
 from servotwin.simulation.compile import Recipe, is_compiled, kernels
 from servotwin.simulation.engine import Plan, State
+from servotwin.simulation.lane_kinds import Terms
 from servotwin.simulation.lane_memory import RECORD
-from servotwin.simulation.lane_runs import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS, programs_of
+from servotwin.simulation.lane_recipes import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS
+from servotwin.simulation.lane_runs import programs_of
 
 Array = NDArray[np.float64]
 
@@ -101,15 +103,8 @@ def tape_of(servos: int) -> Tape:
 
 
 def not_plain(numbers: Numbers) -> Any:
-    """Tell of a servo, or of lanes, which have a term that the plain form leaves out."""
-    found: Any = False
-    for name in PLAIN_BUSES.absent:
-        term, _, field = name.partition(".")
-        if term in Numbers._fields:  # not of an input
-            neutral, own = getattr(NEUTRAL, term), getattr(numbers, term)
-            field = field or neutral._fields[0]
-            found = found | (getattr(own, field) != getattr(neutral, field))
-    return found
+    """Tell of a servo, or of lanes, which have a term that the plain form leaves out or does not know."""
+    return np.logical_not(Terms(numbers, NO_CHIP, NO_FIRMWARE, False).fit(PLAIN_RUNS))
 
 
 def _worth_it(recipe: Recipe, frames: float) -> bool:

@@ -15,11 +15,13 @@ from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID
 from servotwin.models.engine.records import TILE, columns_of, room
 from servotwin.models.engine.ticks import ANGLE, SPEED
 from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation import lane_runs
+from servotwin.simulation import lane_recipes, lane_runs
 from servotwin.simulation.compile import kernels
+from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of, looking
 from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
-from servotwin.simulation.lane_runs import OneByOne, SideBySide, some_of
+from servotwin.simulation.lane_runs import some_of
 from servotwin.simulation.lanes import ALL_FIELDS
 from servotwin.simulation.vector_buses import BusSet, sets_of
 from servotwin.simulation.vector_calls import TICKS, asked, calls_in_records, calls_in_tiles
@@ -77,8 +79,10 @@ class Store:
     def _kinds_now(self) -> list[SideBySide | OneByOne]:
         numbers, lanes = self.numbers, slice(self.numbers.count)
         own = columns_of(Numbers, numbers.columns.numbers, lanes), columns_of(Chip, numbers.columns.chips, lanes)
-        kinds = lane_runs.kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
-                                   numbers.torque.count > 0, bool(numbers.curve.size))
+        programs = numbers.columns.firmware
+        kinds = kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
+                         numbers.torque.count > 0, bool(numbers.curve.size),
+                         Firmware(*(programs[name] for name in Firmware._fields)) if numbers.digital else NO_FIRMWARE)
         if numbers.supplies.lanes:
             bus_of = numbers.supplies.bus_of
             kinds = [kind._replace(which=kind.which[bus_of[kind.which] < 0]) for kind in kinds]
@@ -334,7 +338,7 @@ class _Tiles:
         return np.asarray(edge + since)
 
     def look(self, columns: tiles.Lanes, inputs: Any, status: Any, seen: Array) -> None:
-        kernels(lane_runs.LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
+        kernels(lane_recipes.LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
 
     def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
         """Return what compiled code calls at each stage of a tick."""
@@ -348,13 +352,13 @@ class _Records:
         self.which, self.recipe = kind.which, kind.recipe
         self.rows = np.zeros(len(self.which), RECORD)
         self.done = np.zeros(len(self.which), np.int64)  # those that are through this call already
-        self.calms = (not numbers.pulsed and kind.recipe == lane_runs.PLAIN_RUNS
+        self.calms = (not numbers.pulsed and kind.recipe == lane_recipes.PLAIN_RUNS
                       and not numbers.torque.count[kind.which].any())
 
     def calm(self, store: Store, duration: float) -> NDArray[np.bool_]:
         """Let those go on for a time [s] that are through it without an event; tell which."""
         if self.calms:
-            kernels(lane_runs.CALM).go(store.columns, self.which, np.array([duration, 0.0]), store.status, self.rows,
+            kernels(lane_recipes.CALM).go(store.columns, self.which, np.array([duration, 0.0]), store.status, self.rows,
                                        self.done)
         return np.asarray(self.done != 0)
 
@@ -384,7 +388,7 @@ class _Records:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
     def look(self, columns: tiles.Lanes, inputs: Any, status: Any, seen: Array) -> None:
-        kernels(lane_runs.looking(self.recipe)).one_by_one(columns, *inputs, self.which, self.rows, seen)
+        kernels(looking(self.recipe)).one_by_one(columns, *inputs, self.which, self.rows, seen)
 
     def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
         """Return what compiled code calls at each stage of a tick."""

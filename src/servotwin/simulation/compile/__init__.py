@@ -9,6 +9,7 @@ from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
+from typing import cast
 
 from servotwin import physics
 from servotwin.models import engine, terms
@@ -16,7 +17,7 @@ from servotwin.simulation.compile import derive as derive_module
 from servotwin.simulation.compile.derive import Recipe, derive, surroundings
 from servotwin.simulation.compile.storage import is_stored, key_of, loaded, stored
 
-__all__ = ["Recipe", "is_compiled", "kernels", "source_key"]
+__all__ = ["Recipe", "is_compiled", "kernels", "source_key", "unread"]
 
 _lock = threading.Lock()
 
@@ -33,7 +34,7 @@ def kernels(recipe: Recipe) -> ModuleType:
 @cache
 def _sources() -> tuple[str, ...]:
     """Return the text of everything from which a module is derived; to read it is quicker than to derive."""
-    files = [Path(derive_module.__file__)]
+    files = [Path(derive_module.__file__).with_name(name) for name in ("derive.py", "reading.py")]
     for package in (physics, terms, engine):
         files += sorted(Path(package.__path__[0]).glob("*.py"))
     return tuple(file.read_text(encoding="utf-8") for file in files)
@@ -62,3 +63,18 @@ def _kernels(recipe: Recipe) -> ModuleType:
         sys.stderr.flush()
     import_module("numba")
     return loaded(path)
+
+
+@cache
+def unread(recipe: Recipe) -> tuple[str, ...]:
+    """Return the numbers of terms that a recipe does not know and others do, found once on a machine.
+
+    Lanes in which they are not neutral are not for it.
+    """
+    def text() -> str:
+        from servotwin.simulation.compile import reading
+        return f"NUMBERS = {reading.unread(recipe)!r}\n"
+
+    with _lock:
+        path, _ = stored(f"{_name(recipe)}_unread", text)
+        return cast("tuple[str, ...]", loaded(path).NUMBERS)

@@ -54,6 +54,10 @@ class Recipe:
         Constants that nothing will be equal to.
     present : tuple of str
         Numbers of terms that are positive in all that will run ("firmware.T_c").
+    knows : int
+        On what the acceleration may depend in what will run: flags of `terms.dependence`.
+    spares : tuple of str
+        Numbers of terms that it does well without, though other kernels read them: they act in what it leaves to them.
     """
 
     name: str
@@ -63,6 +67,8 @@ class Recipe:
     absent: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     present: tuple[str, ...] = ()
+    knows: int = -1
+    spares: tuple[str, ...] = ()
 
 
 def derive(recipe: Recipe) -> str:
@@ -101,12 +107,14 @@ class Derivation:
     constants: dict[str, str] = field(default_factory=dict)
     imports: dict[str, tuple[str, str]] = field(default_factory=dict)
     in_any_order: set[str] = field(default_factory=set)
+    homes: dict[str, FunctionType] = field(default_factory=dict)  # what each function was
 
     def function(self, module: str, name: str) -> str:
         """Collect a function after those that it calls, and return its name in the derived module."""
         flat = flat_name(module, name)
         if flat not in self.functions:
             self.functions[flat] = ""  # marks a call of itself
+            self.homes[flat] = getattr(import_module(module), name)
             if name in getattr(import_module(module), "IN_ANY_ORDER", ()):
                 self.in_any_order.add(flat)
             node = definition(module, name)
@@ -144,6 +152,7 @@ class Derivation:
         """Collect a function of `engine.records`, which comes as text."""
         flat = flat_name(function.__module__, function.__name__)
         if flat not in self.functions:
+            self.homes[flat] = function
             aliases = {name: self.value(kind.__module__, name, kind) for name, kind in function.kinds.items()}
             node = ast.parse(function.text).body[0]
             for part in ast.walk(node):

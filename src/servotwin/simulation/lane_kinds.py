@@ -1,0 +1,224 @@
+"""Which lanes run in which form: the fastest that can follow what their terms do, else the general one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from servotwin.models.engine import tiles
+from servotwin.models.engine.motion import may_depend
+from servotwin.models.engine.records import numbers_in
+from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.physics.laws import array_form
+from servotwin.physics.pieces import Piece
+from servotwin.simulation import lane_recipes as recipes
+from servotwin.simulation.compile import Recipe, unread
+
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+_SMALLEST = 2.0**-150  # what is not more is zero in float32
+_NOTHING: dict[str, Any] = {**NEUTRAL._asdict(), "chip": NO_CHIP, "firmware": NO_FIRMWARE}
+_may_depend = array_form(may_depend, __name__)
+
+
+class Terms:
+    """What lanes have, each question asked once."""
+
+    def __init__(self, numbers: Numbers, chip: Chip, firmware: Firmware, swept: Any) -> None:
+        self.numbers, self.chip = numbers, chip
+        self._rooms: dict[str, Any] = {**numbers._asdict(), "chip": chip, "firmware": firmware}
+        self._known: dict[str, Any] = {"sweep": swept}
+
+    @cached_property
+    def _depends(self) -> Any:
+        """On what the acceleration of each lane may depend."""
+        wave: Any = np.where(self._known["sweep"], 1.0, 0.0)
+        return _may_depend(self.numbers, Piece(sweep=wave if wave.ndim else float(wave)))
+
+    def have(self, name: str) -> Any:
+        """Tell which lanes have a term ("heat", told by its first number), or a number of one ("motor.L")."""
+        if name not in self._known:
+            room, *fields = name.split(".")
+            own, nothing = self._rooms[room], _NOTHING[room]
+            for field in fields or nothing._fields[:1]:
+                own, nothing = getattr(own, field), getattr(nothing, field)
+            self._known[name] = own != nothing
+        return self._known[name]
+
+    def have_any(self, names: Iterable[str]) -> Any:
+        """Tell which lanes have one of some terms or numbers."""
+        found: Any = False
+        for name in names:
+            found = _either(found, self.have(name))
+        return found
+
+    def fit(self, recipe: Recipe) -> Any:
+        """Tell for which lanes kernels are made: for those with nothing that they leave out, do not know or follow."""
+        unknown = (name for part in recipes.parts_of(recipe) for name in unread(part))
+        return _without((self._depends & ~recipe.knows) == 0, self.have_any((*recipe.absent, *unknown)))
+
+
+class SideBySide(NamedTuple):
+    """Lanes that run side by side in one form.
+
+    Whether some have a potentiometer with play, whether some creep, and, where they go by strides, whether they have
+    what makes bands.
+    """
+
+    which: Indices
+    form: int
+    slack: bool
+    dtype: str
+    creeps: bool = False
+    banded: bool = False
+
+    @property
+    def recipe(self) -> Recipe:
+        """Their kernels."""
+        return recipes.side_by_side(self.form, self.dtype, self.creeps, self.banded)
+
+    @property
+    def general(self) -> Recipe:
+        """The kernels of those that cannot go on side by side."""
+        if self.form == tiles.GAPS:
+            return recipes.GAP_RUNS
+        plain = self.form in (tiles.ONE_FORMULA, tiles.ARCS) and not self.slack
+        return recipes.PLAIN_RUNS if plain else recipes.ALL_RUNS
+
+
+class OneByOne(NamedTuple):
+    """Lanes that run one by one, by a form that leaves out what they lack."""
+
+    which: Indices
+    recipe: Recipe
+
+
+def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str, swept: Mask, recorded: Mask,
+             curved: bool, firmware: Firmware = NO_FIRMWARE) -> list[SideBySide | OneByOne]:
+    """Return how lanes run, whose numbers are numbers or arrays (lanes,).
+
+    `swept` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
+    potentiometers have a table.
+    """
+    terms = Terms(numbers, chip, firmware, swept.any() and swept)
+    recording = recorded.any() and recorded
+    if np.any(terms.have("elastic")) or np.any(numbers.bridge.pwm > 0.0):
+        return _alone(terms, recording, lanes)
+    found: list[SideBySide | OneByOne] = []
+    left: Any = True
+    if pulsed and not curved:
+        side = _may_go_side_by_side(terms, recording, dtype)
+        for form, wanted, of_bands in _forms(terms):
+            own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
+            which = _and(side, wanted, left)
+            if np.any(which):
+                which = _and(which, terms.fit(recipes.side_by_side(form, own_type, True, of_bands)))
+                left = _without(left, which)
+                found.append(_together(terms, form, own_type, _indices(which, lanes)))
+    loose = pulsed and _without(terms.have("play"), recording)
+    for recipe, wanted in ((recipes.PLAIN_RUNS, True), (recipes.PENDULUM_RUNS, True), (recipes.GAP_RUNS, loose)):
+        which = _and(left, wanted)
+        if np.any(which):
+            which = _and(which, terms.fit(recipe))
+            left = _without(left, which)
+            found.append(OneByOne(_indices(which, lanes), recipe))
+    found.append(OneByOne(_indices(left, lanes), recipes.ALL_RUNS))
+    return [kind for kind in found if len(kind.which)]
+
+
+def _alone(terms: Terms, recording: Any, lanes: int) -> list[SideBySide | OneByOne]:
+    """Return how lanes run of which some have a spring between two bodies, or a program."""
+    digital = bool(np.any(terms.numbers.bridge.pwm > 0.0))
+    sprung, left = terms.have("elastic"), np.logical_not(terms.have("elastic"))
+    found: list[SideBySide | OneByOne] = [OneByOne(_indices(sprung, lanes), recipes.ELASTIC_RUNS[digital])]
+    wanted = ((recipes.PLAIN_DIGITAL, _without(True, recording)), (recipes.ALL_DIGITAL, True)) if digital else ()
+    for recipe, some in wanted:
+        which = _and(left, some)
+        if np.any(which):
+            which = _and(which, terms.fit(recipe))
+            left = _without(left, which)
+            found.append(OneByOne(_indices(which, lanes), recipe))
+    found.append(OneByOne(_indices(left, lanes), recipes.STEPPED_DIGITAL if digital else recipes.ALL_RUNS))
+    return [kind for kind in found if len(kind.which)]
+
+
+def _may_go_side_by_side(terms: Terms, recording: Any, dtype: str) -> Any:
+    """Tell which pulse servos may go side by side, if there is a form for their terms."""
+    numbers, bridge = terms.numbers, terms.numbers.bridge
+    side = (_without(True, recording) & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
+            & (bridge.silence.coast == bridge.off.coast))
+    if dtype == "float32":  # what is not zero has to stay so
+        for x in (*numbers_in(numbers), *numbers_in(terms.chip)):
+            fits = (x == 0.0) | (abs(x) > _SMALLEST)
+            side = side if fits is True else side & fits
+    return side
+
+
+def _forms(terms: Terms) -> list[tuple[int, Any, bool]]:
+    """Return the forms of going side by side, for which lanes each is if it knows their terms, and if in bands."""
+    bridge = terms.numbers.bridge
+    banded, striding = terms.have_any(recipes.BANDED), terms.have_any(recipes.STRIDING)
+    braked = (bridge.off.D == 0.0) & (bridge.D_drive < terms.numbers.source.V)
+    by_bands = _either(banded, terms.have("sensor.half_slack") & np.logical_not(braked))
+    return [(tiles.ONE_FORMULA, _without(braked, by_bands), False),
+            (tiles.ARCS, _without(np.logical_not(braked), by_bands), False), (tiles.BANDS, by_bands, True),
+            (tiles.STRIDES, _without(striding, banded), False), (tiles.STRIDES, _and(striding, banded), True),
+            (tiles.COILS, terms.have("motor.L"), False), (tiles.GAPS, terms.have("play"), False)]
+
+
+def _together(terms: Terms, form: int, dtype: str, which: Indices) -> SideBySide:
+    """Return how some lanes run side by side, by what some of them have."""
+    own = terms.numbers.friction
+
+    def some(flag: Any) -> bool:
+        return bool(np.any(flag)) and bool(np.any(flag if np.ndim(flag) == 0 else flag[which]))
+
+    return SideBySide(which, form, some(terms.have("sensor.half_slack")), dtype,
+                      form == tiles.BANDS and some(own.varies * own.w_s > 0.0),
+                      form == tiles.STRIDES and some(terms.have_any(recipes.BANDED)))
+
+
+def goes_together(numbers: Numbers, pulsed: bool) -> bool:
+    """Tell whether all lanes take about as long, for none has a term that would let it run on its own."""
+    terms = Terms(numbers, NO_CHIP, NO_FIRMWARE, False)
+    return pulsed and not np.any(terms.have_any(("friction.kappa", "play", *recipes.STRIDING)))
+
+
+def looking(recipe: Recipe) -> Recipe:
+    """Return how lanes are looked at that run one by one in this way."""
+    for digital, own in recipes.ELASTIC_RUNS.items():
+        if recipe == own:
+            return recipes.LOOK_ELASTIC[digital]
+    return recipes.LOOK_DIGITAL if "firmware.T_c" in recipe.present else recipes.LOOK_ONE_BY_ONE
+
+
+def _without(some: Any, *others: Any) -> Any:
+    """Return `some` but for those that one of the others holds for."""
+    for other in others:
+        some = some if other is False else np.logical_and(some, np.logical_not(other))
+    return some
+
+
+def _and(*parts: Any) -> Any:
+    """Return those for which everything holds."""
+    found: Any = True
+    for part in parts:
+        found = part if found is True else found if part is True else np.logical_and(found, part)
+    return found
+
+
+def _either(a: Any, b: Any) -> Any:
+    """Return a | b, at once where one of them holds for none."""
+    return b if a is False else a if b is False else a | b
+
+
+def _indices(some: Any, lanes: int) -> Indices:
+    """Return the lanes that something holds for."""
+    return np.flatnonzero(some) if np.ndim(some) else np.arange(lanes if some else 0)
