@@ -33,21 +33,26 @@ def _side(name: str, forms: tuple[str, ...], knows: int, absent: tuple[str, ...]
                   never=(*(form for form in _FORMS if form not in forms), *never))
 
 
-# Of a share of the load, a stop that is hit, a spring that is not there: lanes with these go elsewhere
+# Numbers that a form follows though it lacks one of their readers: a way to solve that it does not go, or what happens
+# at a stop, which it leaves to others
 _NOT_OF_ARCS = ("shaft.J_out", "shaft.b_out", "stops.restitution", "load.rest_angle")
+_NOT_OF_BANDS = (*_NOT_OF_ARCS, "friction.varies", "friction.w_s", "friction.K_m", "friction.K_e")
+_NOT_OF_STRIDES = (*_NOT_OF_BANDS, "friction.K_ms", "friction.K_es", "load.stiffness", "load.gravity",
+                   "load.hanging_angle")
 _BY_ARCS = {dtype: _side(f"side_by_side_{dtype}", ("ONE_FORMULA", "ARCS"), 0, (*_NOT_IN_BANDS, *BANDED),
                          ("CORE", *_PLAYED), single=dtype == "float32", spares=_NOT_OF_ARCS)
             for dtype in ("float64", "float32")}
-_BY_BANDS = {creeps: _side("by_bands" + "_and_creep" * creeps, ("BANDS",), BY_SHARE | FADING, (
-    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), ("CORE", *_PLAYED)) for creeps in (False, True)}
-_SMOOTH = ON_HEAT | ON_Q | CURVED_Q
-_BY_STRIDES = {banded: _side("by_strides" + "_in_bands" * banded, ("STRIDES",), (
-    _SMOOTH | BY_SHARE | FADING if banded else _SMOOTH), (
-    _NOT_IN_STRIDES if banded else (*_NOT_IN_STRIDES, *BANDED)), ("CORE", *_PLAYED)) for banded in (False, True)}
+_SMOOTH, _BANDS_TOO = ON_HEAT | ON_Q | CURVED_Q, BY_SHARE | FADING
+_BY_BANDS = {creeps: _side("by_bands" + "_and_creep" * creeps, ("BANDS",), _BANDS_TOO, (
+    _NOT_IN_BANDS if creeps else (*_NOT_IN_BANDS, "friction.w_s")), ("CORE", *_PLAYED), spares=_NOT_OF_BANDS)
+    for creeps in (False, True)}
+_BY_STRIDES = {banded: _side("by_strides" + "_in_bands" * banded, ("STRIDES",), _SMOOTH | _BANDS_TOO * banded, (
+    _NOT_IN_STRIDES if banded else (*_NOT_IN_STRIDES, *BANDED)), ("CORE", *_PLAYED), spares=_NOT_OF_STRIDES)
+    for banded in (False, True)}
 _BY_COILS = _side("by_coils", ("COILS",), ON_I, (*_NO_SIDE, _PLAY, *STRIDING, *BANDED), (
     "CORE", *_PLAYED, "LINEAR", "LINEAR_BACKWARD", "LIMITED_FORWARD", "LIMITED_BACKWARD", "SHORT_FORWARD",
-    "SHORT_BACKWARD"))
-_BY_GAPS = _side("by_gaps", ("GAPS",), TWO_BODIES, _NOT_IN_GAPS, ("CORE",))
+    "SHORT_BACKWARD"), spares=_NOT_OF_ARCS)
+_BY_GAPS = _side("by_gaps", ("GAPS",), TWO_BODIES, _NOT_IN_GAPS, ("CORE",), spares=_NOT_OF_ARCS)
 _NOT_PLAIN = ("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE")
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep", *_APART), never=_NOT_PLAIN, knows=ON_Q)

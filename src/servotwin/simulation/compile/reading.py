@@ -160,7 +160,7 @@ def _hints(of: Any) -> dict[str, Any]:
     if hasattr(of, "text"):
         value: Any = ast.parse(of.text).body[0]
         made = getattr(value.body[-1], "value", None)
-        return {"return": of.kinds.get(made.func.id)} if isinstance(made, ast.Call) else {}
+        return {"return": of.kinds.get(ast.unparse(made.func))} if isinstance(made, ast.Call) else {}
     space, found = vars(import_module(of.__module__)) if hasattr(of, "__module__") else {}, {}
     for name, hint in getattr(of, "__annotations__", {}).items():
         text = getattr(hint, "__forward_arg__", hint)
