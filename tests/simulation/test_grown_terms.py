@@ -24,7 +24,8 @@ A_NUMBER = {
         "K_w", "number", NOT_NEGATIVE, "grown", THEORY.of(0.0, 1.0))
     bearing_coulomb_torque: float | None = parameter(""")],
     FRICTION: [
-        ("READS = (\n", f'READS = (\n    "{NAME}",\n'), ("    K_eq: float\n", "    K_eq: float\n    K_w: float = 0.0\n"),
+        ("READS = (\n", f'READS = (\n    "{NAME}",\n'),
+        ("    K_eq: float\n", "    K_eq: float\n    K_w: float = 0.0\n"),
         ("_replace(breakaway=", f'_replace(K_w=model.value_or("{NAME}", 0.0), breakaway=')]}
 BY_THE_SPEED = {
     "physics/load_friction.py": [("def share_balance(", """\
@@ -40,7 +41,8 @@ def share_balance(""")],
          "        F += quadratic_friction(w, friction.K_w)\n"
          "    if friction.varies == 0.0:\n        return F\n    speed"),
         ("    return (STEEP_W if contact == CORE else 0 if",
-         "    return (STEEP_W if contact == CORE else CURVED_W if friction.K_w > 0.0 and not at_rest(contact) else 0 if")]}
+         "    return (STEEP_W if contact == CORE else CURVED_W if friction.K_w > 0.0 and not at_rest(contact)"
+         " else 0 if")]}
 CONSTANT = {FRICTION: [  # `depends` says nothing new of it
     (SLIDES,
      "    F = coulomb(friction, forward) + friction.K_w\n    if friction.varies == 0.0:\n        return F\n    speed"),
