@@ -9,6 +9,7 @@ from servotwin.models.engine.crossing import Counted, Held, Hour, Side, remember
 from servotwin.models.engine.memory import time_of
 from servotwin.models.engine.modes import ON_BACKWARD, RIGID
 from servotwin.models.engine.records import mapped
+from servotwin.models.terms.control import ABSENT, NOT_STARTED
 from servotwin.physics.laws import array_form
 
 PERIOD = 0.02
@@ -32,7 +33,7 @@ def random_side(rng):
 @pytest.mark.parametrize("seed", range(5))
 def test_there_and_back_changes_nothing(seed):
     side = random_side(np.random.default_rng(seed))
-    memory = remembered(side, True, 0.01)
+    memory = remembered(side, True, 0.01, NOT_STARTED)
     assert time_of(memory) == pytest.approx(side.hour.edge + side.hour.since, abs=1e-12)
     back = side_of(memory, PERIOD)
     for there, here in zip(side, back, strict=True):
@@ -42,7 +43,7 @@ def test_there_and_back_changes_nothing(seed):
 def test_another_period_goes_on_at_its_own_next_edge():
     side = random_side(np.random.default_rng(9))
     time = side.hour.edge + side.hour.since
-    back = side_of(remembered(side, True, 0.0), 0.012)
+    back = side_of(remembered(side, True, 0.0, NOT_STARTED), 0.012)
     assert back.counted.number == math.ceil(time / 0.012)
     assert back.hour.edge + back.hour.since == pytest.approx(time, abs=1e-12)
     assert back.counted.first_draw + back.counted.number == side.counted.first_draw + side.counted.number
@@ -50,15 +51,15 @@ def test_another_period_goes_on_at_its_own_next_edge():
 
 def test_without_slack_the_potentiometer_goes_with_the_shaft():
     side = random_side(np.random.default_rng(3))
-    assert remembered(side, True, 0.0).point.wiper == side.held.q
-    assert remembered(side, True, 0.01).point.wiper == side.held.wiper != side.held.q
+    assert remembered(side, True, 0.0, NOT_STARTED).point.wiper == side.held.q
+    assert remembered(side, True, 0.01, NOT_STARTED).point.wiper == side.held.wiper != side.held.q
 
 
 def test_many_at_once_are_each_alone():
     sides = [random_side(np.random.default_rng(seed)) for seed in range(20)]
     columns = Side(*(type(parts[0])(*map(np.array, zip(*parts, strict=True))) for parts in zip(*sides, strict=True)))
-    memory = array_form(remembered)(columns, np.ones(20, bool), np.zeros(20))
+    memory = array_form(remembered)(columns, np.ones(20, bool), np.zeros(20), ABSENT)
     back = array_form(side_of)(memory, np.where(np.arange(20) % 2 == 0, PERIOD, 0.012))
     for k, side in enumerate(sides):
-        alone = side_of(remembered(side, True, 0.0), PERIOD if k % 2 == 0 else 0.012)
+        alone = side_of(remembered(side, True, 0.0, NOT_STARTED), PERIOD if k % 2 == 0 else 0.012)
         assert mapped(lambda column, k=k: float(column[k]), back) == mapped(float, alone)

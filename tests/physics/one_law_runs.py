@@ -8,10 +8,9 @@ and `one_law_runs.py out.npz laws drive_time` calls laws by themselves, compiled
 
 import json
 import sys
-import types
 import warnings
 from dataclasses import astuple
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -129,25 +128,10 @@ def on_a_bus(st, model, command, load, how):
 
 def without_compiler():
     """Let batches run the derived text as it is."""
-    from servotwin.models.engine import elementary
     from servotwin.simulation import lane_runs, vector_store
-    from servotwin.simulation.compile.derive import derive
+    from servotwin.simulation.compile.plain import plain_module
 
-    numba, intrinsics, linking = (types.ModuleType(name) for name in (
-        "numba", *(f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking"))))
-    linking.Part = None
-    numba.njit = lambda **_: lambda function: function
-    for name in ("fma", "two_power", "binary_exponent", "nearest", "floor"):
-        setattr(intrinsics, name, getattr(elementary, name))
-    sys.modules |= {module.__name__: module for module in (numba, intrinsics, linking)}
-    known = {}
-
-    def kernels(recipe):
-        if recipe not in known:
-            known[recipe] = types.ModuleType(recipe.name)
-            exec(derive(recipe), vars(known[recipe]))
-        return known[recipe]
-
+    kernels = cache(plain_module)
     lane_runs.kernels = vector_store.kernels = kernels
 
 

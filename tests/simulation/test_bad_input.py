@@ -69,3 +69,8 @@ def test_what_cannot_be_followed_ends_with_a_status(servo, load, status):
     sim = st.Simulator(model, load=load)
     with pytest.raises(SimulationError):
         sim.advance(sim.initial(STEP, {"output_speed": 1.0}), 1.0, STEP)
+
+
+def test_numbers_that_no_law_takes_end_a_run_with_a_status(servo):
+    result = st.simulate(st.PulseServo(servo), STEP, duration=0.2, load=loads.Constant(1e307))
+    assert result.status is Status.DIVERGED

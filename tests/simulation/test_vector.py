@@ -70,7 +70,7 @@ def test_every_signal_is_that_of_a_simulator_that_stands_there(servo, name, kind
         sims.advance(duration, pulse_width=widths, external_torque=torques)
         seen = {signal: sims[signal] for signal in model.available}
         for lane, record in enumerate(sims.save().records):
-            memory = memory_of(record)
+            memory = memory_of(record, ())
             state = State(time_of(memory), model.states, memory)
             command = st.signals.constant(1e6 * widths[lane], unit="us")
             for signal, values in seen.items():

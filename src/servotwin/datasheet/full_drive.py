@@ -21,6 +21,7 @@ from servotwin.models.engine.memory import started
 from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Mode, Vector
 from servotwin.models.terms import bridge as bridge_term
 from servotwin.models.terms import duty, source
+from servotwin.models.terms.control import NOT_STARTED
 from servotwin.models.terms.elastic import NO_ELASTIC
 from servotwin.models.terms.heat import NO_HEAT
 from servotwin.models.terms.numbers import Numbers
@@ -211,7 +212,7 @@ class FullDrive:
         hung = as_load(load)
         plant = self.loaded(hung)._replace(stops=Stops(-math.inf, end, 0.0))
         record = Record([], [])
-        state = State(time=0.0, places=self.model.states, memory=started(_state(start, 0.0), RIGID))
+        state = State(time=0.0, places=self.model.states, memory=started(_state(start, 0.0), RIGID, NOT_STARTED))
         run(Plan(plant, constant_pieces(self.voltage), hung.torque_pieces), state, _LONGEST_SWING, record)
         time = next((event.time for event in record.events if event.kind == "upper stop"), math.nan)
         if math.isnan(time):

@@ -10,23 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import bus, controller, crew, tape
-from servotwin.models.engine.buses import Buses, Tables
-from servotwin.models.engine.memory import Memory, forgotten, origin_of, resumed
+from servotwin.models.engine.buses import Buses
+from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
 from servotwin.models.engine.seats import ROOM, Mate, Seat, Shared, put_shared
 from servotwin.models.engine.step import DIVERGED
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import at_start
+from servotwin.models.engine.told import Tables
 from servotwin.models.terms import control
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.source import Source
-from servotwin.simulation.compile import Recipe, is_compiled, kernels
+from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.engine import Plan, State
 from servotwin.simulation.lane_kinds import Terms
-from servotwin.simulation.lane_memory import RECORD
+from servotwin.simulation.lane_memory import nothing_yet
 from servotwin.simulation.lane_recipes import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS
 from servotwin.simulation.lane_runs import programs_of
 
@@ -76,7 +77,7 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
         written.used[:] = 0
         try:
             status, when = way.go_on(until, written)
-        except ArithmeticError:  # numbers beyond what a float holds
+        except (ArithmeticError, ValueError):  # numbers beyond what a float holds
             status, when = DIVERGED, float(written.motions[:written.used[0], tape.UNTIL].max(initial=when))
         part = [rows[:used].copy() for rows, used in zip(written[:3], written.used.tolist(), strict=True)]
         part[0][:, tape.FIRST] += count
@@ -109,6 +110,8 @@ def not_plain(numbers: Numbers) -> Any:
 
 def _worth_it(recipe: Recipe, frames: float) -> bool:
     """Tell whether so many frames of servos, with those before, are worth compiled kernels."""
+    if is_plain():
+        return False
     done = _frames_run.get(recipe.name, 0.0) + frames * (_INTEGRATED if recipe is ALL_BUSES else 1)
     if done >= COMPILES_FROM or (done >= LOADS_FROM and is_compiled(recipe)):
         done = math.inf
@@ -137,10 +140,12 @@ class Plainly:
     """
 
     def __init__(self, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
-        self._joined, self._shared = [-1 for _ in plans], object_of(Shared)
+        self._shared = object_of(Shared)
         put_shared(self._shared, at_start(source))
         self._seats, self._mates = ([object_of(kind) for _ in range(n * len(plans))] for kind, n in (
             (Seat, 1), (Mate, 2)))
+        for k, seat in enumerate(self._seats):
+            seat.place, seat.joined = k, -1
         self.begin(plans, states)
 
     def begin(self, plans: Sequence[Plan], states: Sequence[State]) -> None:
@@ -153,14 +158,20 @@ class Plainly:
     def break_up(self, source: Source) -> None:
         """Let nobody move together, and every motion begin anew: numbers of a servo, or the source, are others now."""
         self.memories = [forgotten(memory) for memory in self.memories]
-        self._joined = [-1 for _ in self._joined]
+        for seat in self._seats:
+            seat.joined = -1
         put_shared(self._shared, at_start(source))
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
         """Go on to a time [s]; return a status and when."""
-        ends = [until - origin_of(memory) for memory in self.memories]
-        return bus.through(self._inputs, self.memories, ends, self._joined, self._shared, self._seats, self._mates,
-                           written)
+        for seat, memory in zip(self._seats, self.memories, strict=True):
+            crew.remember(seat, memory)
+            seat.until = until - seat.origin
+        firms = [memory.firm[0] for memory in self.memories]
+        status, when = bus.through(self._inputs, firms, len(firms), self._shared, self._seats, self._mates, written)
+        self.memories = [crew.memory_in(seat, firms)._replace(firm=memory.firm)
+                         for seat, memory in zip(self._seats, self.memories, strict=True)]
+        return status, when
 
 
 class _Compiled:
@@ -221,9 +232,9 @@ def _in_64_bits(seed: int) -> int:
 
 
 def _tables_of(plans: Sequence[Plan]) -> Tables:
-    torques, curves = [plan.torque.rows for plan in plans], [np.array(plan.curve, np.float64).T for plan in plans]
-    return Tables(np.concatenate(torques), *_places(torques),
-                  np.ascontiguousarray(np.concatenate([curve.reshape(-1, 2) for curve in curves]).T), *_places(curves))
+    torques, curves = [plan.torque.rows for plan in plans], [np.array(plan.curve, np.float64) for plan in plans]
+    angles, errors = (np.concatenate([curve[k] for curve in curves]) for k in range(2))
+    return Tables(np.concatenate(torques), *_places(torques), angles, errors, *_places([curve[0] for curve in curves]))
 
 
 def _places(tables: Sequence[Array]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -241,19 +252,19 @@ def _tiles_of(kind: type[Any], values: Sequence[Any]) -> NDArray[Any]:
     return tiles
 
 
-def _records_of(memories: Sequence[Memory]) -> NDArray[Any]:
+def _records_of(memories: Sequence[Memory]) -> Memories:
     """Return memories as records."""
-    records = np.zeros(len(memories), RECORD)
-    for record, memory in zip(records, memories, strict=True):
+    found = nothing_yet(len(memories))
+    for record, firm, memory in zip(*found, memories, strict=True):
         _put(record, memory)
-    return records
+        own = memory.firm[0]
+        _put(firm, own if hasattr(own, "_fields") else control.frozen(own))
+    return found
 
 
 def _put(record: Any, values: Any) -> None:
     for (name, _), value in zip(fields_of(type(values)), values, strict=True):
         if hasattr(value, "_fields"):
             _put(record[name], value)
-        elif name == "firm":  # one in a sequence
-            _put(record[name], value[0] if hasattr(value[0], "_fields") else control.frozen(value[0]))
-        else:
+        elif name in (record.dtype.names or ()):  # what programs remember stands elsewhere
             record[name] = value

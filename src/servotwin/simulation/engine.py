@@ -228,7 +228,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
         before, trip = memory, memory.firm[0].trip if plan.digital else 0
         try:
             memory, m, event, status = step(numbers, chip, inputs, before, m, end)
-        except ArithmeticError:  # numbers beyond what a float holds
+        except (ArithmeticError, ValueError):  # numbers beyond what a float holds
             raise failure(Status.DIVERGED, time_of(before)) from None
         if status != COMPLETED:
             raise failure(Status.of_code(status), time_of(before))

@@ -18,7 +18,8 @@ from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.physics.laws import array_form
 from servotwin.physics.pieces import Piece
 from servotwin.simulation import lane_recipes as recipes
-from servotwin.simulation.compile import Recipe, unread
+from servotwin.simulation.compile import Recipe, is_plain
+from servotwin.simulation.compile.reading import unread
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -61,7 +62,7 @@ class Terms:
 
     def fit(self, recipe: Recipe) -> Any:
         """Tell for which lanes kernels are made: for those with nothing that they leave out, do not know or follow."""
-        unknown = (name for part in recipes.parts_of(recipe) for name in unread(part))
+        unknown = (name for part in recipes.parts_of(recipe) for name in unread(*part))
         return _without((self._depends & ~recipe.knows) == 0, self.have_any((*recipe.absent, *unknown)))
 
 
@@ -108,6 +109,8 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     potentiometers have a table.
     """
     terms = Terms(numbers, chip, firmware, swept.any() and swept)
+    if is_plain():  # a fast form has no worth
+        return _in_general(terms, lanes)
     recording = recorded.any() and recorded
     if np.any(terms.have("elastic")) or np.any(numbers.bridge.pwm > 0.0):
         return _alone(terms, recording, lanes)
@@ -131,6 +134,14 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
             found.append(OneByOne(_indices(which, lanes), recipe))
     found.append(OneByOne(_indices(left, lanes), recipes.ALL_RUNS))
     return [kind for kind in found if len(kind.which)]
+
+
+def _in_general(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
+    """Return how lanes run one by one, whatever they have."""
+    digital, sprung = bool(np.any(terms.numbers.bridge.pwm > 0.0)), terms.have("elastic")
+    kinds = (OneByOne(_indices(sprung, lanes), recipes.ELASTIC_RUNS[digital]),
+             OneByOne(_indices(np.logical_not(sprung), lanes), recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS))
+    return [kind for kind in kinds if len(kind.which)]
 
 
 def _alone(terms: Terms, recording: Any, lanes: int) -> list[SideBySide | OneByOne]:

@@ -1,4 +1,4 @@
-"""What servos that run side by side remember, as records that the general way goes on from, and back."""
+"""What lanes remember, as records: made, picked out, put back, and taken from tiles that run side by side."""
 
 from __future__ import annotations
 
@@ -8,16 +8,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.crossing import Counted, Held, Hour, Side, remembered, side_of
-from servotwin.models.engine.memory import Memory
+from servotwin.models.engine.memory import Memories, Memory
 from servotwin.models.engine.records import TILE, columns_of, fields_of, mapped, put_columns, record_of
+from servotwin.models.terms.control import ABSENT, Firm
 from servotwin.physics.laws import array_form
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-RECORD = record_of(Memory)
+_RECORD, _FIRM = record_of(Memory), record_of(Firm)
 _remembered, _side_of = (array_form(law, __name__) for law in (remembered, side_of))
 _GROUPS = {"servo": Held, "clock": Hour, "count": Counted}  # of a tile, in the order of `Side`
+
+
+def nothing_yet(count: int) -> Memories:
+    """Return room for what so many lanes remember."""
+    return Memories(np.zeros(count, _RECORD), np.zeros(count, _FIRM))
+
+
+def taken(memories: Memories, which: Any) -> Memories:
+    """Return what some lanes remember, by their numbers or as a slice."""
+    return Memories(*(array[which] for array in memories))
+
+
+def put_back(memories: Memories, which: Any, some: Memories) -> None:
+    """Let some lanes remember something else."""
+    for array, values in zip(memories, some, strict=True):
+        array[which] = values
+
+
+def copied(memories: Memories) -> Memories:
+    """Return the same, to be kept."""
+    return Memories(*(array.copy() for array in memories))
 
 
 def flat(tiles: NDArray[Any], group: str, name: str) -> Any:
@@ -30,20 +52,20 @@ def put(tiles: NDArray[Any], group: str, name: str, places: Indices, values: Any
     tiles[group][name][places // TILE, places % TILE] = values
 
 
-def records_of(tiles: NDArray[Any], places: Indices) -> NDArray[Any]:
+def memories_of(tiles: NDArray[Any], places: Indices) -> Memories:
     """Return what the lanes at these places of tiles remember."""
-    records = np.zeros(len(places), RECORD)
+    found = nothing_yet(len(places))
     if len(places):
         side = Side(*(columns_of(kind, tiles[group], places) for group, kind in _GROUPS.items()))
         regular, half_slack = flat(tiles, "count", "edges")[places] < 0, flat(tiles, "hung", "half_slack")[places]
-        _put_in(records, _remembered(mapped(_doubled, side), regular, half_slack))
-    return records
+        _put_in(found.rows, _remembered(mapped(_doubled, side), regular, half_slack, ABSENT))
+    return found
 
 
-def put_records(tiles: NDArray[Any], places: Indices, records: NDArray[Any], period: Floats) -> None:
+def put_memories(tiles: NDArray[Any], places: Indices, memories: Memories, period: Floats) -> None:
     """Put what lanes remember back into tiles; their frames are regular, of these periods from now on [s]."""
     if len(places):
-        side = _side_of(_read_from(Memory, records), period)
+        side = _side_of(_read_from(Memory, memories.rows), period)
         for group, values in zip(_GROUPS, side, strict=True):
             put_columns(tiles[group], places, values)
 
@@ -54,7 +76,8 @@ def _doubled(column: NDArray[Any]) -> NDArray[Any]:
 
 def _read_from(kind: type[Any], records: NDArray[Any]) -> Any:
     """Return the fields of records as a named tuple of columns, with those in it."""
-    return kind(*(_read(hint, records[name]) for name, hint in fields_of(kind)))
+    names = records.dtype.names or ()
+    return kind(*(_read(hint, records[name]) if name in names else ABSENT for name, hint in fields_of(kind)))
 
 
 def _read(hint: Any, field: NDArray[Any]) -> Any:
@@ -66,6 +89,8 @@ def _read(hint: Any, field: NDArray[Any]) -> Any:
 def _put_in(records: NDArray[Any], values: Any) -> None:
     """Set the fields of records from a named tuple of columns and numbers, with those in it."""
     for name, value in zip(values._fields, values, strict=True):
+        if name not in (records.dtype.names or ()):
+            continue
         if hasattr(value, "_fields"):
             _put_in(records[name], value)
         elif isinstance(value, tuple):

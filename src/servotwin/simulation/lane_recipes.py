@@ -88,10 +88,11 @@ _DECIDES_ALONE = (
     "firmware.overload_output", "firmware.latches", "firmware.trip_time", "firmware.resets",
     "firmware.restart_time", "firmware.loss", "firmware.failsafe", "firmware.soft_duty", "firmware.per_second",
     "firmware.at_nothing", "firmware.shortest", "firmware.longest",)
-GLIDING = Recipe("gliding", ("servotwin.models.engine.glides:go",), absent=_NOT_GLIDING, never=_NOT_PLAIN,
-                 present=_DIGITAL, spares=_GIVES_WAY)
-TICKING = Recipe("ticking", _TICKS, vector=True, absent=_NOT_GLIDING, never=_NOT_PLAIN, present=_DIGITAL,
-                 spares=(*_GIVES_WAY, *_DECIDES_ALONE))
+# Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop
+_GLIDING = (Recipe("gliding", _ENTRIES, absent=_NOT_GLIDING, never=_NOT_PLAIN, present=_DIGITAL, spares=_GIVES_WAY),
+            ("servotwin.models.engine.glides:go",))
+_TICKING = (Recipe("ticking", ("servotwin.models.engine.loops:go_on",), vector=True, absent=_NOT_GLIDING,
+                   never=_NOT_PLAIN, present=_DIGITAL, spares=(*_GIVES_WAY, *_DECIDES_ALONE)), _TICKS)
 BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, absent=PLAIN_DIGITAL.absent,
                   never=PLAIN_DIGITAL.never, present=_DIGITAL)
 
@@ -106,12 +107,15 @@ def _sprung(name: str, entries: tuple[str, ...]) -> dict[bool, Recipe]:
 ELASTIC_RUNS = _sprung("elastic_runs", _ENTRIES)
 LOOK_ELASTIC = _sprung("look_elastic", LOOK_ONE_BY_ONE.entries)
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, absent=_PROGRAM)
-_PARTS = {PLAIN_DIGITAL: (PLAIN_DIGITAL, GLIDING, TICKING), ALL_DIGITAL: (GLIDING,)}
+_PARTS = {PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _GLIDING, _TICKING), ALL_DIGITAL: (_GLIDING,)}
 
 
-def parts_of(recipe: Recipe) -> tuple[Recipe, ...]:
-    """Return the kernels by which lanes of a form may go, where these say by themselves whether they do."""
-    return _PARTS.get(recipe, (recipe,))
+def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
+    """Return the kernels by which lanes of a form may go, as `compile.reading.unread` is asked of them.
+
+    Those that say by themselves whether they do follow all numbers.
+    """
+    return _PARTS.get(recipe, ((recipe, ()),))
 
 
 def side_by_side(form: int, dtype: str, creeps: bool, banded: bool) -> Recipe:

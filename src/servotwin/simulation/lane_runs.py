@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import loop_tiles, tiles
+from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.records import columns_of, record_of, room, tiles_with
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation.compile import Recipe, kernels
+from servotwin.simulation.compile import Recipe, is_plain, kernels
 from servotwin.simulation.first_ticks import to_first_ticks
 from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
-from servotwin.simulation.lane_memory import RECORD, flat, records_of
+from servotwin.simulation.lane_memory import flat, memories_of, nothing_yet, taken
 from servotwin.simulation.lane_recipes import ALL_RUNS, BY_TICKS, ENDING, PLAIN_DIGITAL
 from servotwin.simulation.lanes import ALL_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
 
@@ -68,20 +69,19 @@ def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> No
     if lost:
         owed = flat(rows, "clock", "owed")[:len(which)]
         places = np.flatnonzero(owed > 0.0)
-        gone = which[places]
-        _finish(work, lanes, gone, owed[places], flat(rows, "count", "output")[places],
-                records_of(rows, places), raw, kind.general)
+        _finish(work, lanes, which[places], owed[places], flat(rows, "count", "output")[places],
+                memories_of(rows, places), raw, kind.general)
 
 
 def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = ALL_RUNS) -> None:
     """Run some lanes one after the other, in float64."""
-    records = np.zeros(len(which), RECORD)
-    kernels(recipe).start(lanes, which, records)
-    _finish(work, lanes, which, np.full(len(which), float(work.duration)), np.zeros(len(which), np.int64), records,
+    memories = nothing_yet(len(which))
+    kernels(recipe).start(lanes, which, memories)
+    _finish(work, lanes, which, np.full(len(which), float(work.duration)), np.zeros(len(which), np.int64), memories,
             raw, recipe)
 
 
-def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: Indices, records: NDArray[Any],
+def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: Indices, memories: Memories,
             raw: Raw, recipe: Recipe) -> None:
     """Let lanes go on one after the other, for durations of their own [s], from outputs of their own on."""
     times = _own(work.times, np.float64)
@@ -92,11 +92,11 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
         found = np.zeros((len(part), len(ALL_FIELDS), len(times)))
         status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
         go_on(recipe, lanes, np.array(work.curve, np.float64), _rows(work.torque.rows), _indices(work.torque.first),
-              _indices(work.torque.count), part, durations[some].copy(), times, own.copy(), found, records[some],
-              status, ended)
+              _indices(work.torque.count), part, durations[some].copy(), times, own.copy(), found,
+              taken(memories, some), status, ended)
         bad = status != 0
         raw.status[part], raw.ended[part] = status, np.where(bad, ended, work.duration)
-        y = records[some]["point"]["y"]
+        y = memories.rows[some]["point"]["y"]
         raw.final[part] = y[:, [0, 1, 3, 4]]
         failed = bad[:, None] & (times >= ended[:, None])
         ahead = np.arange(len(times)) >= own[:, None]
@@ -110,7 +110,7 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
 def go_on(recipe: Recipe, *arguments: Any) -> None:
     """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads."""
     *shared, ended = arguments
-    if recipe == PLAIN_DIGITAL:
+    if recipe == PLAIN_DIGITAL and not is_plain():
         to_first_ticks(kernels(recipe), *shared)
         kernels(BY_TICKS).go_on(*shared, loop_tiles.tile_room())
     kernels(recipe).go_on(*shared, ended)

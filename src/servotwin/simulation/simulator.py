@@ -18,6 +18,7 @@ from servotwin.models.engine.runs import mode_of
 from servotwin.models.outputs import PLAIN
 from servotwin.models.samples import Samples
 from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.control import NOT_STARTED
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
@@ -122,7 +123,7 @@ class Simulator:
         y = start_vector(self.model.states, self._numbers, angle, initial or {})
         check_start(self.model.states, self._numbers, y)
         mesh = INSIDE if self._numbers.play.half > 0.0 else RIGID
-        return State(time=0.0, places=self._places, memory=started(y, mesh))
+        return State(time=0.0, places=self._places, memory=started(y, mesh, NOT_STARTED))
 
     def advance(self, state: State, until: float, command: Signal, *, external_torque: float = 0.0) -> State:
         """Return the state at `until` [s] under a command.

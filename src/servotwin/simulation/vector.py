@@ -289,7 +289,7 @@ class VectorSimulator:
     def save(self) -> VectorMemory:
         """Return all that the lanes remember, as it is now; picklable."""
         store = self._store
-        return VectorMemory(type(self._numbers.model).__name__, store.records(), self._command.copy(),
+        return VectorMemory(type(self._numbers.model).__name__, *store.memories(), self._command.copy(),
                             self._torque.copy(), store.status.copy(), store.ended.copy(), store.work.copy(),
                             self._numbers.columns.numbers.copy(), store.common())
 

@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.buses import Buses, Tables
+from servotwin.models.engine.buses import Buses
+from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.records import columns_of
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import APART
+from servotwin.models.engine.told import Tables
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.bus_run import not_plain, recipe_of, room_of, shared_of
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
-from servotwin.simulation.lane_memory import RECORD
+from servotwin.simulation.lane_memory import copied, nothing_yet, put_back
 from servotwin.simulation.vector_calls import NO_TAPE, TICKS, calls_on_buses
 from servotwin.simulation.vector_memory import Piece, piece_of
 
@@ -47,8 +49,8 @@ class BusSet:
     ----------
     which : ndarray of int64
         The lanes.
-    rows : ndarray
-        What each remembers, a record of `models.engine.memory.Memory`.
+    memories : Memories
+        What each remembers.
     buses : Buses
         What those on a bus remember together; `recipe`, `tables` and `rooms` are what its kernels need besides.
     """
@@ -60,15 +62,16 @@ class BusSet:
         self.which = np.concatenate(lanes)
         sizes = np.array([len(some) for some in lanes])
         count = len(self.which)
-        self.rows = np.zeros(count, RECORD)
+        self.memories = nothing_yet(count)
+        self.rows = self.memories.rows
         self._bus_at = np.repeat(np.arange(len(buses)), sizes)
-        self.buses = Buses(self.which, np.concatenate([[0], np.cumsum(sizes)]), self.rows, np.full(count, -1),
+        self.buses = Buses(self.which, np.concatenate([[0], np.cumsum(sizes)]), self.memories, np.full(count, -1),
                             shared_of([source_of(supplies.supplies[k]) for k in buses]), np.zeros(count, np.int64),
                             np.zeros(count))
         none = np.zeros(numbers.count, np.int64)
-        curve = numbers.curve
-        self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, curve, none,
-                              none + curve.shape[1])
+        angles, errors = numbers.curve
+        self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, angles, errors, none,
+                             none + len(angles))
         self.rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(buses) // _WORTH)))]
 
     def advance(self, columns: Lanes, duration: float, status: NDArray[np.int8], ended: Array) -> None:
@@ -101,10 +104,10 @@ class BusSet:
         self.buses.shared["phase"][touched] = APART
         self.buses.shared["jumped"][touched] = 1
 
-    def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
+    def put(self, places: Indices, memories: Memories, numbers: LaneNumbers) -> None:
         """Put what lanes remember into their places."""
         self._break_up(places)
-        self.rows[places] = records
+        put_back(self.memories, places, memories)
 
     def refit(self, columns: Lanes, lanes: Indices, places: Indices) -> None:
         """Let motions of lanes begin anew: their numbers are read at each step."""
@@ -120,13 +123,13 @@ class BusSet:
         """Return what compiled code calls at each stage of a tick."""
         return calls_on_buses(self, store, room)
 
-    def records(self) -> NDArray[Any]:
+    def copied(self) -> Memories:
         """Return what the lanes remember."""
-        return self.rows.copy()
+        return copied(self.memories)
 
     def pieces(self) -> list[Piece]:
         """Return where the lanes stand, and what those on a bus remember together."""
-        return [piece_of(array) for array in (self.rows, self.buses.joined, self.buses.shared)]
+        return [piece_of(array) for array in (*self.memories, self.buses.joined, self.buses.shared)]
 
     def common(self, joined: Indices, shared: dict[int, Any]) -> None:
         """Put into `joined` (lanes,) and `shared` what the lanes of each bus remember together."""

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import loop_tiles, tape
+from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.tape import Tape
 from servotwin.simulation import lane_recipes
-from servotwin.simulation.compile import Recipe
+from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.compile.layout import GIVEN, STAGES
 from servotwin.simulation.lane_kinds import looking
-from servotwin.simulation.lane_memory import RECORD
+from servotwin.simulation.lane_memory import nothing_yet
 from servotwin.simulation.lanes import ALL_FIELDS
 
 if TYPE_CHECKING:
@@ -93,7 +94,8 @@ def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[
     alone = _Alone(len(which))
     lost = [call_of(TICKS, "gather_lost", which, store.status, rows, *alone.room, returns=True),
             *alone.go_on(some.general, store),
-            call_of(TICKS, "put_lost", *alone.some("places", "lanes", "records"), store.numbers.frame_period, rows)]
+            call_of(TICKS, "put_lost", *alone.some("places", "lanes"), alone.memories, store.numbers.frame_period,
+                    rows)]
     return {
         "refit": [call_of(kernels, "refit", store.columns, some.form[0], which, places, rows)],
         "impose": [call_of(TICKS, "impose_on_tiles", room.has, room.given, store.columns.numbers, which, places,
@@ -110,15 +112,17 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
     if some.calms:
         calm = [call_of(lane_recipes.CALM, "go", store.columns, which, store.now, store.status, rows, some.done,
                         returns=True)]
-    gather = call_of(TICKS, "gather", which, store.status, store.now, some.done, rows, *alone.room, returns=True)
+    gather = call_of(TICKS, "gather", which, store.status, store.now, some.done, some.memories, *alone.room,
+                     returns=True)
     advance = [*calm, gather,
-               *alone.go_on(some.recipe, store), call_of(TICKS, "put", *alone.some("places", "records"), rows)]
+               *alone.go_on(some.recipe, store),
+               call_of(TICKS, "put", *alone.some("places"), alone.memories, some.memories)]
     found = {
         "refit": [call_of(TICKS, "forget_motions", rows)],
         "impose": [call_of(TICKS, "impose_on_records", room.has, room.given, store.columns.numbers, which,
                            np.arange(len(which)), store.work, rows)],
         "advance": advance, "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
-        "look": [call_of(looking(some.recipe), "one_by_one", store.columns, *store.inputs, which, rows,
+        "look": [call_of(looking(some.recipe), "one_by_one", store.columns, *store.inputs, which, some.memories,
                          room.seen)]}
     return found | _clock(some, store, room)
 
@@ -154,7 +158,7 @@ class _Gathered(NamedTuple):
     places: Indices
     lanes: Indices
     durations: Array
-    records: NDArray[Any]
+    memories: Memories
 
 
 class _Alone:
@@ -162,7 +166,8 @@ class _Alone:
 
     def __init__(self, most: int) -> None:
         self.room = _Gathered(np.zeros(1, np.int64), np.zeros(most, np.int64), np.zeros(most, np.int64), np.zeros(most),
-                              np.zeros(most, RECORD))
+                              nothing_yet(most))
+        self.memories = Memories(*(Some(array, self.room.number) for array in self.room.memories))
         self._how, self._at = np.zeros(most, np.int64), np.zeros(most)
         self._first, self._outputs = np.zeros(most, np.int64), np.zeros((most, len(ALL_FIELDS), 0))
 
@@ -172,11 +177,11 @@ class _Alone:
 
     def go_on(self, recipe: Recipe, store: Store) -> list[Call]:
         """Return the calls that let the lanes go on and note who has failed."""
-        lanes, durations, records = self.some("lanes", "durations", "records")
+        lanes, durations = self.some("lanes", "durations")
         how, at = Some(self._how, self.room.number), Some(self._at, self.room.number)
-        shared = (store.columns, *store.inputs, lanes, durations, _NONE, self._first, self._outputs, records, how)
+        shared = (store.columns, *store.inputs, lanes, durations, _NONE, self._first, self._outputs, self.memories, how)
         calls = [call_of(recipe, "go_on", *shared, at),
-                 call_of(TICKS, "note_failures", lanes, how, at, records, store.status, store.ended)]
-        if recipe == lane_recipes.PLAIN_DIGITAL:
+                 call_of(TICKS, "note_failures", lanes, how, at, self.memories.rows, store.status, store.ended)]
+        if recipe == lane_recipes.PLAIN_DIGITAL and not is_plain():
             calls.insert(0, call_of(lane_recipes.BY_TICKS, "go_on", *shared, loop_tiles.tile_room()))
         return calls

@@ -32,8 +32,8 @@ class VectorMemory:
     ----------
     model : str
         Name of the model's class.
-    records : ndarray, shape (lanes,)
-        A record of `models.engine.memory.Memory` for each lane.
+    records, firms : ndarray, shape (lanes,)
+        Records of each lane: of `models.engine.memory.Memory`, and of `models.terms.control.Firm`.
     command, torque : ndarray, shape (lanes,)
         What each is told: width of the pulse [s] or control voltage [V]; external torque [N m].
     status, ended : ndarray, shape (lanes,)
@@ -49,6 +49,7 @@ class VectorMemory:
 
     model: str
     records: NDArray[Any]
+    firms: NDArray[Any]
     command: Array
     torque: Array
     status: NDArray[np.int8]

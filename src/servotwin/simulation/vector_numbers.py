@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
-from servotwin.models.engine.memory import put_started, started
+from servotwin.models.engine.memory import Memories, put_started
 from servotwin.models.engine.modes import INSIDE, RIGID
 from servotwin.models.engine.records import columns_of, put_columns, tiles_with
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
@@ -23,7 +23,7 @@ from servotwin.simulation import lane_runs
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes, lanes_of
-from servotwin.simulation.lane_memory import RECORD
+from servotwin.simulation.lane_memory import nothing_yet, taken
 from servotwin.simulation.lanes import Tables
 from servotwin.simulation.packing import Asked, Chunk, Commands, flat, groups
 from servotwin.simulation.start import start_vector
@@ -184,7 +184,7 @@ class LaneNumbers:
 
     # --- where lanes are ----------------------------------------------------------------------------------------------
 
-    def start(self, which: Indices, command: Array, angle: Array | None) -> NDArray[Any]:
+    def start(self, which: Indices, command: Array, angle: Array | None) -> Memories:
         """Return the memories of lanes at rest, under commands of all lanes as the engine follows them.
 
         Raises
@@ -192,9 +192,9 @@ class LaneNumbers:
         InputError
             If an angle is beyond a stop; names the lane.
         """
-        rest = np.zeros(1, RECORD)
-        put_started(rest[0], started((0.0,) * 7, RIGID))
-        records = np.repeat(rest, len(which))
+        rest = nothing_yet(1)
+        put_started(rest, 0, (0.0,) * 7, RIGID)
+        memories = taken(rest, np.zeros(len(which), np.int64))
         place = np.full(self.count, -1)
         place[which] = np.arange(len(which))
         for chunk in self.chunks:
@@ -209,12 +209,12 @@ class LaneNumbers:
             if angle is not None:
                 self.check_angles(angle[place[own]], own)
             play = self.now("play", own).half > 0.0
-            point = records["point"]
+            point = memories.rows["point"]
             for name in ("y", "anchor"):
                 point[name][place[own]] = y[:, :, 0].T
             point["wiper"][place[own]] = y[0, :, 0]
             point["mode"]["mesh"][place[own]] = np.where(play, INSIDE, RIGID)
-        return records
+        return memories
 
     def check_angles(self, angle: Array, which: Indices) -> None:
         """Raise InputError if an angle [rad] is beyond a stop; names the lane."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
+from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID
 from servotwin.models.engine.records import TILE, columns_of, room
 from servotwin.models.engine.ticks import ANGLE, SPEED
@@ -20,7 +21,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_recipes, lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of, looking
-from servotwin.simulation.lane_memory import RECORD, flat, put, put_records, records_of
+from servotwin.simulation.lane_memory import copied, flat, memories_of, nothing_yet, put, put_back, put_memories, taken
 from servotwin.simulation.lane_runs import some_of
 from servotwin.simulation.lanes import ALL_FIELDS
 from servotwin.simulation.vector_buses import BusSet, sets_of
@@ -111,10 +112,10 @@ class Store:
 
     def renew(self, numbers: LaneNumbers, which: Indices, torque: Array) -> None:
         """Take other numbers of some lanes; memories go on."""
-        memory, common = self.records(), self.common()
+        memories, common = self.memories(), self.common()
         self._build(numbers)
         self.hang(torque)
-        self._go_on_from(memory, which, common)
+        self._go_on_from(memories, which, common)
 
     def restore(self, memory: VectorMemory, torque: Array) -> None:
         """Go back to what was saved."""
@@ -124,7 +125,7 @@ class Store:
         before, now = (x.view(np.float64).reshape(len(x), -1, TILE)
                        for x in (memory.numbers, self.numbers.columns.numbers))
         others = np.flatnonzero((before != now).any(axis=1).ravel()[:count])
-        self._go_on_from(memory.records.copy(), others, memory.common)
+        self._go_on_from(copied(Memories(memory.records, memory.firms)), others, memory.common)
 
     def common(self) -> Common | None:
         """Return what lanes on shared supplies remember together."""
@@ -135,10 +136,10 @@ class Store:
             some.common(joined, shared)
         return Common(self.numbers.supplies.bus_of, joined, shared)
 
-    def _go_on_from(self, memory: NDArray[Any], others: Indices, common: Common | None) -> None:
+    def _go_on_from(self, memories: Memories, others: Indices, common: Common | None) -> None:
         """Take the memories of all lanes, of which some have other numbers than when they were made."""
         play, sprung = self.numbers.now("play").half > 0.0, self.numbers.now("elastic").k > 0.0
-        point = memory["point"]
+        point = memories.rows["point"]
         point["anchor_time"][others] = math.inf
         mesh = point["mode"]["mesh"]
         point["mode"]["mesh"] = np.where(
@@ -148,35 +149,35 @@ class Store:
         anchors = point["anchor_time"].copy()
         if common is not None:
             point["anchor_time"][common.joined >= 0] = math.inf  # unless their bus is the same as then
-        self._put(np.arange(len(self.status)), memory)
+        self._put(np.arange(len(self.status)), memories)
         if common is not None and np.array_equal(common.bus_of, self.numbers.supplies.bus_of):
             touched = common.bus_of[others]
             shared = {k: record for k, record in common.shared.items() if k not in touched}
             for some in self._buses:
                 some.set_common(common.joined, shared, anchors)
 
-    def start(self, which: Indices, records: NDArray[Any]) -> None:
+    def start(self, which: Indices, memories: Memories) -> None:
         """Put lanes where they start; their noise goes on."""
-        before = self.records()[which]
-        records["chip"]["draws"], records["firm"]["draws"] = before["chip"]["draws"], before["firm"]["draws"]
+        before = taken(self.memories(), which)
+        memories.rows["chip"]["draws"], memories.firms["draws"] = before.rows["chip"]["draws"], before.firms["draws"]
         self.status[which], self.ended[which], self.work[which] = 0, 0.0, 0.0
-        self._put(which, records)
+        self._put(which, memories)
 
     def enable(self, which: Indices, torque: Array) -> None:
         """Let torque of some lanes be on (1) or off (0)."""
-        records = self.records()[which]
-        records["firm"]["torque"] = torque
-        self._put(which, records)
+        memories = taken(self.memories(), which)
+        memories.firms["torque"] = torque
+        self._put(which, memories)
 
-    def _put(self, which: Indices, records: NDArray[Any]) -> None:
+    def _put(self, which: Indices, memories: Memories) -> None:
         for some, places, of in self._parts(which):
-            some.put(places, records[of], self.numbers)
+            some.put(places, taken(memories, of), self.numbers)
 
-    def records(self) -> NDArray[Any]:
+    def memories(self) -> Memories:
         """Return the memories of all lanes."""
-        found = np.zeros(len(self.status), RECORD)
+        found = nothing_yet(len(self.status))
         for some in self.sets:
-            found[some.which] = some.records()
+            put_back(found, some.which, some.copied())
         return found
 
     def shaft(self, name: str) -> Array:
@@ -210,11 +211,11 @@ class Store:
                 self.columns.pieces[:, 1] = command
                 own = np.flatnonzero((self.status[some.which] == 0) & ~some.calm(self, duration))
                 if len(own) == len(some.which):
-                    self._one_by_one(some.recipe, some.which, duration, some.rows)
+                    self._one_by_one(some.recipe, some.which, duration, some.memories)
                 elif len(own):
-                    part = some.rows[own]
+                    part = taken(some.memories, own)
                     self._one_by_one(some.recipe, some.which[own], duration, part)
-                    some.rows[own] = part
+                    put_back(some.memories, own, part)
         self.now[1] = 0.0
 
     def _advance_tiles(self, some: _Tiles, duration: float, command: Array) -> None:
@@ -236,11 +237,11 @@ class Store:
             places, durations = places[alive], durations[alive]
             if len(places):
                 self.columns.pieces[:, 1] = command
-                part = records_of(some.rows, places)
+                part = memories_of(some.rows, places)
                 self._one_by_one(some.general, some.which[places], durations, part)
-                put_records(some.rows, places, part, self.numbers.frame_period[some.which[places]])
+                put_memories(some.rows, places, part, self.numbers.frame_period[some.which[places]])
 
-    def _one_by_one(self, recipe: Any, which: Indices, duration: float | Array, records: NDArray[Any]) -> None:
+    def _one_by_one(self, recipe: Any, which: Indices, duration: float | Array, memories: Memories) -> None:
         """Let some lanes go on one by one; their memories are changed in place."""
         status, ended = np.zeros(len(which), np.int64), np.zeros(len(which))
         durations = np.full(len(which), duration) if isinstance(duration, float) else duration
@@ -248,8 +249,8 @@ class Store:
         def go(part: slice) -> None:
             some = which[part]
             lane_runs.go_on(recipe, self.columns, *self.inputs, some, durations[part], _NONE,
-                            np.zeros(len(some), np.int64), np.zeros((len(some), len(ALL_FIELDS), 0)), records[part],
-                            status[part], ended[part])
+                            np.zeros(len(some), np.int64), np.zeros((len(some), len(ALL_FIELDS), 0)),
+                            taken(memories, part), status[part], ended[part])
 
         workers = min(self._threads, len(which))
         if workers == 1:
@@ -260,7 +261,7 @@ class Store:
                 run.result()
         for k in np.flatnonzero(status).tolist():
             self.status[which[k]], self.ended[which[k]] = status[k], ended[k]
-            records["point"]["y"][k] = math.nan
+            memories.rows["point"]["y"][k] = math.nan
 
     # --- what shows, and what is imposed ------------------------------------------------------------------------------
 
@@ -302,8 +303,8 @@ class _Tiles:
         module.start(lanes, kind.form, math.inf, self.rows)
         self.rows["clock"]["piece_end"] = math.inf
 
-    def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
-        put_records(self.rows, places, records, numbers.frame_period[self.which[places]])
+    def put(self, places: Indices, memories: Memories, numbers: LaneNumbers) -> None:
+        put_memories(self.rows, places, memories, numbers.frame_period[self.which[places]])
 
     def refit(self, columns: tiles.Lanes, lanes: Indices, places: Indices) -> None:
         """Take the numbers of lanes anew."""
@@ -317,8 +318,8 @@ class _Tiles:
         """Let the general way finish the calls of these lanes."""
         put(self.rows, "clock", "owed", places, 0.0)
 
-    def records(self) -> NDArray[Any]:
-        return records_of(self.rows, np.arange(len(self.which)))
+    def copied(self) -> Memories:
+        return memories_of(self.rows, np.arange(len(self.which)))
 
     def pieces(self) -> list[Piece]:
         """Return where the lanes of each tile stand: numbers of one kind side by side."""
@@ -350,7 +351,8 @@ class _Records:
 
     def __init__(self, kind: OneByOne, numbers: LaneNumbers) -> None:
         self.which, self.recipe = kind.which, kind.recipe
-        self.rows = np.zeros(len(self.which), RECORD)
+        self.memories = nothing_yet(len(self.which))
+        self.rows = self.memories.rows
         self.done = np.zeros(len(self.which), np.int64)  # those that are through this call already
         self.calms = (not numbers.pulsed and kind.recipe == lane_recipes.PLAIN_RUNS
                       and not numbers.torque.count[kind.which].any())
@@ -362,8 +364,8 @@ class _Records:
                                        self.done)
         return np.asarray(self.done != 0)
 
-    def put(self, places: Indices, records: NDArray[Any], numbers: LaneNumbers) -> None:
-        self.rows[places] = records
+    def put(self, places: Indices, memories: Memories, numbers: LaneNumbers) -> None:
+        put_back(self.memories, places, memories)
 
     def refit(self, columns: tiles.Lanes, lanes: Indices, places: Indices) -> None:
         """Let motions of lanes begin anew: their numbers are read at each step."""
@@ -373,12 +375,12 @@ class _Records:
         """Set angles and speeds, as `engine.lane_ticks` does; motor and potentiometer go along as far as their play."""
         kernels(TICKS).impose_on_records(*imposed, self.rows)
 
-    def records(self) -> NDArray[Any]:
-        return self.rows.copy()
+    def copied(self) -> Memories:
+        return copied(self.memories)
 
     def pieces(self) -> list[Piece]:
         """Return where the lanes stand."""
-        return [piece_of(self.rows)]
+        return [piece_of(array) for array in self.memories]
 
     def shaft(self, name: str) -> Array:
         return np.asarray(self.rows["point"]["y"][:, SHAFT[name][1]])
@@ -388,7 +390,7 @@ class _Records:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
     def look(self, columns: tiles.Lanes, inputs: Any, status: Any, seen: Array) -> None:
-        kernels(looking(self.recipe)).one_by_one(columns, *inputs, self.which, self.rows, seen)
+        kernels(looking(self.recipe)).one_by_one(columns, *inputs, self.which, self.memories, seen)
 
     def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
         """Return what compiled code calls at each stage of a tick."""

@@ -14,7 +14,6 @@ from servotwin.models.engine.memory import (
     FRAMES,
     SAME,
     Inputs,
-    Memory,
     Point,
     counted_anew,
     due,
@@ -22,7 +21,6 @@ from servotwin.models.engine.memory import (
     instant,
     resumed,
     since,
-    time_of,
 )
 from servotwin.models.engine.modes import Mode, Vector
 from servotwin.models.engine.motion import LONG_STEP
@@ -43,6 +41,7 @@ from servotwin.models.engine.seats import (
 from servotwin.models.engine.step import CHATTER, COMPLETED, CROWDED, MOST_IDLE, STEP_TOO_SMALL, TOO_FAST
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.together import APART, ENDED, TOGETHER
+from servotwin.models.engine.told import inputs_at
 from servotwin.models.terms import control, duty, firmware, frame
 from servotwin.models.terms.bridge import terminal_voltage
 from servotwin.models.terms.control import NOTHING_SENSED, Sensed
@@ -56,51 +55,56 @@ _SPAN = 16.0  # s: then times count anew
 _LONGEST = 1.0  # s, of a common motion: it may be one of constant speed without an end
 
 
-def through(inputs: list[Inputs], memories: list[Memory], ends: list[float], joined: list[int], shared: Any, seats: Any,
-            mates: Any, written: Tape) -> tuple[int, float]:
-    """Go on to the ends of all servos by their clocks [s]; return a status, and when since the start.
+def through(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, written: Tape) -> tuple[int, float]:
+    """Go on until servos have gone as far as their seats say; return a status, and when since the start.
 
-    The servos have their seats; memories, places among those that move together, and `shared` are kept up to date.
-    Programs know their next tick.
+    The first `count` seats are taken, by servos that remember where they stand; seats and `shared` are kept up to date.
+    What they are `told` is found by `told.inputs_at`, what their programs remember in `firms`; they know their next
+    tick.
     """
-    programs = [memory.firm for memory in memories]
-    for j in range(len(memories)):
-        ends[j] = instant(True, inputs[j], memories[j], ends[j])
-    status, when = COMPLETED, time_of(memories[0])
-    while status == COMPLETED and memories[0].point.time < ends[0]:
-        for j in range(len(memories)):
-            memories[j] = resumed(True, inputs[j], memories[j], False)
-            while due(memories[j]):
-                shift = FRAMES * memories[j].beat
-                memories[j] = counted_anew(memories[j])
-                ends[j] = instant(True, inputs[j], memories[j], ends[j] - shift)  # or a tick next to it comes twice
-                if j == 0:
-                    shared.begin, shared.end = shared.begin - shift, shared.end - shift
-        first = memories[0].point.time
-        last = ends[0] <= first + _SPAN
-        for j in range(len(memories)):
-            end = ends[j] if last else memories[j].point.time + _SPAN
-            crew.place(seats[j], memories[j], first, end, joined[j])
-        status, time = run(inputs, programs, shared, seats, mates, written)
+    for j in range(count):
+        seat = seats[j]
+        seat.until = instant(True, inputs_at(told, seat), crew.memory_in(seat, firms), seat.until)
+    status, when = COMPLETED, seats[0].origin + seats[0].point.time
+    while status == COMPLETED and seats[0].point.time < seats[0].until:
+        for j in range(count):
+            _be_ready(inputs_at(told, seats[j]), seats[j], firms, shared, j == 0)
+        first = seats[0].point.time
+        last = seats[0].until <= first + _SPAN
+        for j in range(count):
+            seat = seats[j]
+            crew.begin(seat, first, seat.until if last else seat.point.time + _SPAN)
+        status, time = run(told, firms, count, shared, seats, mates, written)
         when = seats[0].origin + time
-        for j in range(len(memories)):
-            memories[j], joined[j] = crew.memory_now(seats[j], programs[j]), seats[j].joined
+        for j in range(count):
+            crew.finish(seats[j])
     return status, when
 
 
-def run(inputs: list[Inputs], programs: list[Any], shared: Any, seats: Any, mates: Any,
-        written: Tape) -> tuple[int, float]:
+def _be_ready(inputs: Inputs, seat: Any, firms: Any, shared: Any, first: bool) -> None:
+    """Let a servo be ready to go on, and its clock count from later on where that is due; the bus has the first's."""
+    memory = resumed(True, inputs, crew.memory_in(seat, firms), False)
+    while due(memory):
+        shift = FRAMES * memory.beat
+        memory = counted_anew(memory)
+        seat.until = instant(True, inputs, memory, seat.until - shift)  # or a tick next to it comes twice
+        if first:
+            shared.begin, shared.end = shared.begin - shift, shared.end - shift
+    crew.remember(seat, memory)
+
+
+def run(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, written: Tape) -> tuple[int, float]:
     """Go on to the end of the run, or until the tape is full; return a status and when, by the clock of the bus [s]."""
-    count, idle, status = len(inputs), 0, COMPLETED
+    idle, status = 0, COMPLETED
     time, until = seats[0].clock, seats[0].end
     _take_up(count, shared, seats, mates)
     for j in range(count):
-        crew.plan_ahead(seats[j], crew.edge_of(seats[j], inputs[j], programs[j]), until)
+        crew.plan_ahead(seats[j], crew.edge_of(seats[j], inputs_at(told, seats[j]), firms), until)
     while time < until:
         if tape.is_full(written, count):
             status = PAUSED
             break
-        status = _act(inputs, programs, shared, seats, mates, written, time, until)
+        status = _act(told, firms, count, shared, seats, mates, written, time, until)
         if status == COMPLETED:
             status = _go_on(count, shared, seats, mates, written, time, until)
         if status != COMPLETED:
@@ -168,36 +172,40 @@ def _come(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: 
 # --- what chips and loads do ------------------------------------------------------------------------------------------
 
 
-def _act(inputs: list[Inputs], programs: list[Any], shared: Any, seats: Any, mates: Any, written: Tape, time: float,
+def _act(told: Any, firms: Any, count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: float,
          until: float) -> int:
     """Do what is due at a time of the bus [s]: first switch, then measure, then put new duties on; return a status."""
     busy = False
-    for j in range(len(inputs)):
+    for j in range(count):
         seat = seats[j]
         if seat.due <= time:
-            busy = True
+            busy, inputs = True, inputs_at(told, seat)
             if seat.switch <= seat.clock:
                 crew.bring(seat, j, shared, mates, time, written)
-                _switch(inputs[j], seat, j, written)
+                _switch(inputs, seat, j, written)
                 crew.plan_ahead(seat, seat.edge, until)
-            if firmware.present(inputs[j].firmware[0]) and seat.due <= time:
-                _apply(inputs[j], programs[j][0], j, shared, seats, mates, written, time)
-    if busy:
-        for j in range(len(inputs)):
-            seat = seats[j]
-            if seat.due <= time and seat.edge <= seat.clock:
-                if firmware.present(inputs[j].firmware[0]):
-                    _tick(inputs[j], programs[j][0], j, len(inputs), shared, seats, mates, time)
-                    continue
-                _measure(inputs[j], j, len(inputs), shared, seats, mates, written, time)
-                if seat.decided.number == frame.CROWDED:
-                    return CROWDED
-                crew.plan_ahead(seat, crew.edge_of(seat, inputs[j], programs[j]), until)
-        for j in range(len(inputs)):
-            seat = seats[j]
-            if firmware.present(inputs[j].firmware[0]) and seat.due <= time and seat.edge <= seat.clock:
-                _apply(inputs[j], programs[j][0], j, shared, seats, mates, written, time)
-                crew.plan_ahead(seat, crew.edge_of(seat, inputs[j], programs[j]), until)
+            if firmware.present(inputs.firmware[0]) and seat.due <= time:
+                _apply(inputs, firms[seat.place], j, shared, seats, mates, written, time)
+    if not busy:
+        return COMPLETED
+    for j in range(count):
+        seat = seats[j]
+        if seat.due <= time and seat.edge <= seat.clock:
+            inputs = inputs_at(told, seat)
+            if firmware.present(inputs.firmware[0]):
+                _tick(inputs, firms[seat.place], j, count, shared, seats, mates, time)
+                continue
+            _measure(inputs, j, count, shared, seats, mates, written, time)
+            if seat.decided.number == frame.CROWDED:
+                return CROWDED
+            crew.plan_ahead(seat, crew.edge_of(seat, inputs, firms), until)
+    for j in range(count):
+        seat = seats[j]
+        if seat.due <= time and seat.edge <= seat.clock:
+            inputs = inputs_at(told, seat)
+            if firmware.present(inputs.firmware[0]):
+                _apply(inputs, firms[seat.place], j, shared, seats, mates, written, time)
+                crew.plan_ahead(seat, crew.edge_of(seat, inputs, firms), until)
     return COMPLETED
 
 

@@ -5,40 +5,21 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import bus, controller, crew, runs, step
-from servotwin.models.engine.memory import (
-    Inputs,
-    Memory,
-    in_force,
-    origin_of,
-    put_memory,
-    silent_now,
-    since,
-)
+from servotwin.models.engine import bus, controller, crew, step
+from servotwin.models.engine.memory import Memories, in_force, memory_at, origin_of, put_memory, silent_now, since
 from servotwin.models.engine.observe import observed, on_bus, told_by
-from servotwin.models.engine.runs import memory_at
 from servotwin.models.engine.seats import drive_of
 from servotwin.models.engine.sights import put
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import chip_of, numbers_of
+from servotwin.models.engine.told import Tables, Told, inputs_at
 from servotwin.models.terms import duty, firmware
 from servotwin.models.terms.numbers import warm
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
-
-
-class Tables(NamedTuple):
-    """What lanes have besides their columns: rows of torque over time, and tables of their potentiometers."""
-
-    torques: Floats
-    torque_first: Indices
-    torque_count: Indices
-    curves: Floats
-    curve_first: Indices
-    curve_count: Indices
 
 
 class Buses(NamedTuple):
@@ -50,7 +31,7 @@ class Buses(NamedTuple):
 
     which: Indices
     first: Indices
-    records: Any
+    memories: Memories
     joined: Indices
     shared: Any
     status: Indices
@@ -65,76 +46,79 @@ def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, dura
     servo of a bus, and twice as many mates. Return the status of the last bus: where it is `bus.PAUSED` the tape is
     full.
     """
-    status = COMPLETED
+    told, status = Told(lanes, tables), COMPLETED
     for k in range(begin, end):
-        places = [j for j in range(buses.first[k], buses.first[k + 1]) if buses.status[j] == COMPLETED]
-        if len(places) == 0:
-            continue
-        inputs, joined = [inputs_of(lanes, tables, buses.which[j]) for j in places], [buses.joined[j] for j in places]
-        memories = _seated(lanes, buses, places, inputs, seats)
-        if firmware.present(lanes.firmware[0]) and until == math.inf:
-            for n in range(len(places)):
-                controller.resume(inputs[n], memories[n])
-        ends = [m.point.time + duration if until == math.inf else until - origin_of(m) for m in memories]
-        status, when = bus.through(inputs, memories, ends, joined, buses.shared[k], seats, mates, written)
-        if firmware.present(lanes.firmware[0]) and until == math.inf:
-            for n in range(len(places)):
-                controller.pause(inputs[n], memories[n])
-        for n in range(len(places)):
-            j = places[n]
-            put_memory(buses.records[j], memories[n])
-            buses.joined[j], buses.ended[j] = joined[n], when
-            if status != COMPLETED and status != bus.PAUSED:
-                buses.status[j] = status
+        count = _seated(told, buses, k, seats)
+        if count > 0:
+            status = _go_on(told, buses, k, count, duration, until, seats, mates, written)
     return status
 
 
-def _seated(lanes: Lanes, buses: Buses, places: list[int], inputs: list[Inputs], seats: Any) -> list[Memory]:
-    """Give lanes their seats, and return what they remember."""
-    for n in range(len(places)):
-        lane = buses.which[places[n]]
-        crew.sit(seats[n], numbers_of(lanes, lane), chip_of(lanes, lane), inputs[n])
-    return [memory_at(lanes, buses.records, j) for j in places]
+def _go_on(told: Told, buses: Buses, k: int, count: int, duration: float, until: float, seats: Any, mates: Any,
+           written: Tape) -> int:
+    """Let the servos of a bus go on that have their seats; return a status."""
+    firms, paused = buses.memories.firms, firmware.present(told.lanes.firmware[0]) and until == math.inf
+    for n in range(count):
+        seat = seats[n]
+        if paused:
+            controller.resume(inputs_at(told, seat), crew.memory_in(seat, firms))
+        seat.until = seat.point.time + duration if until == math.inf else until - seat.origin
+    status, when = bus.through(told, firms, count, buses.shared[k], seats, mates, written)
+    for n in range(count):
+        seat = seats[n]
+        memory, j = crew.memory_in(seat, firms), seat.place
+        if paused:
+            controller.pause(inputs_at(told, seat), memory)
+        put_memory(buses.memories.rows[j], memory)
+        buses.joined[j], buses.ended[j] = seat.joined, when
+        if status != COMPLETED and status != bus.PAUSED:
+            buses.status[j] = status
+    return status
 
 
-def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
-    """Return what a lane is told, and what hangs on its shaft."""
-    first = tables.torque_first[lane]
-    curve = tables.curves[:, tables.curve_first[lane]:tables.curve_first[lane] + tables.curve_count[lane]]
-    return runs.inputs_of(lanes, curve, tables.torques[first:first + tables.torque_count[lane]], lane)
+def _seated(told: Told, buses: Buses, k: int, seats: Any) -> int:
+    """Give the lanes of a bus that have no status yet their seats, where they remember; return how many there are."""
+    count = 0
+    for j in range(buses.first[k], buses.first[k + 1]):
+        if buses.status[j] == COMPLETED:
+            seat, lane = seats[count], buses.which[j]
+            seat.place, seat.lane, seat.joined = j, lane, buses.joined[j]
+            crew.sit(seat, numbers_of(told.lanes, lane), chip_of(told.lanes, lane), inputs_at(told, seat))
+            crew.remember(seat, memory_at(buses.memories, j))
+            count += 1
+    return count
 
 
 def look(lanes: Lanes, tables: Tables, buses: Buses, seats: Any, mates: Any, seen: Floats) -> None:
     """Look at all lanes as they stand; `seen` has a row of signals for each lane there is."""
+    told = Told(lanes, tables)
     for k in range(len(buses.shared)):
-        places = [j for j in range(buses.first[k], buses.first[k + 1]) if buses.status[j] == COMPLETED]
-        if len(places) > 0:
-            _look(lanes, tables, buses, k, places, seats, mates, seen)
+        count = _seated(told, buses, k, seats)
+        if count > 0:
+            _look(told, buses, k, count, seats, mates, seen)
 
 
-def _look(lanes: Lanes, tables: Tables, buses: Buses, k: int, places: list[int], seats: Any, mates: Any,
-          seen: Floats) -> None:
-    told = [inputs_of(lanes, tables, buses.which[j]) for j in places]
-    memories = _seated(lanes, buses, places, told, seats)
-    for n in range(len(places)):
-        memory = memories[n]
-        crew.place(seats[n], memory, memory.point.time, memory.point.time, -1)
-        seats[n].decided.silent = silent_now(memory)
-    V = bus.bus_voltage(len(places), buses.shared[k], seats, mates, 0.0)
-    for n in range(len(places)):
-        memory, lane = memories[n], buses.which[places[n]]
-        inputs, point, time, origin = told[n], memory.point, memory.point.time, origin_of(memory)
-        path, share = seats[n].numbers.bridge, 1.0
+def _look(told: Told, buses: Buses, k: int, count: int, seats: Any, mates: Any, seen: Floats) -> None:
+    firms = buses.memories.firms
+    for n in range(count):
+        seat = seats[n]
+        seat.decided.silent, seat.joined = silent_now(crew.memory_in(seat, firms)), -1
+        crew.begin(seat, seat.point.time, seat.point.time)
+    V = bus.bus_voltage(count, buses.shared[k], seats, mates, 0.0)
+    for n in range(count):
+        seat = seats[n]
+        memory, inputs, path, share = crew.memory_in(seat, firms), inputs_at(told, seat), seat.numbers.bridge, 1.0
+        point, time, origin = memory.point, memory.point.time, origin_of(memory)
         if duty.present(path):
-            share = duty.share_of(path, seats[n].shown.duty)
-        numbers = on_bus(crew.numbers_now(seats[n]), share * V)
-        u = drive_of(seats[n]) * numbers.source.V
+            share = duty.share_of(path, seat.shown.duty)
+        numbers = on_bus(crew.numbers_now(seat), share * V)
+        u = drive_of(seat) * numbers.source.V
         piece, _ = in_force(inputs.torque, origin, time, inputs.constant_torque)
         tau, mode = since(piece, origin), point.mode
         if point.anchor_time == math.inf or piece != memory.tau:
             mode = step.anchored(numbers, Piece(0.0, u, 0.0, 0.0, 0.0, 0.0, 0.0), tau, time, point).mode
         shown = observed(warm(numbers, point.y), inputs.curve, mode, u, piece_value(tau, time), point.y, point.wiper,
                          memory.chip.drive, memory.chip.error)
-        if firmware.present(lanes.firmware[0]):
+        if firmware.present(told.lanes.firmware[0]):
             shown = told_by(numbers.bridge, memory.firm[0], shown)
-        put(seen, lane, shown)
+        put(seen, seat.lane, shown)

@@ -52,24 +52,34 @@ def sit(seat: Any, numbers: Numbers, chip: Chip, inputs: Inputs) -> None:
     seat.period, seat.accuracy = inputs.period, inputs.accuracy
 
 
-def place(seat: Any, memory: Memory, first: float, end: float, joined: int) -> None:
-    """Put a servo where its memory says, for a run to `end` by its clock [s]; it is `first` by the bus's."""
+def remember(seat: Any, memory: Memory) -> None:
+    """Put a servo where its memory says."""
     put_point(seat.point, memory.point)
     put_decided(seat.decided, memory.chip)
     if duty.present(seat.numbers.bridge):
         show(seat, memory.firm[0])
+    put_piece(seat.u, memory.u)
     put_piece(seat.tau, memory.tau)
-    seat.tau_end, seat.frames, seat.beat = memory.tau_end, memory.frames, memory.beat
+    seat.u_end, seat.tau_end, seat.frames, seat.beat = memory.u_end, memory.tau_end, memory.frames, memory.beat
     seat.origin = memory.frames * memory.beat
-    seat.clock, seat.late, seat.end = memory.point.time, memory.point.time - first, end
-    seat.arrival, seat.joined = _UNKNOWN, joined
 
 
-def memory_now(seat: Any, firm: Any) -> Memory:
-    """Return what a servo remembers, its program `firm`."""
-    u = source(seat, numbers_now(seat))
-    return Memory(seat.frames, seat.beat, point_of(seat.point), decided_of(seat.decided), u, math.inf,
-                  piece_of(seat.tau), seat.tau_end, firm)
+def memory_in(seat: Any, firms: Any) -> Memory:
+    """Return what a servo remembers, with what its program does, of those of all, by reference."""
+    return Memory(seat.frames, seat.beat, point_of(seat.point), decided_of(seat.decided), piece_of(seat.u), seat.u_end,
+                  piece_of(seat.tau), seat.tau_end, firms[seat.place:seat.place + 1])
+
+
+def begin(seat: Any, first: float, end: float) -> None:
+    """Begin a run to `end` by a servo's clock [s] where it stands, which is `first` by the bus's."""
+    seat.clock, seat.late, seat.end = seat.point.time, seat.point.time - first, end
+    seat.arrival = _UNKNOWN
+
+
+def finish(seat: Any) -> None:
+    """Note what a servo follows at the end of a run."""
+    put_piece(seat.u, source(seat, numbers_now(seat)))
+    seat.u_end = math.inf
 
 
 def show(seat: Any, firm: Any) -> None:
@@ -141,10 +151,10 @@ def plan_ahead(seat: Any, edge: float, until: float) -> None:
     seat.due = by_bus(seat, seat.limit, until)
 
 
-def edge_of(seat: Any, inputs: Inputs, programs: Any) -> float:
+def edge_of(seat: Any, inputs: Inputs, firms: Any) -> float:
     """Return when the next frame begins, or the next tick or duty comes, by the servo's clock [s]."""
     if firmware.present(inputs.firmware[0]):
-        return controller.next_due(inputs.firmware[0], programs[0], seat.frames)
+        return controller.next_due(inputs.firmware[0], firms[seat.place], seat.frames)
     if seat.period > 0.0:
         return frame.edge_time(seat.period, inputs.edges, seat.decided.number - seat.frames)
     edge: float = frame.edge_time(0.0, inputs.edges, seat.decided.number) - seat.origin

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from servotwin.models.engine.memory import BEAT, NOTHING, SAME, Memory, Point
 from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, RIGID, Mode
 from servotwin.models.engine.records import reader, writer
-from servotwin.models.terms.control import ABSENT
+from servotwin.models.terms.control import Programs
 from servotwin.models.terms.frame import Decision, Frame
 
 
@@ -71,10 +71,11 @@ put_hour = writer("put_hour", Hour)
 put_counted = writer("put_counted", Counted)
 
 
-def remembered(side: Side, regular: bool, half_slack: float) -> Memory:
+def remembered(side: Side, regular: bool, half_slack: float, firm: Programs) -> Memory:
     """Return the memory of a servo that ran side by side.
 
-    `regular` is whether its frames come regularly; without slack the potentiometer goes with the shaft.
+    `regular` is whether its frames come regularly; without slack the potentiometer goes with the shaft. `firm` is what
+    stands in the place of a program's memory.
     """
     held, hour, number = side.held, side.hour, side.counted.number
     now = hour.since - hour.length if regular else hour.edge + hour.since
@@ -91,7 +92,7 @@ def remembered(side: Side, regular: bool, half_slack: float) -> Memory:
     wiper = 1.0 * held.wiper if half_slack > 0.0 else q
     point = Point(now, y, Mode(0, 0, mesh, 0, 0), math.inf, y, 1.0 * held.step, wiper)
     return Memory(number if regular else 0, hour.period if regular else BEAT, point, chip, NOTHING, math.inf, NOTHING,
-                  math.inf, ABSENT)
+                  math.inf, firm)
 
 
 def side_of(memory: Memory, period: float) -> Side:

@@ -10,13 +10,15 @@ Coefficients: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differenti
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from servotwin.models.engine.modes import NOWHERE, Mode, Vector
+from servotwin.models.engine.modes import Mode, Vector
 from servotwin.models.engine.rates import rates_of
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Piece, piece_value
 
 STAGES = 12
+NUMBERS = 7 * 16  # of the rates of all stages, those of the dense output included: one stage after the other
 # Per stage: fraction of the step, and where the stages before it that enter begin; of these, number and weight.
 FRACTIONS = (
     0.0, 0.05260015195876773, 0.0789002279381516, 0.1183503419072274, 0.2816496580927726, 0.3333333333333333, 0.25,
@@ -73,20 +75,26 @@ _DENSE = (
 
 def step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h: float) -> tuple[Vector, float]:
     """Return the state after a step of `h` [s], and its error relative to 1 + |state|."""
-    ks = [NOWHERE] * STAGES
+    ks = [0.0] * NUMBERS
     for j in range(STAGES):
-        ks[j] = _rates(numbers, mode, u, tau, t + FRACTIONS[j] * h, moved(y, ks, j, h))
+        put_rates(ks, j, _rates(numbers, mode, u, tau, t + FRACTIONS[j] * h, moved(y, ks, j, h)))
     after = moved(y, ks, STAGES, h)
     return after, error_of(y, after, ks, h)
 
 
-def error_of(y: Vector, after: Vector, ks: list[Vector], h: float) -> float:
+def put_rates(ks: Any, stage: int, rates: Vector) -> None:
+    """Note the rates of a stage."""
+    for n in range(7):
+        ks[7 * stage + n] = rates[n]
+
+
+def error_of(y: Vector, after: Vector, ks: Any, h: float) -> float:
     """Return the error of a step relative to 1 + |state|."""
     sum_5 = sum_3 = 0.0
     for n in range(7):
         e5 = e3 = 0.0
         for j in range(STAGES):
-            k = ks[j][n]
+            k = ks[7 * j + n]
             e5 += ERROR_5[j] * k
             e3 += ERROR_3[j] * k
         scale = 1.0 + max(abs(y[n]), abs(after[n]))
@@ -97,19 +105,19 @@ def error_of(y: Vector, after: Vector, ks: list[Vector], h: float) -> float:
 
 def dense(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector, h: float) -> tuple[Vector, ...]:
     """Return the seven vectors of the dense output of a step."""
-    ks = [NOWHERE] * 16
+    ks = [0.0] * NUMBERS
     after = y
     for j in range(16):
         at = moved(y, ks, j, h)
         if j == STAGES:
             after = at
-        ks[j] = _rates(numbers, mode, u, tau, t + FRACTIONS[j] * h, at)
+        put_rates(ks, j, _rates(numbers, mode, u, tau, t + FRACTIONS[j] * h, at))
     return dense_of(y, after, ks, h)
 
 
-def dense_of(y: Vector, after: Vector, ks: list[Vector], h: float) -> tuple[Vector, ...]:
+def dense_of(y: Vector, after: Vector, ks: Any, h: float) -> tuple[Vector, ...]:
     """Return the same from the rates of all sixteen stages."""
-    way, left, right = _difference(y, after), ks[0], ks[STAGES]
+    way, left, right = _difference(y, after), _rates_in(ks, 0), _rates_in(ks, STAGES)
     first = _sum(way, left, -1.0, h, left, 0.0)
     second = _sum(way, left, 2.0, -h, right, -h)
     return (way, first, second, _row(ks, 0, h), _row(ks, 16, h), _row(ks, 32, h), _row(ks, 48, h))
@@ -134,32 +142,37 @@ def _rates(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vect
     return rates_of(numbers, mode, piece_value(u, t), piece_value(tau, t), y)
 
 
-def moved(y: Vector, ks: list[Vector], stage: int, h: float) -> Vector:
+def _rates_in(ks: Any, stage: int) -> Vector:
+    k = 7 * stage
+    return (ks[k], ks[k + 1], ks[k + 2], ks[k + 3], ks[k + 4], ks[k + 5], ks[k + 6])
+
+
+def moved(y: Vector, ks: Any, stage: int, h: float) -> Vector:
     """Return the state from which a stage takes its rates."""
     a = b = c = d = e = f = g = 0.0
     for n in range(FIRST[stage], FIRST[stage + 1]):
-        k, weight = ks[WHICH[n]], WEIGHTS[n]
-        a += weight * k[0]
-        b += weight * k[1]
-        c += weight * k[2]
-        d += weight * k[3]
-        e += weight * k[4]
-        f += weight * k[5]
-        g += weight * k[6]
+        k, weight = 7 * WHICH[n], WEIGHTS[n]
+        a += weight * ks[k]
+        b += weight * ks[k + 1]
+        c += weight * ks[k + 2]
+        d += weight * ks[k + 3]
+        e += weight * ks[k + 4]
+        f += weight * ks[k + 5]
+        g += weight * ks[k + 6]
     return (y[0] + h * a, y[1] + h * b, y[2] + h * c, y[3] + h * d, y[4] + h * e, y[5] + h * f, y[6] + h * g)
 
 
-def _row(ks: list[Vector], at: int, h: float) -> Vector:
+def _row(ks: Any, at: int, h: float) -> Vector:
     a = b = c = d = e = f = g = 0.0
     for n in range(16):
-        k, weight = ks[n], h * _DENSE[at + n]
-        a += weight * k[0]
-        b += weight * k[1]
-        c += weight * k[2]
-        d += weight * k[3]
-        e += weight * k[4]
-        f += weight * k[5]
-        g += weight * k[6]
+        k, weight = 7 * n, h * _DENSE[at + n]
+        a += weight * ks[k]
+        b += weight * ks[k + 1]
+        c += weight * ks[k + 2]
+        d += weight * ks[k + 3]
+        e += weight * ks[k + 4]
+        f += weight * ks[k + 5]
+        g += weight * ks[k + 6]
     return (a, b, c, d, e, f, g)
 
 

@@ -10,10 +10,19 @@ from typing import Any, NamedTuple
 
 from servotwin.models.engine import contacts, creep, dormand_prince
 from servotwin.models.engine.dormand_prince import STAGES
-from servotwin.models.engine.modes import INSIDE, NO_CURRENT, NOWHERE, Vector, at_rest, sign_of
+from servotwin.models.engine.modes import INSIDE, NO_CURRENT, Vector, at_rest, sign_of
 from servotwin.models.engine.motion import LONG_STEP
 from servotwin.models.engine.rates import rates_of
-from servotwin.models.engine.seats import ROOM, mode_of, numbers_of, piece_of, put_vector, vector_of
+from servotwin.models.engine.seats import (
+    ROOM,
+    Linear,
+    mode_of,
+    numbers_of,
+    piece_of,
+    put_law,
+    put_vector,
+    vector_of,
+)
 from servotwin.models.engine.shared_source import BROKEN_DOWN, FOLLOWING, KEEPING, LIMITED, behind, bus_voltage
 from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import piece_value
@@ -58,51 +67,33 @@ def longest_series(mates: Any, count: int) -> float:
     return _LONGEST / rate if rate > 0.0 else math.inf
 
 
-class Linear(NamedTuple):
-    """The law of a linear mate: L di/dt = s V − K_b w − drop − R i, J dw/dt = K i − b w − torques."""
-
-    sign: float  # or duty
-    K: float
-    K_b: float
-    R: float
-    L: float
-    J: float
-    b: float
-    stiffness: float
-    drop: float
-    conductance: float  # 0 where no current flows
-    conducts: float
-    moves: float
-    against: float
-    slope: float
-    start: float  # its angle
-
-
 def series(source: Source, state: int, mates: Any, count: int, time: float, length: float) -> int:
     """Work out the motion of linear mates from `time` on, for at most `length` [s]; return how many terms it has.
 
     Its coefficients are those of speed and current in powers of time.
     """
-    laws = [_linear(mates[k], time) for k in range(count)]
     plain = True
     for k in range(count):
-        law, mate = laws[k], mates[k]
+        mate = mates[k]
+        put_law(mate.law, _linear(mate, time))
+        law = mate.law
         plain = plain and law.L == 0.0 and law.stiffness == 0.0 and law.slope == 0.0
         mate.speed[0] = mate.start[1] if law.moves > 0.0 else 0.0
         mate.current[0] = mate.start[2]
     if plain:
-        return _plain_series(source, state, laws, length, mates)
-    return _general_series(source, state, laws, length, mates)
+        return _plain_series(source, state, mates, count, length)
+    return _general_series(source, state, mates, count, length)
 
 
-def _general_series(source: Source, state: int, laws: list[Linear], length: float, mates: Any) -> int:
+def _general_series(source: Source, state: int, mates: Any, count: int, length: float) -> int:
     terms, power = 1, length
     while terms < ROOM - 1:
         n = terms - 1
-        V_n = _series_voltage(source, state, laws, mates, n)
+        V_n = _series_voltage(source, state, mates, count, n)
         size = 0.0
-        for k in range(len(laws)):
-            t, mate = laws[k], mates[k]
+        for k in range(count):
+            mate = mates[k]
+            t = mate.law
             w, i = mate.speed[n], mate.current[n]
             loop = t.sign * V_n - t.K_b * w - (t.drop if n == 0 else 0.0)
             if t.L == 0.0:
@@ -121,20 +112,21 @@ def _general_series(source: Source, state: int, laws: list[Linear], length: floa
     return terms
 
 
-def _plain_series(source: Source, state: int, laws: list[Linear], length: float, mates: Any) -> int:
+def _plain_series(source: Source, state: int, mates: Any, count: int, length: float) -> int:
     """Work out the same for mates without inductance, spring and ramp of torque, of which there are most."""
-    below, per_volt, given = _meeting(source, state, laws)
+    below, per_volt, given = _meeting(source, state, mates, count)
     first, terms, power = 1.0, 1, length
     while terms < ROOM - 1:
         n = terms - 1
         h = 0.0
-        for k in range(len(laws)):
-            t = laws[k]
+        for k in range(count):
+            t = mates[k].law
             h += t.sign * (first * t.drop + t.K_b * mates[k].speed[n]) * t.conductance
         V = (first * given + per_volt * h) / below
         size = 0.0
-        for k in range(len(laws)):
-            t, mate = laws[k], mates[k]
+        for k in range(count):
+            mate = mates[k]
+            t = mate.law
             w = mate.speed[n]
             i = (t.sign * V - t.K_b * w - first * t.drop) * t.conductance
             w = t.moves * (t.K * i - t.b * w - first * t.against) / (t.J * terms)
@@ -148,11 +140,12 @@ def _plain_series(source: Source, state: int, laws: list[Linear], length: float,
     return terms
 
 
-def _meeting(source: Source, state: int, laws: list[Linear]) -> tuple[float, float, float]:
+def _meeting(source: Source, state: int, mates: Any, count: int) -> tuple[float, float, float]:
     """Return what V_bus = (given + per_volt h) / below is made of, where h are the currents that back-EMFs drive."""
     g = 0.0
-    for k in range(len(laws)):
-        g += laws[k].sign * laws[k].sign * laws[k].conductance
+    for k in range(count):
+        t = mates[k].law
+        g += t.sign * t.sign * t.conductance
     if state == LIMITED:
         return g, 1.0, source.I_max
     if state == KEEPING:
@@ -173,7 +166,7 @@ def _linear(mate: Any, time: float) -> Linear:
                   0.0 if at_rest(mode.contact) else 1.0, against, tau.slope, y[0])
 
 
-def _series_voltage(source: Source, state: int, laws: list[Linear], mates: Any, n: int) -> float:
+def _series_voltage(source: Source, state: int, mates: Any, count: int, n: int) -> float:
     """Return the n-th coefficient of V_bus."""
     if state == BROKEN_DOWN:
         return 0.0
@@ -181,8 +174,8 @@ def _series_voltage(source: Source, state: int, laws: list[Linear], mates: Any, 
     if state == KEEPING:
         return first * source.V
     g = h = given = above = below = 0.0
-    for k in range(len(laws)):
-        t, w, i = laws[k], mates[k].speed[n], mates[k].current[n]
+    for k in range(count):
+        t, w, i = mates[k].law, mates[k].speed[n], mates[k].current[n]
         back = first * t.drop + t.K_b * w
         if t.L == 0.0:
             g += t.sign * t.sign * t.conductance
@@ -213,46 +206,45 @@ class Step(NamedTuple):
 
 def joint_step(source: Source, state: int, mates: Any, count: int, time: float, step: float) -> Step:
     """Work out one accepted step of at most `step` [s]: dense outputs and ends of all mates."""
-    stages = [[NOWHERE for _ in range(16)] for _ in range(count)]
     h, factor, short = step, 1.0, False
     for _ in range(60):
         size, part = 0.0, 1.0
         for k in range(STAGES):
-            _stage(source, state, mates, time, h, k, stages)
+            _stage(source, state, mates, count, time, h, k)
         for j in range(count):
-            start = vector_of(mates[j].start)
-            end = dormand_prince.moved(start, stages[j], STAGES, h)
+            start, stages = vector_of(mates[j].start), mates[j].stages
+            end = dormand_prince.moved(start, stages, STAGES, h)
             put_vector(mates[j].end, end)
-            error = dormand_prince.error_of(start, end, stages[j], h)
+            error = dormand_prince.error_of(start, end, stages, h)
             size = max(size, error if error == error else math.inf)
             part = min(part, creep.part_before(numbers_of(mates[j].numbers), mode_of(mates[j].mode), start, end))
         size = min(size / _TOLERANCE, 1e12)
         factor = min(6.0, max(0.15, 0.9 * size**-0.125)) if size > 0.0 else 6.0
         if size <= 1.0 and part == 1.0:
             for k in range(STAGES, 16):
-                _stage(source, state, mates, time, h, k, stages)
+                _stage(source, state, mates, count, time, h, k)
             for j in range(count):
-                _put_dense(mates[j], stages[j], h)
+                _put_dense(mates[j], h)
             return Step(h, max(step, h * factor) if short else h * factor)
         short = size <= 1.0
         h *= part if short else factor
     return Step(-1.0, step)
 
 
-def _stage(source: Source, state: int, mates: Any, time: float, h: float, k: int,
-           stages: list[list[Vector]]) -> None:
+def _stage(source: Source, state: int, mates: Any, count: int, time: float, h: float, k: int) -> None:
     """Work out the rates of all mates in one stage of a step."""
-    for j in range(len(stages)):
-        put_vector(mates[j].y, dormand_prince.moved(vector_of(mates[j].start), stages[j], k, h))
-    V, t = bus_voltage(source, state, mates, len(stages)), time + dormand_prince.FRACTIONS[k] * h
-    for j in range(len(stages)):
+    for j in range(count):
+        put_vector(mates[j].y, dormand_prince.moved(vector_of(mates[j].start), mates[j].stages, k, h))
+    V, t = bus_voltage(source, state, mates, count), time + dormand_prince.FRACTIONS[k] * h
+    for j in range(count):
         mate = mates[j]
-        stages[j][k] = rates_of(numbers_of(mate.numbers), mode_of(mate.mode), behind(mate, V),
-                                piece_value(piece_of(mate.tau), t), vector_of(mate.y))
+        dormand_prince.put_rates(mate.stages, k, rates_of(
+            numbers_of(mate.numbers), mode_of(mate.mode), behind(mate, V), piece_value(piece_of(mate.tau), t),
+            vector_of(mate.y)))
 
 
-def _put_dense(mate: Any, stages: list[Vector], h: float) -> None:
-    vectors = dormand_prince.dense_of(vector_of(mate.start), vector_of(mate.end), stages, h)
+def _put_dense(mate: Any, h: float) -> None:
+    vectors = dormand_prince.dense_of(vector_of(mate.start), vector_of(mate.end), mate.stages, h)
     for k in range(_SIZE):
         vector = vectors[k]
         for n in range(_SIZE):

@@ -1,6 +1,6 @@
 """The sets of lanes of which a tick consists, in tiles or in records: what is asked of each between its kernels.
 
-Lanes that have to go on one by one are put together in the first `count[0]` of some places, with their records.
+Lanes that have to go on one by one are put together in the first `count[0]` of some places, with their memories.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from servotwin.models.engine.crossing import (
     side_of,
 )
 from servotwin.models.engine.imposing import carried, impulse_work, placed
-from servotwin.models.engine.memory import memory_of, point_of, put_memory, put_point, time_of
+from servotwin.models.engine.memory import memory_at, point_of, put_memory, put_point, time_of
 from servotwin.models.engine.modes import INSIDE
 from servotwin.models.engine.records import TILE
 from servotwin.models.engine.step import COMPLETED
@@ -28,11 +28,12 @@ from servotwin.models.engine.ticks import ANGLE, SPEED, shaft_at, stops_at
 from servotwin.models.engine.together import APART
 
 if TYPE_CHECKING:
+    from servotwin.models.engine.memory import Memories
     from servotwin.models.engine.tiles import Floats, Indices
 
 
 def gather_lost(which: Indices, status: Any, tile_rows: Any, count: Indices, places: Indices,
-                lanes: Indices, durations: Floats, records: Any) -> int:
+                lanes: Indices, durations: Floats, memories: Memories) -> int:
     """Put together the lanes of tiles that were given up; return how many there are. They owe nothing any more."""
     n = 0
     for k in range(which.size):
@@ -40,7 +41,8 @@ def gather_lost(which: Indices, status: Any, tile_rows: Any, count: Indices, pla
         if tile.clock.owed[j] > 0.0:
             if status[lane] == COMPLETED:
                 side = Side(held_at(tile.servo, j), hour_at(tile.clock, j), counted_at(tile.count, j))
-                put_memory(records[n], remembered(side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j]))
+                put_memory(memories.rows[n], remembered(side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j],
+                                                        memories.firms[n:n + 1]))
                 places[n], lanes[n], durations[n] = k, lane, tile.clock.owed[j]
                 n += 1
             tile.clock.owed[j] = 0.0
@@ -48,33 +50,33 @@ def gather_lost(which: Indices, status: Any, tile_rows: Any, count: Indices, pla
     return n
 
 
-def put_lost(places: Indices, lanes: Indices, records: Any, periods: Floats, tile_rows: Any) -> None:
+def put_lost(places: Indices, lanes: Indices, memories: Memories, periods: Floats, tile_rows: Any) -> None:
     """Put lanes that have gone on one by one back into their tiles."""
     for k in range(places.size):
         tile, j = tile_rows[places[k] // TILE], places[k] % TILE
-        side = side_of(memory_of(records[k]), periods[lanes[k]])
+        side = side_of(memory_at(memories, k), periods[lanes[k]])
         put_held(tile.servo, j, side.held)
         put_hour(tile.clock, j, side.hour)
         put_counted(tile.count, j, side.counted)
 
 
-def gather(which: Indices, status: Any, now: Floats, done: Indices, rows: Any, count: Indices, places: Indices,
-           lanes: Indices, durations: Floats, records: Any) -> int:
+def gather(which: Indices, status: Any, now: Floats, done: Indices, kept: Memories, count: Indices,
+           places: Indices, lanes: Indices, durations: Floats, memories: Memories) -> int:
     """Put together the lanes of records that have neither failed nor are `done` (1); return how many there are."""
     n = 0
     for k in range(which.size):
         if status[which[k]] == COMPLETED and done[k] == 0:
             places[n], lanes[n], durations[n] = k, which[k], now[0]
-            records[n] = rows[k]
+            memories.rows[n], memories.firms[n] = kept.rows[k], kept.firms[k]
             n += 1
     count[0] = n
     return n
 
 
-def put(places: Indices, records: Any, rows: Any) -> None:
-    """Put lanes back into their records."""
+def put(places: Indices, memories: Memories, kept: Memories) -> None:
+    """Put lanes back to where they are kept."""
     for k in range(places.size):
-        rows[places[k]] = records[k]
+        kept.rows[places[k]], kept.firms[places[k]] = memories.rows[k], memories.firms[k]
 
 
 def note_failures(lanes: Indices, how: Indices, at: Floats, records: Any, status: Any, ended: Floats) -> None:
@@ -151,7 +153,7 @@ def read_clocks(which: Indices, status: Any, ended: Floats, rows: Any, clock: Fl
     """Put the times of lanes in records into `clock` [s]."""
     for k in range(which.size):
         lane = which[k]
-        clock[lane] = time_of(memory_of(rows[k])) if status[lane] == COMPLETED else ended[lane]
+        clock[lane] = time_of(rows[k]) if status[lane] == COMPLETED else ended[lane]
 
 
 def take_status(which: Indices, status: Any, own: Indices) -> None:
@@ -164,7 +166,7 @@ def note_lost_buses(which: Indices, own: Indices, rows: Any, status: Any, ended:
     """Note which lanes on buses have failed, and when; they are nan from there on."""
     for k in range(which.size):
         if own[k] != COMPLETED and status[which[k]] == COMPLETED:
-            status[which[k]], ended[which[k]] = own[k], time_of(memory_of(rows[k]))
+            status[which[k]], ended[which[k]] = own[k], time_of(rows[k])
             for i in range(7):
                 rows[k].point.y[i] = math.nan
 

@@ -7,10 +7,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from servotwin.models.engine import controller, glides
 from servotwin.models.engine.glides import Body
-from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, instant, origin_of, put_memory, resumed
+from servotwin.models.engine.memory import (
+    SAME,
+    Inputs,
+    Memory,
+    Point,
+    instant,
+    memory_at,
+    origin_of,
+    put_memory,
+    resumed,
+)
 from servotwin.models.engine.modes import RIGID, Mode, Vector
 from servotwin.models.engine.records import reader, room, rows_of, tile_of, writer
-from servotwin.models.engine.runs import UNDERWAY, inputs_of, memory_at
+from servotwin.models.engine.runs import UNDERWAY, inputs_of
 from servotwin.models.engine.tiles import numbers_of
 from servotwin.models.terms import profile, trips
 from servotwin.models.terms.bridge import Bridge
@@ -26,6 +36,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from servotwin.models.engine.memory import Memories
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
 
 TOGETHER = 64  # lanes: what they work with fits into the nearest cache
@@ -122,14 +133,14 @@ def possible(numbers: Numbers, inputs: Inputs) -> bool:
 
 
 def enter(lanes: Lanes, curve: Floats, torque: Floats, k: int, lane: int, duration: float, times: Floats,
-           output: int, records: Any, tile: Any, j: int) -> bool:
+           output: int, memories: Memories, tile: Any, j: int) -> bool:
     """Put a lane into a tile; return whether it goes on there at all."""
     numbers, inputs = numbers_of(lanes, lane), inputs_of(lanes, curve, torque, lane)
     if not possible(numbers, inputs):
         return False
-    memory = resumed(False, inputs, memory_at(lanes, records, k), False)
+    memory = resumed(False, inputs, memory_at(memories, k), False)
     controller.resume(inputs, memory)
-    firmware, firm = lanes.firmware[lane], records[k].firm
+    firmware, firm = lanes.firmware[lane], memories.firms[k]
     t, slack, delayed = memory.point.time, SAME * firmware.T_c, firmware.T_d > 0.0
     until = instant(False, inputs, memory, t + duration)
     tick = float(firm.tick - memory.frames)
@@ -138,7 +149,7 @@ def enter(lanes: Lanes, curve: Floats, torque: Floats, k: int, lane: int, durati
     on_tick = abs(firmware.t_phi + tick * firmware.T_c - t) <= slack
     if not on_tick or left < 1.0 or firm.waiting > (1 if delayed else 0):
         return False
-    put_memory(records[k], memory)
+    put_memory(memories.rows[k], memory)
     put_firmware(tile.program, j, firmware)
     put_body(tile.body, j, glides.body_of(numbers, inputs.constant_torque))
     put_path(tile.path, j, numbers.bridge)
@@ -218,26 +229,26 @@ def await_output(times: Floats, tile: Any, j: int) -> None:
         tile.clock.output[j] = (times[o] - (tile.place.frames[j] * T_c + tile.program.t_phi[j])) / T_c
 
 
-def leave(lanes: Lanes, durations: Floats, first_output: Indices, records: Any, status: Indices, tile: Any,
-           size: int) -> None:
+def leave(lanes: Lanes, durations: Floats, first_output: Indices, memories: Memories, status: Indices, tile: Any,
+          size: int) -> None:
     """Put all lanes of a tile where `runs` goes on from."""
     for j in range(size):
         k, lane = tile.place.k[j], tile.place.lane[j]
-        firmware, firm = lanes.firmware[lane], records[k].firm
+        firmware, firm = lanes.firmware[lane], memories.firms[k]
         lost, frames = tile.clock.last[j] < 0.0, tile.place.frames[j]
         store(firmware, tile, j, firm)
         firm.tick = frames + int(tile.clock.tick[j]) + (1 if lost else 0)
         firm.waiting = 1 if tile.plan.delayed[j] > 0.0 else 0
         firm.duties[firm.head] = tile.loop.coming[j]
         firm.head = (firm.head + 1) % WAITING
-        memory = memory_at(lanes, records, k)
+        memory = memory_at(memories, k)
         q, w, y = tile.loop.q[j], tile.loop.w[j], memory.point.y
         here: Vector = (q, w, y[2], y[3], y[4], q, w)
         t = tile.clock.tick[j] * firmware.T_c + firmware.t_phi
         gone = (frames * memory.beat + t) - (origin_of(memory) + memory.point.time)
         point = Point(t, here, Mode(0, 0, RIGID, 0, 0), math.inf, here, memory.point.step, q)
-        put_memory(records[k], Memory(frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau,
-                                      memory.tau_end, memory.firm))
+        put_memory(memories.rows[k], Memory(frames, memory.beat, point, memory.chip, memory.u, memory.u_end,
+                                            memory.tau, memory.tau_end, memory.firm))
         durations[k] = 0.0 if tile.clock.last[j] > 0.0 else max(durations[k] - gone, 0.0)
         first_output[k] = tile.place.output[j]
         status[k] = UNDERWAY

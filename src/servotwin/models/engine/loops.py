@@ -21,11 +21,12 @@ from servotwin.models.terms.control import NOTHING_SENSED
 from servotwin.models.terms.sensor import sensed_voltage
 
 if TYPE_CHECKING:
+    from servotwin.models.engine.memory import Memories
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
 
 
 def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
-          which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, records: Any,
+          which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, memories: Memories,
           status: Indices, room: Any) -> None:
     """Let the lanes named in `which` go on side by side, as far as that leads; `runs.go_on` finishes them all.
 
@@ -36,15 +37,16 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
     for k in range(which.size):
         lane = which[k]
         torque = torques[torque_first[lane]:torque_first[lane] + torque_count[lane]]
-        if tiles.enter(lanes, curve, torque, k, lane, durations[k], times, first_output[k], records, tile, size):
+        if tiles.enter(lanes, curve, torque, k, lane, durations[k], times, first_output[k], memories, tile, size):
             size += 1
         if size == tiles.TOGETHER or (size > 0 and k == which.size - 1):
-            _through(lanes, curve, times, outputs, records, tile, size)
-            tiles.leave(lanes, durations, first_output, records, status, tile, size)
+            _through(lanes, curve, times, outputs, memories, tile, size)
+            tiles.leave(lanes, durations, first_output, memories, status, tile, size)
             size = 0
 
 
-def _through(lanes: Lanes, curve: Floats, times: Floats, outputs: Floats, records: Any, tile: Any, size: int) -> None:
+def _through(lanes: Lanes, curve: Floats, times: Floats, outputs: Floats, memories: Memories, tile: Any,
+             size: int) -> None:
     """Let all lanes of a tile go on from tick to tick."""
     senses = rounds.any_senses(tile, size)
     going, news, following = rounds.asked(tile, size)
@@ -52,7 +54,7 @@ def _through(lanes: Lanes, curve: Floats, times: Floats, outputs: Floats, record
         if news > 0:
             for j in range(size):
                 if tile.clock.left[j] > 0.0 and tile.clock.tick[j] >= tile.clock.hears[j]:
-                    _hear(lanes, curve, records, tile, j)
+                    _hear(lanes, curve, memories, tile, j)
         if following > 0:
             rounds.follow(tile, size)
         if senses:
@@ -63,7 +65,7 @@ def _through(lanes: Lanes, curve: Floats, times: Floats, outputs: Floats, record
         if rounds.decide(tile, size) > 0:
             for j in range(size):
                 if tile.plan.usual[j] == 0.0 and tile.clock.left[j] > 0.0:
-                    _decide_alone(lanes, curve, records, tile, j)
+                    _decide_alone(lanes, curve, memories, tile, j)
         if rounds.move(tile, size) > 0:
             for j in range(size):
                 if tile.plan.ends[j] > 0.0:
@@ -71,15 +73,15 @@ def _through(lanes: Lanes, curve: Floats, times: Floats, outputs: Floats, record
         if rounds.with_outputs(tile, size) > 0:
             for j in range(size):
                 if rounds.is_wanted(tile, j):
-                    _write(times, outputs, records, tile, j)
+                    _write(times, outputs, memories, tile, j)
         rounds.tick_over(tile, size)
         going, news, following = rounds.asked(tile, size)
 
 
-def _hear(lanes: Lanes, curve: Floats, records: Any, tile: Any, j: int) -> None:
+def _hear(lanes: Lanes, curve: Floats, memories: Memories, tile: Any, j: int) -> None:
     """Let the program of a lane listen."""
     k, lane = tile.place.k[j], tile.place.lane[j]
-    firmware, firm = lanes.firmware[lane], records[k].firm
+    firmware, firm = lanes.firmware[lane], memories.firms[k]
     inputs = inputs_of(lanes, curve, curve[0][:0], lane)
     now = (tile.place.frames[j] + tile.clock.tick[j]) * firmware.T_c + firmware.t_phi
     if controller.has_news(firmware, firm, now):
@@ -96,14 +98,14 @@ def _hear(lanes: Lanes, curve: Floats, records: Any, tile: Any, j: int) -> None:
                 tile.clock.hears[j] = tiles.ticks(firmware, tile, j, end + firmware.latency) - 1e-6
 
 
-def _decide_alone(lanes: Lanes, curve: Floats, records: Any, tile: Any, j: int) -> None:
+def _decide_alone(lanes: Lanes, curve: Floats, memories: Memories, tile: Any, j: int) -> None:
     """Let the program of one lane decide."""
     k, lane = tile.place.k[j], tile.place.lane[j]
-    firmware, firm, numbers = lanes.firmware[lane], records[k].firm, numbers_of(lanes, lane)
+    firmware, firm, numbers = lanes.firmware[lane], memories.firms[k], numbers_of(lanes, lane)
     tiles.store(firmware, tile, j, firm)
     if tile.plan.delayed[j] > 0.0:
         firm.duty = tile.loop.coming[j]
-    q, w, y = tile.loop.q[j], tile.loop.w[j], records[k].point.y
+    q, w, y = tile.loop.q[j], tile.loop.w[j], memories.rows[k].point.y
     here = (q, w, y[2], y[3], y[4], q, w)
     angle = q
     if firmware.per_volt != 0.0:
@@ -116,10 +118,10 @@ def _decide_alone(lanes: Lanes, curve: Floats, records: Any, tile: Any, j: int) 
     tile.plan.given[j] = given
 
 
-def _write(times: Floats, outputs: Floats, records: Any, tile: Any, j: int) -> None:
+def _write(times: Floats, outputs: Floats, memories: Memories, tile: Any, j: int) -> None:
     """Write the outputs of a lane in this tick."""
     k, dry, T_c = tile.place.k[j], tile.body.dry[j] > 0.0, tile.program.T_c[j]
-    firm, y = records[k].firm, records[k].point.y
+    firm, y = memories.firms[k], memories.rows[k].point.y
     firm.duty = tile.loop.duty[j]
     if tile.plan.usual[j] > 0.0:
         firm.r = firm.goal = tile.loop.goal[j]

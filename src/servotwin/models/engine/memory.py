@@ -58,6 +58,13 @@ class Memory(NamedTuple):
     firm: Programs  # one: what the program of a digital servo remembers; while it runs it is changed in place
 
 
+class Memories(NamedTuple):
+    """What lanes remember: records of `Memory`, and beside them of `Firm`."""
+
+    rows: Any
+    firms: Any
+
+
 class Inputs(NamedTuple):
     """What a servo is told and what hangs on its shaft: tables of pieces, a row each; frames of pulses."""
 
@@ -80,22 +87,21 @@ point_of = record_reader("point_of", Point)
 put_point = record_writer("put_point", Point)
 
 
-def started(y: Vector, mesh: int) -> Memory:
-    """Return the memory of a servo at t = 0, in no mode yet."""
+def started(y: Vector, mesh: int, firm: Programs) -> Memory:
+    """Return the memory of a servo at t = 0, in no mode yet; `firm` is what its program remembers."""
     point = Point(0.0, y, Mode(0, 0, mesh, 0, 0), math.inf, y, FIRST_STEP, y[0])
-    return Memory(0, BEAT, point, frame.AT_START, NOTHING, math.inf, NOTHING, math.inf, control.NOT_STARTED)
+    return Memory(0, BEAT, point, frame.AT_START, NOTHING, math.inf, NOTHING, math.inf, firm)
 
 
-def with_firm(memory: Memory, firm: Any) -> Memory:
-    """Return a memory with what a program remembers, one in a sequence."""
-    return Memory(memory.frames, memory.beat, memory.point, memory.chip, memory.u, memory.u_end, memory.tau,
-                  memory.tau_end, firm)
+def memory_at(memories: Memories, k: int) -> Memory:
+    """Return what a lane remembers, with what its program does by reference."""
+    return memory_of(memories.rows[k], memories.firms[k:k + 1])
 
 
-def put_started(record: Any, memory: Memory) -> None:
-    """Put a memory that is not yet anywhere into a record."""
-    put_memory(record, memory)
-    put_firm(record.firm, memory.firm[0])
+def put_started(memories: Memories, k: int, y: Vector, mesh: int) -> None:
+    """Let a lane remember what a servo does at t = 0, in no mode yet."""
+    put_firm(memories.firms[k], control.AT_START)
+    put_memory(memories.rows[k], started(y, mesh, memories.firms[k:k + 1]))
 
 
 def origin_of(memory: Memory) -> float:

@@ -141,8 +141,9 @@ def put_columns(tiles: NDArray[Any], places: Any, values: Any) -> None:
 
 
 def record_of(kind: type[Any]) -> np.dtype[Any]:
-    """Return the type of a record that holds a named tuple, with those in it."""
-    return np.dtype((np.record, [(name, *_field(hint)) for name, hint in fields_of(kind)]))
+    """Return the type of a record that holds a named tuple, with those in it; sequences stand elsewhere."""
+    return np.dtype((np.record, [(name, *_field(hint)) for name, hint in fields_of(kind)
+                                 if get_origin(hint) is not Sequence]))
 
 
 def _field(hint: Any) -> tuple[Any, ...]:
@@ -150,8 +151,6 @@ def _field(hint: Any) -> tuple[Any, ...]:
         return (record_of(hint),)
     if hint is int:
         return (np.int64,)
-    if get_origin(hint) is Sequence:
-        return (record_of(get_args(hint)[0]),)
     return (np.float64,) if hint is float else (np.float64, (len(get_args(hint)),))
 
 
@@ -166,10 +165,14 @@ def _nothing(hint: Any) -> Any:
     return 0 if hint is int else 0.0 if hint is float else [0.0] * len(get_args(hint))
 
 
-def record_reader(name: str, kind: type[Kind]) -> Callable[[Any], Kind]:
-    """Return the function `name(record)` that reads a named tuple with those in it; a compiler gets it as text."""
+def record_reader(name: str, kind: type[Kind]) -> Callable[..., Kind]:
+    """Return the function `name(record)` that reads a named tuple with those in it; a compiler gets it as text.
+
+    What is a sequence of the named tuple has to be given beside the record.
+    """
     kinds: dict[str, type[Any]] = {}
-    return made(name, f"def {name}(record):\n    return {_reading(kind, 'record', kinds)}\n", kinds)
+    given = "".join(f", {field}" for field, hint in fields_of(kind) if get_origin(hint) is Sequence)
+    return made(name, f"def {name}(record{given}):\n    return {_reading(kind, 'record', kinds)}\n", kinds)
 
 
 def _reading(kind: Any, place: str, kinds: dict[str, type[Any]]) -> str:
@@ -178,7 +181,7 @@ def _reading(kind: Any, place: str, kinds: dict[str, type[Any]]) -> str:
     for field, hint in fields_of(kind):
         at = f"{place}.{field}"
         if get_origin(hint) is Sequence:
-            at = "0"  # by reference, see `with_firm`
+            at = field
         elif hasattr(hint, "_fields"):
             at = _reading(hint, at, kinds)
         elif hint not in (int, float):
@@ -195,7 +198,7 @@ def record_writer(name: str, kind: type[Kind]) -> Callable[[Any, Kind], None]:
 def _writing(kind: Any, to: str, of: str) -> Iterator[str]:
     for field, hint in fields_of(kind):
         if get_origin(hint) is Sequence:
-            continue  # it stands there
+            continue  # it stands elsewhere
         if hasattr(hint, "_fields"):
             yield from _writing(hint, f"{to}.{field}", f"{of}.{field}")
         elif hint in (int, float):

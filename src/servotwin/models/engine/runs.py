@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from servotwin.models.engine import controller, glides, motion
 from servotwin.models.engine.glides import GLIDES
@@ -15,16 +15,14 @@ from servotwin.models.engine.memory import (
     due,
     in_force,
     instant,
-    memory_of,
+    memory_at,
     origin_of,
     put_memory,
     put_started,
     resumed,
     silent_now,
     since,
-    started,
     time_of,
-    with_firm,
 )
 from servotwin.models.engine.modes import INSIDE, RIGID, Mode
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
@@ -38,25 +36,26 @@ from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
+    from servotwin.models.engine.memory import Memories
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
 
 UNDERWAY = -1  # status of a lane that has gone on side by side with others in this call
 
 
-def start(lanes: Lanes, which: Indices, records: Any) -> None:
+def start(lanes: Lanes, which: Indices, memories: Memories) -> None:
     """Put the lanes named in `which` into records, as they start."""
     for k in range(which.size):
         lane, y = which[k], lanes.start
         numbers = numbers_of(lanes, lane)
-        put_started(records[k], started(
-            (y[0, lane], y[1, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane]),
-            INSIDE if play.present(numbers.play) else RIGID))
+        put_started(
+            memories, k, (y[0, lane], y[1, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane]),
+            INSIDE if play.present(numbers.play) else RIGID)
 
 
 def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
-          which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, records: Any,
+          which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, memories: Memories,
           status: Indices, ended: Floats) -> None:
-    """Let the lanes named in `which`, whose memories the records hold, go on for durations of their own [s].
+    """Let the lanes named in `which`, whose memories are given, go on for durations of their own [s].
 
     `outputs` has the shape (n, 18, T), as in `run`, and gets what stands at `times` from the one numbered
     `first_output` on. A lane whose status is `UNDERWAY` may be in the middle of a tick.
@@ -64,19 +63,12 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
     for k in range(which.size):
         lane = which[k]
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(lanes, records, k),
+        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(memories, k),
                           durations[k], status[k] == UNDERWAY, times, first_output[k], outputs[k])
         status[k] = how
         ended[k] = time_of(memory)
         if how == COMPLETED:
-            put_memory(records[k], memory)
-
-
-def memory_at(lanes: Lanes, records: Any, k: int) -> Memory:
-    """Return what a record holds, with what a program remembers by reference."""
-    if firmware.present(lanes.firmware[0]):
-        return with_firm(memory_of(records[k]), records["firm"][k:k + 1])
-    return memory_of(records[k])
+            put_memory(memories.rows[k], memory)
 
 
 def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:

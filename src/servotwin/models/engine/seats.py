@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from servotwin.models.engine.dormand_prince import NUMBERS
 from servotwin.models.engine.memory import Point
 from servotwin.models.engine.modes import Mode, Vector
 from servotwin.models.engine.records import record_reader, record_writer
@@ -24,10 +25,12 @@ DENSE = 49  # numbers of the dense output of a step
 if TYPE_CHECKING:
     Coefficients = list[float]
     Numerals = list[float]
+    Stages = list[float]
     State = list[float]
 else:
     Coefficients = tuple[(float,) * ROOM]
     Numerals = tuple[(float,) * DENSE]
+    Stages = tuple[(float,) * NUMBERS]
     State = Vector
 
 
@@ -52,11 +55,15 @@ class Shown(NamedTuple):
 class Seat(NamedTuple):
     """A servo on a bus; times by its own clock [s] unless said."""
 
+    place: int  # where its memory stands among those of all
+    lane: int  # where its numbers do
     numbers: Numbers
     chip: Chip
     point: Point
     decided: Frame  # what its chip remembers
     shown: Shown  # of a program, which remembers more elsewhere
+    u: Piece  # what it follows, as in `Memory`
+    u_end: float
     tau: Piece
     tau_end: float
     frames: int  # where its clock counts from, as in `Memory`
@@ -66,7 +73,8 @@ class Seat(NamedTuple):
     accuracy: float  # of what is integrated [rad]
     clock: float  # its time now
     late: float  # by how much its clock is ahead of that of the bus
-    end: float  # when the run is over
+    until: float  # when it has gone far enough
+    end: float  # when the run is over: then, or before
     switch: float  # when bridge or load change next
     edge: float  # when its next frame begins
     limit: float  # when anything is to be done next
@@ -76,6 +84,26 @@ class Seat(NamedTuple):
     event: int  # that it has there; −1: none
     track: Track
     joined: int  # its place among those that move together; −1: none
+
+
+class Linear(NamedTuple):
+    """The law of a linear mate: L di/dt = s V − K_b w − drop − R i, J dw/dt = K i − b w − torques."""
+
+    sign: float  # or duty
+    K: float
+    K_b: float
+    R: float
+    L: float
+    J: float
+    b: float
+    stiffness: float
+    drop: float
+    conductance: float  # 0 where no current flows
+    conducts: float
+    moves: float
+    against: float
+    slope: float
+    start: float  # its angle
 
 
 class Mate(NamedTuple):
@@ -92,6 +120,8 @@ class Mate(NamedTuple):
     y: State  # where it is looked at
     speed: Coefficients  # of power series
     current: Coefficients
+    law: Linear  # of the series
+    stages: Stages  # of a step: the rates of all
     dense: Numerals  # of a step
 
 
@@ -126,6 +156,7 @@ piece_of = record_reader("piece_of", Piece)
 put_piece = record_writer("put_piece", Piece)
 mode_of = record_reader("mode_of", Mode)
 put_mode = record_writer("put_mode", Mode)
+put_law = record_writer("put_law", Linear)
 put_track = record_writer("put_track", Track)
 put_shared = record_writer("put_shared", Shared)
 source_of = record_reader("source_of", Source)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import contacts, currents
-from servotwin.models.engine.memory import time_of
+from servotwin.models.engine.memory import memory_at, time_of
 from servotwin.models.engine.modes import RIGID
 from servotwin.models.engine.observe import Observed, observed, told_by
 from servotwin.models.engine.records import TILE
-from servotwin.models.engine.runs import as_now, inputs_of, memory_at, mode_under, told
+from servotwin.models.engine.runs import as_now, inputs_of, mode_under, told
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms import duty
 from servotwin.models.terms.chip import present as pulsed_chip
@@ -18,17 +18,18 @@ from servotwin.models.terms.sensor import slack
 from servotwin.physics.pieces import piece_value
 
 if TYPE_CHECKING:
+    from servotwin.models.engine.memory import Memories
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
 
 
 def one_by_one(lanes: Lanes, curve: Floats, torque_rows: Floats, torque_first: Indices, torque_count: Indices,
-               which: Indices, records: Any, seen: Floats) -> None:
-    """Look at the lanes named in `which`, whose memories the records hold; `seen` has a row of signals for each."""
+               which: Indices, memories: Memories, seen: Floats) -> None:
+    """Look at the lanes named in `which`, whose memories are given; `seen` has a row of signals for each."""
     for k in range(which.size):
         lane = which[k]
         numbers, chip = numbers_of(lanes, lane), chip_of(lanes, lane)
         inputs = inputs_of(lanes, curve, torque_rows[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        memory = memory_at(lanes, records, k)
+        memory = memory_at(memories, k)
         point, now, time = memory.point, memory.chip, time_of(memory)
         u, tau = told(numbers, pulsed_chip(chip), inputs, memory)
         numbers = as_now(numbers, inputs, memory)

@@ -1,80 +1,43 @@
-"""Compile the kernels: derive a real module from them, keep it in the user's cache, let numba compile it once."""
+"""Kernels: derived from the engine, printed as C, found or built as libraries, called from Python and from C."""
 
 from __future__ import annotations
 
-import sys
 import threading
+import warnings
 from functools import cache
-from importlib import import_module
-from importlib.metadata import version
-from pathlib import Path
-from types import ModuleType
-from typing import cast
+from typing import Any
 
-from servotwin import physics
-from servotwin.models import engine, terms
-from servotwin.simulation.compile import derive as derive_module
-from servotwin.simulation.compile.derive import Recipe, derive, surroundings
-from servotwin.simulation.compile.storage import is_stored, key_of, loaded, stored
+from servotwin.simulation.compile.backend import is_plain, use_plain
+from servotwin.simulation.compile.building import WAY_OUT, is_ready, source_key
+from servotwin.simulation.compile.derive import Recipe
+from servotwin.simulation.compile.library import loaded
+from servotwin.simulation.compile.plain import plain_kernels
 
-__all__ = ["Recipe", "is_compiled", "kernels", "source_key", "unread"]
+__all__ = ["Recipe", "is_compiled", "is_plain", "kernels", "source_key"]
 
 _lock = threading.Lock()
 
 
-def kernels(recipe: Recipe) -> ModuleType:
-    """Return the derived module, with the recipe's entries compiled when they are first called.
+def kernels(recipe: Recipe) -> Any:
+    """Return the kernels of a recipe, each under the name of its entry.
 
-    The first time on a machine a line on standard error says that this takes a while.
+    Where there is neither a library nor a compiler they run in plain Python from then on, which is said once.
     """
     with _lock:
-        return _kernels(recipe)
-
-
-@cache
-def _sources() -> tuple[str, ...]:
-    """Return the text of everything from which a module is derived; to read it is quicker than to derive."""
-    files = [Path(derive_module.__file__).with_name(name) for name in ("derive.py", "reading.py")]
-    for package in (physics, terms, engine):
-        files += sorted(Path(package.__path__[0]).glob("*.py"))
-    return tuple(file.read_text(encoding="utf-8") for file in files)
-
-
-def source_key() -> str:
-    """Return a short name for all that compiled code depends on, a recipe apart."""
-    return key_of(*_sources(), version("numba"), version("llvmlite"))
+        return plain_kernels(recipe) if is_plain() else _kernels(recipe)
 
 
 def is_compiled(recipe: Recipe) -> bool:
-    """Tell whether this machine has compiled a recipe before, without loading the compiler."""
-    return is_stored(_name(recipe))
+    """Tell whether there is a library of a recipe, in the package or in the cache."""
+    return is_ready(recipe)
 
 
 @cache
-def _name(recipe: Recipe) -> str:
-    return f"servotwin_{recipe.name}_{key_of(source_key(), surroundings(recipe))}"
-
-
-@cache
-def _kernels(recipe: Recipe) -> ModuleType:
-    path, known = stored(_name(recipe), lambda: derive(recipe))
-    if not known:
-        sys.stderr.write("servotwin: compiling the kernels for this machine, once (10 to 25 s)\n")
-        sys.stderr.flush()
-    import_module("numba")
-    return loaded(path)
-
-
-@cache
-def unread(recipe: Recipe) -> tuple[str, ...]:
-    """Return the numbers of terms that a recipe does not know and others do, found once on a machine.
-
-    Lanes in which they are not neutral are not for it.
-    """
-    def text() -> str:
-        from servotwin.simulation.compile import reading
-        return f"NUMBERS = {reading.unread(recipe)!r}\n"
-
-    with _lock:
-        path, _ = stored(f"{_name(recipe)}_unread", text)
-        return cast("tuple[str, ...]", loaded(path).NUMBERS)
+def _kernels(recipe: Recipe) -> Any:
+    found = loaded(recipe)
+    if found is None:
+        use_plain()
+        warnings.warn(f"no C compiler: many servos run in plain Python, a hundred times slower. {WAY_OUT}",
+                      RuntimeWarning, stacklevel=4)
+        return plain_kernels(recipe)
+    return found

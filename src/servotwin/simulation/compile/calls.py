@@ -1,39 +1,25 @@
-"""Kernels as C functions of one address: that of the words which say where their arguments are.
+"""Kernels with their arguments, to be called by address: from compiled code, and from Python again and again.
 
-A number is a word; an array is its address and its lengths; a named tuple is all that is in it. The kernels themselves
-are those that Python calls, compiled once.
+A number is a word; an array is its address and its lengths; a tuple is all that is in it. What changes from call to
+call, `Now` and `Some`, is put into the words by a call before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+import ctypes
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.simulation.compile import Recipe, kernels, source_key
-from servotwin.simulation.compile.storage import key_of, loaded, stored
+from servotwin.simulation.compile import Recipe, is_plain, kernels, plain
+from servotwin.simulation.compile.kinds import Tuple
+from servotwin.simulation.compile.translate import words_of
 
-_HEAD = """# Derived from servotwin's kernels; do not edit.
-from numba import cfunc, types
-
-from servotwin.simulation.compile.intrinsics import array_maker
-from {module} import {entry} as kernel
-{imports}
-_words = array_maker("<i8", 1, True)
-_numbers = array_maker("<f8", 1, True)
-{makers}
-
-@cfunc(types.int64(types.int64), cache=True, error_model="numpy")
-def call(address):
-    w, x = _words(address, ({size},)), _numbers(address, ({size},))
-    {line}
-"""
+_WORD = 8  # bytes
 
 
 class Now(NamedTuple):
@@ -53,103 +39,101 @@ class Some(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Call:
-    """A kernel with its arguments, to be called from compiled code.
+    """A kernel with its arguments.
 
     Parameters
     ----------
     function : int
-        Address of the C function `long long f(long long words)`.
+        Address of the C function `int64_t f(int64_t *words)`.
     words : ndarray of int64
         What it is called with the address of.
     kept : tuple
-        The arguments, whose memory it uses.
+        What it uses the memory of.
+    before : Call or None
+        What has to be called before, each time.
     """
 
     function: int
     words: NDArray[np.int64]
     kept: tuple[Any, ...]
+    before: Call | None = None
+
+
+DRIVERS = Recipe("drivers", tuple(f"servotwin.simulation.compile.{entry}" for entry in (
+    "renewal:renew", "tick:advance", "joints:control", "joints:step")), by_numbers=True)
+"""What is called with numbers, by kernels, by a program in C and by a rigid-body engine."""
 
 
 def call_of(recipe: Recipe, entry: str, *arguments: Any, returns: bool = False) -> Call:
     """Return a call of a kernel; it returns the kernel's whole number where that `returns` one, else 1."""
-    block = _Block()
-    text = ", ".join(block.put(argument) for argument in arguments)
-    line = f"return kernel({text})" if returns else f"kernel({text})\n    return 1"
-    size = len(block.words)
-    rest = (entry, tuple(block.imports), tuple(block.makers), size, line)
-    return Call(_compiled(recipe, rest), np.array(block.words, np.int64), arguments)
+    kernel = getattr(kernels(recipe), entry)
+    if is_plain():
+        return _plain_call(kernel, arguments, returns)
+    function = kernel.fitting([_whole(argument) for argument in arguments])
+    words = function.words([_whole(argument) for argument in arguments])
+    copies, truths = list[int](), list[int]()
+    place = words.ctypes.data
+    for kind, argument in zip(function.kinds, arguments, strict=True):
+        _note(kind, argument, place, copies, truths)
+        place += _WORD * words_of(kind)
+    before = None
+    if copies or truths:
+        pairs = np.array([len(copies) // 2, len(truths) // 2, *copies, *truths], np.int64)
+        before = Call(_address("renew"), pairs, ())
+    return Call(function.address, words, arguments, before)
 
 
-@dataclass
-class _Block:
-    """Words of arguments, and the text that reads them."""
-
-    words: list[int] = field(default_factory=list)
-    imports: list[str] = field(default_factory=list)
-    makers: list[str] = field(default_factory=list)
-
-    def put(self, argument: Any) -> str:
-        """Put an argument in, and return the text that reads it."""
-        place = len(self.words)
-        if isinstance(argument, Now):
-            self.words.append(argument.array.ctypes.data + 8 * argument.place)
-            text = f"_numbers(w[{place}], (1,))[0]"
-            return f"{text} != 0.0" if argument.truth else text
-        if isinstance(argument, Some):
-            self.words.append(argument.number.ctypes.data)
-            return self._array(argument.array, f"_words(w[{place}], (1,))[0]")
-        if isinstance(argument, np.ndarray):
-            return self._array(argument, None)
-        if hasattr(argument, "_fields"):
-            kind = type(argument)
-            self.imports.append(f"from {kind.__module__} import {kind.__name__}")
-            return f"{kind.__name__}({', '.join(map(self.put, argument))})"
-        if isinstance(argument, bool | int):
-            self.words.append(int(argument))
-            return f"w[{place}] != 0" if isinstance(argument, bool) else f"w[{place}]"
-        self.words.append(int(np.float64(argument).view(np.int64)))
-        return f"x[{place}]"
-
-    def _array(self, array: NDArray[Any], length: str | None) -> str:
-        if not array.flags.c_contiguous:
-            raise ValueError("an array that kernels share with C has its numbers in a row")
-        maker = f"array_maker({described(array.dtype)!r}, {array.ndim}, {array.flags.aligned})"
-        if maker not in self.makers:
-            self.makers.append(maker)
-        place = len(self.words)
-        self.words += [array.ctypes.data, *array.shape]
-        lengths = [f"w[{place + 1 + k}]" for k in range(array.ndim)]
-        if length is not None:
-            lengths[0] = length
-        return f"_array_{self.makers.index(maker)}(w[{place}], ({', '.join(lengths)},))"
+def _whole(argument: Any) -> Any:
+    """Return an argument of the same kind without anything that changes."""
+    if isinstance(argument, Now):
+        return bool(argument.array[argument.place]) if argument.truth else float(argument.array[argument.place])
+    if isinstance(argument, Some):
+        return argument.array
+    if isinstance(argument, tuple) and hasattr(argument, "_fields"):
+        return type(argument)(*map(_whole, argument))
+    return argument
 
 
-def described(kind: np.dtype[Any]) -> Any:
-    """Return a type of numbers or records as plain words."""
-    if kind.names is None or kind.fields is None:
-        return kind.str
-    found = []
-    for name in kind.names:
-        base, shape = kind.fields[name][0].base, kind.fields[name][0].shape
-        found.append((name, described(base), shape))
-    return found
+def _note(kind: Any, argument: Any, place: int, copies: list[int], truths: list[int]) -> None:
+    """Note which words from a place on are copied from where: numbers as they are, conditions as 0 or 1."""
+    if isinstance(argument, Now):
+        (truths if argument.truth else copies).extend((place, argument.array.ctypes.data + _WORD * argument.place))
+    elif isinstance(argument, Some):
+        copies += (place + _WORD, argument.number.ctypes.data)
+    elif isinstance(kind, Tuple):
+        for inner, each in zip(kind.elements, argument, strict=True):
+            _note(inner, each, place, copies, truths)
+            place += _WORD * words_of(inner)
 
 
-@cache
-def _compiled(recipe: Recipe, rest: tuple[str, tuple[str, ...], tuple[str, ...], int, str]) -> int:
-    entry, imports, makers, size, line = rest
-    module = kernels(recipe)
-    text = _HEAD.format(
-        module=module.__name__, entry=entry, imports="\n".join(sorted(set(imports))), size=size, line=line,
-        makers="\n".join(f"_array_{k} = {maker}" for k, maker in enumerate(makers)))
-    path, _ = stored(f"servotwin_call_{recipe.name}_{entry}_{key_of(text)}", lambda: text)
-    return int(loaded(path).call.address)
+def _plain_call(kernel: Callable[..., Any], arguments: tuple[Any, ...], returns: bool) -> Call:
+    """Return a call of a kernel in plain Python, which has its arguments without words."""
+    def call(_: int) -> int:
+        found = kernel(*(_as_now(argument) for argument in arguments))
+        return int(found) if returns else 1
+
+    callback = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(call)
+    return Call(plain.address(callback), np.zeros(1, np.int64), (callback, *arguments))
+
+
+def _as_now(argument: Any) -> Any:
+    """Return what a kernel gets for an argument at this moment."""
+    if isinstance(argument, Now):
+        value = argument.array[argument.place]
+        return bool(value != 0.0) if argument.truth else value
+    if isinstance(argument, Some):
+        return argument.array[:argument.number[0]]
+    if isinstance(argument, tuple) and hasattr(argument, "_fields"):
+        return type(argument)(*map(_as_now, argument))
+    return argument
 
 
 @cache
 def tick_address() -> int:
     """Return the address of the C function `int servotwin_advance(servotwin_tick *tick)`."""
-    return int(_module("tick", "layout", _TICK).entry.address)
+    if is_plain():
+        return plain.address_of(kernels(DRIVERS).advance, ctypes.c_int32, ctypes.c_int64)
+    return _address("advance")
 
 
 @cache
@@ -157,36 +141,25 @@ def joint_addresses() -> tuple[int, int]:
     """Return the addresses of two C functions of `joints`.
 
     They are `void control(const mjModel *m, mjData *d)` and
-    `long long step(long long *drive, const mjModel *m, mjData *d, long long steps)`.
+    `int64_t step(int64_t *drive, const mjModel *m, mjData *d, int64_t steps)`.
     """
-    module = _module("joints", "joints_layout", _JOINTS)
-    return int(module.at_callback.address), int(module.stepping.address)
+    if is_plain():
+        own, word = kernels(DRIVERS), ctypes.c_int64
+        return plain.address_of(own.control, None, word, word), plain.address_of(own.step, word, *[word] * 4)
+    return _address("control"), _address("step")
 
 
-def _module(name: str, layout: str, entries: str) -> ModuleType:
-    """Return a file of this folder as a compiled module, with its entries for C."""
-    text, *others = (Path(__file__).with_name(f"{file}.py").read_text(encoding="utf-8")
-                     for file in (name, layout, "intrinsics"))
-    path, _ = stored(f"servotwin_{name}_{key_of(source_key(), text, entries, *others)}", lambda: text + entries)
-    return loaded(path)
-
-
-_TICK = """
-
-entry = cfunc(types.int32(types.int64), cache=True, error_model="numpy")(advance)
-"""
-_JOINTS = """
-
-at_callback = cfunc(types.void(types.int64, types.int64), cache=True, error_model="numpy")(control)
-stepping = cfunc(types.int64(*[types.int64] * 4), cache=True, error_model="numpy")(step)
-"""
+def _address(entry: str) -> int:
+    """Return the address of a driver."""
+    return int(getattr(kernels(DRIVERS), entry).functions[0].address)
 
 
 def program(chains: Sequence[Sequence[Call]]) -> NDArray[np.int64]:
     """Return chains of calls as words: how many there are, then for each how many calls, and these."""
     words = [len(chains)]
     for chain in chains:
-        words.append(len(chain))
-        for call in chain:
+        calls = [each for call in chain for each in (call.before, call) if each is not None]
+        words.append(len(calls))
+        for call in calls:
             words += [call.function, call.words.ctypes.data]
     return np.array(words, np.int64)

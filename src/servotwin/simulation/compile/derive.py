@@ -1,4 +1,4 @@
-"""Derive one module that numba can compile and cache from the kernels and laws, mechanically.
+"""Derive one module from the kernels and laws, mechanically: plain Python that the translator can print as C.
 
 Starting from the entries, every function that is called is collected from its own module under the name
 `package_module__function`; constants come along by value, classes are imported from where they are. A kernel is changed
@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import ast
 import math
-import sys
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib import import_module
-from pathlib import Path
 from types import FunctionType
 from typing import Any, cast
 
@@ -27,8 +26,8 @@ from servotwin.simulation.compile.rewriting import (
     local_names,
 )
 
-_INTRINSICS, _LINKING = (f"servotwin.simulation.compile.{name}" for name in ("intrinsics", "linking"))
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest", "floor")  # single instructions in the vector form
+_ADDRESSES = "servotwin.simulation.compile.addresses"
 _LONG = 12  # a tuple of more numbers is a table
 
 
@@ -58,6 +57,8 @@ class Recipe:
         On what the acceleration may depend in what will run: flags of `terms.dependence`.
     spares : tuple of str
         Numbers of terms that it does well without, though other kernels read them: they act in what it leaves to them.
+    by_numbers : bool
+        Whether C calls the entries with their whole numbers, instead of with words.
     """
 
     name: str
@@ -69,32 +70,61 @@ class Recipe:
     present: tuple[str, ...] = ()
     knows: int = -1
     spares: tuple[str, ...] = ()
+    by_numbers: bool = False
 
 
-def derive(recipe: Recipe) -> str:
-    """Return the source text of the derived module."""
+@dataclass(frozen=True, eq=False)
+class Derived:
+    """A derived module.
+
+    Attributes
+    ----------
+    recipe : Recipe
+    functions : dict of str to ast.FunctionDef
+        By their names in the module, each after those that it calls.
+    head : str
+        Imports and constants.
+    primitives : dict of str to str
+        What C has an expression for, by its name in the module.
+    in_any_order : frozenset of str
+        Functions whose sums may be taken in any order.
+    entries : dict of str to str
+        Names in the module, by those of the entries.
+    """
+
+    recipe: Recipe
+    functions: dict[str, ast.FunctionDef]
+    head: str
+    primitives: dict[str, str]
+    in_any_order: frozenset[str]
+    entries: dict[str, str]
+
+    @cached_property
+    def space(self) -> dict[str, Any]:
+        """Constants and classes, by their names in the module."""
+        space: dict[str, Any] = {}
+        exec(self.head, space)
+        return space
+
+    @property
+    def text(self) -> str:
+        """The module as plain Python."""
+        functions = (f"\n\n{ast.unparse(node)}\n" for node in self.functions.values())
+        entries = (f"{entry} = {name}\n" for entry, name in self.entries.items())
+        return "".join([self.head, *functions, "\n\n", *entries])
+
+
+def derive(recipe: Recipe) -> Derived:
+    """Derive a module."""
     work = Derivation(recipe)
     names = [work.function(*entry.split(":")) for entry in recipe.entries]
-    lines = ["# Derived from servotwin's kernels; do not edit.", "import math", "", "import numpy as np",
-             "from numba import njit", "", f"from {_LINKING} import Part", ""]
+    lines = ["# Derived from servotwin's kernels; do not edit.", "import math", "", "import numpy as np", ""]
     lines += [f"from {module} import {name} as {alias}" for alias, (module, name) in sorted(work.imports.items())]
     lines += ["", f"_f = np.{'float32' if recipe.single else 'float64'}", ""]
     lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
-    for flat in work.order:
-        options = _options(recipe, flat in names, work.functions[flat])
-        options += ', fastmath={"reassoc"}' if recipe.vector and flat in work.in_any_order else ""
-        lines += ["", "", f"@njit({options})", work.functions[flat]]
-    lines += ["", *(f"{entry.split(':')[1]} = {flat}" for entry, flat in zip(recipe.entries, names, strict=True)), ""]
-    return "\n".join(lines)
-
-
-def _options(recipe: Recipe, entry: bool, text: str) -> str:
-    options = 'nogil=True, error_model="numpy"'
-    if entry:
-        return options + ", cache=True"
-    options += ", no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=Part"
-    loops = any(isinstance(node, (ast.For, ast.While)) for node in ast.walk(ast.parse(text)))
-    return options + (", forceinline=True" if recipe.vector and not loops else "")
+    entries = dict(zip((entry.split(":")[1] for entry in recipe.entries), names, strict=True))
+    return Derived(recipe, {name: work.functions[name] for name in work.order}, "\n".join([*lines, ""]),
+                   work.primitives, frozenset(work.in_any_order), entries)
 
 
 @dataclass
@@ -103,24 +133,23 @@ class Derivation:
 
     recipe: Recipe
     order: list[str] = field(default_factory=list)
-    functions: dict[str, str] = field(default_factory=dict)
+    functions: dict[str, ast.FunctionDef] = field(default_factory=dict)
     constants: dict[str, str] = field(default_factory=dict)
     imports: dict[str, tuple[str, str]] = field(default_factory=dict)
+    primitives: dict[str, str] = field(default_factory=dict)
     in_any_order: set[str] = field(default_factory=set)
-    homes: dict[str, FunctionType] = field(default_factory=dict)  # what each function was
 
     def function(self, module: str, name: str) -> str:
         """Collect a function after those that it calls, and return its name in the derived module."""
         flat = flat_name(module, name)
         if flat not in self.functions:
-            self.functions[flat] = ""  # marks a call of itself
-            self.homes[flat] = getattr(import_module(module), name)
+            self.functions[flat] = ast.FunctionDef(flat)  # marks a call of itself
             if name in getattr(import_module(module), "IN_ANY_ORDER", ()):
                 self.in_any_order.add(flat)
             node = definition(module, name)
             rewritten = Rewriting(self, module, local_names(node)).visit(node)
             rewritten.name = flat
-            self.functions[flat] = ast.unparse(ast.fix_missing_locations(rewritten))
+            self.functions[flat] = ast.fix_missing_locations(rewritten)
             self.order.append(flat)
         return flat
 
@@ -142,9 +171,9 @@ class Derivation:
         module, name = function.__module__, function.__name__
         if hasattr(function, "text"):
             return self._generated(function)
-        if self.recipe.vector and module == ELEMENTARY and name.lstrip("_") in _PRIMITIVES:
-            flat = flat_name(_INTRINSICS, name.lstrip("_"))
-            self.imports[flat] = (_INTRINSICS, name.lstrip("_"))
+        if module == _ADDRESSES or (self.recipe.vector and module == ELEMENTARY and name in _PRIMITIVES):
+            flat = flat_name(module, name)
+            self.imports[flat], self.primitives[flat] = (module, name), name
             return flat
         return self.function(module, name)
 
@@ -152,14 +181,13 @@ class Derivation:
         """Collect a function of `engine.records`, which comes as text."""
         flat = flat_name(function.__module__, function.__name__)
         if flat not in self.functions:
-            self.homes[flat] = function
             aliases = {name: self.value(kind.__module__, name, kind) for name, kind in function.kinds.items()}
-            node = ast.parse(function.text).body[0]
+            node = cast("ast.FunctionDef", ast.parse(function.text).body[0])
             for part in ast.walk(node):
                 if isinstance(part, ast.Name) and part.id in aliases:
                     part.id = aliases[part.id]
-            cast("ast.FunctionDef", node).name = flat
-            self.functions[flat] = ast.unparse(node)
+            node.name = flat
+            self.functions[flat] = node
             self.order.append(flat)
         return flat
 
@@ -182,8 +210,3 @@ class Derivation:
             return repr(value)
         raise TypeError(f"{module}: a {type(value).__name__} cannot be carried into compiled code")
 
-
-def surroundings(recipe: Recipe) -> str:
-    """Return what the compiled code depends on besides the derived text."""
-    beside = (Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("intrinsics.py", "linking.py"))
-    return f"{sys.version_info[:2]} {recipe} {' '.join(beside)}"

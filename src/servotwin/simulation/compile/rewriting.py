@@ -48,7 +48,7 @@ class Rewriting(ast.NodeTransformer):
         if ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
         self._flags = _given_once(_function(self._module, node.name))
-        node.body = [self.visit(statement) for statement in node.body]
+        node.body = self._reached(node.body) or [ast.Pass()]
         self._by_place(node.args)
         node.args.defaults = [self.visit(default) for default in node.args.defaults]
         return node
@@ -65,11 +65,33 @@ class Rewriting(ast.NodeTransformer):
     def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
         """Leave out the branch that is not taken."""
         known = self._truth(node.test)
-        if known is None:
-            return self.generic_visit(node)
-        taken = [self.visit(statement) for statement in (node.body if known else node.orelse)]
-        flat = [one for part in taken for one in (part if isinstance(part, list) else [part])]
-        return flat or [ast.Pass()]
+        if known is not None:
+            return self._reached(node.body if known else node.orelse)
+        node.test = self.visit(node.test)
+        node.body, node.orelse = self._reached(node.body) or [ast.Pass()], self._reached(node.orelse)
+        return node
+
+    def visit_For(self, node: ast.For) -> ast.AST:
+        """Leave out what is not reached in a round."""
+        node.target, node.iter = self.visit(node.target), self.visit(node.iter)
+        node.body, node.orelse = self._reached(node.body) or [ast.Pass()], self._reached(node.orelse)
+        return node
+
+    def visit_While(self, node: ast.While) -> ast.AST:
+        """Leave out what is not reached in a round."""
+        node.test = self.visit(node.test)
+        node.body, node.orelse = self._reached(node.body) or [ast.Pass()], self._reached(node.orelse)
+        return node
+
+    def _reached(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+        """Return statements rewritten, but for those behind one that always leaves."""
+        found: list[ast.stmt] = []
+        for statement in statements:
+            new = self.visit(statement)
+            found += [one for one in (new if isinstance(new, list) else [new]) if not isinstance(one, ast.Pass)]
+            if found and _leaves(found[-1]):
+                break
+        return found
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
         """Leave out the value that is not taken."""
@@ -93,6 +115,8 @@ class Rewriting(ast.NodeTransformer):
 
     def _truth(self, node: ast.expr) -> bool | None:
         """Return whether a condition holds for all that a recipe is for; None where it depends."""
+        if isinstance(node, ast.Name) and node.id == "PLAIN":  # what plain Python alone does
+            return False
         if not self._work.recipe.absent and not self._work.recipe.never:
             return None
         if isinstance(node, ast.BoolOp):
@@ -270,6 +294,13 @@ def _given_once(node: ast.FunctionDef) -> dict[str, ast.expr]:
                      if isinstance(names, ast.Tuple) and isinstance(values, ast.Tuple) else [(names, values)])
             found |= {name.id: value for name, value in pairs if isinstance(name, ast.Name)}
     return {name: value for name, value in found.items() if stored.count(name) == 1}
+
+
+def _leaves(node: ast.stmt) -> bool:
+    """Tell whether nothing behind a statement is reached."""
+    if isinstance(node, ast.If):
+        return bool(node.orelse) and _leaves(node.body[-1]) and _leaves(node.orelse[-1])
+    return isinstance(node, ast.Return | ast.Break | ast.Continue)
 
 
 def _last(node: ast.expr) -> str:

@@ -1,19 +1,14 @@
-"""The one function that C calls at a tick, over the programs of a simulator; kept and compiled as a derived module.
+"""The one function that C calls at a tick, over the programs of a simulator.
 
-It is not imported from here. Words are those of `layout`.
+It runs as derived text, compiled or not. Words are those of `layout`.
 """
-
-# numba's own types are not annotated
-# mypy: disable-error-code="no-untyped-def, no-untyped-call, misc, import-untyped, call-arg, unreachable"
 
 from __future__ import annotations
 
 import math
 
-from numba import cfunc, njit, types  # noqa: F401 - the last lines of the derived module need them
-
 from servotwin.models.engine.observe import Observed
-from servotwin.simulation.compile.intrinsics import array_maker, called
+from servotwin.simulation.compile.addresses import Bytes, Numbers, Words, bytes_at, called, numbers, rows, words
 from servotwin.simulation.compile.layout import (
     DONE,
     GIVEN,
@@ -26,9 +21,6 @@ from servotwin.simulation.compile.layout import (
     TICK,
     VERSION,
 )
-
-_words, _table = array_maker("<i8", 1, True), array_maker("<f8", 2, True)
-_numbers, _bytes = array_maker("<f8", 1, True), array_maker("|i1", 1, True)
 
 _TICK_WORDS, _HANDLE_WORDS, _INPUTS, _SIGNALS = len(TICK), len(HANDLE), len(GIVEN), len(Observed._fields)
 _LANES, _DURATION, _SIMULATOR = TICK.index("lanes"), TICK.index("duration"), TICK.index("simulator")
@@ -43,16 +35,16 @@ _SHOW, _LOOK = HANDLE.index("show"), HANDLE.index("look")
 _OF_SHAFT = 2  # of what is shown; the rest stands in these columns of what is seen
 _COLUMNS = (Observed._fields.index(SHOWN[2]), Observed._fields.index(SHOWN[3]), Observed._fields.index(SHOWN[4]),
             Observed._fields.index(SHOWN[5]))
+_OTHERS = len(_COLUMNS)
 
 
-@njit(error_model="numpy")
-def _run(program):
+def _run(program: int) -> int:
     """Run a program, each chain until one of its calls returns 0; return the last number."""
-    count = _words(program, (1,))[0]
+    count = words(program, 1)[0]
     at, found = program + 8, 0
     for _ in range(count):
-        size = _words(at, (1,))[0]
-        calls = _words(at + 8, (2 * size,))
+        size = words(at, 1)[0]
+        calls = words(at + 8, 2 * size)
         for k in range(size):
             found = called(calls[2 * k], calls[2 * k + 1])
             if found == 0:
@@ -61,22 +53,20 @@ def _run(program):
     return found
 
 
-@njit(error_model="numpy")
-def _take(t, h, lanes):
+def _take(t: Words, h: Words, lanes: int) -> Words:
     """Copy what is given to where the programs read it."""
-    given, has = _table(h[_H_GIVEN], (_INPUTS, lanes)), _words(h[_H_HAS], (_INPUTS,))
+    given, has = rows(h[_H_GIVEN], _INPUTS, lanes), words(h[_H_HAS], _INPUTS)
     for row in range(_INPUTS):
         address = t[_FIRST_GIVEN + row]
         has[row] = 1 if address != 0 else 0
         if address != 0:
-            source = _numbers(address, (lanes,))
+            source = numbers(address, lanes)
             for k in range(lanes):
                 given[row, k] = source[k]
     return has
 
 
-@njit(error_model="numpy")
-def _impose(has, h):
+def _impose(has: Words, h: Words) -> bool:
     """Impose what another simulator decides; return whether that could be done."""
     if has[_INERTIA] + has[_VOLTAGE] != 0:
         if _run(h[_CHANGE]) == 0:
@@ -88,62 +78,60 @@ def _impose(has, h):
     return True
 
 
-@njit(error_model="numpy")
-def _put(values, stride, first, address, lanes, status):
+def _put(values: Numbers, stride: int, first: int, address: int, lanes: int, status: Bytes) -> None:
     """Copy a signal to where it is wanted; lanes that have failed are nan."""
-    out = _numbers(address, (lanes,))
+    out = numbers(address, lanes)
     for k in range(lanes):
         out[k] = values[first + stride * k] if status[k] == 0 else math.nan
 
 
-@njit(error_model="numpy")
-def _show(t, h, lanes):
+def _show(t: Words, h: Words, lanes: int) -> None:
     """Copy to C what it wants to see."""
-    status = _bytes(h[_H_STATUS], (lanes,))
+    status = bytes_at(h[_H_STATUS], lanes)
     wanted = 0
     for row in range(_OF_SHAFT):
         wanted += 1 if t[_FIRST_SHOWN + row] != 0 else 0
     if wanted > 0:
         _run(h[_SHOW])
-        shaft = _numbers(h[_H_SHAFT], (_OF_SHAFT * lanes,))
+        shaft = numbers(h[_H_SHAFT], _OF_SHAFT * lanes)
         for row in range(_OF_SHAFT):
             if t[_FIRST_SHOWN + row] != 0:
                 _put(shaft, 1, row * lanes, t[_FIRST_SHOWN + row], lanes, status)
     wanted = 0
-    for row in range(len(_COLUMNS)):
+    for row in range(_OTHERS):
         wanted += 1 if t[_FIRST_SHOWN + _OF_SHAFT + row] != 0 else 0
     if wanted > 0:
         _run(h[_LOOK])
-        seen = _numbers(h[_H_SEEN], (_SIGNALS * lanes,))
-        for row in range(len(_COLUMNS)):
+        seen = numbers(h[_H_SEEN], _SIGNALS * lanes)
+        for row in range(_OTHERS):
             if t[_FIRST_SHOWN + _OF_SHAFT + row] != 0:
                 _put(seen, _SIGNALS, _COLUMNS[row], t[_FIRST_SHOWN + _OF_SHAFT + row], lanes, status)
     if t[_STATUS] != 0:
-        out = _bytes(t[_STATUS], (lanes,))
+        out = bytes_at(t[_STATUS], lanes)
         for k in range(lanes):
             out[k] = status[k]
 
 
-def advance(tick):
+def advance(tick: int) -> int:
     """Go on by one tick, and return `DONE` or what is wrong; then nothing has changed."""
     if tick == 0:
         return NOTHING_GIVEN
-    if _words(tick, (1,))[0] != VERSION:
+    if words(tick, 1)[0] != VERSION:
         return OTHER_VERSION
-    t = _words(tick, (_TICK_WORDS,))
+    t = words(tick, _TICK_WORDS)
     if t[_SIMULATOR] == 0:
         return NOTHING_GIVEN
-    h = _words(t[_SIMULATOR], (_HANDLE_WORDS,))
+    h = words(t[_SIMULATOR], _HANDLE_WORDS)
     lanes = h[0]
     if t[_LANES] != lanes:
         return OTHER_LANES
-    has, now = _take(t, h, lanes), _numbers(h[_H_NOW], (2,))
-    now[0] = _numbers(tick, (_TICK_WORDS,))[_DURATION]
+    has, now = _take(t, h, lanes), numbers(h[_H_NOW], 2)
+    now[0] = numbers(tick, _TICK_WORDS)[_DURATION]
     _run(h[_CLOCK])
     code = _run(h[_ACCEPT])
     if code != DONE:
         return code
-    _words(h[_H_FRESH], (1,))[0] = 0
+    words(h[_H_FRESH], 1)[0] = 0
     if not _impose(has, h):
         return NOT_RENEWED
     _run(h[_FOLLOW])

@@ -1,0 +1,257 @@
+"""Types of C for kinds of values, and what changes one into another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from servotwin.simulation.compile.inference import field_kind
+from servotwin.simulation.compile.kinds import (
+    BOOL,
+    FLOAT32,
+    FLOAT64,
+    INT8,
+    INT32,
+    INT64,
+    Array,
+    Fixed,
+    Kind,
+    Record,
+    Scalar,
+    Tuple,
+    of_value,
+)
+
+_TAKEN = frozenset(
+    "auto bool break case char const continue default do double else enum extern false float for goto if inline int "
+    "long main register restrict return short signed sizeof static struct switch true typedef union unsigned void "
+    "volatile while floor_div floor_mod mod_float whole clamped words numbers rows bytes_at halves called copied "
+    "activate active two_power two_powerf binary_exponent binary_exponentf isfinite isnan isinf".split())
+_NAMED = ((FLOAT64, 1), (FLOAT64, 2), (INT64, 1), (INT8, 1), (INT32, 1))  # arrays that the header knows
+
+
+def identifier(name: str) -> str:
+    """Return a name as C may have it."""
+    return f"{name}_" if name in _TAKEN else name
+
+
+class Types:
+    """Structs, tables and small functions that a text needs, in the order in which they are asked for."""
+
+    def __init__(self) -> None:
+        self.structs: list[str] = []
+        self.tables: list[str] = []
+        self.helpers: list[str] = []
+        self._names: dict[Any, str] = {}
+        self._used: dict[str, int] = {}
+
+    def fresh(self, name: str) -> str:
+        """Return a name that nothing has yet."""
+        self._used[name] = self._used.get(name, 0) + 1
+        return name if self._used[name] == 1 else f"{name}_{self._used[name]}"
+
+    # --- types --------------------------------------------------------------------------------------------------------
+
+    def of(self, kind: Kind | None) -> str:
+        """Return the type of a value."""
+        if kind is None:
+            return "void"
+        if isinstance(kind, Scalar):
+            return kind.c
+        if isinstance(kind, Record):
+            return f"{self.record(kind)} *"
+        if isinstance(kind, Fixed):
+            return f"{self.element(kind.element)} *"
+        return self._array(kind) if isinstance(kind, Array) else self._tuple(kind)
+
+    def declared(self, kind: Kind, name: str) -> str:
+        """Return type and name of a variable."""
+        type_ = self.of(kind)
+        return f"{type_}{name}" if type_.endswith("*") else f"{type_} {name}"
+
+    def element(self, kind: Kind) -> str:
+        """Return the type of an element of an array."""
+        return self.record(kind) if isinstance(kind, Record) else self.of(kind)
+
+    def _array(self, kind: Array) -> str:
+        if (kind.element, kind.dimensions) in _NAMED:
+            return f"array_{self.of(kind.element)}_{kind.dimensions}"
+        if kind not in self._names:
+            element = self.element(kind.element)
+            self._names[kind] = name = self.fresh(f"array_{element.strip(' *')}_{kind.dimensions}")
+            self.structs.append(f"typedef struct {{ {element} *p; int64_t n[{kind.dimensions}]; }} {name};")
+        return self._names[kind]
+
+    def _tuple(self, kind: Tuple) -> str:
+        if kind not in self._names:
+            elements = [self.declared(each, self.field(kind, k)) for k, each in enumerate(kind.elements)]
+            if not elements:
+                body = "char nothing;"
+            elif kind.uniform:
+                body = f"{self.declared(kind.elements[0], 'v')}[{len(elements)}];"
+            else:
+                body = " ".join(f"{each};" for each in elements)
+            self._names[kind] = name = self.fresh(kind.name or f"tuple_{len(elements)}")
+            self.structs.append(f"typedef struct {{ {body} }} {name};")
+        return self._names[kind]
+
+    @staticmethod
+    def field(kind: Tuple, place: int) -> str:
+        """Return the name of an element of a tuple in its struct."""
+        return identifier(kind.fields[place]) if kind.fields else f"f{place}"
+
+    def record(self, kind: Record) -> str:
+        """Return the type of a record, laid out as numpy has it."""
+        if kind not in self._names:
+            body, dtype = [], kind.dtype
+            for name in dtype.names or ():
+                own = field_kind(kind, name)
+                length = f"[{own.count}]" if isinstance(own, Fixed) else ""
+                element = own.element if isinstance(own, Fixed) else own
+                body.append(f"{self.element(element)} {identifier(name)}{length};")
+            self._names[kind] = name = self.fresh("record")
+            attribute = "" if _aligned(dtype) else "PACKED "
+            self.structs.append(f"typedef struct {attribute}{{ {' '.join(body)} }} {name};\n"
+                                f"CHECKED_SIZE({name}, {dtype.itemsize});")
+        return self._names[kind]
+
+    # --- values -------------------------------------------------------------------------------------------------------
+
+    def helper(self, key: Any, name: str, make: Callable[[str], str]) -> str:
+        """Return the name of a small function, which `make` writes when it is first asked for."""
+        if key not in self._names:
+            self._names[key] = own = self.fresh(name)
+            self.helpers.append(make(own))
+        return self._names[key]
+
+    def made(self, kind: Tuple, parts: list[str]) -> str:
+        """Return a tuple of these values."""
+        inner = ", ".join(parts) or "0"
+        return f"(({self.of(kind)}){{{{{inner}}}}})" if kind.uniform else f"(({self.of(kind)}){{{inner}}})"
+
+    def part(self, text: str, kind: Tuple, place: int) -> str:
+        """Return an element of a tuple."""
+        return member(text, f"v[{place}]" if kind.uniform else self.field(kind, place))
+
+    def converted(self, text: str, kind: Kind | None, to: Kind | None) -> str:
+        """Return a value as one of another kind, which it may be."""
+        if kind == to or kind is None or to is None:
+            return text
+        if isinstance(to, Scalar):
+            return f"({text} != 0)" if to == BOOL else f"({to.c}){bracketed(text)}"
+        if isinstance(kind, Fixed) and isinstance(to, Array):
+            lengths = ", ".join(map(str, kind.shape))
+            return f"(({self.of(to)}){{{text}, {{{lengths}}}}})"
+        assert isinstance(kind, Tuple)  # noqa: S101 - nothing else is united
+        assert isinstance(to, Tuple)  # noqa: S101
+        old, new = self.of(kind), self.of(to)
+
+        def make(name: str) -> str:
+            parts = [self.converted(self.part("x", kind, k), x, y)
+                     for k, (x, y) in enumerate(zip(kind.elements, to.elements, strict=True))]
+            return f"static inline {new} {name}({old} x) {{ return {self.made(to, parts)}; }}"
+
+        return f"{self.helper(('converted', kind, to), f'as_{new}', make)}({text})"
+
+    def equal(self, a: str, kind_a: Kind, b: str, kind_b: Kind) -> str:
+        """Return the condition that two values are equal."""
+        if isinstance(kind_a, Scalar):
+            return f"{a} == {b}"
+        assert isinstance(kind_a, Tuple)  # noqa: S101 - nothing else is comparable
+        assert isinstance(kind_b, Tuple)  # noqa: S101
+        first, second = self.of(kind_a), self.of(kind_b)
+
+        def make(name: str) -> str:
+            parts = [self.equal(self.part("x", kind_a, k), x, self.part("y", kind_b, k), y)
+                     for k, (x, y) in enumerate(zip(kind_a.elements, kind_b.elements, strict=True))]
+            condition = " && ".join(parts) or "true"
+            return f"static inline bool {name}({first} x, {second} y) {{ return {condition}; }}"
+
+        return f"{self.helper(('equal', kind_a, kind_b), f'equal_{first}', make)}({a}, {b})"
+
+    def literal(self, value: Any) -> str:
+        """Return a constant."""
+        kind = of_value(value)
+        if kind == BOOL:
+            return "true" if value else "false"
+        if kind == INT64:
+            return f"INT64_C({value})" if abs(int(value)) > 2**31 - 1 else f"{value}" if value >= 0 else f"({value})"
+        if kind in (FLOAT32, FLOAT64):
+            return _float(float(value), kind == FLOAT32)
+        key = ("constant", kind, value.tobytes() if isinstance(value, np.ndarray) else repr(value))
+        if key not in self._names:
+            self._names[key] = name = self.fresh("table")
+            self.tables.append(self._table(name, kind, value))
+        name = self._names[key]
+        if isinstance(kind, Array):
+            lengths = ", ".join(map(str, value.shape))
+            return f"(({self.of(kind)}){{({self.element(kind.element)} *){name}, {{{lengths}}}}})"
+        return name
+
+    def _table(self, name: str, kind: Kind | None, value: Any) -> str:
+        if isinstance(kind, Array):
+            inner = ", ".join(self.literal(x.item()) for x in value.ravel())
+            return f"static const {self.element(kind.element)} {name}[] = {{{inner}}};"
+        return f"static const {self.of(kind)} {name} = {self._initial(kind, value)};"
+
+    def _initial(self, kind: Kind | None, value: Any) -> str:
+        if not isinstance(kind, Tuple):
+            return self.literal(value)
+        inner = ", ".join(self._initial(each, x) for each, x in zip(kind.elements, value, strict=True)) or "0"
+        return f"{{{{{inner}}}}}" if kind.uniform else f"{{{inner}}}"
+
+
+def member(text: str, name: str) -> str:
+    """Return a member of a struct, by what stands for the struct."""
+    if text.startswith("(*") and text.endswith(")") and "(" not in text[2:]:
+        return f"{text[2:-1]}->{name}"
+    return f"{text}.{name}"
+
+
+def bracketed(text: str) -> str:
+    """Return an expression that may stand behind an operator."""
+    return text if text.replace("_", "").replace(".", "").isalnum() or _enclosed(text) else f"({text})"
+
+
+def _enclosed(text: str) -> bool:
+    """Tell whether one pair of brackets encloses all."""
+    if not text.startswith("("):
+        return False
+    depth = 0
+    for place, letter in enumerate(text):
+        depth += (letter == "(") - (letter == ")")
+        if depth == 0:
+            return place == len(text) - 1
+    return False
+
+
+def _aligned(dtype: np.dtype[Any]) -> bool:
+    """Tell whether C would lay a record out in the same way."""
+    place = 0
+    most = 1
+    for name in dtype.names or ():
+        own, offset = (dtype.fields or {})[name][:2]
+        size = _alignment(own)
+        most = max(most, size)
+        if offset != place or place % size:
+            return False
+        place = offset + own.itemsize
+    return place == dtype.itemsize and place % most == 0
+
+
+def _alignment(dtype: np.dtype[Any]) -> int:
+    base = dtype.base
+    return max((_alignment(each[0]) for each in (base.fields or {}).values()), default=1) if base.names else base.itemsize
+
+
+def _float(value: float, single: bool) -> str:
+    if math.isinf(value):
+        return "(-INFINITY)" if value < 0 else "INFINITY"
+    if math.isnan(value):
+        return "NAN"
+    text = repr(np.float32(value).item() if single else value)
+    text += "" if "." in text or "e" in text else ".0"
+    return f"({text}{'f' * single})" if text.startswith("-") else f"{text}{'f' * single}"

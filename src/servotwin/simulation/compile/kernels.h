@@ -1,0 +1,131 @@
+/* What kernels printed by servotwin stand on: C99, and in macros what compilers add to it. */
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if defined(_WIN32)
+#define EXPORTED __declspec(dllexport)
+#else
+#define EXPORTED __attribute__((visibility("default")))
+#endif
+#define INLINED static inline __attribute__((always_inline))
+#define PACKED __attribute__((packed))
+#define FMA(a, b, c) __builtin_fma(a, b, c)
+#define FMAf(a, b, c) __builtin_fmaf(a, b, c)
+#define NEAREST(x) __builtin_rint(x)
+#define NEARESTf(x) __builtin_rintf(x)
+#define FLOOR(x) __builtin_floor(x)
+#define FLOORf(x) __builtin_floorf(x)
+#define CEIL(x) __builtin_ceil(x)
+#define CEILf(x) __builtin_ceilf(x)
+#define AS_TEXT(...) #__VA_ARGS__
+#define PRAGMA(...) _Pragma(AS_TEXT(__VA_ARGS__))
+#define SUM_IN_ANY_ORDER(...) PRAGMA(omp simd reduction(+ : __VA_ARGS__))
+#define CHECKED_SIZE(type, size) typedef char type##_has_its_size[sizeof(type) == (size) ? 1 : -1]
+
+typedef struct { double *p; int64_t n[1]; } array_double_1;
+typedef struct { double *p; int64_t n[2]; } array_double_2;
+typedef struct { int64_t *p; int64_t n[1]; } array_int64_t_1;
+typedef struct { int8_t *p; int64_t n[1]; } array_int8_t_1;
+typedef struct { int32_t *p; int64_t n[1]; } array_int32_t_1;
+
+/* Memory at addresses, and functions there. */
+static inline array_int64_t_1 words(int64_t address, int64_t count) {
+    return (array_int64_t_1){(int64_t *)(intptr_t)address, {count}};
+}
+static inline array_double_1 numbers(int64_t address, int64_t count) {
+    return (array_double_1){(double *)(intptr_t)address, {count}};
+}
+static inline array_double_2 rows(int64_t address, int64_t count, int64_t width) {
+    return (array_double_2){(double *)(intptr_t)address, {count, width}};
+}
+static inline array_int8_t_1 bytes_at(int64_t address, int64_t count) {
+    return (array_int8_t_1){(int8_t *)(intptr_t)address, {count}};
+}
+static inline array_int32_t_1 halves(int64_t address, int64_t count) {
+    return (array_int32_t_1){(int32_t *)(intptr_t)address, {count}};
+}
+typedef int64_t told_1(int64_t), told_2(int64_t, int64_t), told_3(int64_t, int64_t, int64_t),
+    told_4(int64_t, int64_t, int64_t, int64_t), told_5(int64_t, int64_t, int64_t, int64_t, int64_t),
+    told_6(int64_t, int64_t, int64_t, int64_t, int64_t, int64_t),
+    told_7(int64_t, int64_t, int64_t, int64_t, int64_t, int64_t, int64_t);
+#define TOLD(kind, function, ...) (((kind *)(intptr_t)(function))(__VA_ARGS__))
+static inline void copied(int64_t to, int64_t of, int64_t size) {
+    memcpy((void *)(intptr_t)to, (const void *)(intptr_t)of, (size_t)size);
+}
+static int64_t active_word;
+static inline void activate(int64_t word) {
+    active_word = word;
+}
+static inline int64_t active(void) {
+    return active_word;
+}
+/* Whole numbers are divided as Python divides them; by 0 the quotient is 0. */
+static inline int64_t floor_div(int64_t a, int64_t b) {
+    if (b == 0 || b == -1)
+        return b == 0 ? 0 : (int64_t)(0 - (uint64_t)a);
+    return a / b - (a % b != 0 && (a < 0) != (b < 0));
+}
+static inline int64_t floor_mod(int64_t a, int64_t b) {
+    if (b == 0 || b == -1)
+        return 0;
+    const int64_t rest = a % b;
+    return rest != 0 && (rest < 0) != (b < 0) ? rest + b : rest;
+}
+static inline double mod_float(double a, double b) {
+    const double rest = fmod(a, b);
+    return rest != 0 && (rest < 0) != (b < 0) ? rest + b : rest;
+}
+/* The whole number that x is, towards zero; what none holds, nan too, is the lowest one. */
+static inline int64_t whole(double x) {
+    return x >= -9223372036854775808.0 && x < 9223372036854775808.0 ? (int64_t)x : INT64_MIN;
+}
+static inline int64_t clamped(int64_t k, int64_t n) {
+    k += k < 0 ? n : 0;
+    return k < 0 ? 0 : k > n ? n : k;
+}
+static inline double float_of(int64_t word) {
+    double x;
+    memcpy(&x, &word, sizeof x);
+    return x;
+}
+static inline int64_t word_of(double x) {
+    int64_t word;
+    memcpy(&word, &x, sizeof word);
+    return word;
+}
+/* 2^k for a whole k: a sum with a magic number leaves k in the lowest bits, from where it is moved to the exponent. */
+INLINED double two_power(double k) {
+    const double shifted = k + 6755399441055744.0;
+    uint64_t bits;
+    memcpy(&bits, &shifted, sizeof bits);
+    bits = (bits + 1023) << 52;
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+INLINED float two_powerf(float k) {
+    const float shifted = k + 12582912.0f;
+    uint32_t bits;
+    memcpy(&bits, &shifted, sizeof bits);
+    bits = (bits + 127) << 23;
+    float x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+/* The whole e for which x / 2^e lies in [sqrt(1/2), sqrt(2)); with operations that AVX2 has for four numbers at once. */
+INLINED double binary_exponent(double x) {
+    uint64_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    bits = ((bits - UINT64_C(0x3FE6A09E667F3BCD) + (UINT64_C(1023) << 52)) >> 52) | UINT64_C(0x4330000000000000);
+    double e;
+    memcpy(&e, &bits, sizeof e);
+    return e - 4503599627371519.0;
+}
+INLINED float binary_exponentf(float x) {
+    int32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    return (float)((bits - 0x3F3504F3) >> 23);
+}

@@ -1,0 +1,175 @@
+"""What the entries of kernels are called with: one table."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from importlib import import_module
+from types import FunctionType
+from typing import Any, get_type_hints
+
+import numpy as np
+
+from servotwin.models.engine import loop_tiles, tiles
+from servotwin.models.engine.buses import Buses
+from servotwin.models.engine.memory import Memories, Memory
+from servotwin.models.engine.records import record_of, rows_of
+from servotwin.models.engine.seats import Mate, Seat, Shared
+from servotwin.models.engine.tape import Tape
+from servotwin.models.engine.told import Tables
+from servotwin.models.engine.tiles import Lanes, Outputs
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.control import Firm
+from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.numbers import Numbers
+from servotwin.simulation.compile.derive import Recipe
+from servotwin.simulation.compile.kinds import (
+    BOOL,
+    FLOAT32,
+    FLOAT64,
+    INT8,
+    INT64,
+    Array,
+    Kind,
+    NotTranslatable,
+    Record,
+    Tuple,
+)
+
+Signature = tuple[str, tuple[Kind, ...]]
+_ENGINE = "servotwin.models.engine"
+_FLOATS, _TABLE, _CUBE = (Array(FLOAT64, dimensions) for dimensions in (1, 2, 3))
+_INDICES, _SMALLS, _SMALL_TABLE = Array(INT64, 1), Array(INT8, 1), Array(INT8, 2)
+FORMS = ("ONE_FORMULA", "ARCS", "BANDS", "STRIDES", "COILS", "GAPS")
+"""Names of the ways in which tiles go through phases, in `models.engine.tiles`."""
+
+
+def _records(dtype: np.dtype[Any]) -> Array:
+    return Array(Record(dtype), 1)
+
+
+def _tuple(kind: Any, default: Kind, **fields: Kind) -> Tuple:
+    return Tuple(tuple(fields.get(name, default) for name in kind._fields), kind.__name__, kind._fields)
+
+
+_NUMBERS, _ROWS = _records(rows_of(Numbers, np.float64)), _records(record_of(Memory))
+_MEMORIES = _tuple(Memories, _ROWS, firms=_records(record_of(Firm)))
+_LANES = _tuple(
+    Lanes, _INDICES, numbers=_NUMBERS, chips=_records(rows_of(Chip, np.float64)), start=_TABLE, torque=_FLOATS,
+    pieces=_TABLE, edges=_FLOATS, accuracy=FLOAT64, firmware=_records(record_of(Firmware)))
+_TABLES = _tuple(Tables, _INDICES, torques=_TABLE, angles=_FLOATS, errors=_FLOATS)
+_BUSES = _tuple(Buses, _INDICES, memories=_MEMORIES, shared=_records(record_of(Shared)), ended=_FLOATS)
+_SEATS, _MATES = _records(record_of(Seat)), _records(record_of(Mate))
+_TAPE = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
+_RECORDED = (_TABLE, _INDICES, _INDICES)  # rows of torques, where those of a lane begin, and how many there are
+
+
+def _outputs(real: Kind) -> Tuple:
+    return _tuple(Outputs, Array(real, 2), contact=_SMALL_TABLE, drive=_SMALL_TABLE, mesh=_SMALL_TABLE)
+
+
+_GOING = (_LANES, _TABLE, *_RECORDED, _INDICES, _FLOATS, _FLOATS, _INDICES, _CUBE, _MEMORIES, _INDICES)
+_SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
+    "runs:start": (_LANES, _INDICES, _MEMORIES), "runs:go_on": (*_GOING, _FLOATS),
+    "loops:go_on": (*_GOING, _records(loop_tiles.TILE_TYPE)),
+    "calm:go": (_LANES, _INDICES, _FLOATS, _SMALLS, _ROWS, _INDICES),
+    "ending:look_at_lanes": (BOOL, _LANES, *_RECORDED, FLOAT64, _TABLE, _FLOATS, _SMALLS),
+    "sights:one_by_one": (_LANES, _TABLE, *_RECORDED, _INDICES, _MEMORIES, _TABLE),
+    "buses:go_on": (_LANES, _TABLES, _BUSES, INT64, INT64, FLOAT64, FLOAT64, _SEATS, _MATES, _TAPE),
+    "buses:look": (_LANES, _TABLES, _BUSES, _SEATS, _MATES, _TABLE),
+    "ticks:accept": (_FLOATS, _INDICES, _TABLE, _CUBE, _NUMBERS, _FLOATS, _FLOATS, _INDICES, _FLOATS),
+    "ticks:change": (_INDICES, _TABLE, _INDICES, _NUMBERS, _FLOATS, _FLOATS, BOOL, _FLOATS, _FLOATS, _NUMBERS),
+    "ticks:follow": (_INDICES, _TABLE, *(_FLOATS,) * 5, _TABLE, _FLOATS),
+    "lane_ticks:gather": (_INDICES, _SMALLS, _FLOATS, _INDICES, _MEMORIES, _INDICES, _INDICES, _INDICES, _FLOATS,
+                          _MEMORIES),
+    "lane_ticks:put": (_INDICES, _MEMORIES, _MEMORIES),
+    "lane_ticks:note_failures": (_INDICES, _INDICES, _FLOATS, _ROWS, _SMALLS, _FLOATS),
+    "lane_ticks:forget_motions": (_ROWS,),
+    "lane_ticks:impose_on_records": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, _ROWS),
+    "lane_ticks:show_records": (_INDICES, _ROWS, _TABLE),
+    "lane_ticks:read_clocks": (_INDICES, _SMALLS, _FLOATS, _ROWS, _FLOATS),
+    "lane_ticks:take_status": (_INDICES, _SMALLS, _INDICES),
+    "lane_ticks:note_lost_buses": (_INDICES, _INDICES, _ROWS, _SMALLS, _FLOATS),
+    "lane_ticks:break_up": (_INDICES, _records(record_of(Shared)), _ROWS),
+}
+
+
+def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ...]]:
+    """Return what entries are called with that go over tiles."""
+    return {
+        "side_by_side:start": (_LANES, INT64, FLOAT64, rows),
+        "side_by_side:go_on": (_TABLE, _FLOATS, INT64, BOOL, _INDICES, FLOAT64, _FLOATS, _outputs(real), rows, plans),
+        "side_by_side:advance": (_INDICES, INT64, BOOL, INT64, INT64, FLOAT64, _FLOATS, _FLOATS, BOOL, rows, plans),
+        "side_by_side:refit": (_LANES, INT64, _INDICES, _INDICES, rows),
+        "sights:side_by_side": (_LANES, _TABLE, _INDICES, rows, _TABLE),
+        "lane_ticks:gather_lost": (_INDICES, _SMALLS, rows, _INDICES, _INDICES, _INDICES, _FLOATS, _MEMORIES),
+        "lane_ticks:put_lost": (_INDICES, _INDICES, _MEMORIES, _FLOATS, rows),
+        "lane_ticks:impose_on_tiles": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, rows),
+        "lane_ticks:show_tiles": (_INDICES, rows, _TABLE),
+    }
+
+
+def signatures(recipe: Recipe) -> list[Signature]:
+    """Return the entries of a recipe, each with all kinds of arguments that it is called with.
+
+    Raises
+    ------
+    NotTranslatable
+        If nothing says what an entry is called with.
+    """
+    return [(entry.split(":")[1], kinds) for entry in recipe.entries for kinds in _kinds_of(entry, recipe)]
+
+
+def _kinds_of(entry: str, recipe: Recipe) -> Iterator[tuple[Kind, ...]]:
+    name = entry.removeprefix(f"{_ENGINE}.")
+    if name in _SIGNATURES:
+        yield _SIGNATURES[name]
+        return
+    known = False
+    for real, form in _tiles_of(recipe):
+        rows, plans = _records(tiles.tile_type(real, form)), _records(tiles.plan_type(real, form))
+        own = _on_tiles(rows, plans, FLOAT32 if real == "float32" else FLOAT64)
+        if name in own:
+            known = True
+            yield own[name]
+    if not known:
+        module, function = entry.split(":")
+        yield annotated(getattr(import_module(module), function))
+
+
+def _tiles_of(recipe: Recipe) -> list[tuple[str, int]]:
+    """Return numbers and forms of the tiles that a recipe has to do with, those of one layout once."""
+    forms = [getattr(tiles, name) for name in FORMS if name not in recipe.never]
+    both = len(forms) == len(FORMS)  # a recipe that looks at the tiles of all others
+    kinds = [(real, form) for real in (("float64", "float32") if both else ("float32" if recipe.single else "float64",))
+             for form in forms if real == "float64" or form in (tiles.ONE_FORMULA, tiles.ARCS)]
+    return list({tiles.tile_type(*kind): kind for kind in kinds}.values())
+
+
+def annotated(function: FunctionType) -> tuple[Kind, ...]:
+    """Return what a function of numbers, and of named tuples of numbers, is called with.
+
+    Raises
+    ------
+    NotTranslatable
+        If an argument is anything else.
+    """
+    hints = get_type_hints(inspect.unwrap(function))
+    names: Sequence[str] = list(inspect.signature(function).parameters)
+    return tuple(_hinted(function.__name__, name, hints.get(name)) for name in names)
+
+
+def _hinted(function: str, name: str, hint: Any) -> Kind:
+    numbers: dict[Any, Kind] = {float: FLOAT64, int: INT64, bool: BOOL}
+    if hint in numbers:
+        return numbers[hint]
+    if hasattr(hint, "_fields"):
+        return _named(function, hint)
+    raise NotTranslatable(function, name, "an entry that takes arrays or records has a line in `signatures`")
+
+
+@cache
+def _named(function: str, kind: Any) -> Tuple:
+    hints = get_type_hints(kind)
+    return Tuple(tuple(_hinted(function, name, hints[name]) for name in kind._fields), kind.__name__, kind._fields)
