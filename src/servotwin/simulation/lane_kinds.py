@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,9 +39,13 @@ class Terms:
 
     @cached_property
     def _depends(self) -> Any:
-        """On what the acceleration of each lane may depend."""
-        wave: Any = np.where(self._known["sweep"], 1.0, 0.0)
-        return _may_depend(self.numbers, Piece(sweep=wave if wave.ndim else float(wave)))
+        """On what the acceleration may depend, of all lanes or each."""
+        swept = self._known["sweep"]
+        wave = Piece(sweep=np.where(swept, 1.0, 0.0) if np.ndim(swept) else float(swept))
+        try:  # most columns do not matter to it
+            return may_depend(self.numbers, wave)
+        except ValueError:  # an array is neither true nor false
+            return _may_depend(self.numbers, wave)
 
     def have(self, name: str) -> Any:
         """Tell which lanes have a term ("heat", told by its first number), or a number of one ("motor.L")."""
@@ -62,8 +66,17 @@ class Terms:
 
     def fit(self, recipe: Recipe) -> Any:
         """Tell for which lanes kernels are made: for those with nothing that they leave out, do not know or follow."""
-        unknown = (name for part in recipes.parts_of(recipe) for name in unread(*part))
-        return _without((self._depends & ~recipe.knows) == 0, self.have_any((*recipe.absent, *unknown)))
+        return _without(self.suit(recipe), self.have_any(_unknown(recipe)))
+
+    def suit(self, recipe: Recipe) -> Any:
+        """Tell for which lanes kernels would be made, if they knew all numbers of the terms that they have."""
+        return _without((self._depends & ~recipe.knows) == 0, self.have_any(recipe.absent))
+
+
+@cache
+def _unknown(recipe: Recipe) -> tuple[str, ...]:
+    """Return the numbers that kernels do not know, nor those by which they may go."""
+    return tuple(dict.fromkeys(name for part in recipes.parts_of(recipe) for name in unread(*part)))
 
 
 class SideBySide(NamedTuple):
@@ -112,7 +125,7 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     if is_plain():  # a fast form has no worth
         return _in_general(terms, lanes)
     recording = recorded.any() and recorded
-    if np.any(terms.have("elastic")) or np.any(numbers.bridge.pwm > 0.0):
+    if _any(terms.have("elastic")) or _any(numbers.bridge.pwm > 0.0):
         return _alone(terms, recording, lanes)
     found: list[SideBySide | OneByOne] = []
     left: Any = True
@@ -121,14 +134,14 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
         for form, wanted, of_bands in _forms(terms):
             own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
             which = _and(side, wanted, left)
-            if np.any(which):
+            if _any(which):
                 which = _and(which, terms.fit(recipes.side_by_side(form, own_type, True, of_bands)))
                 left = _without(left, which)
                 found.append(_together(terms, form, own_type, _indices(which, lanes)))
     loose = pulsed and _without(terms.have("play"), recording)
     for recipe, wanted in ((recipes.PLAIN_RUNS, True), (recipes.PENDULUM_RUNS, True), (recipes.GAP_RUNS, loose)):
         which = _and(left, wanted)
-        if np.any(which):
+        if _any(which):
             which = _and(which, terms.fit(recipe))
             left = _without(left, which)
             found.append(OneByOne(_indices(which, lanes), recipe))
@@ -138,7 +151,7 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
 
 def _in_general(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run one by one, whatever they have."""
-    digital, sprung = bool(np.any(terms.numbers.bridge.pwm > 0.0)), terms.have("elastic")
+    digital, sprung = _any(terms.numbers.bridge.pwm > 0.0), terms.have("elastic")
     kinds = (OneByOne(_indices(sprung, lanes), recipes.ELASTIC_RUNS[digital]),
              OneByOne(_indices(np.logical_not(sprung), lanes), recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS))
     return [kind for kind in kinds if len(kind.which)]
@@ -146,13 +159,13 @@ def _in_general(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
 
 def _alone(terms: Terms, recording: Any, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
-    digital = bool(np.any(terms.numbers.bridge.pwm > 0.0))
+    digital = _any(terms.numbers.bridge.pwm > 0.0)
     sprung, left = terms.have("elastic"), np.logical_not(terms.have("elastic"))
     found: list[SideBySide | OneByOne] = [OneByOne(_indices(sprung, lanes), recipes.ELASTIC_RUNS[digital])]
     wanted = ((recipes.PLAIN_DIGITAL, _without(True, recording)), (recipes.ALL_DIGITAL, True)) if digital else ()
     for recipe, some in wanted:
         which = _and(left, some)
-        if np.any(which):
+        if _any(which):
             which = _and(which, terms.fit(recipe))
             left = _without(left, which)
             found.append(OneByOne(_indices(which, lanes), recipe))
@@ -189,7 +202,7 @@ def _together(terms: Terms, form: int, dtype: str, which: Indices) -> SideBySide
     own = terms.numbers.friction
 
     def some(flag: Any) -> bool:
-        return bool(np.any(flag)) and bool(np.any(flag if np.ndim(flag) == 0 else flag[which]))
+        return _any(flag[which] if np.ndim(flag) else flag)
 
     return SideBySide(which, form, some(terms.have("sensor.half_slack")), dtype,
                       form == tiles.BANDS and some(own.varies * own.w_s > 0.0),
@@ -199,7 +212,7 @@ def _together(terms: Terms, form: int, dtype: str, which: Indices) -> SideBySide
 def goes_together(numbers: Numbers, pulsed: bool) -> bool:
     """Tell whether all lanes take about as long, for none has a term that would let it run on its own."""
     terms = Terms(numbers, NO_CHIP, NO_FIRMWARE, False)
-    return pulsed and not np.any(terms.have_any(("friction.kappa", "play", *recipes.STRIDING)))
+    return pulsed and not _any(terms.have_any(("friction.kappa", "play", *recipes.STRIDING)))
 
 
 def looking(recipe: Recipe) -> Recipe:
@@ -213,21 +226,30 @@ def looking(recipe: Recipe) -> Recipe:
 def _without(some: Any, *others: Any) -> Any:
     """Return `some` but for those that one of the others holds for."""
     for other in others:
-        some = some if other is False else np.logical_and(some, np.logical_not(other))
+        some = some if other is False else _and(some, _not(other))
     return some
+
+
+def _not(some: Any) -> Any:
+    return np.logical_not(some) if np.ndim(some) else not some
 
 
 def _and(*parts: Any) -> Any:
     """Return those for which everything holds."""
     found: Any = True
     for part in parts:
-        found = part if found is True else found if part is True else np.logical_and(found, part)
+        found = part if found is True else found if part is True else found & part
     return found
 
 
 def _either(a: Any, b: Any) -> Any:
     """Return a | b, at once where one of them holds for none."""
     return b if a is False else a if b is False else a | b
+
+
+def _any(some: Any) -> bool:
+    """Tell whether something holds for any lane."""
+    return bool(some.any() if np.ndim(some) else some)
 
 
 def _indices(some: Any, lanes: int) -> Indices:
