@@ -169,7 +169,7 @@ def _alone(terms: Terms, recording: Any, lanes: int) -> list[SideBySide | OneByO
             which = _and(which, terms.fit(recipe))
             left = _without(left, which)
             found.append(OneByOne(_indices(which, lanes), recipe))
-    found.append(OneByOne(_indices(left, lanes), recipes.STEPPED_DIGITAL if digital else recipes.ALL_RUNS))
+    found.append(OneByOne(_indices(left, lanes), recipes.digital_steps() if digital else recipes.ALL_RUNS))
     return [kind for kind in found if len(kind.which)]
 
 
