@@ -123,8 +123,8 @@ def show(parts: list[str], now: Times, before: Times, peer: str) -> None:
 
 
 def commit_of(checkout: Path) -> str:
-    """Return the commit of a checkout."""
-    return subprocess.run(["git", "-C", str(checkout), "rev-parse", "--short", "HEAD"], stdout=subprocess.PIPE,
+    """Return the last commit of a checkout that changed the package."""
+    return subprocess.run(["git", "-C", str(checkout), "log", "-1", "--format=%h", "--", "src"], stdout=subprocess.PIPE,
                           text=True, check=True).stdout.strip()
 
 
@@ -138,7 +138,7 @@ def record(side: Side, parts: list[str]) -> None:
     for part, found in times.items():
         least = kept["seconds"].setdefault(part, {})
         for name, seconds in found.items():
-            least[name] = min(float(f"{seconds:.4g}"), least.get(name, seconds))
+            least[name] = float(f"{min(seconds, least.get(name, seconds)):.4g}")
     seconds = {part: kept["seconds"][part] for part in PARTS if part in kept["seconds"]}
     FILE.write_text(json.dumps(head | {"seconds": seconds}, indent=1) + "\n", encoding="utf-8")
     show(list(seconds), seconds, {}, f"recorded now into {FILE.name}, in the column 'this'")

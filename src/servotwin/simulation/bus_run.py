@@ -105,7 +105,7 @@ def tape_of(servos: int) -> Tape:
 
 def not_plain(numbers: Numbers) -> Any:
     """Tell of a servo, or of lanes, which have a term that the plain form leaves out or does not know."""
-    return np.logical_not(Terms(numbers, NO_CHIP, NO_FIRMWARE, False).fit(PLAIN_RUNS))
+    return is_plain() or np.logical_not(Terms(numbers, NO_CHIP, NO_FIRMWARE, False).fit(PLAIN_RUNS))
 
 
 def _worth_it(recipe: Recipe, frames: float) -> bool:
@@ -232,9 +232,9 @@ def _in_64_bits(seed: int) -> int:
 
 
 def _tables_of(plans: Sequence[Plan]) -> Tables:
-    torques, curves = [plan.torque.rows for plan in plans], [np.array(plan.curve, np.float64) for plan in plans]
-    angles, errors = (np.concatenate([curve[k] for curve in curves]) for k in range(2))
-    return Tables(np.concatenate(torques), *_places(torques), angles, errors, *_places([curve[0] for curve in curves]))
+    torques = [plan.torque.rows for plan in plans]
+    curves = [np.array(plan.curve, np.float64).reshape(-1, 2) for plan in plans]
+    return Tables(np.concatenate(torques), *_places(torques), np.concatenate(curves), *_places(curves))
 
 
 def _places(tables: Sequence[Array]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

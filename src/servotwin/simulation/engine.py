@@ -73,7 +73,7 @@ class Plan:
     seed : int
         Of its noise.
     curve : tuple
-        Angles [rad] and errors [V] of its potentiometer's linearity table.
+        Rows of angle [rad] and error [V] of its potentiometer's linearity table.
     external_torque : float
         Constant, beside the load's [N m].
     accuracy : float
@@ -88,7 +88,7 @@ class Plan:
     chip: Chip = NO_CHIP
     edges: tuple[float, ...] | None = None
     seed: int = 0
-    curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    curve: tuple[tuple[float, float], ...] = ()
     external_torque: float = 0.0
     accuracy: float = ACCURACY
     firmware: Firmware = NO_FIRMWARE

@@ -41,7 +41,7 @@ class Terms:
     def _depends(self) -> Any:
         """On what the acceleration may depend, of all lanes or each."""
         swept = self._known["sweep"]
-        wave = Piece(sweep=np.where(swept, 1.0, 0.0) if np.ndim(swept) else float(swept))
+        wave: Any = Piece(sweep=swept if np.ndim(swept) else float(swept))
         try:  # most columns do not matter to it
             return may_depend(self.numbers, wave)
         except ValueError:  # an array is neither true nor false
@@ -153,14 +153,14 @@ def _in_general(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run one by one, whatever they have."""
     digital, sprung = _any(terms.numbers.bridge.pwm > 0.0), terms.have("elastic")
     kinds = (OneByOne(_indices(sprung, lanes), recipes.ELASTIC_RUNS[digital]),
-             OneByOne(_indices(np.logical_not(sprung), lanes), recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS))
+             OneByOne(_indices(_not(sprung), lanes), recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS))
     return [kind for kind in kinds if len(kind.which)]
 
 
 def _alone(terms: Terms, recording: Any, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
     digital = _any(terms.numbers.bridge.pwm > 0.0)
-    sprung, left = terms.have("elastic"), np.logical_not(terms.have("elastic"))
+    sprung, left = terms.have("elastic"), _not(terms.have("elastic"))
     found: list[SideBySide | OneByOne] = [OneByOne(_indices(sprung, lanes), recipes.ELASTIC_RUNS[digital])]
     wanted = ((recipes.PLAIN_DIGITAL, _without(True, recording)), (recipes.ALL_DIGITAL, True)) if digital else ()
     for recipe, some in wanted:
@@ -190,9 +190,9 @@ def _forms(terms: Terms) -> list[tuple[int, Any, bool]]:
     bridge = terms.numbers.bridge
     banded, striding = terms.have_any(recipes.BANDED), terms.have_any(recipes.STRIDING)
     braked = (bridge.off.D == 0.0) & (bridge.D_drive < terms.numbers.source.V)
-    by_bands = _either(banded, terms.have("sensor.half_slack") & np.logical_not(braked))
+    by_bands = _either(banded, terms.have("sensor.half_slack") & _not(braked))
     return [(tiles.ONE_FORMULA, _without(braked, by_bands), False),
-            (tiles.ARCS, _without(np.logical_not(braked), by_bands), False), (tiles.BANDS, by_bands, True),
+            (tiles.ARCS, _without(True, braked, by_bands), False), (tiles.BANDS, by_bands, True),
             (tiles.STRIDES, _without(striding, banded), False), (tiles.STRIDES, _and(striding, banded), True),
             (tiles.COILS, terms.have("motor.L"), False), (tiles.GAPS, terms.have("play"), False)]
 

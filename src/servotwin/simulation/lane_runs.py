@@ -34,7 +34,7 @@ def run(work: Work) -> Raw:
     raw = empty_raw(work)
     lanes = lanes_of(work)
     for kind in kinds_of(work.numbers, work.chip or NO_CHIP, work.lanes, work.law == "pulse", work.dtype, swept(lanes),
-                         work.torque.count > 0, bool(work.curve[0]), work.firmware or NO_FIRMWARE):
+                         work.torque.count > 0, bool(work.curve), work.firmware or NO_FIRMWARE):
         if isinstance(kind, OneByOne):
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
         else:
@@ -91,9 +91,9 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
         part, own = which[some], _indices(first[some])
         found = np.zeros((len(part), len(ALL_FIELDS), len(times)))
         status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
-        go_on(recipe, lanes, np.array(work.curve, np.float64), _rows(work.torque.rows), _indices(work.torque.first),
-              _indices(work.torque.count), part, durations[some].copy(), times, own.copy(), found,
-              taken(memories, some), status, ended)
+        go_on(recipe, lanes, np.array(work.curve, np.float64).reshape(-1, 2), _rows(work.torque.rows),
+              _indices(work.torque.first), _indices(work.torque.count), part, durations[some].copy(), times, own.copy(),
+              found, taken(memories, some), status, ended)
         bad = status != 0
         raw.status[part], raw.ended[part] = status, np.where(bad, ended, work.duration)
         y = memories.rows[some]["point"]["y"]

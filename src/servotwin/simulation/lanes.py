@@ -106,7 +106,7 @@ class Work:
     dtype : str
         "float64" or "float32".
     curve : tuple
-        Angles [rad] and errors [V] of the potentiometer's linearity table, the same for all lanes.
+        Rows of angle [rad] and error [V] of the potentiometer's linearity table, the same for all lanes.
     accuracy : float
         Of what is integrated [rad].
     firmware : Firmware, optional
@@ -126,7 +126,7 @@ class Work:
     times: Floats
     fields: tuple[str, ...]
     dtype: str
-    curve: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    curve: tuple[tuple[float, float], ...] = ()
     accuracy: float = ACCURACY
     firmware: Firmware | None = None
 

@@ -18,6 +18,7 @@ from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.models.engine.records import mapped
 from servotwin.models.outputs import FIELDS as FIELDS_OF
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.sensor import table_of
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
 from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes
@@ -256,7 +257,7 @@ class Chunk:
                     chip=None if chip is None else mapped(flat, chip), command=command, torque=torque,
                     constant_torque=flat(self.load.torque), edges=self.commands.frame_edges(self.which),
                     start=self.start, seeds=self.lanes.seeds[self.which], duration=asked.duration,
-                    times=asked.times, fields=fields, dtype=asked.dtype, curve=self.model.curve(),
+                    times=asked.times, fields=fields, dtype=asked.dtype, curve=table_of(self.model.curve()),
                     accuracy=asked.accuracy,
                     firmware=None if self.firmware is None else mapped(flat, self.firmware))
 

@@ -20,6 +20,7 @@ from servotwin.models.samples import Samples
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import NOT_STARTED
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.sensor import table_of
 from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
@@ -296,8 +297,8 @@ class Simulator:
             self._circuits = {command.frame_period: (self.model.chip(command) or NO_CHIP,
                                                      self.model.firmware(command) or NO_FIRMWARE)}
         chip, firmware = self._circuits[command.frame_period]
-        plan = Plan(self._numbers, drive, self._torque, chip, self.model.edges(command), self.seed, self.model.curve(),
-                    float(external_torque), self.accuracy, firmware)
+        plan = Plan(self._numbers, drive, self._torque, chip, self.model.edges(command), self.seed,
+                    table_of(self.model.curve()), float(external_torque), self.accuracy, firmware)
         self._last = (command, plan)
         return plan
 

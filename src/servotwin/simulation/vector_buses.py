@@ -19,12 +19,14 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.bus_run import not_plain, recipe_of, room_of, shared_of
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
+from servotwin.simulation.compile.calls import Call, Now, call_of
 from servotwin.simulation.lane_memory import copied, nothing_yet, put_back
 from servotwin.simulation.vector_calls import NO_TAPE, TICKS, calls_on_buses
 from servotwin.simulation.vector_memory import Piece, piece_of
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_numbers import LaneNumbers
+    from servotwin.simulation.vector_store import Store
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -69,26 +71,27 @@ class BusSet:
                             shared_of([source_of(supplies.supplies[k]) for k in buses]), np.zeros(count, np.int64),
                             np.zeros(count))
         none = np.zeros(numbers.count, np.int64)
-        angles, errors = numbers.curve
-        self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, angles, errors, none,
-                             none + len(angles))
+        curve = numbers.curve
+        self.tables = Tables(numbers.torque.rows, numbers.torque.first, numbers.torque.count, curve, none,
+                              none + len(curve))
+        self._calls: list[Call] = []
+        self._look: Call | None = None
         self.rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(buses) // _WORTH)))]
 
-    def advance(self, columns: Lanes, duration: float, status: NDArray[np.int8], ended: Array) -> None:
-        """Let all buses go on for a duration [s]; `status` and `ended` of all lanes are kept up to date."""
-        buses = self.buses
+    def advance(self, store: Store) -> None:
+        """Let all buses go on by a tick; status and end of all lanes are kept up to date."""
+        buses, status, ended = self.buses, store.status, store.ended
         buses.status[:] = status[self.which]
         before = buses.status.copy()
-        go_on, count, workers = kernels(self.recipe).go_on, len(self.numbers_of_buses), len(self.rooms)
-
-        def go(k: int) -> None:
-            go_on(columns, self.tables, buses, count * k // workers, count * (k + 1) // workers, duration, math.inf,
-                  *self.rooms[k], NO_TAPE)
-
-        if workers == 1:
-            go(0)
+        if not self._calls:
+            count, workers = len(self.numbers_of_buses), len(self.rooms)
+            self._calls = [call_of(self.recipe, "go_on", store.columns, self.tables, buses, count * k // workers,
+                                   count * (k + 1) // workers, Now(store.now, 0), math.inf, *room, NO_TAPE)
+                           for k, room in enumerate(self.rooms)]
+        if len(self._calls) == 1:
+            self._calls[0]()
         else:
-            for run in [self._pool.submit(go, k) for k in range(workers)]:
+            for run in [self._pool.submit(call) for call in self._calls]:
                 run.result()
         failed = np.flatnonzero((buses.status != COMPLETED) & (before == COMPLETED))
         if len(failed):
@@ -156,7 +159,9 @@ class BusSet:
         """Time of each lane since its start [s]."""
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
-    def look(self, columns: Lanes, inputs: Any, status: NDArray[np.int8], seen: Array) -> None:
+    def look(self, store: Store, seen: Array) -> None:
         """Put what shows of the lanes into their rows of `seen`."""
-        self.buses.status[:] = status[self.which]
-        kernels(self.recipe).look(columns, self.tables, self.buses, *self.rooms[0], seen)
+        self.buses.status[:] = store.status[self.which]
+        self._look = self._look or call_of(self.recipe, "look", store.columns, self.tables, self.buses, *self.rooms[0],
+                                           seen)
+        self._look()

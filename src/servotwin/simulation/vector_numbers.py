@@ -19,6 +19,7 @@ from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import NO_FIRMWARE
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.models.terms.sensor import table_of
 from servotwin.simulation import lane_runs
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
@@ -52,8 +53,8 @@ class LaneNumbers:
         N of each gear.
     torque : Tables
         Recorded torque over time; a lane without one has no row.
-    curve : ndarray, shape (2, n)
-        Angles [rad] and errors [V] of the potentiometers.
+    curve : ndarray, shape (n, 2)
+        Rows of angle [rad] and error [V] of the potentiometers.
     given : ndarray
         Tiles of the numbers as servo and load say them, without what is imposed.
     load_total, V_oc : ndarray, shape (lanes,)
@@ -75,7 +76,7 @@ class LaneNumbers:
                        for own, part in supplies.parts(inputs, which)]
         law = TICK_LAWS[type(inputs.model)]
         self.pulsed, self.digital = law != "bounded", law == "digital"  # whether there is a bridge, and a program
-        self.curve = np.array(inputs.model.curve(), np.float64).reshape(2, -1)
+        self.curve = np.array(table_of(inputs.model.curve()), np.float64).reshape(-1, 2)
         self.neutral = np.empty(self.count)
         self.columns, self.torque = self._packed()
         self.frame_period = self.columns.chips["frame_period"].ravel()[:self.count]

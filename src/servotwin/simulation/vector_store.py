@@ -20,12 +20,14 @@ from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation import lane_recipes, lane_runs
 from servotwin.simulation.compile import kernels
+from servotwin.simulation.compile.calls import Call, Now, call_of
 from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of, looking
 from servotwin.simulation.lane_memory import copied, flat, memories_of, nothing_yet, put, put_back, put_memories, taken
 from servotwin.simulation.lane_runs import some_of
 from servotwin.simulation.lanes import ALL_FIELDS
 from servotwin.simulation.vector_buses import BusSet, sets_of
 from servotwin.simulation.vector_calls import TICKS, asked, calls_in_records, calls_in_tiles
+from servotwin.simulation.vector_going import GoingOn
 from servotwin.simulation.vector_memory import Common, Piece, piece_of
 
 if TYPE_CHECKING:
@@ -201,16 +203,19 @@ class Store:
 
     def advance(self, duration: float, command: Array) -> None:
         """Let all lanes go on [s]."""
+        self.now[0] = duration
         for some in self.sets:
             if isinstance(some, _Tiles):
-                self._advance_tiles(some, duration, command)
+                self._advance_tiles(some, command)
             elif isinstance(some, BusSet):
                 self.columns.pieces[:, 1] = command
-                some.advance(self.columns, duration, self.status, self.ended)
+                some.advance(self)
             else:
                 self.columns.pieces[:, 1] = command
-                own = np.flatnonzero((self.status[some.which] == 0) & ~some.calm(self, duration))
-                if len(own) == len(some.which):
+                own = np.flatnonzero((self.status[some.which] == 0) & ~some.calm(self))
+                if len(own) == len(some.which) and min(self._threads, len(own)) == 1:
+                    some.go_on(self, duration)
+                elif len(own) == len(some.which):
                     self._one_by_one(some.recipe, some.which, duration, some.memories)
                 elif len(own):
                     part = taken(some.memories, own)
@@ -218,16 +223,12 @@ class Store:
                     put_back(some.memories, own, part)
         self.now[1] = 0.0
 
-    def _advance_tiles(self, some: _Tiles, duration: float, command: Array) -> None:
-        count, workers = len(some.rows), some.workers
-        arguments: tuple[Any, ...] = (duration, command, self.total, bool(self.now[1]), some.rows)
-        if workers == 1:
-            lost = some.advance(some.which, *some.form, 0, count, *arguments, some.plans[0])
+    def _advance_tiles(self, some: _Tiles, command: Array) -> None:
+        calls = some.advancing(self, command)
+        if len(calls) == 1:
+            lost = calls[0]()
         else:
-            cuts = [count * k // workers for k in range(workers + 1)]
-            runs = [self._pool.submit(some.advance, some.which, *some.form, cuts[k], cuts[k + 1], *arguments,
-                                      some.plans[k]) for k in range(workers)]
-            lost = sum(run.result() for run in runs)
+            lost = sum(run.result() for run in [self._pool.submit(call) for call in calls])
         if lost:
             owed = flat(some.rows, "clock", "owed")[:len(some.which)]
             places = np.flatnonzero(owed > 0.0)
@@ -259,6 +260,10 @@ class Store:
             cuts = [len(which) * k // workers for k in range(workers + 1)]
             for run in [self._pool.submit(go, slice(a, b)) for a, b in itertools.pairwise(cuts)]:
                 run.result()
+        self.note_failures(which, status, ended, memories)
+
+    def note_failures(self, which: Indices, status: Indices, ended: Array, memories: Memories) -> None:
+        """Note which of some lanes have failed, and when [s]."""
         for k in np.flatnonzero(status).tolist():
             self.status[which[k]], self.ended[which[k]] = status[k], ended[k]
             memories.rows["point"]["y"][k] = math.nan
@@ -269,7 +274,7 @@ class Store:
         """Put what shows of all lanes under their commands into `seen`, a row of `observe.Observed` for each."""
         self.columns.pieces[:, 1] = command
         for some in self.sets:
-            some.look(self.columns, self.inputs, self.status, seen)
+            some.look(self, seen)
         seen[self.status != 0] = math.nan
 
     def impose(self, which: Indices, angle: Array | None, speed: Array | None) -> None:
@@ -298,17 +303,27 @@ class _Tiles:
         self.workers = max(1, min(threads, len(self.rows) // _WORTH))
         self.plans = [tiles.plan_room(kind.dtype, kind.form) for _ in range(self.workers)]
         self.recipe = kind.recipe
-        module = kernels(kind.recipe)
-        self.advance, self._refit = module.advance, module.refit
-        module.start(lanes, kind.form, math.inf, self.rows)
+        self._calls: list[Call] = []
+        self._look: Call | None = None
+        kernels(kind.recipe).start(lanes, kind.form, math.inf, self.rows)
         self.rows["clock"]["piece_end"] = math.inf
+
+    def advancing(self, store: Store, command: Array) -> list[Call]:
+        """Return the calls that let the lanes go on, one a thread; they return how many lanes were given up."""
+        if not self._calls:
+            count, workers = len(self.rows), self.workers
+            self._calls = [call_of(
+                self.recipe, "advance", self.which, *self.form, count * k // workers, count * (k + 1) // workers,
+                Now(store.now, 0), command, store.total, Now(store.now, 1, True), self.rows, self.plans[k],
+                returns=True) for k in range(workers)]
+        return self._calls
 
     def put(self, places: Indices, memories: Memories, numbers: LaneNumbers) -> None:
         put_memories(self.rows, places, memories, numbers.frame_period[self.which[places]])
 
     def refit(self, columns: tiles.Lanes, lanes: Indices, places: Indices) -> None:
         """Take the numbers of lanes anew."""
-        self._refit(columns, self.form[0], lanes, places, self.rows)
+        kernels(self.recipe).refit(columns, self.form[0], lanes, places, self.rows)
 
     def impose(self, *imposed: Any) -> None:
         """Set angles and speeds, as `engine.lane_ticks` does."""
@@ -338,8 +353,10 @@ class _Tiles:
         edge, since = (flat(self.rows, "clock", name)[:len(self.which)] for name in ("edge", "since"))
         return np.asarray(edge + since)
 
-    def look(self, columns: tiles.Lanes, inputs: Any, status: Any, seen: Array) -> None:
-        kernels(lane_recipes.LOOK_SIDE_BY_SIDE).side_by_side(columns, inputs[0], self.which, self.rows, seen)
+    def look(self, store: Store, seen: Array) -> None:
+        self._look = self._look or call_of(lane_recipes.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns,
+                                           store.inputs[0], self.which, self.rows, seen)
+        self._look()
 
     def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
         """Return what compiled code calls at each stage of a tick."""
@@ -356,13 +373,22 @@ class _Records:
         self.done = np.zeros(len(self.which), np.int64)  # those that are through this call already
         self.calms = (not numbers.pulsed and kind.recipe == lane_recipes.PLAIN_RUNS
                       and not numbers.torque.count[kind.which].any())
+        self._calm: Call | None = None
+        self._look: Call | None = None
+        self._going: GoingOn | None = None
 
-    def calm(self, store: Store, duration: float) -> NDArray[np.bool_]:
-        """Let those go on for a time [s] that are through it without an event; tell which."""
+    def calm(self, store: Store) -> NDArray[np.bool_]:
+        """Let those go on that are through a tick without an event; tell which."""
         if self.calms:
-            kernels(lane_recipes.CALM).go(store.columns, self.which, np.array([duration, 0.0]), store.status, self.rows,
-                                       self.done)
+            self._calm = self._calm or call_of(lane_recipes.CALM, "go", store.columns, self.which, store.now,
+                                               store.status, self.rows, self.done)
+            self._calm()
         return np.asarray(self.done != 0)
+
+    def go_on(self, store: Store, duration: float) -> None:
+        """Let all of them go on for a time [s]."""
+        self._going = self._going or GoingOn(self.recipe, store.columns, store.inputs, self.which, self.memories)
+        store.note_failures(self.which, *self._going(duration), self.memories)
 
     def put(self, places: Indices, memories: Memories, numbers: LaneNumbers) -> None:
         put_back(self.memories, places, memories)
@@ -389,8 +415,10 @@ class _Records:
     def time(self) -> Array:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
-    def look(self, columns: tiles.Lanes, inputs: Any, status: Any, seen: Array) -> None:
-        kernels(looking(self.recipe)).one_by_one(columns, *inputs, self.which, self.memories, seen)
+    def look(self, store: Store, seen: Array) -> None:
+        self._look = self._look or call_of(looking(self.recipe), "one_by_one", store.columns, *store.inputs,
+                                           self.which, self.memories, seen)
+        self._look()
 
     def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
         """Return what compiled code calls at each stage of a tick."""

@@ -100,7 +100,8 @@ def worst(before: np.ndarray, now: np.ndarray) -> str:
     if not moved.any():
         return "those that are kept are the same"
     k = int(np.argmax(moved))
-    return (f"{now[k]:.17g}, was {before[k]:.17g} ({abs(now[k] - before[k]) / np.spacing(abs(before[k])):.3g} ulp); "
+    ulp = np.spacing(max(abs(now[k]), abs(before[k])))
+    return (f"{now[k]:.17g}, was {before[k]:.17g} ({abs(now[k] - before[k]) / ulp:.3g} ulp); "
             f"{int((moved > 0.0).sum())} of {moved.size} kept numbers differ")
 
 

@@ -116,8 +116,8 @@ def share_sign(numbers: Numbers, zone: int, contact: int, u: float, tau: float, 
     """Return the sign of what the torques through a gear add to its friction before its magnitude is taken."""
     if (contact != FORWARD and contact != BACKWARD) or not friction.shared(numbers.friction):
         return 0
-    tau_d = drive_torque(numbers, zone, u, y)
-    tau_m = tau_d if tau_d != 0.0 else sign_of(zone) * NEXT_TO_NOTHING
+    torque = drive_torque(numbers, zone, u, y)
+    tau_m = torque if torque != 0.0 else sign_of(zone) * NEXT_TO_NOTHING
     return 1 if through_gear(numbers, tau_m, tau, y) >= 0.0 else -1
 
 

@@ -108,6 +108,6 @@ def side_of(memory: Memory, period: float) -> Side:
         y[0], y[1], chip.drive, chip.drive_end - now if chip.drive != 0.0 else 0.0,
         chip.clock - now, chip.error, pending.time - now, pending.sign, pending.duration, pending.error,
         later.time - now, later.sign, later.duration, later.error, memory.point.wiper, y[2], y[3], y[4], y[5], y[6],
-        memory.point.mode.mesh, memory.point.step)
+        1.0 * memory.point.mode.mesh, memory.point.step)
     return Side(held, Hour(period, (number - 1) * period, period - to_next, period),
                 Counted(number, chip.draws - number))

@@ -50,7 +50,7 @@ class Body(NamedTuple):
 
     motor: Motor
     shaft: Shaft
-    dry: bool
+    dry: float  # 1: with dry friction
     against_forward: float  # of a shaft that slides forward; negative of one that slides backward
     against_backward: float
     hold_forward: float  # most that friction holds against a start
@@ -84,7 +84,7 @@ def way_of(numbers: Numbers, inputs: Inputs) -> int:
 def body_of(numbers: Numbers, tau: float) -> Body:
     """Return what moves, under a constant external torque [N m]."""
     backward, forward = contacts.holding_bounds(numbers, 0.0, -tau)
-    return Body(numbers.motor, numbers.shaft, contacts.has_friction(numbers),
+    return Body(numbers.motor, numbers.shaft, 1.0 if contacts.has_friction(numbers) else 0.0,
                 contacts.friction_torque(numbers, FORWARD, 0.0, 0.0, 0.0),
                 contacts.friction_torque(numbers, BACKWARD, 0.0, 0.0, 0.0), forward, backward, numbers.stops.lower,
                 numbers.stops.upper, tau)
@@ -99,7 +99,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     firmware, firm, frames, origin = inputs.firmware[0], controller.of(memory), memory.frames, origin_of(memory)
     point, slack, body = memory.point, SAME * inputs.firmware[0].T_c, body_of(numbers, inputs.constant_torque)
     p, b_o, seed = numbers.sensor.p, numbers.sensor.b_o, inputs.seed
-    straight = numbers.sensor.step == 0.0 and len(inputs.curve[0]) == 0
+    straight = numbers.sensor.step == 0.0 and len(inputs.curve) == 0
     measures, senses = firmware.per_volt != 0.0, control.senses(firmware)
     t, q, w, y = point.time, point.y[0], point.y[1], point.y
     last, gone = min(until, FRAMES * memory.beat), False
@@ -161,13 +161,13 @@ def _begun(body: Body, path: Bridge, supply: Source, u: float, q: float, w: floa
     own = body.motor
     zone = bridge.zone_of(path, supply, own, u, u - back_emf(w, own.K_b), 0.0)
     if w != 0.0:
-        return _law(body, path, supply, u, shaft.sliding(w > 0.0, body.dry), zone)
+        return _law(body, path, supply, u, shaft.sliding(w > 0.0, body.dry > 0.0), zone)
     torque = 0.0
     if zone != NO_CURRENT:
         v, R = bridge.loop(path, supply, zone, u)
         torque = electromagnetic_torque(steady_armature_current(v, 0.0, R, own.K_b), own.K)
     contact = shaft.from_rest(torque - body.tau, body.hold_backward, body.hold_forward, q >= body.upper,
-                              q <= body.lower, body.dry)
+                              q <= body.lower, body.dry > 0.0)
     return _law(body, path, supply, u, contact, zone)
 
 

@@ -173,7 +173,7 @@ def _is_alone(numbers: Numbers, inputs: Inputs, T_h: float) -> bool:
     """Tell whether the program of a servo has more to decide than the law with P and D."""
     firmware = inputs.firmware[0]
     measures = firmware.per_volt != 0.0
-    crooked = measures and (numbers.sensor.step != 0.0 or len(inputs.curve[0]) > 0 or firmware.noise > 0.0)
+    crooked = measures and (numbers.sensor.step != 0.0 or len(inputs.curve) > 0 or firmware.noise > 0.0)
     more = firmware.k_i > 0.0 or firmware.k_v > 0.0 or firmware.k_a > 0.0 or firmware.soft_time > 0.0
     of_bus = firmware.I_m < math.inf and firmware.senses_bus > 0.0
     return crooked or more or of_bus or T_h > firmware.trip_temperature - 2.0 * trips.COOLER

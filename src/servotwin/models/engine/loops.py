@@ -82,7 +82,7 @@ def _hear(lanes: Lanes, curve: Floats, memories: Memories, tile: Any, j: int) ->
     """Let the program of a lane listen."""
     k, lane = tile.place.k[j], tile.place.lane[j]
     firmware, firm = lanes.firmware[lane], memories.firms[k]
-    inputs = inputs_of(lanes, curve, curve[0][:0], lane)
+    inputs = inputs_of(lanes, curve, curve[:0], lane)
     now = (tile.place.frames[j] + tile.clock.tick[j]) * firmware.T_c + firmware.t_phi
     if controller.has_news(firmware, firm, now):
         tiles.store(firmware, tile, j, firm)

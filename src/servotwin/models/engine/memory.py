@@ -73,7 +73,7 @@ class Inputs(NamedTuple):
     constant_torque: float  # beside it
     period: float  # of regular frames [s]; 0: as listed
     edges: Sequence[float] | NDArray[np.float64]
-    curve: Sequence[Sequence[float]] | NDArray[np.float64]  # of the potentiometer: angles and errors
+    curve: Sequence[Sequence[float]] | NDArray[np.float64]  # of the potentiometer: angle and error
     seed: int
     accuracy: float  # of what is integrated [rad]
     firmware: Sequence[Firmware] | NDArray[np.record]  # one

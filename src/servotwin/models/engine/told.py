@@ -19,8 +19,7 @@ class Tables(NamedTuple):
     torques: Floats
     torque_first: Indices
     torque_count: Indices
-    angles: Floats
-    errors: Floats
+    curves: Floats
     curve_first: Indices
     curve_count: Indices
 
@@ -42,7 +41,6 @@ def inputs_at(told: Any, seat: Any) -> Inputs:
 
 def inputs_of(lanes: Lanes, tables: Tables, lane: int) -> Inputs:
     """Return what a lane is told, and what hangs on its shaft."""
-    first, start = tables.torque_first[lane], tables.curve_first[lane]
-    end = start + tables.curve_count[lane]
-    curve = (tables.angles[start:end], tables.errors[start:end])
-    return runs.inputs_of(lanes, curve, tables.torques[first:first + tables.torque_count[lane]], lane)
+    first, start = tables.curve_first[lane], tables.torque_first[lane]
+    return runs.inputs_of(lanes, tables.curves[first:first + tables.curve_count[lane]],
+                          tables.torques[start:start + tables.torque_count[lane]], lane)

@@ -98,8 +98,8 @@ def share_sign(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) ->
     body = mode.motor if elastic.geared(numbers.elastic) else mode.contact
     if not slides(body) or not friction.shared(numbers.friction):
         return 0
-    tau_d = drive_torque(numbers, mode.zone, u, y)
-    tau_m = tau_d if tau_d != 0.0 else sign_of(mode.zone) * NEXT_TO_NOTHING
+    torque = drive_torque(numbers, mode.zone, u, y)
+    tau_m = torque if torque != 0.0 else sign_of(mode.zone) * NEXT_TO_NOTHING
     return 1 if through_gear(numbers, mode.mesh, tau_m, tau, y) >= 0.0 else -1
 
 

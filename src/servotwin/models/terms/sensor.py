@@ -59,23 +59,27 @@ def error_rate(sensor: Sensor, du: float, w: float) -> float:
 
 
 def sensed_voltage(sensor: Sensor, curve: Sequence[Sequence[float]] | NDArray[np.float64], q: float) -> float:
-    """Return v_o [V] of the potentiometer with its wiper at q; `curve` has angles and errors of its linearity."""
+    """Return v_o [V] of the potentiometer with its wiper at q; `curve` has rows of its linearity, angle and error."""
     v_o = feedback_voltage(q, sensor.p, sensor.b_o)
-    if len(curve[0]) > 0:
+    if len(curve) > 0:
         v_o += _interpolated(curve, q)
     if sensor.step > 0.0:
         v_o = quantised(v_o, sensor.step)
     return v_o
 
 
+def table_of(curve: tuple[Sequence[float], Sequence[float]]) -> tuple[tuple[float, float], ...]:
+    """Return angles and errors of a linearity table as its rows."""
+    return tuple(zip(*curve, strict=True))
+
+
 def _interpolated(curve: Sequence[Sequence[float]] | NDArray[np.float64], q: float) -> float:
-    angles, errors = curve[0], curve[1]
-    if q <= angles[0]:
-        return errors[0]
-    for k in range(1, len(angles)):
-        if q < angles[k]:
-            return error_between(q, angles[k - 1], errors[k - 1], angles[k], errors[k])
-    return errors[len(errors) - 1]
+    if q <= curve[0][0]:
+        return curve[0][1]
+    for k in range(1, len(curve)):
+        if q < curve[k][0]:
+            return error_between(q, curve[k - 1][0], curve[k - 1][1], curve[k][0], curve[k][1])
+    return curve[len(curve) - 1][1]
 
 
 def wiper_at(sensor: Sensor, wiper: float, q: float) -> float:

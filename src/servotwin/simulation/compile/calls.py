@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,7 +58,19 @@ class Call:
     kept: tuple[Any, ...]
     before: Call | None = None
 
+    def __call__(self) -> int:
+        """Call it, and return its number."""
+        for function, words in self._steps:
+            found: int = function(words)
+        return found
 
+    @cached_property
+    def _steps(self) -> list[tuple[Any, int]]:
+        calls = (self,) if self.before is None else (self.before, self)
+        return [(_FUNCTION(call.function), call.words.ctypes.data) for call in calls]
+
+
+_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 DRIVERS = Recipe("drivers", tuple(f"servotwin.simulation.compile.{entry}" for entry in (
     "renewal:renew", "tick:advance", "joints:control", "joints:step")), by_numbers=True)
 """What is called with numbers, by kernels, by a program in C and by a rigid-body engine."""

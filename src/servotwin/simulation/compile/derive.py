@@ -2,9 +2,10 @@
 
 Starting from the entries, every function that is called is collected from its own module under the name
 `package_module__function`; constants come along by value, classes are imported from where they are. A kernel is changed
-in these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out; in the float32
-form every float literal gets that type; in the vector form exponentials, logarithms, sines and floors become those of
-`engine.elementary`, and the sums of functions that a module names `IN_ANY_ORDER` are taken so.
+in these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out, and what plain
+Python alone does (`if PLAIN`); in the float32 form every float literal gets that type; in the vector form exponentials,
+logarithms, sines and floors become those of `engine.elementary`, and the sums of functions that a module names
+`IN_ANY_ORDER` are taken so.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ class Function:
     def __call__(self, arguments: Sequence[Any]) -> Any:
         """Call the kernel."""
         words = self.words(arguments)
-        returned = self.call(words.__array_interface__["data"][0])
+        returned = self.call(words.ctypes.data)
         if self.result in ("", "i"):
             return returned if self.result else None
         if self.result == "b":
@@ -226,7 +226,7 @@ def _array_filler(kind: Array) -> Callable[[Any, Words], None]:
             raise Misfit(f"got {got:.80}, allowed: {dimensions} dimensions of {dtype!s:.80}")
         if not value.flags.c_contiguous:
             raise Misfit("an array that kernels work on has its numbers in a row")
-        values.append(value.__array_interface__["data"][0])
+        values.append(value.ctypes.data)
         values += value.shape
 
     return fill

@@ -48,7 +48,7 @@ def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
 
 
 def _unread(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
-    """The general form has none of the recipe's absent terms either, but only their first numbers say so."""
+    """Compare with the general form, which has none of the absent terms either: their first numbers say so."""
     told = (f"{name}.{getattr(NEUTRAL, name)._fields[0]}" if name in Numbers._fields else name
             for name in recipe.absent)
     general = _readers(Recipe("general", _RUNS, absent=tuple(told), never=(*recipe.never, "GLIDES"),

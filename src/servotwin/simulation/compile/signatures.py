@@ -58,7 +58,7 @@ _MEMORIES = _tuple(Memories, _ROWS, firms=_records(record_of(Firm)))
 _LANES = _tuple(
     Lanes, _INDICES, numbers=_NUMBERS, chips=_records(rows_of(Chip, np.float64)), start=_TABLE, torque=_FLOATS,
     pieces=_TABLE, edges=_FLOATS, accuracy=FLOAT64, firmware=_records(record_of(Firmware)))
-_TABLES = _tuple(Tables, _INDICES, torques=_TABLE, angles=_FLOATS, errors=_FLOATS)
+_TABLES = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
 _BUSES = _tuple(Buses, _INDICES, memories=_MEMORIES, shared=_records(record_of(Shared)), ended=_FLOATS)
 _SEATS, _MATES = _records(record_of(Seat)), _records(record_of(Mate))
 _TAPE = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
