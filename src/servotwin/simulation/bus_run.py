@@ -58,9 +58,11 @@ class Rows(NamedTuple):
 def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration: float) -> Rows:
     """Run servos on one source from t = 0 to `duration` [s]."""
     digital = {plan.digital for plan in plans}
-    recipe = recipe_of(any(digital), any(not_plain(plan.numbers) for plan in plans))
+    recipe = recipe_of(any(digital), not all(_terms(plan.numbers).suit(PLAIN_RUNS) for plan in plans))
     work = duration * sum(1.0 / (plan.firmware.T_c if plan.digital else plan.chip.frame_period) for plan in plans)
     compiled = len(digital) == 1 and _worth_it(recipe, work)  # no kernel has servos with a program beside others
+    if compiled:
+        recipe = recipe_of(any(digital), any(not_plain(plan.numbers) for plan in plans))
     way = _Compiled(recipe, plans, states, source) if compiled else Plainly(plans, states, source)
     return taped(way, duration, tape_of(len(plans)))
 
@@ -105,7 +107,11 @@ def tape_of(servos: int) -> Tape:
 
 def not_plain(numbers: Numbers) -> Any:
     """Tell of a servo, or of lanes, which have a term that the plain form leaves out or does not know."""
-    return is_plain() or np.logical_not(Terms(numbers, NO_CHIP, NO_FIRMWARE, False).fit(PLAIN_RUNS))
+    return is_plain() or np.logical_not(_terms(numbers).fit(PLAIN_RUNS))
+
+
+def _terms(numbers: Numbers) -> Terms:
+    return Terms(numbers, NO_CHIP, NO_FIRMWARE, False)
 
 
 def _worth_it(recipe: Recipe, frames: float) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from servotwin.models.engine import tiles
+from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.dependence import BY_SHARE, CURVED_Q, FADING, ON_HEAT, ON_I, ON_Q, TWO_BODIES
 from servotwin.simulation.compile import Recipe
 
@@ -58,7 +59,14 @@ _BY_GAPS = _side("by_gaps", ("GAPS",), TWO_BODIES, _NOT_IN_GAPS, ("CORE",), spar
 _NOT_PLAIN = ("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE")
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep", *_APART), never=_NOT_PLAIN, knows=ON_Q)
-CALM = Recipe("calm", ("servotwin.models.engine.calm:go",), absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never)
+# What it has from others' coefficients, or acts in pulses and at events, which it leaves to others
+_NOT_CALM = (
+    "motor.K", "motor.K_b", "motor.R", "bridge.D_drive", "bridge.R_drive", "bridge.off.coast", "bridge.silence.coast",
+    "bridge.V_br", "source.V", "source.R_b", "follower.half_deadband", "shaft.J", "shaft.b", "shaft.J_out",
+    "shaft.b_out", "load.coulomb", "load.stiffness", "stops.restitution", "sensor.b_o", "sensor.step",
+    *(f"chip.{name}" for name in Chip._fields))
+CALM = Recipe("calm", ("servotwin.models.engine.calm:go",), absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never,
+              spares=_NOT_CALM)
 PENDULUM_RUNS = Recipe(
     "pendulum_runs", _ENTRIES, absent=(*_RARE, "sweep", *_APART),
     never=("SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE"), knows=ON_Q | CURVED_Q)
@@ -108,7 +116,7 @@ def _sprung(name: str, entries: tuple[str, ...]) -> dict[bool, Recipe]:
 ELASTIC_RUNS = _sprung("elastic_runs", _ENTRIES)
 LOOK_ELASTIC = _sprung("look_elastic", LOOK_ONE_BY_ONE.entries)
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, absent=_PROGRAM)
-_PARTS = {PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _GLIDING, _TICKING), ALL_DIGITAL: (_GLIDING,)}
+_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _GLIDING, _TICKING), ALL_DIGITAL: (_GLIDING,)}
 
 
 def digital_steps() -> Recipe:
