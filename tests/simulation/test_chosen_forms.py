@@ -147,8 +147,8 @@ def test_servos_of_the_catalog_take_the_forms_that_they_took():
         assert found == known.get(name, "runs" if analog else "digital_runs"), name
 
 
-def test_no_servo_of_today_needs_digital_steps(servo):
-    """They are there for terms that glides do not know; no library of them is made beforehand."""
+def test_no_servo_of_today_needs_kernels_that_are_not_made_beforehand(servo):
+    """They are there for terms to come that the others do not know."""
     rng = np.random.default_rng(4)
     own = [name for name in FEATURES if name not in (*OF_PULSES, "share")]
     catalog = [st.load_servo(name) for name in st.catalog_names()]

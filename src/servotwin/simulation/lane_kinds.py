@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
@@ -19,7 +19,7 @@ from servotwin.physics.laws import array_form
 from servotwin.physics.pieces import Piece
 from servotwin.simulation import lane_recipes as recipes
 from servotwin.simulation.compile import Recipe, is_plain
-from servotwin.simulation.compile.reading import unread
+from servotwin.simulation.compile.reading import in_general, told, unread
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -122,14 +122,12 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
     potentiometers have a table.
     """
     terms = Terms(numbers, chip, firmware, swept.any() and swept)
-    if is_plain():  # a fast form has no worth
-        return _in_general(terms, lanes)
     recording = recorded.any() and recorded
     if _any(terms.have("elastic")) or _any(numbers.bridge.pwm > 0.0):
         return _alone(terms, recording, lanes)
     found: list[SideBySide | OneByOne] = []
     left: Any = True
-    if pulsed and not curved:
+    if pulsed and not curved and not is_plain():
         side = _may_go_side_by_side(terms, recording, dtype)
         for form, wanted, of_bands in _forms(terms):
             own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
@@ -140,37 +138,36 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str,
                 found.append(_together(terms, form, own_type, _indices(which, lanes)))
     loose = pulsed and _without(terms.have("play"), recording)
     for recipe, wanted in ((recipes.PLAIN_RUNS, True), (recipes.PENDULUM_RUNS, True), (recipes.GAP_RUNS, loose)):
-        which = _and(left, wanted)
+        which = _and(left, wanted, not is_plain())
         if _any(which):
             which = _and(which, terms.fit(recipe))
             left = _without(left, which)
             found.append(OneByOne(_indices(which, lanes), recipe))
-    found.append(OneByOne(_indices(left, lanes), recipes.ALL_RUNS))
-    return [kind for kind in found if len(kind.which)]
-
-
-def _in_general(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
-    """Return how lanes run one by one, whatever they have."""
-    digital, sprung = _any(terms.numbers.bridge.pwm > 0.0), terms.have("elastic")
-    kinds = (OneByOne(_indices(sprung, lanes), recipes.ELASTIC_RUNS[digital]),
-             OneByOne(_indices(_not(sprung), lanes), recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS))
-    return [kind for kind in kinds if len(kind.which)]
+    return [kind for kind in (*found, *_at_last(terms, left, recipes.ALL_RUNS, lanes)) if len(kind.which)]
 
 
 def _alone(terms: Terms, recording: Any, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
     digital = _any(terms.numbers.bridge.pwm > 0.0)
     sprung, left = terms.have("elastic"), _not(terms.have("elastic"))
-    found: list[SideBySide | OneByOne] = [OneByOne(_indices(sprung, lanes), recipes.ELASTIC_RUNS[digital])]
-    wanted = ((recipes.PLAIN_DIGITAL, _without(True, recording)), (recipes.ALL_DIGITAL, True)) if digital else ()
-    for recipe, some in wanted:
-        which = _and(left, some)
-        if _any(which):
-            which = _and(which, terms.fit(recipe))
-            left = _without(left, which)
-            found.append(OneByOne(_indices(which, lanes), recipe))
-    found.append(OneByOne(_indices(left, lanes), recipes.digital_steps() if digital else recipes.ALL_RUNS))
+    found = [*_at_last(terms, sprung, recipes.ELASTIC_RUNS[digital], lanes)]
+    which = _without(left, recording) if digital and not is_plain() else False
+    if _any(which):
+        which = _and(which, terms.fit(recipes.PLAIN_DIGITAL))
+        left = _without(left, which)
+        found.append(OneByOne(_indices(which, lanes), recipes.PLAIN_DIGITAL))
+    found += _at_last(terms, left, recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS, lanes)
     return [kind for kind in found if len(kind.which)]
+
+
+def _at_last(terms: Terms, left: Any, recipe: Recipe, lanes: int) -> Iterator[OneByOne]:
+    """Return how those run that no faster form takes: none that its kernels do not know either, as terms are now."""
+    if is_plain():  # a fast form has no worth, nor to ask for it
+        yield OneByOne(_indices(left, lanes), told(recipe))
+    elif _any(left):
+        which = _and(left, terms.fit(recipe))
+        yield OneByOne(_indices(which, lanes), recipe)
+        yield OneByOne(_indices(_without(left, which), lanes), in_general(recipe))
 
 
 def _may_go_side_by_side(terms: Terms, recording: Any, dtype: str) -> Any:
@@ -217,10 +214,10 @@ def goes_together(numbers: Numbers, pulsed: bool) -> bool:
 
 def looking(recipe: Recipe) -> Recipe:
     """Return how lanes are looked at that run one by one in this way."""
-    for digital, own in recipes.ELASTIC_RUNS.items():
-        if recipe == own:
-            return recipes.LOOK_ELASTIC[digital]
-    return recipes.LOOK_DIGITAL if "firmware.T_c" in recipe.present else recipes.LOOK_ONE_BY_ONE
+    digital = "firmware.T_c" in recipe.present
+    look = (recipes.LOOK_ELASTIC[digital] if "elastic.k" in recipe.present else recipes.LOOK_DIGITAL if digital
+            else recipes.LOOK_ONE_BY_ONE)
+    return told(look) if recipe.absent == told(recipe).absent else look
 
 
 def _without(some: Any, *others: Any) -> Any:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from servotwin.models.engine import tiles
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.dependence import BY_SHARE, CURVED_Q, FADING, ON_HEAT, ON_I, ON_Q, TWO_BODIES
@@ -116,15 +114,8 @@ def _sprung(name: str, entries: tuple[str, ...]) -> dict[bool, Recipe]:
 ELASTIC_RUNS = _sprung("elastic_runs", _ENTRIES)
 LOOK_ELASTIC = _sprung("look_elastic", LOOK_ONE_BY_ONE.entries)
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, absent=_PROGRAM)
-_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _GLIDING, _TICKING), ALL_DIGITAL: (_GLIDING,)}
-
-
-def digital_steps() -> Recipe:
-    """Return the kernels of servos with a program and a term that glides do not know: none has one, as terms are now.
-
-    So they are no constant beside the others, which are all built before they are asked for.
-    """
-    return replace(ALL_DIGITAL, name="digital_steps", never=("GLIDES",))
+_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _GLIDING, _TICKING),
+          ALL_DIGITAL: ((ALL_DIGITAL, ()), _GLIDING)}
 
 
 def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:

@@ -10,6 +10,7 @@ import ast
 import contextlib
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -31,6 +32,20 @@ _COPYING = flat_name(records.__name__, "")  # functions that only take records o
 
 
 @cache
+def told(recipe: Recipe) -> Recipe:
+    """Return a recipe that knows of its absent terms by their first numbers alone, and follows all others."""
+    absent = tuple(f"{name}.{getattr(NEUTRAL, name)._fields[0]}" if name in Numbers._fields else name
+                   for name in recipe.absent)
+    return replace(recipe, name=f"{recipe.name}_told", absent=absent)
+
+
+@cache
+def in_general(recipe: Recipe) -> Recipe:
+    """Return the recipe for what a form leaves out, in which no way of going on is chosen by terms that it knows."""
+    return replace(told(recipe), name=f"{recipe.name}_in_general", never=(*recipe.never, "GLIDES"))
+
+
+@cache
 def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return the numbers that the general form reads and a recipe's kernels do not know ("friction.K_m", "chip.beta").
 
@@ -48,11 +63,7 @@ def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
 
 
 def _unread(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
-    """Compare with the general form, which has none of the absent terms either: their first numbers say so."""
-    told = (f"{name}.{getattr(NEUTRAL, name)._fields[0]}" if name in Numbers._fields else name
-            for name in recipe.absent)
-    general = _readers(Recipe("general", _RUNS, absent=tuple(told), never=(*recipe.never, "GLIDES"),
-                              present=recipe.present))
+    general = _readers(replace(in_general(recipe), entries=_RUNS, vector=False, single=False))
     own = _readers(recipe, of)
     for path, key in _paths("", Numbers, ("chip", Chip), ("firmware", Firmware)):
         there = {name for name, read in general.items() if key in read}
