@@ -34,12 +34,15 @@ def _side(name: str, forms: tuple[str, ...], knows: int, absent: tuple[str, ...]
                   never=(*(form for form in _FORMS if form not in forms), *never))
 
 
-# Numbers that a form follows though it lacks one of their readers: a way to solve that it does not go, or what happens
-# at a stop, which it leaves to others
-_NOT_OF_ARCS = ("shaft.J_out", "shaft.b_out", "stops.restitution", "load.rest_angle")
-_NOT_OF_BANDS = (*_NOT_OF_ARCS, "friction.varies", "friction.w_s", "friction.K_m", "friction.K_e")
+# Numbers that a form follows though it lacks one of their readers, a way to solve that it does not go, or what happens
+# at a stop, which it leaves to others; and though it leaves them to functions of others, which read them as ever
+_NOT_OF_ARCS = ("shaft.J_out", "shaft.b_out", "stops.restitution", "load.rest_angle", *(
+    f"chip.{name}" for name in ("T_0", "slope", "half_deadband", "K", "t_min", "shortest", "longest", "V_oc")))
+_NOT_OF_GAPS = (*_NOT_OF_ARCS, "source.I_max")
+_NOT_OF_BANDS = (*_NOT_OF_GAPS, "friction.varies", "friction.w_s", "friction.K_m", "friction.K_e")
 _NOT_OF_STRIDES = (*_NOT_OF_BANDS, "friction.K_ms", "friction.K_es", "load.stiffness", "load.gravity",
-                   "load.hanging_angle")
+                   "load.hanging_angle", "heat.magnet", "friction.F_forward", "friction.F_backward",
+                   "friction.breakaway", "friction.alpha", "friction.K_mq", "friction.K_eq")
 _BY_ARCS = {dtype: _side(f"side_by_side_{dtype}", ("ONE_FORMULA", "ARCS"), 0, (*_NOT_IN_BANDS, *BANDED),
                          ("CORE", *_PLAYED), single=dtype == "float32", spares=_NOT_OF_ARCS)
             for dtype in ("float64", "float32")}
@@ -53,7 +56,7 @@ _BY_STRIDES = {banded: _side("by_strides" + "_in_bands" * banded, ("STRIDES",), 
 _BY_COILS = _side("by_coils", ("COILS",), ON_I, (*_NO_SIDE, _PLAY, *STRIDING, *BANDED), (
     "CORE", *_PLAYED, "LINEAR", "LINEAR_BACKWARD", "LIMITED_FORWARD", "LIMITED_BACKWARD", "SHORT_FORWARD",
     "SHORT_BACKWARD"), spares=_NOT_OF_ARCS)
-_BY_GAPS = _side("by_gaps", ("GAPS",), TWO_BODIES, _NOT_IN_GAPS, ("CORE",), spares=_NOT_OF_ARCS)
+_BY_GAPS = _side("by_gaps", ("GAPS",), TWO_BODIES, _NOT_IN_GAPS, ("CORE",), spares=_NOT_OF_GAPS)
 _NOT_PLAIN = ("LONG_STEP", "STEP", "SERIES", "HELD", "WITH_CURRENT", *_PLAYED, "CORE")
 PLAIN_RUNS = Recipe(
     "plain_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, "sweep", *_APART), never=_NOT_PLAIN, knows=ON_Q)
@@ -87,19 +90,22 @@ _TICKS = tuple(f"servotwin.models.engine.{name}" for name in (
 _GIVES_WAY = (
     "source.V", "motor.R", "follower.half_deadband", "shaft.J", "shaft.J_out", "shaft.b_out", "friction.K_m",
     "friction.K_e", "load.coulomb", "load.rest_angle", "stops.restitution", "play.bearing", "elastic.J",
-    "firmware.t_phi", "firmware.goals", "firmware.latency", "firmware.T_f",)
+    "firmware.t_phi", "firmware.goals", "firmware.latency", "firmware.T_f")
 _DECIDES_ALONE = (
-    "bridge.R_drive", "bridge.off.coast", "bridge.silence.coast", "bridge.one_way", "follower.V_max",
-    "firmware.I_limit", "firmware.kappa", "firmware.at_rest", "firmware.brakes", "firmware.resolution",
-    "firmware.v", "firmware.a", "firmware.v_0", "firmware.overload_time", "firmware.stall_travel",
-    "firmware.overload_output", "firmware.latches", "firmware.trip_time", "firmware.resets",
-    "firmware.restart_time", "firmware.loss", "firmware.failsafe", "firmware.soft_duty", "firmware.per_second",
-    "firmware.at_nothing", "firmware.shortest", "firmware.longest",)
+    "bridge.R_drive", "bridge.off.R", "bridge.off.coast", "bridge.silence.R", "bridge.silence.coast", "bridge.one_way",
+    "follower.V_max", "firmware.resolution", "firmware.restart_time", "firmware.per_second", "firmware.at_nothing",
+    "firmware.shortest", "firmware.longest")
+# Numbers of programs that these leave to functions of others, which read them as ever
+_DECIDED = tuple(f"firmware.{name}" for name in (
+    "T_d", "quantum", "k_p", "k_i", "k_d", "k_v", "k_a", "m", "threshold", "I_limit", "kappa", "at_rest", "delta",
+    "duty_limit", "slew", "I_m", "brakes", "v", "a", "v_0", "overload_duty", "overload_time", "stall_travel",
+    "overload_output", "latches", "trip_current", "trip_time", "resets", "timeout", "loss", "failsafe", "soft_duty",
+    "soft_time", "noise", "b_o", "weight", "h", "gate", "rest_travel", "whole", "minimum", "torque_limit"))
 # Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop
-_GLIDING = (Recipe("gliding", _ENTRIES, absent=_NOT_GLIDING, never=_NOT_PLAIN, present=_DIGITAL, spares=_GIVES_WAY),
-            ("servotwin.models.engine.glides:go",))
+_GLIDING = (Recipe("gliding", _ENTRIES, absent=_NOT_GLIDING, never=_NOT_PLAIN, present=_DIGITAL,
+                   spares=(*_GIVES_WAY, *_DECIDED)), ("servotwin.models.engine.glides:go",))
 _TICKING = (Recipe("ticking", ("servotwin.models.engine.loops:go_on",), vector=True, absent=_NOT_GLIDING,
-                   never=_NOT_PLAIN, present=_DIGITAL, spares=(*_GIVES_WAY, *_DECIDES_ALONE)), _TICKS)
+                   never=_NOT_PLAIN, present=_DIGITAL, spares=(*_GIVES_WAY, *_DECIDED, *_DECIDES_ALONE)), _TICKS)
 BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, absent=PLAIN_DIGITAL.absent,
                   never=PLAIN_DIGITAL.never, present=_DIGITAL)
 

@@ -1,7 +1,9 @@
 """Which numbers of the terms a recipe's kernels do not know, told by which of their functions read them.
 
-Kernels know a number if every function that reads it in the general form is among them as well, or if a function of
-their own reads it. What they do not know would be as if it were not there.
+What they do not know would be as if it were not there. They know a number that a function of their own reads, which the
+general form has not. Else all functions that read it in the general form have to be among them, and no function of
+their own may read what these read beside it: it would be another form of their law. Terms that a recipe leaves out are
+not known.
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
     """
     name = f"{recipe.name}-unread-{key_of(source_key(), repr((recipe, of)))}.json"
     for folder in (shipped_folder(), cache_folder()):
-        with contextlib.suppress(OSError, ValueError, TypeError):
+        with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
             return tuple(map(str, json.loads((folder / name).read_text(encoding="utf-8"))["unread"]))
     found = tuple(_unread(recipe, of))
     with contextlib.suppress(OSError):  # to find it again costs its time alone
@@ -64,11 +66,14 @@ def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
 
 def _unread(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
     general = _readers(replace(in_general(recipe), entries=_RUNS, vector=False, single=False))
-    own = _readers(recipe, of)
+    own = _readers(recipe if of else replace(recipe, never=(*recipe.never, "GLIDES")), of)  # glides are asked apart
+    by_itself = set().union(*(own[name] for name in own.keys() - general.keys()))
     for path, key in _paths("", Numbers, ("chip", Chip), ("firmware", Firmware)):
         there = {name for name, read in general.items() if key in read}
-        knows = there <= own.keys() or any(key in own[name] for name in own.keys() - general.keys())
-        if not knows and path not in recipe.spares:
+        beside = {other for name in there for other in general[name] if other[0] == key[0]}
+        left_out = path.split(".")[0] in recipe.absent
+        if there and key not in by_itself and path not in recipe.spares and (
+                left_out or not there <= own.keys() or beside & by_itself):
             yield path
 
 
