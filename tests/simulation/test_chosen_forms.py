@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 import servotwin as st
+from servotwin.models.engine.motion import may_depend
+from servotwin.models.engine.records import mapped
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.firmware import NO_FIRMWARE
+from servotwin.physics.pieces import Piece
 from servotwin.simulation import lane_kinds
+from servotwin.simulation.lane_groups import by_groups
 
 NOBODY = np.zeros(1, np.bool_)
 PULSED = (st.PulseServo, st.PulseServoInductive)
@@ -159,3 +163,18 @@ def test_no_servo_of_today_needs_kernels_that_are_not_made_beforehand(servo):
         digital = programs[rng.integers(len(programs))]
         assert combined(st.DigitalServo, digital, names, "float64", rng) in (
             "plain_digital_runs", "digital_runs", "elastic_runs_digital"), names
+
+
+def test_many_lanes_are_asked_what_each_of_them_is(servo):
+    rng, lanes = np.random.default_rng(5), 30
+    plain = st.PulseServo(servo).pack(NO_LOAD)
+
+    def column(value):
+        return np.where(rng.random(lanes) < 0.5, rng.choice([0.0, 0.5, 1.0, 2.0], lanes), value)
+
+    for _ in range(20):
+        numbers = mapped(lambda value: column(value) if rng.random() < 0.3 else value, plain)
+        found = by_groups(may_depend, lanes, numbers, Piece())
+        for k in range(lanes):
+            own = mapped(lambda value, k=k: value[k].item() if isinstance(value, np.ndarray) else value, numbers)
+            assert found[k] == may_depend(own, Piece())

@@ -15,18 +15,17 @@ from servotwin.models.engine.records import numbers_in
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
-from servotwin.physics.laws import array_form
 from servotwin.physics.pieces import Piece
 from servotwin.simulation import lane_recipes as recipes
 from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.reading import in_general, told, unread
+from servotwin.simulation.lane_groups import by_groups
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 _SMALLEST = 2.0**-150  # what is not more is zero in float32
 _NOTHING: dict[str, Any] = {**NEUTRAL._asdict(), "chip": NO_CHIP, "firmware": NO_FIRMWARE}
-_may_depend = array_form(may_depend, __name__)
 
 
 class Terms:
@@ -45,7 +44,8 @@ class Terms:
         try:  # most columns do not matter to it
             return may_depend(self.numbers, wave)
         except ValueError:  # an array is neither true nor false
-            return _may_depend(self.numbers, wave)
+            lanes = max(len(x) for x in (*numbers_in(self.numbers), swept) if isinstance(x, np.ndarray))
+            return by_groups(may_depend, lanes, self.numbers, wave)
 
     def have(self, name: str) -> Any:
         """Tell which lanes have a term ("heat", told by its first number), or a number of one ("motor.L")."""
