@@ -10,8 +10,8 @@ from servotwin.simulation.compile.kinds import FLOAT64, INT8, INT32, INT64, Arra
 class Primitive(NamedTuple):
     """A function of Python that C has an expression for.
 
-    `text` gets the arguments, `n` is their number less one; `{s}` is "f" where they have 32 bits; `result` is None where it is that of the
-    arguments; it `writes` where it changes memory.
+    `text` gets the arguments, `n` is their number less one; `s` is "f" where they have 32 bits. `result` is None where
+    it is that of the arguments; it `writes` where it changes memory.
     """
 
     text: str
@@ -23,10 +23,14 @@ PRIMITIVES = {
     "fma": Primitive("FMA{s}({0}, {1}, {2})"), "two_power": Primitive("two_power{s}({0})"),
     "binary_exponent": Primitive("binary_exponent{s}({0})"), "nearest": Primitive("NEAREST{s}({0})"),
     "floor": Primitive("FLOOR{s}({0})"),
-    "words": Primitive("words({0}, {1})", Array(INT64, 1)), "numbers": Primitive("numbers({0}, {1})", Array(FLOAT64, 1)),
-    "rows": Primitive("rows({0}, {1}, {2})", Array(FLOAT64, 2)), "bytes_at": Primitive("bytes_at({0}, {1})", Array(INT8, 1)),
-    "halves": Primitive("halves({0}, {1})", Array(INT32, 1)), "called": Primitive("TOLD(told_1, {0}, {1})", INT64, True),
-    "told": Primitive("TOLD(told_{n}, {all})", INT64, True), "copied": Primitive("copied({0}, {1}, {2})", None, True),
+    "words": Primitive("words({0}, {1})", Array(INT64, 1)),
+    "numbers": Primitive("numbers({0}, {1})", Array(FLOAT64, 1)),
+    "rows": Primitive("rows({0}, {1}, {2})", Array(FLOAT64, 2)),
+    "bytes_at": Primitive("bytes_at({0}, {1})", Array(INT8, 1)),
+    "halves": Primitive("halves({0}, {1})", Array(INT32, 1)),
+    "called": Primitive("TOLD(told_1, {0}, {1})", INT64, True),
+    "told": Primitive("TOLD(told_{n}, {all})", INT64, True),
+    "copied": Primitive("copied({0}, {1}, {2})", None, True),
     "activate": Primitive("activate({0})", None, True), "active": Primitive("active()", INT64),
 }
 """Of `models.engine.elementary`, single instructions in the vector form, and of `compile.addresses`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -145,8 +145,10 @@ class Types:
         if isinstance(kind, Fixed) and isinstance(to, Array):
             lengths = ", ".join(map(str, kind.shape))
             return f"(({self.of(to)}){{{text}, {{{lengths}}}}})"
-        assert isinstance(kind, Tuple)  # noqa: S101 - nothing else is united
-        assert isinstance(to, Tuple)  # noqa: S101
+        return self._as_tuple(text, cast("Tuple", kind), cast("Tuple", to))
+
+    def _as_tuple(self, text: str, kind: Tuple, to: Tuple) -> str:
+        """Return a tuple as one of other kinds."""
         old, new = self.of(kind), self.of(to)
 
         def make(name: str) -> str:
@@ -160,8 +162,10 @@ class Types:
         """Return the condition that two values are equal."""
         if isinstance(kind_a, Scalar):
             return f"{a} == {b}"
-        assert isinstance(kind_a, Tuple)  # noqa: S101 - nothing else is comparable
-        assert isinstance(kind_b, Tuple)  # noqa: S101
+        return self._equal_tuples(a, cast("Tuple", kind_a), b, cast("Tuple", kind_b))
+
+    def _equal_tuples(self, a: str, kind_a: Tuple, b: str, kind_b: Tuple) -> str:
+        """Return the condition that two tuples are equal."""
         first, second = self.of(kind_a), self.of(kind_b)
 
         def make(name: str) -> str:
@@ -230,10 +234,8 @@ def _enclosed(text: str) -> bool:
 
 def _aligned(dtype: np.dtype[Any]) -> bool:
     """Tell whether C would lay a record out in the same way."""
-    place = 0
-    most = 1
-    for name in dtype.names or ():
-        own, offset = (dtype.fields or {})[name][:2]
+    place, most = 0, 1
+    for own, offset, *_ in (dtype.fields or {}).values():
         size = _alignment(own)
         most = max(most, size)
         if offset != place or place % size:
@@ -244,7 +246,7 @@ def _aligned(dtype: np.dtype[Any]) -> bool:
 
 def _alignment(dtype: np.dtype[Any]) -> int:
     base = dtype.base
-    return max((_alignment(each[0]) for each in (base.fields or {}).values()), default=1) if base.names else base.itemsize
+    return max(_alignment(each[0]) for each in base.fields.values()) if base.fields else base.itemsize
 
 
 def _float(value: float, single: bool) -> str:

@@ -144,10 +144,9 @@ class Derivation:
         """Collect a function after those that it calls, and return its name in the derived module."""
         flat = flat_name(module, name)
         if flat not in self.functions:
-            self.functions[flat] = ast.FunctionDef(flat)  # marks a call of itself
+            self.functions[flat] = node = definition(module, name)  # marks a call of itself
             if name in getattr(import_module(module), "IN_ANY_ORDER", ()):
                 self.in_any_order.add(flat)
-            node = definition(module, name)
             rewritten = Rewriting(self, module, local_names(node)).visit(node)
             rewritten.name = flat
             self.functions[flat] = ast.fix_missing_locations(rewritten)

@@ -7,7 +7,6 @@ each, which is found by going through its statements until nothing changes any m
 from __future__ import annotations
 
 import ast
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,9 +23,9 @@ from servotwin.simulation.compile.kinds import (
     Array,
     Fixed,
     Kind,
-    NotTranslatable,
     Record,
     Scalar,
+    TranslationError,
     Tuple,
     of_dtype,
     of_value,
@@ -79,7 +78,7 @@ class Specialised:
     arguments: tuple[Kind, ...]
     kinds: dict[ast.AST, Kind | None] = field(default_factory=dict)
     calls: dict[ast.Call, Specialised] = field(default_factory=dict)
-    local: dict[str, Kind | None] = field(default_factory=dict)
+    local: dict[str, Any] = field(default_factory=dict)
     owned: set[str] = field(default_factory=set)
     result: Kind | None = None
     writes: bool = False
@@ -104,10 +103,10 @@ class Specialised:
                 return
         raise self.refused(self.node, "the kinds of its variables do not settle")
 
-    def refused(self, node: ast.AST, instead: str) -> NotTranslatable:
+    def refused(self, node: ast.AST, instead: str) -> TranslationError:
         """Return the error for a piece of text."""
         first = ast.unparse(node).splitlines()[0]
-        return NotTranslatable(self.node.name, first, instead)
+        return TranslationError(self.node.name, first, instead)
 
     # --- statements ---------------------------------------------------------------------------------------------------
 
@@ -134,10 +133,8 @@ class Specialised:
         for target in node.targets:
             self._put(target, kind, value)
 
-    def _list(self, node: ast.Assign, length: int) -> None:
-        (target,) = node.targets
-        assert isinstance(value := node.value, ast.BinOp) and isinstance(value.left, ast.List)  # noqa: S101
-        (element,) = value.left.elts
+    def _list(self, node: Any, length: int) -> None:
+        ((target,), (element,)) = node.targets, node.value.left.elts
         kind = self.of(element)
         if not isinstance(target, ast.Name):
             raise self.refused(node, "a list of a constant length has a name of its own")
@@ -192,7 +189,7 @@ class Specialised:
         self._truth(node.test)
         self._block(node.body)
 
-    def _for(self, node: ast.For) -> None:
+    def _for(self, node: Any) -> None:
         if node.orelse:
             raise self.refused(node, "a loop of a kernel has no else")
         if is_range(node.iter):
@@ -374,7 +371,7 @@ class Specialised:
         return self._united(self.of(node.body), self.of(node.orelse), node)
 
     def _call(self, node: ast.Call) -> Kind | None:
-        if any(isinstance(argument, ast.Starred) for argument in node.args) or any(k.arg is None for k in node.keywords):
+        if any(isinstance(argument, ast.Starred) for argument in node.args) or None in (k.arg for k in node.keywords):
             raise self.refused(node, "arguments are written one by one")
         if isinstance(node.func, ast.Attribute):
             if isinstance(node.func.value, ast.Name) and node.func.value.id == "math":
@@ -512,9 +509,7 @@ def _row(kind: Array | Fixed, places: int) -> Kind:
 
 def field_kind(record: Record, name: str) -> Kind:
     """Return the kind of a field of a record."""
-    fields = record.dtype.fields
-    assert fields is not None  # noqa: S101 - a record has fields
-    own = fields[name][0]
+    own = record.dtype[name]
     base, shape = own.subdtype if own.subdtype else (own, ())
     element = of_dtype(base)
     return Fixed(element, shape) if shape else element

@@ -11,7 +11,7 @@ import numpy as np
 from servotwin.errors import ServotwinError
 
 
-class NotTranslatable(ServotwinError):
+class TranslationError(ServotwinError):
     """Something stands in a kernel that has no form in C.
 
     Parameters

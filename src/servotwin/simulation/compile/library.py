@@ -1,4 +1,4 @@
-"""Kernels of a library, as Python calls them: arguments are checked, laid out as words, and one address is handed over."""
+"""Kernels of a library, as Python calls them: arguments are checked and laid out as words, whose address is given."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from servotwin.simulation.compile.translate import words_of
 Words = list[int | float]
 
 
-class Misfit(TypeError):
+class MisfitError(TypeError):
     """An argument of a kernel is not of the kind that it was compiled for."""
 
 
@@ -62,14 +62,14 @@ class Function:
 
         Raises
         ------
-        Misfit
+        MisfitError
             If one is not of its kind.
         """
         values: Words = []
         for fill, argument in zip(self._fillers, arguments, strict=True):
             fill(argument, values)
         found = np.empty(self.size + self._room, np.int64)
-        struct.pack_into(self._format, found, 0, *values)
+        struct.pack_into(self._format, found.data, 0, *values)
         return found
 
     def __call__(self, arguments: Sequence[Any]) -> Any:
@@ -80,7 +80,10 @@ class Function:
             return returned if self.result else None
         if self.result == "b":
             return returned != 0
-        return _read(iter(self.result), iter(words[self.size:]))
+        return _read(self.result, words[self.size:])
+
+
+_OF_WORD: dict[str, Callable[[Any], Any]] = {"d": lambda word: float(word.view(np.float64)), "b": bool, "i": int}
 
 
 def _read(result: str, words: NDArray[np.int64]) -> Any:
@@ -95,7 +98,7 @@ def _read(result: str, words: NDArray[np.int64]) -> Any:
         else:
             word = words[place]
             place += 1
-            stack[-1].append(float(word.view(np.float64)) if letter == "d" else bool(word) if letter == "b" else int(word))
+            stack[-1].append(_OF_WORD[letter](word))
     return stack[0][0]
 
 
@@ -124,7 +127,7 @@ class Entry:
 
         Raises
         ------
-        Misfit
+        MisfitError
             If there is none; it says which argument is not of its kind.
         """
         if len(self.functions) == 1:
@@ -132,7 +135,7 @@ class Entry:
         for function in self.functions:
             if all(fits(kind, argument) for kind, argument in zip(function.kinds, arguments, strict=True)):
                 return function
-        raise Misfit(f"{self.name}: no tile of such a layout is known")
+        raise MisfitError(f"{self.name}: no tile of such a layout is known")
 
 
 class Kernels:
@@ -187,11 +190,11 @@ def filler(kind: Kind) -> Callable[[Any, Words], None]:
     if isinstance(kind, Array):
         return _array_filler(kind)
     if isinstance(kind, Record):
-        raise Misfit("a record is given as an array of one")
+        raise MisfitError("a record is given as an array of one")
     return _number_filler(kind)
 
 
-def _number_filler(kind: Scalar) -> Callable[[Any, Words], None]:
+def _number_filler(kind: Kind) -> Callable[[Any, Words], None]:
     real = kind in (FLOAT64, FLOAT32)
     allowed: tuple[Any, ...] = (bool, np.bool_) if kind == BOOL else (int, np.integer, bool, np.bool_)
     if real:
@@ -199,7 +202,7 @@ def _number_filler(kind: Scalar) -> Callable[[Any, Words], None]:
 
     def fill(value: Any, values: Words) -> None:
         if not isinstance(value, allowed):
-            raise Misfit(f"got {value!r}, allowed: {told(kind)}")
+            raise MisfitError(f"got {value!r}, allowed: {told(kind)}")
         values.append(float(value) if real else int(value))
 
     return fill
@@ -210,7 +213,7 @@ def _tuple_filler(kind: Tuple) -> Callable[[Any, Words], None]:
 
     def fill(value: Any, values: Words) -> None:
         if len(value) != len(fillers):
-            raise Misfit(f"got {len(value)} values, allowed: {told(kind)}")
+            raise MisfitError(f"got {len(value)} values, allowed: {told(kind)}")
         for inner, each in zip(fillers, value, strict=True):
             inner(each, values)
 
@@ -223,9 +226,9 @@ def _array_filler(kind: Array) -> Callable[[Any, Words], None]:
     def fill(value: Any, values: Words) -> None:
         if not isinstance(value, np.ndarray) or value.ndim != dimensions or not _same(value.dtype, dtype):
             got = f"{value.ndim} dimensions of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
-            raise Misfit(f"got {got:.80}, allowed: {dimensions} dimensions of {dtype!s:.80}")
+            raise MisfitError(f"got {got:.80}, allowed: {dimensions} dimensions of {dtype!s:.80}")
         if not value.flags.c_contiguous:
-            raise Misfit("an array that kernels work on has its numbers in a row")
+            raise MisfitError("an array that kernels work on has its numbers in a row")
         values.append(value.ctypes.data)
         values += value.shape
 
@@ -237,7 +240,7 @@ def _dtype(kind: Kind) -> np.dtype[Any]:
         return kind.dtype
     if isinstance(kind, Scalar):
         return np.dtype(kind.dtype)
-    raise Misfit("an array holds numbers or records")
+    raise MisfitError("an array holds numbers or records")
 
 
 def _same(a: np.dtype[Any], b: np.dtype[Any]) -> bool:

@@ -17,8 +17,8 @@ from servotwin.models.engine.memory import Memories, Memory
 from servotwin.models.engine.records import record_of, rows_of
 from servotwin.models.engine.seats import Mate, Seat, Shared
 from servotwin.models.engine.tape import Tape
-from servotwin.models.engine.told import Tables
 from servotwin.models.engine.tiles import Lanes, Outputs
+from servotwin.models.engine.told import Tables
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
@@ -32,8 +32,8 @@ from servotwin.simulation.compile.kinds import (
     INT64,
     Array,
     Kind,
-    NotTranslatable,
     Record,
+    TranslationError,
     Tuple,
 )
 
@@ -115,7 +115,7 @@ def signatures(recipe: Recipe) -> list[Signature]:
 
     Raises
     ------
-    NotTranslatable
+    TranslationError
         If nothing says what an entry is called with.
     """
     return [(entry.split(":")[1], kinds) for entry in recipe.entries for kinds in _kinds_of(entry, recipe)]
@@ -152,7 +152,7 @@ def annotated(function: FunctionType) -> tuple[Kind, ...]:
 
     Raises
     ------
-    NotTranslatable
+    TranslationError
         If an argument is anything else.
     """
     hints = get_type_hints(inspect.unwrap(function))
@@ -166,7 +166,7 @@ def _hinted(function: str, name: str, hint: Any) -> Kind:
         return numbers[hint]
     if hasattr(hint, "_fields"):
         return _named(function, hint)
-    raise NotTranslatable(function, name, "an entry that takes arrays or records has a line in `signatures`")
+    raise TranslationError(function, name, "an entry that takes arrays or records has a line in `signatures`")
 
 
 @cache

@@ -21,9 +21,9 @@ from servotwin.simulation.compile.kinds import (
     FLOAT64,
     Array,
     Kind,
-    NotTranslatable,
     Record,
     Scalar,
+    TranslationError,
     Tuple,
     told,
 )
@@ -65,7 +65,7 @@ def translated(derived: Derived, signatures: Sequence[tuple[str, tuple[Kind, ...
 
     Raises
     ------
-    NotTranslatable
+    TranslationError
         If a kernel contains what has no form in C; it names function and line, and says what to write instead.
     """
     module = Module(derived)
@@ -105,7 +105,7 @@ def _letters(kind: Kind | None) -> str:
         return "d" if kind in (FLOAT64, FLOAT32) else "b" if kind == BOOL else "i"
     if isinstance(kind, Tuple):
         return f"({''.join(map(_letters, kind.elements))})"
-    raise NotTranslatable("", told(kind), "an entry returns numbers")
+    raise TranslationError("", told(kind), "an entry returns numbers")
 
 
 def _entry(types: Types, symbol: str, called: str, kinds: tuple[Kind, ...], result: Kind | None) -> str:
@@ -125,7 +125,8 @@ def _entry(types: Types, symbol: str, called: str, kinds: tuple[Kind, ...], resu
 def _entry_by_numbers(types: Types, symbol: str, called: str, kinds: tuple[Kind, ...], result: Kind | None) -> str:
     names = [f"word_{k}" for k in range(len(kinds))]
     head = f"EXPORTED int64_t {symbol}({', '.join(f'int64_t {name}' for name in names)})"
-    return "\n".join([f"{head};", f"{head} {{", *_returning(types, f"{called}({', '.join(names)})", result, 0), "}", ""])
+    lines = _returning(types, f"{called}({', '.join(names)})", result, 0)
+    return "\n".join([f"{head};", f"{head} {{", *lines, "}", ""])
 
 
 def _returning(types: Types, call: str, result: Kind | None, place: int) -> list[str]:
@@ -175,4 +176,4 @@ class _Reading:
             address = f"({self._types.element(kind.element)} *)(intptr_t){self._next()}"
             lengths = ", ".join(self._next() for _ in range(kind.dimensions))
             return f"(({self._types.of(kind)}){{{address}, {{{lengths}}}}})"
-        raise NotTranslatable("", told(kind), "it is no argument of an entry")
+        raise TranslationError("", told(kind), "it is no argument of an entry")

@@ -56,7 +56,8 @@ class Variables:
             return None
         if isinstance(statement.value, ast.BinOp) and isinstance(statement.value.left, ast.List):
             return statement
-        targets = [n for target in statement.targets for n in ast.walk(target) if isinstance(n, ast.Name) and n.id == name]
+        targets = [n for target in statement.targets for n in ast.walk(target)
+                   if isinstance(n, ast.Name) and n.id == name]
         return targets[0] if len(targets) == 1 and isinstance(targets[0].ctx, ast.Store) else None
 
     def _fits_within(self, statement: ast.stmt, name: str) -> bool:
