@@ -4,11 +4,12 @@ import ast
 
 import pytest
 
-from servotwin.simulation import bus_run, lane_runs, vector_calls
+from servotwin.simulation import bus_run, lane_recipes, vector_calls
 from servotwin.simulation.compile.derive import derive
 
-RECIPES = (bus_run.PLAIN_BUSES, bus_run.ALL_BUSES, bus_run.DIGITAL_BUSES, lane_runs.ALL_RUNS, lane_runs.PLAIN_RUNS,
-           lane_runs.ALL_DIGITAL, lane_runs.LOOK_DIGITAL, lane_runs.BY_TICKS, vector_calls.TICKS)
+RECIPES = (bus_run.PLAIN_BUSES, bus_run.ALL_BUSES, bus_run.DIGITAL_BUSES, lane_recipes.ALL_RUNS,
+           lane_recipes.PLAIN_RUNS, lane_recipes.ALL_DIGITAL, lane_recipes.LOOK_DIGITAL, lane_recipes.BY_TICKS,
+           vector_calls.TICKS)
 
 
 @pytest.fixture(scope="module", params=RECIPES, ids=lambda recipe: recipe.name)

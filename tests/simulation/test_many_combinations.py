@@ -1,11 +1,14 @@
 """The compiled form against the plain one in every combination of features, and against itself at other outputs."""
 
 import itertools
+from dataclasses import fields
 
 import numpy as np
 import pytest
 
 import servotwin as st
+from servotwin.errors import CommandError, ParameterError
+from servotwin.parameters import GROUPS
 
 # What a feature sets where it is on; where it is off, a number that leaves it out.
 FEATURES = {
@@ -26,6 +29,11 @@ TIMES = np.linspace(0.0, 0.2, 9)
 COMMAND = st.signals.samples([0.0, 0.05, 0.11, 0.15], [1000.0, 1700.0, 2100.0, 1500.0], unit="us")
 LOAD = st.loads.Constant(0.1) + st.loads.Coulomb(0.02) + st.loads.Inertia(1e-3)
 
+PROGRAM = {"firmware.control_period": 2e-3, "firmware.proportional_gain": 9.0}
+DECLARED = {f"{group}.{field.name}": field.metadata for group, kind in GROUPS.items() for field in fields(kind)}
+TABLE = {"potentiometer.linearity_angle": [0.0, 1.0, 2.0], "potentiometer.linearity_error": [0.0, 0.01, -0.01]}
+ENDLESS = "potentiometer.fixed_angle"
+
 
 def lanes():
     """Return the parameters of all combinations."""
@@ -35,8 +43,8 @@ def lanes():
 
 
 @pytest.mark.parametrize(("kind", "changes", "every"), [  # any three features meet in all eight ways
-    (st.PulseServo, {}, 9), (st.PulseServo, {"electronics.stretcher_time_constant": 0.02}, 23),
-    (st.PulseServoInductive, {"motor.armature_inductance": 6e-4}, 23)], ids=["linear", "rc", "inductance"])
+    (st.PulseServo, {}, 13), (st.PulseServo, {"electronics.stretcher_time_constant": 0.02}, 33),
+    (st.PulseServoInductive, {"motor.armature_inductance": 6e-4}, 33)], ids=["linear", "rc", "inductance"])
 def test_every_combination_of_features(servo, kind, changes, every):
     model = kind(servo.replace(changes))
     parameters = lanes()
@@ -50,6 +58,60 @@ def test_every_combination_of_features(servo, kind, changes, every):
         np.testing.assert_allclose(batch["output_angle"][lane], plain["output_angle"], rtol=0.0, atol=1e-12,
                                    err_msg=str(own))
         np.testing.assert_array_equal(batch["drive"][lane], plain["drive"])
+
+
+def drawn(name, rng):
+    """Return a value of a parameter by its name, as it is declared: a word, or a number well inside its range."""
+    rule = DECLARED[name]["rule"]
+    if rule == "table":
+        return TABLE
+    if isinstance(rule, tuple):
+        return {name: str(rng.choice(rule))}
+    low, high, _ = DECLARED[name]["plausible"]
+    if low > 0.0:
+        value = low * (high / low) ** rng.uniform(0.3, 0.6)
+        return {name: float(round(value)) if low >= 1.0 and rng.integers(2) else value}  # it may be a count
+    return {name: high * 10.0 ** -rng.uniform(1.0, 2.0) * (rng.choice([-1.0, 1.0]) if low < 0.0 else 1.0)}
+
+
+def drawn_together(kind, name, rng):
+    """Return parameters: one that terms read, some of its group, and two of any."""
+    group = name.partition(".")[0]
+    near = [other for other in kind.optional if other.startswith(f"{group}.")]
+    others = (*rng.choice(near, min(rng.integers(4), len(near)), replace=False), *rng.choice(kind.optional, 2))
+    found = {}
+    for one in (name, *map(str, others)):
+        found |= drawn(one, rng)
+    if ENDLESS in found:  # a servo that turns without end has no stops
+        found = {one: value for one, value in found.items() if not one.startswith("stops.")}
+        found |= {f"stops.{one}": None for one in ("lower_angle", "upper_angle", "restitution")}
+    return found
+
+
+@pytest.mark.parametrize(("kind", "changes"), [(st.PulseServo, {}), (st.DigitalServo, PROGRAM)],
+                         ids=["pulse", "digital"])
+def test_whatever_terms_read(servo, kind, changes):
+    """Every parameter that the terms of a model name in `READS`, one of tomorrow too, meets some others."""
+    rng, moved = np.random.default_rng(2), 0
+    for name in kind.optional:
+        for _ in range(500):  # not all go together
+            try:
+                model = kind(servo.replace({**changes, "gear.output_inertia": 1e-3, **drawn_together(kind, name, rng)}))
+                R = model.value("motor.armature_resistance") * np.array([1.0, 1.05])
+                batch = st.simulate_many(model, COMMAND, duration=0.2, load=LOAD, output_times=TIMES, seeds=7,
+                                         parameters={"motor.armature_resistance": R})
+                break
+            except (ParameterError, CommandError):
+                continue
+        else:
+            pytest.fail(f"no servo has {name}")
+        plain = st.simulate(kind(model.servo.replace({"motor.armature_resistance": R[1].item()})), COMMAND,
+                            duration=0.2, load=LOAD, output_times=TIMES, seed=7)
+        assert batch.ok == plain.status.ok
+        np.testing.assert_allclose(batch["output_angle"][1], plain["output_angle"], rtol=0.0, atol=1e-9,
+                                   err_msg=name)
+        moved += bool(np.ptp(plain["output_angle"]) > 1e-2)
+    assert moved > 0.3 * len(kind.optional)
 
 
 def test_a_timeout_of_one_frame_is_renewed_by_every_edge(servo):

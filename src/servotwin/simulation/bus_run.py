@@ -20,14 +20,17 @@ from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import at_start
 from servotwin.models.engine.told import Tables
 from servotwin.models.terms import control
-from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.firmware import Firmware
-from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.source import Source
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
+from servotwin.simulation.compile.reading import in_general
 from servotwin.simulation.engine import Plan, State
+from servotwin.simulation.lane_kinds import Terms
 from servotwin.simulation.lane_memory import nothing_yet
-from servotwin.simulation.lane_runs import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS, programs_of
+from servotwin.simulation.lane_recipes import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS
+from servotwin.simulation.lane_runs import programs_of
 
 Array = NDArray[np.float64]
 
@@ -35,6 +38,7 @@ _ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("go_on", "
 ALL_BUSES = Recipe("buses", _ENTRIES, absent=ALL_RUNS.absent)
 PLAIN_BUSES = Recipe("plain_buses", _ENTRIES, absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never)
 DIGITAL_BUSES = Recipe("digital_buses", _ENTRIES, absent=ALL_DIGITAL.absent, present=ALL_DIGITAL.present)
+PLAIN, RARE, OTHER = 0, 1, 2  # terms of a servo: what the plain form follows, what others do, and neither
 SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 
 LOADS_FROM, COMPILES_FROM = 2e3, 6e4  # frames of servos in one process: about what it takes, in plain Python
@@ -56,9 +60,11 @@ class Rows(NamedTuple):
 def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration: float) -> Rows:
     """Run servos on one source from t = 0 to `duration` [s]."""
     digital = {plan.digital for plan in plans}
-    recipe = recipe_of(any(digital), any(not_plain(plan.numbers) for plan in plans))
+    recipe = recipe_of(any(digital), max(way_of(plan.numbers, plan.digital, False) for plan in plans))
     work = duration * sum(1.0 / (plan.firmware.T_c if plan.digital else plan.chip.frame_period) for plan in plans)
     compiled = len(digital) == 1 and _worth_it(recipe, work)  # no kernel has servos with a program beside others
+    if compiled:
+        recipe = recipe_of(any(digital), max(way_of(plan.numbers, plan.digital) for plan in plans))
     way = _Compiled(recipe, plans, states, source) if compiled else Plainly(plans, states, source)
     return taped(way, duration, tape_of(len(plans)))
 
@@ -87,11 +93,10 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
     return Rows(motions, events, numbers, int(status), float(when))
 
 
-def recipe_of(digital: bool, rare: Any) -> Recipe:
+def recipe_of(digital: bool, way: int) -> Recipe:
     """Return the kernels of servos on a bus: of programs, of servos with rare terms, or of plain ones."""
-    if digital:
-        return DIGITAL_BUSES
-    return ALL_BUSES if rare else PLAIN_BUSES
+    recipe = DIGITAL_BUSES if digital else PLAIN_BUSES if way == PLAIN else ALL_BUSES
+    return recipe if way <= RARE else in_general(recipe)
 
 
 def tape_of(servos: int) -> Tape:
@@ -101,16 +106,18 @@ def tape_of(servos: int) -> Tape:
                 np.empty(max(_NUMBERS, 64 * servos * ROOM)), np.zeros(3, np.int64))
 
 
-def not_plain(numbers: Numbers) -> Any:
-    """Tell of a servo, or of lanes, which have a term that the plain form leaves out."""
-    found: Any = False
-    for name in PLAIN_BUSES.absent:
-        term, _, field = name.partition(".")
-        if term in Numbers._fields:  # not of an input
-            neutral, own = getattr(NEUTRAL, term), getattr(numbers, term)
-            field = field or neutral._fields[0]
-            found = found | (getattr(own, field) != getattr(neutral, field))
-    return found
+def way_of(numbers: Numbers, digital: bool, knowing: bool = True) -> Any:
+    """Return whether a servo, or each of some lanes, has terms that the plain form leaves out or does not know.
+
+    With `knowing` it is asked too which numbers of its terms kernels know: `OTHER` has one that no form knows.
+    """
+    terms = Terms(numbers, NO_CHIP, NO_FIRMWARE, False)
+    if is_plain():  # a fast form has no worth
+        return OTHER
+    if not knowing:
+        return np.where(terms.suit(PLAIN_RUNS), PLAIN, RARE)
+    every = ALL_DIGITAL if digital else ALL_RUNS
+    return np.where(terms.fit(every), np.where(terms.fit(PLAIN_RUNS), PLAIN, RARE), OTHER)
 
 
 def _worth_it(recipe: Recipe, frames: float) -> bool:

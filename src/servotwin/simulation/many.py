@@ -19,7 +19,7 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.simulation.batch import Batch, Failure
 from servotwin.simulation.lane_inputs import Lanes, framed, lanes_of
-from servotwin.simulation.lane_runs import goes_together
+from servotwin.simulation.lane_kinds import goes_together
 from servotwin.simulation.lane_runs import run as run_lanes
 from servotwin.simulation.lanes import Raw, Work
 from servotwin.simulation.oddities import warn_of

@@ -16,7 +16,7 @@ from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import APART
 from servotwin.models.engine.told import Tables
 from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation.bus_run import not_plain, recipe_of, room_of, shared_of
+from servotwin.simulation.bus_run import recipe_of, room_of, shared_of, way_of
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
@@ -37,9 +37,8 @@ _WORTH = 4  # buses for a thread: fewer cost more in waking it
 def sets_of(numbers: LaneNumbers, threads: int, pool: Any) -> list[BusSet]:
     """Return the sets of all buses: those of plain servos, and others."""
     supplies = numbers.supplies
-    rare = not_plain(columns_of(Numbers, numbers.columns.numbers, slice(numbers.count)))
-    plain = [not np.any(np.broadcast_to(rare, numbers.count)[lanes]) for lanes in supplies.lanes]
-    ways = [recipe_of(numbers.digital, not own) for own in plain]
+    own = way_of(columns_of(Numbers, numbers.columns.numbers, slice(numbers.count)), numbers.digital)
+    ways = [recipe_of(numbers.digital, np.broadcast_to(own, numbers.count)[lanes].max()) for lanes in supplies.lanes]
     parts = ((recipe, [k for k, own in enumerate(ways) if own == recipe]) for recipe in dict.fromkeys(ways))
     return [BusSet(numbers, recipe, which, threads, pool) for recipe, which in parts]
 

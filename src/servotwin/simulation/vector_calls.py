@@ -13,10 +13,11 @@ from servotwin.models.engine import loop_tiles, tape
 from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.tape import Tape
-from servotwin.simulation import lane_runs
+from servotwin.simulation import lane_recipes
 from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.compile.layout import GIVEN, STAGES
+from servotwin.simulation.lane_kinds import looking
 from servotwin.simulation.lane_memory import nothing_yet
 from servotwin.simulation.lanes import ALL_FIELDS
 
@@ -100,7 +101,7 @@ def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[
         "impose": [call_of(TICKS, "impose_on_tiles", room.has, room.given, store.columns.numbers, which, places,
                            store.work, rows)],
         "advance": [advance, *lost], "show": [call_of(TICKS, "show_tiles", which, rows, room.shaft)],
-        "look": [call_of(lane_runs.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns, store.inputs[0], which, rows,
+        "look": [call_of(lane_recipes.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns, store.inputs[0], which, rows,
                          room.seen)]}
 
 
@@ -109,7 +110,7 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
     rows, which, alone = some.rows, some.which, _Alone(len(some.which))
     calm = list[Call]()
     if some.calms:
-        calm = [call_of(lane_runs.CALM, "go", store.columns, which, store.now, store.status, rows, some.done,
+        calm = [call_of(lane_recipes.CALM, "go", store.columns, which, store.now, store.status, rows, some.done,
                         returns=True)]
     gather = call_of(TICKS, "gather", which, store.status, store.now, some.done, some.memories, *alone.room,
                      returns=True)
@@ -121,8 +122,8 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
         "impose": [call_of(TICKS, "impose_on_records", room.has, room.given, store.columns.numbers, which,
                            np.arange(len(which)), store.work, rows)],
         "advance": advance, "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
-        "look": [call_of(lane_runs.looking(some.recipe), "one_by_one", store.columns, *store.inputs, which,
-                         some.memories, room.seen)]}
+        "look": [call_of(looking(some.recipe), "one_by_one", store.columns, *store.inputs, which, some.memories,
+                         room.seen)]}
     return found | _clock(some, store, room)
 
 
@@ -181,6 +182,6 @@ class _Alone:
         shared = (store.columns, *store.inputs, lanes, durations, _NONE, self._first, self._outputs, self.memories, how)
         calls = [call_of(recipe, "go_on", *shared, at),
                  call_of(TICKS, "note_failures", lanes, how, at, self.memories.rows, store.status, store.ended)]
-        if recipe == lane_runs.PLAIN_DIGITAL and not is_plain():
-            calls.insert(0, call_of(lane_runs.BY_TICKS, "go_on", *shared, loop_tiles.tile_room()))
+        if recipe == lane_recipes.PLAIN_DIGITAL and not is_plain():
+            calls.insert(0, call_of(lane_recipes.BY_TICKS, "go_on", *shared, loop_tiles.tile_room()))
         return calls

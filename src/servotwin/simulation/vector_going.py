@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from servotwin.models.engine import loop_tiles
 from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.tiles import Lanes
-from servotwin.simulation import lane_runs
+from servotwin.simulation import lane_recipes
 from servotwin.simulation.compile import Recipe, is_plain, kernels
 from servotwin.simulation.compile.calls import call_of
 from servotwin.simulation.first_ticks import to_first_ticks
@@ -43,9 +43,9 @@ class GoingOn:
         self._shared = (columns, *inputs, which, self._durations, np.zeros(0), self._first,
                         np.zeros((count, len(ALL_FIELDS), 0)), memories, self._status)
         self._calls = [call_of(recipe, "go_on", *self._shared, self._ended)]
-        self._ticking = recipe == lane_runs.PLAIN_DIGITAL and not is_plain()
+        self._ticking = recipe == lane_recipes.PLAIN_DIGITAL and not is_plain()
         if self._ticking:
-            self._calls.insert(0, call_of(lane_runs.BY_TICKS, "go_on", *self._shared, loop_tiles.tile_room()))
+            self._calls.insert(0, call_of(lane_recipes.BY_TICKS, "go_on", *self._shared, loop_tiles.tile_room()))
 
     def __call__(self, duration: float) -> tuple[Indices, Array]:
         """Let them go on for a time [s]; return status and end of each, until the next call."""

@@ -16,12 +16,14 @@ from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID
 from servotwin.models.engine.records import TILE, columns_of, room
 from servotwin.models.engine.ticks import ANGLE, SPEED
 from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation import lane_runs
+from servotwin.simulation import lane_recipes, lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
+from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of, looking
 from servotwin.simulation.lane_memory import copied, flat, memories_of, nothing_yet, put, put_back, put_memories, taken
-from servotwin.simulation.lane_runs import OneByOne, SideBySide, some_of
+from servotwin.simulation.lane_runs import some_of
 from servotwin.simulation.lanes import ALL_FIELDS
 from servotwin.simulation.vector_buses import BusSet, sets_of
 from servotwin.simulation.vector_calls import TICKS, asked, calls_in_records, calls_in_tiles
@@ -80,8 +82,10 @@ class Store:
     def _kinds_now(self) -> list[SideBySide | OneByOne]:
         numbers, lanes = self.numbers, slice(self.numbers.count)
         own = columns_of(Numbers, numbers.columns.numbers, lanes), columns_of(Chip, numbers.columns.chips, lanes)
-        kinds = lane_runs.kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
-                                   numbers.torque.count > 0, bool(numbers.curve.size))
+        programs = numbers.columns.firmware
+        kinds = kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
+                         numbers.torque.count > 0, bool(numbers.curve.size),
+                         Firmware(*(programs[name] for name in Firmware._fields)) if numbers.digital else NO_FIRMWARE)
         if numbers.supplies.lanes:
             bus_of = numbers.supplies.bus_of
             kinds = [kind._replace(which=kind.which[bus_of[kind.which] < 0]) for kind in kinds]
@@ -350,8 +354,8 @@ class _Tiles:
         return np.asarray(edge + since)
 
     def look(self, store: Store, seen: Array) -> None:
-        self._look = self._look or call_of(lane_runs.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns, store.inputs[0],
-                                           self.which, self.rows, seen)
+        self._look = self._look or call_of(lane_recipes.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns,
+                                           store.inputs[0], self.which, self.rows, seen)
         self._look()
 
     def calls(self, store: Store, room: Any, command: Array) -> dict[str, list[Any]]:
@@ -367,7 +371,7 @@ class _Records:
         self.memories = nothing_yet(len(self.which))
         self.rows = self.memories.rows
         self.done = np.zeros(len(self.which), np.int64)  # those that are through this call already
-        self.calms = (not numbers.pulsed and kind.recipe == lane_runs.PLAIN_RUNS
+        self.calms = (not numbers.pulsed and kind.recipe == lane_recipes.PLAIN_RUNS
                       and not numbers.torque.count[kind.which].any())
         self._calm: Call | None = None
         self._look: Call | None = None
@@ -376,8 +380,8 @@ class _Records:
     def calm(self, store: Store) -> NDArray[np.bool_]:
         """Let those go on that are through a tick without an event; tell which."""
         if self.calms:
-            self._calm = self._calm or call_of(lane_runs.CALM, "go", store.columns, self.which, store.now, store.status,
-                                               self.rows, self.done)
+            self._calm = self._calm or call_of(lane_recipes.CALM, "go", store.columns, self.which, store.now,
+                                               store.status, self.rows, self.done)
             self._calm()
         return np.asarray(self.done != 0)
 
@@ -412,7 +416,7 @@ class _Records:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
     def look(self, store: Store, seen: Array) -> None:
-        self._look = self._look or call_of(lane_runs.looking(self.recipe), "one_by_one", store.columns, *store.inputs,
+        self._look = self._look or call_of(looking(self.recipe), "one_by_one", store.columns, *store.inputs,
                                            self.which, self.memories, seen)
         self._look()
 

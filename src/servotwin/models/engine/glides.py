@@ -24,20 +24,8 @@ from servotwin.models.engine.modes import (
     Vector,
     at_rest,
 )
-from servotwin.models.terms import (
-    bridge,
-    control,
-    duty,
-    elastic,
-    friction,
-    heat,
-    load,
-    motor,
-    play,
-    sensor,
-    shaft,
-    source,
-)
+from servotwin.models.engine.motion import may_depend
+from servotwin.models.terms import bridge, control, duty, sensor, shaft, source
 from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE
 from servotwin.models.terms.motor import Motor
@@ -46,12 +34,15 @@ from servotwin.models.terms.sensor import sensed_voltage
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
 from servotwin.physics.motor import back_emf, electromagnetic_torque, steady_armature_current
+from servotwin.physics.pieces import Piece
 from servotwin.physics.potentiometer import feedback_voltage
 
 if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats
 
+GLIDES, STEPS = 0, 1  # from tick to tick: in this loop, or from event to event
 _MOST = 12  # changes of law within a tick
+_GIVEN = Piece()  # what a servo follows that a program drives
 
 
 class Body(NamedTuple):
@@ -80,13 +71,14 @@ class Way(NamedTuple):
 
 def possible(numbers: Numbers, inputs: Inputs) -> bool:
     """Tell whether a servo always moves so, end stops apart."""
-    if friction.smoothed(numbers.friction) or friction.varying(numbers.friction) or play.present(numbers.play):
+    if source.regulated(numbers.source) or sensor.slack(numbers.sensor) or len(inputs.torque) > 0:
         return False
-    if elastic.present(numbers.elastic) or motor.inductive(numbers.motor) or source.regulated(numbers.source):
-        return False
-    if heat.present(numbers.heat) or sensor.slack(numbers.sensor):
-        return False
-    return not (load.swings(numbers.load) or load.springy(numbers.load)) and len(inputs.torque) == 0
+    return may_depend(numbers, _GIVEN) == 0
+
+
+def way_of(numbers: Numbers, inputs: Inputs) -> int:
+    """Return which way a servo goes from tick to tick."""
+    return GLIDES if possible(numbers, inputs) else STEPS
 
 
 def body_of(numbers: Numbers, tau: float) -> Body:

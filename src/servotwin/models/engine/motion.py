@@ -18,8 +18,16 @@ from servotwin.models.engine.coefficients import (
 )
 from servotwin.models.engine.courses import Course, both
 from servotwin.models.engine.modes import (
+    BACKWARD,
     CONDUCTING,
+    CORE,
+    CURRENT_BACKWARD,
+    CURRENT_FORWARD,
+    FORWARD,
+    FREE,
     INSIDE,
+    LINEAR,
+    NO_CURRENT,
     NOWHERE,
     RIGID,
     Mode,
@@ -145,6 +153,16 @@ def dependence(numbers: Numbers, mode: Mode, u: Piece, still: bool) -> int:
             | friction.depends(numbers.friction, mode.contact) | play.depends(mode.mesh, still)
             | elastic.depends(numbers.elastic, still) | sensor.depends(numbers.sensor, numbers.source)
             | follower.depends(mode.zone, u))
+
+
+def may_depend(numbers: Numbers, u: Piece) -> int:
+    """Return on what the acceleration may depend while a servo moves, whichever way it slides and wherever it is."""
+    forward, backward = (CORE, CORE) if friction.smoothed(numbers.friction) else (FORWARD, BACKWARD)
+    mesh = INSIDE if play.present(numbers.play) else RIGID
+    return (dependence(numbers, Mode(LINEAR, forward, mesh, FREE, 0), u, False)
+            | dependence(numbers, Mode(CURRENT_FORWARD, forward, mesh, FREE, 0), u, False)
+            | dependence(numbers, Mode(CURRENT_BACKWARD, backward, mesh, FREE, 0), u, False)
+            | dependence(numbers, Mode(NO_CURRENT, backward, mesh, FREE, 0), u, False))
 
 
 def _closed(kind: int, numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector,

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from servotwin.models.engine import controller, glides, motion
+from servotwin.models.engine.glides import GLIDES
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
@@ -139,7 +140,7 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
             memory = counted_anew(memory)
             until = instant(pulsed, inputs, memory, until - (origin_of(memory) - origin))
             origin = origin_of(memory)
-        if firmware.present(inputs.firmware[0]) and glides.possible(numbers, inputs):
+        if firmware.present(inputs.firmware[0]) and glides.way_of(numbers, inputs) == GLIDES:
             memory, done = glides.go(numbers, inputs, memory, until, times, done, outputs)
             if memory.point.time >= until or due(memory):
                 continue

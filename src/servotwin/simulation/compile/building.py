@@ -208,7 +208,7 @@ def _made(recipe: Recipe, folder: Path, useless: set[Path]) -> Built | None:
                 there = path.exists() and path not in useless
                 problem = None if there else _compiled(recipe, translation.text, compiler, path)
             if problem is None:
-                _write(folder / index_name(recipe), json.dumps(said))
+                write(folder / index_name(recipe), json.dumps(said))
                 return Built(path, _functions(said))
         except OSError as error:
             problem = str(error)
@@ -266,7 +266,7 @@ def _tell() -> None:
     sys.stderr.flush()
 
 
-def _write(path: Path, text: str) -> None:
+def write(path: Path, text: str) -> None:
     """Write a file at once, so that nobody reads half of it."""
     handle, aside = tempfile.mkstemp(suffix=".tmp", dir=path.parent)
     with os.fdopen(handle, "w", encoding="utf-8") as file:

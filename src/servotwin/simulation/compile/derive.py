@@ -54,6 +54,10 @@ class Recipe:
         Constants that nothing will be equal to.
     present : tuple of str
         Numbers of terms that are positive in all that will run ("firmware.T_c").
+    knows : int
+        On what the acceleration may depend in what will run: flags of `terms.dependence`.
+    spares : tuple of str
+        Numbers of terms that it does well without, though other kernels read them: they act in what it leaves to them.
     by_numbers : bool
         Whether C calls the entries with their whole numbers, instead of with words.
     """
@@ -65,6 +69,8 @@ class Recipe:
     absent: tuple[str, ...] = ()
     never: tuple[str, ...] = ()
     present: tuple[str, ...] = ()
+    knows: int = -1
+    spares: tuple[str, ...] = ()
     by_numbers: bool = False
 
 

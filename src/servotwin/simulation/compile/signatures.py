@@ -168,7 +168,7 @@ def _hinted(function: str, name: str, hint: Any) -> Kind:
         return numbers[hint]
     if hasattr(hint, "_fields"):
         return _named(function, hint)
-    raise TranslationError(function, name, "an entry that takes records, or arrays of several dimensions, has a line in "
+    raise TranslationError(function, name, "an entry with records, or arrays of several dimensions, has a line in "
                                            "`signatures`")
 
 

@@ -1,0 +1,120 @@
+"""Which numbers of the terms a recipe's kernels do not know, told by which of their functions read them.
+
+What they do not know would be as if it were not there. They know a number that a function of their own reads, which the
+general form has not. Else all functions that read it in the general form have to be among them, and no function of
+their own may read what these read beside it: it would be another form of their law. Terms that a recipe leaves out are
+not known.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+from servotwin.models.engine import records
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.simulation.compile.building import shipped_folder, source_key, write
+from servotwin.simulation.compile.derive import Recipe, derive
+from servotwin.simulation.compile.inference import Module, Specialised
+from servotwin.simulation.compile.kinds import Kind, Record, Tuple
+from servotwin.simulation.compile.rewriting import flat_name
+from servotwin.simulation.compile.signatures import signatures
+from servotwin.simulation.compile.storage import cache_folder, key_of
+
+_Number = tuple[tuple[str, ...], str]  # the fields of its record, and its own name
+_RUNS = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
+_COPYING = flat_name(records.__name__, "")  # functions that only take records out of memory, or put them there
+
+
+@cache
+def told(recipe: Recipe) -> Recipe:
+    """Return a recipe that knows of its absent terms by their first numbers alone, and follows all others."""
+    absent = tuple(f"{name}.{getattr(NEUTRAL, name)._fields[0]}" if name in Numbers._fields else name
+                   for name in recipe.absent)
+    return replace(recipe, name=f"{recipe.name}_told", absent=absent)
+
+
+@cache
+def in_general(recipe: Recipe) -> Recipe:
+    """Return the recipe for what a form leaves out, in which no way of going on is chosen by terms that it knows."""
+    return replace(told(recipe), name=f"{recipe.name}_in_general", never=(*recipe.never, "GLIDES"))
+
+
+@cache
+def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return the numbers that the general form reads and a recipe's kernels do not know ("friction.K_m", "chip.beta").
+
+    With `of`, "module:function", it is asked of what these call alone. The answer is kept beside the kernels.
+    """
+    name = f"{recipe.name}-unread-{key_of(source_key(), repr((recipe, of)))}.json"
+    for folder in (shipped_folder(), cache_folder()):
+        with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
+            return tuple(map(str, json.loads((folder / name).read_text(encoding="utf-8"))["unread"]))
+    found = tuple(_unread(recipe, of))
+    with contextlib.suppress(OSError):  # to find it again costs its time alone
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        write(cache_folder() / name, json.dumps({"unread": found}))
+    return found
+
+
+def _unread(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
+    general = _readers(replace(in_general(recipe), entries=_RUNS, vector=False, single=False))
+    own = _readers(recipe if of else replace(recipe, never=(*recipe.never, "GLIDES")), of)  # glides are asked apart
+    by_itself = set().union(*(own[name] for name in own.keys() - general.keys()))
+    for path, key in _paths("", Numbers, ("chip", Chip), ("firmware", Firmware)):
+        there = {name for name, read in general.items() if key in read}
+        beside = {other for name in there for other in general[name] if other[0] == key[0]}
+        left_out = path.split(".")[0] in recipe.absent
+        if there and key not in by_itself and path not in recipe.spares and (
+                left_out or not there <= own.keys() or beside & by_itself):
+            yield path
+
+
+def _readers(recipe: Recipe, of: tuple[str, ...] = ()) -> dict[str, set[_Number]]:
+    """Return what each function reads that is called."""
+    derived = derive(recipe)
+    module = Module(derived)
+    waiting = [module.specialised(derived.entries[entry], kinds) for entry, kinds in signatures(recipe)]
+    if of:
+        names = {flat_name(*entry.split(":")) for entry in of}
+        waiting = [own for (name, _), own in module.known.items() if name in names]
+    found, seen = dict[str, set[_Number]](), set[Specialised]()
+    while waiting:
+        own = waiting.pop()
+        if own not in seen and not own.node.name.startswith(_COPYING):
+            seen.add(own)
+            waiting += own.calls.values()
+            found.setdefault(own.node.name, set()).update(_read_in(own))
+    return found
+
+
+def _read_in(own: Specialised) -> Iterator[_Number]:
+    """Return the numbers that a function reads, but for those that it hands on to the next record of their kind."""
+    nodes = list(ast.walk(own.node))
+    handed = {argument for node in nodes if isinstance(node, ast.Call) and node not in own.calls
+              for argument, name in zip(node.args, _fields(own.kinds.get(node)), strict=False)
+              if isinstance(argument, ast.Attribute) and argument.attr == name
+              and _fields(own.kinds.get(argument.value)) == _fields(own.kinds.get(node))}
+    return ((_fields(own.kinds.get(node.value)), node.attr) for node in nodes
+            if isinstance(node, ast.Attribute) and node not in handed)
+
+
+def _fields(kind: Kind | None) -> tuple[str, ...]:
+    """Return by what records are told apart: the names of their fields."""
+    return kind.fields if isinstance(kind, Tuple) else kind.dtype.names or () if isinstance(kind, Record) else ()
+
+
+def _paths(path: str, kind: Any, *more: tuple[str, Any]) -> Iterator[tuple[str, _Number]]:
+    """Return the numbers of a record and of those in it."""
+    for name, hint in (*records.fields_of(kind), *more):
+        if hasattr(hint, "_fields"):
+            yield from _paths(f"{path}{name}.", hint)
+        else:
+            yield f"{path}{name}", (kind._fields, name)

@@ -1,0 +1,180 @@
+"""Which kernels servos take: as it was written down when forms were chosen by the names of terms.
+
+How long many servos take hangs on it, and what has to be compiled at all.
+"""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+import servotwin as st
+from servotwin.models.engine.motion import may_depend
+from servotwin.models.engine.records import mapped
+from servotwin.models.terms.chip import NO_CHIP
+from servotwin.models.terms.firmware import NO_FIRMWARE
+from servotwin.physics.pieces import Piece
+from servotwin.simulation import lane_kinds
+from servotwin.simulation.lane_groups import by_groups
+
+NOBODY = np.zeros(1, np.bool_)
+PULSED = (st.PulseServo, st.PulseServoInductive)
+PROGRAM = {"firmware.control_period": 2e-3, "firmware.proportional_gain": 9.0}
+MEAN = {"electronics.bridge_gain": 40.0, "electronics.comparator_gain": 1.0, "electronics.pulse_to_voltage_gain": 735.0,
+        "electronics.command_offset": 0.1}
+FEATURES = {  # what the servo has, or a load
+    "play": {"gear.backlash": 0.01, "gear.output_inertia": 1e-3},
+    "spring": {"gear.stiffness": 30.0, "gear.output_inertia": 1e-3},
+    "coil": {"motor.armature_inductance": 5e-4},
+    "heat": {"thermal.winding_capacity": 5.0, "thermal.housing_capacity": 50.0, "thermal.winding_to_housing": 5.0,
+             "thermal.housing_to_ambient": 20.0},
+    "limit": {"supply.current_limit": 1.0},
+    "creep": {"friction.breakaway_ratio": 1.4, "friction.stribeck_speed": 5.0},
+    "share": {"friction.load_friction": 0.05},
+    "locks": {"friction.load_friction_motor": 1.2},
+    "slack": {"potentiometer.backlash": 0.01},
+    "steps": {"potentiometer.quantisation": 1e-3},
+    "bend": {"potentiometer.linearity_angle": [0.0, 1.0, 2.0], "potentiometer.linearity_error": [0.0, 0.01, -0.01]},
+    "coast": {"electronics.off_state": "coast"},
+    "silent": {"electronics.silence_state": "coast"},
+    "hangs": st.loads.Pendulum(mass=0.1, length=0.1),
+    "held": st.loads.Spring(stiffness=0.1, rest_angle=0.3),
+    "told": st.loads.Recorded([0.0, 9.0], [0.01, 0.02]),
+}
+NO_LOAD = st.loads.Inertia(1e-4) + st.loads.Constant(0.01)
+OF_PULSES = ("coil", "silent", "coast")
+
+# Sets of features by the kernels that servos took; what is not here took the general ones, a spring those of its own
+OF_ANALOG = {
+    "side_by_side_float64": "plain slack coast coast+silent",
+    "by_gaps": "play play+limit play+slack play+coast",
+    "by_coils": "coil coil+slack coil+coast",
+    "by_strides": (
+        "heat hangs held heat+slack heat+coast heat+hangs heat+held slack+hangs slack+held coast+hangs coast+held "
+        "hangs+held"),
+    "by_bands": "limit share limit+share limit+slack limit+coast share+slack share+coast slack+coast",
+    "by_bands_and_creep": "creep limit+creep creep+share creep+slack creep+coast",
+    "plain_runs": (
+        "steps bend silent told steps+bend steps+coast steps+silent steps+held steps+told bend+coast bend+silent "
+        "bend+held bend+told coast+told silent+held silent+told held+told"),
+    "gap_runs": "play+steps play+bend play+silent",
+    "by_strides_in_bands": (
+        "heat+limit heat+creep heat+share limit+hangs limit+held creep+hangs creep+held share+hangs share+held"),
+    "pendulum_runs": "steps+hangs bend+hangs silent+hangs hangs+told",
+}
+OF_DIGITAL = {
+    "plain_digital_runs": "plain steps bend held steps+bend steps+held bend+held",
+}
+OF_CATALOG = {
+    "by_bands": (
+        "dfrobot-df05bb dfrobot-dss-m15s emax-es08a emax-es08ma feetech-fs5103b futaba-s148 futaba-s3001 "
+        "futaba-s3004 futaba-s3305 gobilda-2000-135 gobilda-2000-67 gws-micro-2bbmg hextronik-hxt900 hitec-hs-300 "
+        "hitec-hs-322hd hitec-hs-325hb hitec-hs-422 hitec-hs-425bb hitec-hs-475hb hitec-hs-485hb hitec-hs-55 "
+        "hitec-hs-645mg hitec-hs-755mg hitec-hs-805bb hitec-hs-81 hitec-hs-85bb power-hd-hd-1501mg "
+        "unbranded-micro-13g"),
+    "plain_digital_runs": (
+        "dsservo-ds3218 dsservo-rds3115 dynamixel-xl330-m077 feetech-ft-7235 towerpro-mg995 towerpro-mg996r"),
+    "side_by_side_float64": "futaba-s3003 hitec-hs-311 hitec-hs-755hb towerpro-mg90s towerpro-sg90",
+}
+
+
+def form_of(model, load=NO_LOAD, dtype="float64", told=False, bent=False):
+    """Return the name of the kernels that a servo takes as a lane."""
+    pulsed = isinstance(model, PULSED)
+    (kind,) = lane_kinds.kinds_of(
+        model.pack(load), model.chip() if pulsed else NO_CHIP, 1, pulsed, dtype, NOBODY, NOBODY | told, bent,
+        model.firmware() or NO_FIRMWARE)
+    return kind.recipe.name
+
+
+def varied(servo, rng):
+    """Return a servo whose motor is up to a tenth off."""
+    return servo.replace({name: servo.get(name) * rng.uniform(0.9, 1.1) for name in servo.names()
+                          if name.startswith("motor.")})
+
+
+def combined(kind, servo, names, dtype, rng):
+    """Return the form that a servo takes with some features."""
+    own = {}
+    for name in names:
+        own |= FEATURES[name] if isinstance(FEATURES[name], dict) else {}
+    load = NO_LOAD
+    for name in names:
+        load = load + FEATURES[name] if not isinstance(FEATURES[name], dict) else load
+    if "coil" in names:
+        kind = st.PulseServoInductive
+    return form_of(kind(varied(servo.replace(own), rng)), load, dtype, "told" in names, "bend" in names)
+
+
+def expected(table, names, digital):
+    """Return what is written down for a set of features."""
+    if "spring" in names:
+        return "elastic_runs" + "_digital" * digital
+    told = "+".join(names) or "plain"
+    return next((form for form, sets in table.items() if told in sets.split()), "digital_runs" if digital else "runs")
+
+
+def pairs(without=()):
+    """Return all sets of up to two features that a servo may have."""
+    own = [name for name in FEATURES if name not in without]
+    return [names for count in range(3) for names in combinations(own, count) if names != ("share", "locks")]
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_analog_servos_take_the_forms_that_they_took(servo, dtype):
+    rng = np.random.default_rng(3)
+    for names in pairs():
+        form = expected(OF_ANALOG, names, False).replace("side_by_side_float64", f"side_by_side_{dtype}")
+        assert combined(st.PulseServo, servo, names, dtype, rng) == form, names
+
+
+def test_servos_without_pulses_take_the_forms_that_they_took(servo):
+    rng = np.random.default_rng(3)
+    for names in pairs(("coil", "silent")):  # only a load's are terms of theirs
+        form = "pendulum_runs" if "hangs" in names else "plain_runs"
+        assert combined(st.BoundedServo, servo.replace(MEAN), names, "float64", rng) == form, names
+
+
+def test_digital_servos_take_the_forms_that_they_took(servo):
+    rng = np.random.default_rng(3)
+    for names in pairs(OF_PULSES):
+        form = expected(OF_DIGITAL, names, True)
+        assert combined(st.DigitalServo, servo.replace(PROGRAM), names, "float64", rng) == form, names
+
+
+def test_servos_of_the_catalog_take_the_forms_that_they_took():
+    known = {name: form for form, names in OF_CATALOG.items() for name in names.split()}
+    for name in st.catalog_names():
+        servo = st.load_servo(name)
+        analog = servo.kind == "analog"
+        found = form_of((st.PulseServo if analog else st.DigitalServo)(servo))
+        assert found == known.get(name, "runs" if analog else "digital_runs"), name
+
+
+def test_no_servo_of_today_needs_kernels_that_are_not_made_beforehand(servo):
+    """They are there for terms to come that the others do not know."""
+    rng = np.random.default_rng(4)
+    own = [name for name in FEATURES if name not in (*OF_PULSES, "share")]
+    catalog = [st.load_servo(name) for name in st.catalog_names()]
+    programs = [servo.replace(PROGRAM), *(
+        one for one in catalog if one.kind != "analog" and "friction.load_friction" not in one.names())]
+    for _ in range(150):
+        names = rng.permutation(own)[:rng.integers(3, 7)].tolist()
+        digital = programs[rng.integers(len(programs))]
+        assert combined(st.DigitalServo, digital, names, "float64", rng) in (
+            "plain_digital_runs", "digital_runs", "elastic_runs_digital"), names
+
+
+def test_many_lanes_are_asked_what_each_of_them_is(servo):
+    rng, lanes = np.random.default_rng(5), 30
+    plain = st.PulseServo(servo).pack(NO_LOAD)
+
+    def column(value):
+        return np.where(rng.random(lanes) < 0.5, rng.choice([0.0, 0.5, 1.0, 2.0], lanes), value)
+
+    for _ in range(20):
+        numbers = mapped(lambda value: column(value) if rng.random() < 0.3 else value, plain)
+        found = by_groups(may_depend, lanes, numbers, Piece())
+        for k in range(lanes):
+            own = mapped(lambda value, k=k: value[k].item() if isinstance(value, np.ndarray) else value, numbers)
+            assert found[k] == may_depend(own, Piece())
