@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 
 from servotwin.simulation.compile.c_functions import MATH
-from servotwin.simulation.compile.inference import field_kind
+from servotwin.simulation.compile.kind_rules import field_kind
 from servotwin.simulation.compile.kinds import (
     BOOL,
     FLOAT32,

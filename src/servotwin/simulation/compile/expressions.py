@@ -5,13 +5,12 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
-
-import numpy as np
+from typing import Any, ClassVar, Protocol
 
 from servotwin.simulation.compile import c_functions
 from servotwin.simulation.compile.c_types import Types, bracketed, identifier, member
-from servotwin.simulation.compile.inference import Specialised, constant_int, ordered_arguments
+from servotwin.simulation.compile.inference import Specialised
+from servotwin.simulation.compile.kind_rules import constant_int
 from servotwin.simulation.compile.kinds import (
     BOOL,
     FLOAT32,
@@ -41,7 +40,15 @@ class Functions(Protocol):
 
 
 class Expressions:
-    """The expressions of one function."""
+    """The expressions of one function, but for calls.
+
+    Attributes
+    ----------
+    printers : dict
+        What prints each kind of expression.
+    """
+
+    printers: ClassVar[dict[type[ast.expr], Callable[[Any, Any], str]]] = {}
 
     def __init__(self, printer: Functions, own: Specialised) -> None:
         self._printer, self._own, self._types = printer, own, printer.types
@@ -49,7 +56,7 @@ class Expressions:
 
     def of(self, node: ast.expr) -> str:
         """Return an expression."""
-        return _EXPRESSIONS[type(node)](self, node)
+        return self.printers[type(node)](self, node)
 
     def kind(self, node: ast.expr) -> Any:
         """Return the kind of an expression."""
@@ -88,7 +95,7 @@ class Expressions:
         return self._types.literal(node.value)
 
     def _tuple(self, node: ast.Tuple) -> str:
-        self._in_order(node.elts, node)
+        self.in_order(node.elts, node)
         kind = self.kind(node)
         return self._types.made(kind, [self.of(element) for element in node.elts])
 
@@ -102,14 +109,15 @@ class Expressions:
             place = f"{text[1:]}.{identifier(node.attr)}" if text.startswith("&") else (
                 f"{bracketed(text)}->{identifier(node.attr)}")
             return f"&{place}" if isinstance(self.kind(node), Record) else place
-        lengths = self._lengths(text, owner)
+        lengths = self.lengths(text, owner)
         if node.attr == "size":
             return f"({' * '.join(lengths)})" if len(lengths) > 1 else lengths[0]
         kind = self.kind(node)
         return self._types.made(kind, lengths)
 
     @staticmethod
-    def _lengths(text: str, owner: Array | Fixed) -> list[str]:
+    def lengths(text: str, owner: Array | Fixed) -> list[str]:
+        """Return the lengths of an array."""
         if isinstance(owner, Fixed):
             return [f"INT64_C({length})" for length in owner.shape]
         return [f"{member(text, 'n')}[{k}]" for k in range(owner.dimensions)]
@@ -125,7 +133,7 @@ class Expressions:
             text = self._types.converted(text, owner, Tuple(owner.elements))
             return f"{member(text, 'v')}[{self.of(index)}]"
         places = index.elts if isinstance(index, ast.Tuple) else [index]
-        lengths = self._lengths(text, owner)
+        lengths = self.lengths(text, owner)
         texts = []
         for place, length in zip(places, lengths, strict=False):
             known = self._known(place)
@@ -134,7 +142,7 @@ class Expressions:
 
     def item(self, text: str, owner: Array | Fixed, places: list[str]) -> tuple[str, Kind]:
         """Return an element or a row of an array."""
-        lengths = self._lengths(text, owner) if isinstance(owner, Array) else [str(n) for n in owner.shape]
+        lengths = self.lengths(text, owner) if isinstance(owner, Array) else [str(n) for n in owner.shape]
         linear = places[0]
         for length, place in zip(lengths[1:len(places)], places[1:], strict=True):
             linear = f"{bracketed(linear)} * {length} + {bracketed(place)}"
@@ -170,7 +178,7 @@ class Expressions:
         return f"{name}({', '.join((self._types.converted(text, owner, array), *bounds))})"
 
     def _binary(self, node: ast.BinOp) -> str:
-        self._in_order([node.left, node.right], node)
+        self.in_order([node.left, node.right], node)
         kind = self.kind(node)
         if isinstance(kind, Tuple):
             return self._joined(node, kind)
@@ -204,7 +212,7 @@ class Expressions:
         return isinstance(node, ast.Constant) or (isinstance(node, ast.Name) and node.id not in self._own.local)
 
     def _joined(self, node: ast.BinOp, kind: Tuple) -> str:
-        self._once(node.left, node.right)
+        self.once(node.left, node.right)
         left = self.kind(node.left)
         parts = [self._types.part(self.of(node.left), left, k) for k in range(len(left.elements))]
         right = self._own.kinds.get(node.right)
@@ -252,7 +260,7 @@ class Expressions:
 
     def _compare(self, node: ast.Compare) -> str:
         sides = [node.left, *node.comparators]
-        self._in_order(sides, node)
+        self.in_order(sides, node)
         if len(node.ops) == 2 and (self.writes(sides[2]) or _guarded(sides)):
             raise self._own.refused(node, "a chain that ends with an index or a call is written with `and`")
         if len(node.ops) == 1:
@@ -298,119 +306,13 @@ class Expressions:
         kind = self.kind(node)
         return f"({self.truth(node.test)} ? {self.as_(node.body, kind)} : {self.as_(node.orelse, kind)})"
 
-    def _call(self, node: Any) -> str:
-        if node in self._own.calls:
-            return self._own_call(node, self._own.calls[node])
-        self._in_order(node.args, node)
-        if isinstance(node.func, ast.Attribute):
-            return self._of_math(node, node.func.attr)
-        name = node.func.id
-        primitive = self._own.module.derived.primitives.get(name)
-        if primitive is not None:
-            return self._primitive(node, c_functions.PRIMITIVES[primitive])
-        value = self._own.space.get(name)
-        if isinstance(value, type) and hasattr(value, "_fields"):
-            return self._named_tuple(node, value)
-        return self._built_in(node, name)
-
-    def _own_call(self, node: ast.Call, called: Specialised) -> str:
-        ordered = ordered_arguments(called.node, node)
-        self._in_order(ordered, node)
-        name = self._printer.name_of(called)
-        parts = []
-        for argument, kind in zip(ordered, called.arguments, strict=True):
-            text = self.of(argument)
-            parts.append(self._address(text, kind) if by_pointer(kind) else text)
-        return f"{name}({', '.join(parts)})"
-
-    def _address(self, text: str, kind: Kind) -> str:
-        """Return the address of a tuple, of a copy where it has none."""
-        if text.startswith("(*") and text.endswith(")") and "(" not in text[2:]:
-            return text[2:-1]
-        if text.replace("_", "").replace(".", "").replace("->", "").replace("[", "").replace("]", "").isalnum():
-            return f"&{text}"
-        return f"({self._types.of(kind)}[1]){{{text}}}"
-
-    def _named_tuple(self, node: ast.Call, class_: Any) -> str:
-        values: dict[str, ast.expr] = dict(zip(class_._fields, node.args, strict=False))
-        values |= {k.arg: k.value for k in node.keywords if k.arg is not None}
-        kind = self.kind(node)
-        self._in_order(list(values.values()), node)
-        return self._types.made(kind, [
-            self.of(values[name]) if name in values else self._types.literal(class_._field_defaults[name])
-            for name in class_._fields])
-
-    def _primitive(self, node: ast.Call, primitive: c_functions.Primitive) -> str:
-        kind = self.kind(node)
-        if primitive.result is None and isinstance(kind, Scalar):
-            texts = [self.as_(argument, kind) for argument in node.args]
-        else:
-            texts = [self.of(argument) for argument in node.args]
-        return primitive.text.format(*texts, s="f" * (kind == FLOAT32), n=len(texts) - 1, all=", ".join(texts))
-
-    def _of_math(self, node: ast.Call, name: str) -> str:
-        kinds = [self.kind(argument) for argument in node.args]
-        kind = FLOAT32 if FLOAT32 in kinds and FLOAT64 not in kinds else FLOAT64
-        text = ", ".join(self.as_(argument, kind) for argument in node.args)
-        single = "f" * (kind == FLOAT32)
-        if name in c_functions.ROUNDED:
-            if kinds[0] not in (FLOAT64, FLOAT32):
-                return self.as_(node.args[0], INT64)
-            return f"whole({c_functions.ROUNDED[name]}{single}({text}))"
-        if name in c_functions.TRUTHS:
-            return f"({c_functions.TRUTHS[name]}({text}) != 0)"
-        return f"{c_functions.MATH[name]}{single}({text})"
-
-    def _built_in(self, node: ast.Call, name: str) -> str:
-        argument = node.args[0]
-        kind, own = self.kind(argument), self.kind(node)
-        if name == "_f" and (number := _number(argument)) is not None:
-            return self._types.literal(number if own == FLOAT64 else np.float32(number))
-        if name in ("float", "_f"):
-            return self.as_(argument, own)
-        if name == "bool":
-            return self._types.converted(self.of(argument), kind, BOOL)
-        if name in ("int", "round") and kind not in (FLOAT64, FLOAT32):
-            return self.as_(argument, INT64)
-        if name == "int":
-            return f"whole({self.of(argument)})"
-        if name == "round":
-            return f"whole(NEAREST({self.as_(argument, FLOAT64)}))"
-        if name == "len":
-            return str(len(kind.elements)) if isinstance(kind, Tuple) else self._lengths(
-                self.of(argument), kind)[0]
-        if name == "abs":
-            return f"fabs{'f' * (own == FLOAT32)}({self.of(argument)})" if own != INT64 else (
-                f"llabs({self.as_(argument, INT64)})")
-        return self._extreme(node, name, kind, own)
-
-    def _extreme(self, node: ast.Call, name: str, first: Kind | None, own: Any) -> str:
-        """Return the least or largest of some values, as Python finds it: the first one where others are no better."""
-        if len(node.args) == 1 and isinstance(first, Tuple):
-            self._once(node.args[0])
-            text = self.of(node.args[0])
-            parts = [self._types.converted(self._types.part(text, first, k), kind, own)
-                     for k, kind in enumerate(first.elements)]
-        else:
-            parts = [self.as_(argument, own) for argument in node.args]
-        sign = "<" if name == "min" else ">"
-
-        def make(own_name: str) -> str:
-            return f"INLINED {own.c} {own_name}({own.c} a, {own.c} b) {{ return b {sign} a ? b : a; }}"
-
-        helper = self._types.helper((name, own), f"{name}_{own.c}", make)
-        text, *rest = parts
-        for part in rest:
-            text = f"{helper}({text}, {part})"
-        return text
-
-    def _in_order(self, parts: Sequence[ast.expr], node: ast.expr) -> None:
+    def in_order(self, parts: Sequence[ast.expr], node: ast.expr) -> None:
         """Refuse what Python works out from left to right, and C in any order, where that makes a difference."""
         writing = [part for part in parts if self.writes(part)]
         if writing and any(part is not writing[0] and not self._is_settled(part) for part in parts):
             raise self._own.refused(node, "a call that changes records or arrays gets a statement of its own")
 
-    def _once(self, *parts: ast.expr) -> None:
+    def once(self, *parts: ast.expr) -> None:
         """Refuse what would be called more than once."""
         if any(map(self.writes, parts)):
             raise self._own.refused(parts[0], "a call that changes records or arrays gets a statement of its own")
@@ -447,17 +349,8 @@ def by_pointer(kind: Kind | None) -> bool:
     return isinstance(kind, Tuple) and len(kind.elements) > 0
 
 
-def _number(node: ast.expr) -> float | None:
-    """Return a literal, or an infinity."""
-    if isinstance(node, ast.Constant) and isinstance(node.value, (int, float)):
-        return float(node.value)
-    if isinstance(node, ast.Attribute) and node.attr == "inf":
-        return math.inf
-    return None
-
-
-_EXPRESSIONS: dict[type[ast.expr], Callable[[Expressions, Any], str]] = {
+Expressions.printers |= {
     ast.Name: Expressions._name, ast.Constant: Expressions._constant_value, ast.Tuple: Expressions._tuple,
     ast.Attribute: Expressions._attribute, ast.Subscript: Expressions._subscript, ast.BinOp: Expressions._binary,
     ast.UnaryOp: Expressions._unary, ast.BoolOp: Expressions._boolean, ast.Compare: Expressions._compare,
-    ast.IfExp: Expressions._conditional, ast.Call: Expressions._call}
+    ast.IfExp: Expressions._conditional}

@@ -8,14 +8,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from servotwin.simulation.compile.c_types import Types, bracketed, identifier, member
-from servotwin.simulation.compile.expressions import ARITHMETIC, Expressions, by_pointer
-from servotwin.simulation.compile.inference import (
-    Specialised,
-    constant_int,
-    dimensions,
-    is_range,
-    list_length,
-)
+from servotwin.simulation.compile.call_expressions import CallExpressions
+from servotwin.simulation.compile.expressions import ARITHMETIC, by_pointer
+from servotwin.simulation.compile.inference import Specialised
+from servotwin.simulation.compile.kind_rules import constant_int, dimensions, is_range, list_length
 from servotwin.simulation.compile.kinds import (
     FLOAT32,
     FLOAT64,
@@ -60,7 +56,7 @@ class Printer:
         return self._names[function]
 
 
-class _Text(Expressions):
+class _Text(CallExpressions):
     """The text of one function."""
 
     def __init__(self, printer: Printer, own: Specialised) -> None:

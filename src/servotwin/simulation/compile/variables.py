@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 
-from servotwin.simulation.compile.inference import Specialised, is_range
+from servotwin.simulation.compile.inference import Specialised
+from servotwin.simulation.compile.kind_rules import is_range
 
 
 class Variables:
