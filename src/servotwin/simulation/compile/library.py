@@ -176,7 +176,7 @@ def _is_cut_off(path: Path) -> bool:
     if len(head) < 64 or head[:4] != b"\x7fELF":
         return False
     start, (each, count) = int.from_bytes(head[40:48], sys.byteorder), struct.unpack_from("2H", head, 58)
-    return size < start + each * count
+    return bool(size < start + each * count)
 
 
 # --- arguments --------------------------------------------------------------------------------------------------------
