@@ -112,7 +112,8 @@ def main() -> None:
     compiler = crossing or compilers()[0]
     own = host(compiler is crossing)
     targets = list(TARGETS.values()) if given.all else [own]
-    print(f"{len(all_recipes())} recipes for {len(targets)} target{'s'[:len(targets) > 1]}, by {compiler.identity}",
+    told = crossing.identity if crossing else compiler.command[0]
+    print(f"{len(all_recipes())} recipes for {len(targets)} target{'s'[:len(targets) > 1]}, by {told}",
           flush=True)
     start = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="servotwin-wheel-") as name:
