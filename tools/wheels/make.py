@@ -49,7 +49,7 @@ def compiled(recipe: Recipe, compiler: Compiler, targets: Sequence[Target], fold
         command = (*compiler.command, *(("-target", target.triple) if target.triple else ()))
         for level in target.levels_for(recipe):
             made = Path(tempfile.mkdtemp(dir=folder)) / f"{recipe.name}-{level}{target.suffix}"
-            # No path in its name: macOS notes it in the library
+            # Named without its folder, which macOS would note in the library
             call = replace(compiler, command=command).library_command(source, Path(made.name), recipe.vector, level)
             done = subprocess.run(call, capture_output=True, text=True, check=False, cwd=made.parent,
                                   env=compiler.environment() | own)
