@@ -105,7 +105,7 @@ def examples(arguments: list[str]) -> None:
 
 def wheel(arguments: list[str]) -> None:
     """Make the wheel for this machine and try it; with `--all` make those for all machines, and try none."""
-    install("wheels")
+    install("wheels,compile")
     shutil.rmtree(ROOT / "dist", ignore_errors=True)
     run("python", "tools/wheels/make.py", *arguments)
     if "--all" not in arguments:

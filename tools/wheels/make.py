@@ -49,7 +49,8 @@ def compiled(recipe: Recipe, compiler: Compiler, targets: Sequence[Target], fold
         command = (*compiler.command, *(("-target", target.triple) if target.triple else ()))
         for level in target.levels_for(recipe):
             made = Path(tempfile.mkdtemp(dir=folder)) / f"{recipe.name}-{level}{target.suffix}"
-            call = replace(compiler, command=command).library_command(source, made, recipe.vector, level)
+            # Named without its folder, which macOS would note in the library
+            call = replace(compiler, command=command).library_command(source, Path(made.name), recipe.vector, level)
             done = subprocess.run(call, capture_output=True, text=True, check=False, cwd=made.parent,
                                   env=compiler.environment() | own)
             if done.returncode != 0:
@@ -112,7 +113,8 @@ def main() -> None:
     compiler = crossing or compilers()[0]
     own = host(compiler is crossing)
     targets = list(TARGETS.values()) if given.all else [own]
-    print(f"{len(all_recipes())} recipes for {len(targets)} target{'s'[:len(targets) > 1]}, by {compiler.identity}",
+    told = crossing.identity if crossing else compiler.command[0]
+    print(f"{len(all_recipes())} recipes for {len(targets)} target{'s'[:len(targets) > 1]}, by {told}",
           flush=True)
     start = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="servotwin-wheel-") as name:

@@ -10,15 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from servotwin.simulation import bus_run, lane_runs, vector_calls
-from servotwin.simulation.compile import Recipe, calls
 from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.c_types import identifier
 from servotwin.simulation.compile.translate import header
+from servotwin.simulation.recipes import all_recipes
 
-RECIPES = {recipe.name: recipe for module in (lane_runs, bus_run, vector_calls, calls)
-           for value in vars(module).values()
-           for recipe in (value.values() if isinstance(value, dict) else (value,)) if isinstance(recipe, Recipe)}
+RECIPES = {recipe.name: recipe for recipe in all_recipes()}
 STRICT = ("-std=c99", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fopenmp-simd", "-ffp-contract=off", "-c")
 ROOT = Path(__file__).parents[3]
 HARNESS = Path(__file__).with_name("harness")
