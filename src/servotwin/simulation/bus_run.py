@@ -41,7 +41,7 @@ DIGITAL_BUSES = Recipe("digital_buses", _ENTRIES, absent=ALL_DIGITAL.absent, pre
 PLAIN, RARE, OTHER = 0, 1, 2  # terms of a servo: what the plain form follows, what others do, and neither
 SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 
-LOADS_FROM, COMPILES_FROM = 2e3, 6e4  # frames of servos in one process: about what it takes, in plain Python
+LOADS_FROM, COMPILES_FROM = 1e2, 1.5e4  # frames of servos in one process: what it takes, and more, in plain Python
 _INTEGRATED = 8  # a servo that does not move by plain laws takes so many times as long
 _ROWS, _NUMBERS = 4096, 1 << 17  # of a tape
 _frames_run: dict[str, float] = {}  # in plain Python, of what each recipe would do
