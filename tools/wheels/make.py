@@ -24,6 +24,8 @@ from targets import TARGETS, Target, host
 from servotwin.simulation.compile import Recipe, source_key
 from servotwin.simulation.compile.building import index, index_name, printed, shipped_folder
 from servotwin.simulation.compile.compilers import Compiler, compilers
+from servotwin.simulation.compile.reading import unread
+from servotwin.simulation.lane_recipes import parts_of
 from servotwin.simulation.recipes import all_recipes
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,6 +58,16 @@ def compiled(recipe: Recipe, compiler: Compiler, targets: Sequence[Target], fold
             if done.returncode != 0:
                 raise RuntimeError(f"{' '.join(call)}\n{done.stderr}")
             made.replace(into / made.name)  # alone: for Windows, what lies beside it is for linkers
+
+
+def note_unread(folder: Path) -> None:
+    """Write down which numbers kernels do not know, which takes a second for each recipe, as a cache has it."""
+    kept = os.environ.get("SERVOTWIN_CACHE_DIR")
+    os.environ["SERVOTWIN_CACHE_DIR"] = str(folder)
+    for recipe in all_recipes():
+        for part in parts_of(recipe):
+            unread(*part)
+    os.environ.pop("SERVOTWIN_CACHE_DIR") if kept is None else os.environ.update(SERVOTWIN_CACHE_DIR=kept)
 
 
 def pure(folder: Path) -> Path:
@@ -124,7 +136,9 @@ def main() -> None:
         unpacked = pure(folder)
         with ProcessPoolExecutor(AT_ONCE) as pool:
             list(pool.map(partial(compiled, compiler=compiler, targets=targets, folder=folder), all_recipes()))
+        note_unread(folder / "unread")
         for target in targets:
+            shutil.copytree(folder / "unread", folder / target.tag, dirs_exist_ok=True)
             wheel = packed(unpacked, folder / target.tag, target, given.out)
             size = wheel.stat().st_size
             print(f"{wheel}: {size / 1e6:.1f} MB, {', '.join(target.levels)}; "
