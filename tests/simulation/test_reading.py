@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from servotwin.simulation.compile import reading
+from servotwin.simulation.compile import reading, unread
 from servotwin.simulation.lane_recipes import GAP_RUNS, PLAIN_RUNS, side_by_side
 
 BY_GAPS = side_by_side(5, "float64", False, False)
-find = reading.unread.__wrapped__  # without its own memory
+find = unread.unread.__wrapped__  # without its own memory
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def test_it_is_found_once_on_a_machine(folder, monkeypatch):
     before = find(PLAIN_RUNS)
     (file,) = folder.iterdir()
     assert tuple(json.loads(file.read_text())["unread"]) == before
-    monkeypatch.setattr(reading, "_unread", None)
+    monkeypatch.setattr(reading, "unread_numbers", None)
     assert find(PLAIN_RUNS) == before
 
 
@@ -49,5 +49,5 @@ def test_what_came_with_the_package_comes_first(folder, tmp_path, monkeypatch):
     find(PLAIN_RUNS)
     (file,) = folder.iterdir()
     (tmp_path / file.name).write_text('{"unread": ["shaft.J"]}')
-    monkeypatch.setattr(reading, "shipped_folder", lambda: tmp_path)
+    monkeypatch.setattr(unread, "shipped_folder", lambda: tmp_path)
     assert find(PLAIN_RUNS) == ("shaft.J",)

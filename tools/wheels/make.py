@@ -22,9 +22,10 @@ from pathlib import Path
 from targets import TARGETS, Target, host
 
 from servotwin.simulation.compile import Recipe, source_key
-from servotwin.simulation.compile.building import index, index_name, printed, shipped_folder
+from servotwin.simulation.compile.building import index, printed
 from servotwin.simulation.compile.compilers import Compiler, compilers
-from servotwin.simulation.compile.reading import unread
+from servotwin.simulation.compile.finding import index_name, shipped_folder
+from servotwin.simulation.compile.unread import unread
 from servotwin.simulation.lane_recipes import parts_of
 from servotwin.simulation.recipes import all_recipes
 

@@ -18,7 +18,7 @@ from servotwin.loads import as_load
 from servotwin.models import PulseServo, PulseServoInductive, mid_travel
 from servotwin.simulation import simulate, simulate_many
 from servotwin.simulation.lane_inputs import LAWS
-from servotwin.units import is_finite
+from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -229,7 +229,7 @@ def _frequencies(model: Model, frequencies: ArrayLike) -> Array:
 
 
 def _array(what: str, values: ArrayLike) -> Array:
-    if np.ma.is_masked(values):  # what the mask hides would count
+    if is_masked(values):  # what the mask hides would count
         raise InputError(what, got="a masked array", allowed="numbers, none of them masked")
     try:
         array = np.array(values, dtype=np.float64)

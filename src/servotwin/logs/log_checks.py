@@ -13,7 +13,7 @@ from servotwin.logs.columns import UNITS
 from servotwin.parameters import GROUPS
 from servotwin.parameters.group import AT_LEAST_ONE, FRACTION, NOT_NEGATIVE, POSITIVE
 from servotwin.parameters.servo import check_name, unit_of
-from servotwin.units import is_finite
+from servotwin.units import is_finite, is_masked
 
 FEWEST = 3  # samples
 _Kind = TypeVar("_Kind", bound=np.generic)
@@ -189,7 +189,7 @@ def _numbers(what: str, values: object) -> NDArray[np.float64]:
         y = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise InputError(what, got="values that are no numbers", allowed="an array of numbers") from None
-    if np.ma.is_masked(values):  # what a mask hides would count
+    if is_masked(values):  # what a mask hides would count
         raise InputError(what, got="a masked array", allowed="numbers, nan where nothing was measured")
     if y.ndim != 1:
         raise InputError(what, got=f"an array of shape {y.shape}", allowed="an array with one dimension")

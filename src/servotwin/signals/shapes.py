@@ -14,6 +14,7 @@ from servotwin.physics.pieces import Piece, Pieces, constant_pieces
 from servotwin.signals.signal import KINDS, Signal, in_si, kind_of
 from servotwin.signals.silence import filled, spans
 from servotwin.signals.time_base import warn_of_time_base
+from servotwin.units import is_masked
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -245,7 +246,7 @@ def _arrays(time: ArrayLike, value: ArrayLike, unit: str, what: str, *,
     if t.size == 0:
         raise CommandError(what, got="no samples", allowed="at least one")
     for name, a, given in (("time", t, time), ("value", y, value)):
-        if np.ma.is_masked(given):  # what a mask hides would count
+        if is_masked(given):  # what a mask hides would count
             raise CommandError(f"{what}: {name}", got="a masked array", allowed="numbers, none of them masked")
         nan = np.isnan(a) if silent and a is y else np.zeros(a.shape, np.bool_)
         if nan.all():

@@ -25,7 +25,7 @@ from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.source import Source
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
-from servotwin.simulation.compile.reading import in_general
+from servotwin.simulation.compile.unread import in_general
 from servotwin.simulation.engine import Plan, State
 from servotwin.simulation.lane_kinds import Terms
 from servotwin.simulation.lane_memory import nothing_yet

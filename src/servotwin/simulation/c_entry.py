@@ -129,7 +129,7 @@ class CEntry:
             if name not in TICK[4:]:
                 raise InputError(f"tick({name})", allowed="one of " + ", ".join(TICK[4:]))
             kind = np.int8 if name == "status" else np.float64
-            plain = isinstance(array, np.ndarray) and not np.ma.isMaskedArray(array)
+            plain = isinstance(array, np.ndarray) and not type(array).__module__.startswith("numpy.ma")
             good = plain and array.dtype == kind and array.shape == (self.lanes,) and array.flags.c_contiguous
             if not (good and (name in GIVEN or array.flags.writeable)):
                 allowed = f"an array ({self.lanes},) of {kind.__name__}, its numbers in a row"

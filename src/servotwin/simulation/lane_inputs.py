@@ -18,7 +18,7 @@ from servotwin.parameters.groups import check_columns
 from servotwin.signals import Signal
 from servotwin.signals.signal import headers
 from servotwin.simulation.lane_loads import LOAD_NAMES, check_number, with_numbers
-from servotwin.units import is_finite
+from servotwin.units import is_finite, is_masked
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -146,7 +146,7 @@ def pick(lanes: Any, count: int) -> Indices:
     array = np.atleast_1d(_array(lanes))
     if array.dtype == np.bool_ and array.shape == (count,):
         return np.flatnonzero(array)
-    if array.ndim != 1 or array.dtype.kind not in "iu" or np.ma.is_masked(lanes):
+    if array.ndim != 1 or array.dtype.kind not in "iu" or is_masked(lanes):
         raise InputError("lanes", got=lanes if array.size < 20 else f"an array of shape {array.shape}",
                          allowed=f"a mask of {count} lanes, or numbers of lanes from 0 to {count - 1}")
     bad = (array < 0) | (array >= count)
@@ -205,7 +205,7 @@ def _value(name: str, value: Any) -> Any:
 
 def _numbers(what: str, values: Any) -> Any:
     """Return one number, or one per lane as an array (B,) of floats."""
-    if np.ma.is_masked(values):  # what the mask hides would count
+    if is_masked(values):  # what the mask hides would count
         raise InputError(what, got="a masked array", allowed="numbers, none of them masked")
     array = _array(values)
     if array.ndim > 1:
@@ -228,7 +228,7 @@ def _array(values: Any) -> NDArray[Any]:
 
 def _seeds(seeds: Any) -> Indices:
     array = _array(seeds)
-    if (array.ndim > 1 or array.dtype.kind not in "iu" or np.ma.is_masked(seeds)
+    if (array.ndim > 1 or array.dtype.kind not in "iu" or is_masked(seeds)
             or (array.size and array.max() > np.iinfo(np.int64).max)):
         raise InputError("seeds", got=seeds, allowed="a whole number of 64 bits with sign, or one per lane")
     return array.astype(np.int64)

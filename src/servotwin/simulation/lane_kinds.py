@@ -18,7 +18,7 @@ from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.physics.pieces import Piece
 from servotwin.simulation import lane_recipes as recipes
 from servotwin.simulation.compile import Recipe, is_plain
-from servotwin.simulation.compile.reading import in_general, told, unread
+from servotwin.simulation.compile.unread import in_general, told, unread
 from servotwin.simulation.lane_groups import by_groups
 
 Indices = NDArray[np.int64]

@@ -125,7 +125,7 @@ _PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), PLAIN_DIGITAL: ((PLAIN_DIG
 
 
 def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
-    """Return the kernels by which lanes of a form may go, as `compile.reading.unread` is asked of them.
+    """Return the kernels by which lanes of a form may go, as `compile.unread` is asked of them.
 
     Those that say by themselves whether they do follow all numbers.
     """

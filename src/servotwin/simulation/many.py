@@ -29,7 +29,7 @@ from servotwin.simulation.remarks import lane_remarks
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.times import times_asked
-from servotwin.units import is_finite
+from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
@@ -207,7 +207,7 @@ def _axis(name: str, values: ArrayLike) -> NDArray[Any]:
         axis = np.atleast_1d(np.asarray(values))
     except ValueError:  # rows of unequal lengths
         axis = np.empty((0, 0))
-    if axis.ndim != 1 or axis.size == 0 or np.ma.is_masked(values):
+    if axis.ndim != 1 or axis.size == 0 or is_masked(values):
         raise InputError(f"grid: {name}", got=values, allowed="a list of at least one value, none of them masked")
     return axis
 

@@ -29,7 +29,7 @@ from servotwin.simulation.vector_commands import Translator
 from servotwin.simulation.vector_memory import VectorMemory
 from servotwin.simulation.vector_numbers import LaneNumbers
 from servotwin.simulation.vector_store import SHAFT, Store
-from servotwin.units import is_finite
+from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
@@ -382,7 +382,7 @@ def numbers_of(name: str, values: Any, which: NDArray[np.int64]) -> Array:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         raise InputError(name, got=values, allowed="a number, or one number per lane") from None
-    if np.ma.is_masked(values) or array.shape not in ((), (len(which),)):
+    if is_masked(values) or array.shape not in ((), (len(which),)):
         raise InputError(name, got=f"an array of shape {array.shape}", allowed=f"a number, or an array ({len(which)},)")
     array = np.broadcast_to(array, which.shape)
     _check_lanes(name, array, which, np.isfinite(array), "a finite number")

@@ -14,6 +14,7 @@ from servotwin.models import AveragedServo, BoundedServo, DigitalServo
 from servotwin.models.base import PULSE_RANGE, TRAVEL_SLACK
 from servotwin.models.columns import LanePieces, LaneSignal
 from servotwin.simulation.packing import Chunk, flat
+from servotwin.units import is_masked
 
 if TYPE_CHECKING:
     from servotwin.models import Model
@@ -71,7 +72,7 @@ class Translator:
         if type(given) is float:
             good = scale.low < given < scale.high
         else:
-            if np.ma.is_masked(given):
+            if is_masked(given):
                 raise InputError(name, got="a masked array", allowed="numbers, none of them masked")
             try:
                 given = np.asarray(given, dtype=np.float64)

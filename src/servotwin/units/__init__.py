@@ -6,6 +6,7 @@ A unit belongs to a dimension; a value is converted with one factor (temperature
 from __future__ import annotations
 
 import math
+import sys
 from numbers import Real
 from typing import TypeGuard, overload
 
@@ -155,6 +156,18 @@ def is_finite(value: object) -> TypeGuard[float]:
         return not isinstance(value, bool) and isinstance(value, (float, Real)) and math.isfinite(value)
     except OverflowError:  # an integer beyond the range of a float
         return False
+
+
+def is_masked(values: object) -> bool:
+    """Tell whether something is an array of numpy's with masked elements, whose hidden numbers would count.
+
+    Examples
+    --------
+    >>> is_masked(np.ma.array([1.0, 2.0], mask=[False, True])), is_masked([1.0])
+    (True, False)
+    """
+    masked = sys.modules.get("numpy.ma")  # who has made one has loaded it, which takes as long as a first run
+    return masked is not None and bool(masked.is_masked(values))
 
 
 def _scaled(value: ArrayLike, by: float, *, divide: bool) -> float | NDArray[np.float64]:

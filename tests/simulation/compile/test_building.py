@@ -15,7 +15,7 @@ import pytest
 
 import servotwin
 from servotwin.models.engine.noise import gaussian
-from servotwin.simulation.compile import Recipe, building, compilers, kernels, library
+from servotwin.simulation.compile import Recipe, building, compilers, finding, kernels, library
 from servotwin.simulation.compile.compilers import compilers as at_hand
 
 RECIPE = Recipe("noise", ("servotwin.models.engine.noise:gaussian",))
@@ -180,7 +180,8 @@ HARM = {"empty": lambda path: path.write_bytes(b""), "cut off": cut, "cut off at
 def here(folder, monkeypatch):
     """Return that cache, for this process."""
     monkeypatch.setenv("SERVOTWIN_CACHE_DIR", str(folder))
-    monkeypatch.setattr(building, "compilers", lambda: tuple(filter(None, [compilers._program("cc")])))
+    for module in (building, finding):
+        monkeypatch.setattr(module, "compilers", lambda: tuple(filter(None, [compilers._program("cc")])))
     building._tell.cache_clear()
     return folder
 
@@ -282,9 +283,9 @@ def test_a_library_for_another_processor_is_not_loaded(tmp_path, monkeypatch):
         for features in ({}, {"AVX2": True, "FMA3": True, "F16C": True}):
             monkeypatch.setattr(compilers, "features", lambda features=features: features)
             compilers.level.cache_clear()
-            assert not building.is_ready(RECIPE)
-            (made, *_) = building.built(RECIPE)
-            assert building.is_ready(RECIPE)
+            assert not finding.is_ready(RECIPE)
+            (made, *_) = finding.built(RECIPE)
+            assert finding.is_ready(RECIPE)
             names.add(made.path.name)
         assert len(names) == (2 if compilers.levels()[0].startswith("x86") else 1)
     finally:
@@ -377,7 +378,6 @@ def test_threads_run_kernels_at_the_same_time(tmp_path):
     assert found == [both.compiled("count", 100_000_000)]
 
 
-@pytest.mark.compiles
 def test_simulators_in_threads_give_the_same_bits(servo):
     model = servotwin.PulseServo(servo)
 

@@ -8,10 +8,8 @@ from functools import cache
 from typing import Any
 
 from servotwin.simulation.compile.backend import is_plain, use_plain
-from servotwin.simulation.compile.building import WAY_OUT, is_ready, problems, source_key
-from servotwin.simulation.compile.derive import Recipe
-from servotwin.simulation.compile.library import loaded
-from servotwin.simulation.compile.plain import plain_kernels
+from servotwin.simulation.compile.finding import WAY_OUT, is_ready, problems, source_key
+from servotwin.simulation.compile.recipe import Recipe
 
 __all__ = ["Recipe", "is_compiled", "is_plain", "kernels", "source_key"]
 
@@ -24,7 +22,7 @@ def kernels(recipe: Recipe) -> Any:
     Where there is neither a library nor a compiler they run in plain Python from then on, which is said once.
     """
     with _lock:
-        return plain_kernels(recipe) if is_plain() else _kernels(recipe)
+        return _in_python(recipe) if is_plain() else _kernels(recipe)
 
 
 def is_compiled(recipe: Recipe) -> bool:
@@ -34,10 +32,18 @@ def is_compiled(recipe: Recipe) -> bool:
 
 @cache
 def _kernels(recipe: Recipe) -> Any:
+    from servotwin.simulation.compile.library import loaded  # nothing of it before it is needed
+
     found = loaded(recipe)
     if found is None:
         use_plain()
         warnings.warn(f"{'; '.join(problems)}: many servos run in plain Python, a hundred times slower. {WAY_OUT}",
                       RuntimeWarning, stacklevel=4)
-        return plain_kernels(recipe)
+        return _in_python(recipe)
     return found
+
+
+def _in_python(recipe: Recipe) -> Any:
+    from servotwin.simulation.compile.plain import plain_kernels
+
+    return plain_kernels(recipe)

@@ -1,15 +1,9 @@
-"""Build and find the libraries of recipes: in the package, in the user's cache, by the compiler at hand.
-
-Two keys save work. The text of the sources names the text in C that was printed from them, so that nothing is derived
-again; this text, the compiler, its flags and the level of the processor name the library, so that an edited comment
-compiles nothing.
-"""
+"""Build the library of a recipe, by the compiler at hand, into the user's cache."""
 
 from __future__ import annotations
 
 import atexit
 import contextlib
-import inspect
 import json
 import os
 import shutil
@@ -18,73 +12,23 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import IO, Any
 
-from servotwin import physics
-from servotwin.models import engine, terms
-from servotwin.simulation.compile.compilers import Compiler, compilers, flags, level, levels, system
-from servotwin.simulation.compile.derive import Recipe, derive
+from servotwin.simulation.compile.compilers import Compiler, compilers, level
+from servotwin.simulation.compile.derive import derive
+from servotwin.simulation.compile.finding import SUFFIX, Built, functions_of, index_name, library_name, problems
+from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.signatures import signatures
-from servotwin.simulation.compile.storage import cache_folder, key_of
+from servotwin.simulation.compile.storage import cache_folder, key_of, write
 from servotwin.simulation.compile.translate import Translation, translated
 
-_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 _LONGEST = 600.0  # s that a compiler may take
-problems: list[str] = []  # why there is no library, as far as this process has found out
-WAY_OUT = ("install a C compiler (gcc or clang) or the package ziglang (pip install 'servotwin[compile]'); "
-           "SERVOTWIN_CC names another one")
 
 
-@dataclass(frozen=True)
-class Built:
-    """A library of a recipe, and what it gives back.
-
-    Parameters
-    ----------
-    path : Path
-    functions : tuple of (str, str)
-        Name and result (see `translate.Entry`) of the function of each entry of `signatures`, in that order.
-    """
-
-    path: Path
-    functions: tuple[tuple[str, str], ...]
-
-
-@cache
-def sources() -> tuple[str, ...]:
-    """Return the text of everything from which C is printed; to read it is quicker than to derive."""
-    files = sorted(Path(__file__).parent.glob("*.[ph]*"))
-    for package in (physics, terms, engine):
-        files += sorted(Path(package.__path__[0]).glob("*.py"))
-    return tuple(file.read_text(encoding="utf-8") for file in files)
-
-
-@cache
-def source_key() -> str:
-    """Return a short name for all that kernels depend on, a recipe apart."""
-    return key_of(*sources())
-
-
-def is_ready(recipe: Recipe) -> bool:
-    """Tell whether a recipe can be used without deriving or compiling it."""
-    return _shipped(recipe) is not None or _known(recipe) is not None
-
-
-def built(recipe: Recipe) -> Iterator[Built]:
-    """Return libraries of a recipe, the one to be tried first; made, where there is none, when it is asked for.
-
-    If one cannot be loaded, the next one is asked for: it was made for another C library, say, or is no library at all.
-    """
-    useless: set[Path] = set()
-    for find in (_shipped, _known):
-        found = find(recipe)
-        if found is not None:
-            yield found
-            useless.add(found.path)
+def made(recipe: Recipe, useless: set[Path]) -> Iterator[Built]:
+    """Make the library of a recipe, also where there is one of no use; return nothing where no compiler does."""
     if not compilers():
         named = os.environ.get("SERVOTWIN_CC")
         problems.append(f"SERVOTWIN_CC names no program ({named})" if named else "no C compiler")
@@ -96,82 +40,10 @@ def built(recipe: Recipe) -> Iterator[Built]:
             return
 
 
-# --- what is known ----------------------------------------------------------------------------------------------------
-
-
-def index_name(recipe: Recipe) -> str:
-    """Return the name of the file that says what was printed of these sources."""
-    homes = {entry.split(":")[0] for entry in recipe.entries}
-    others = [inspect.getsource(import_module(home)) for home in sorted(homes) if not home.startswith("servotwin.")]
-    return f"{recipe.name}-{key_of(source_key(), repr(recipe), *others)}.json"
-
-
 def index(translation: Translation) -> dict[str, Any]:
     """Return what this file says."""
     functions = [[entry.symbol, entry.result] for entry in translation.entries]
     return {"text": key_of(translation.text), "functions": functions}
-
-
-def _read(path: Path) -> dict[str, Any] | None:
-    """Return what an index says; None where it is missing, or was not written by us."""
-    try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return said if isinstance(said, dict) and isinstance(said.get("text"), str) and _are_functions(
-        said.get("functions")) else None
-
-
-def _are_functions(said: Any) -> bool:
-    return isinstance(said, list) and all(
-        isinstance(one, list) and len(one) == 2 and all(isinstance(part, str) for part in one) for one in said)
-
-
-def shipped_folder() -> Path:
-    """Return where a wheel has its libraries."""
-    return Path(__file__).with_name("shipped")
-
-
-def _shipped(recipe: Recipe) -> Built | None:
-    """Return the library that came with the package, for the highest level that this processor has."""
-    said = _read(shipped_folder() / index_name(recipe))
-    if said is None:
-        return None
-    for name in levels():
-        path = shipped_folder() / f"{recipe.name}-{name}{_SUFFIX}"
-        if path.exists():
-            return Built(path, _functions(said))
-    return None
-
-
-def _known(recipe: Recipe) -> Built | None:
-    """Return the library in the cache."""
-    said = _read(cache_folder() / index_name(recipe))
-    if said is None:
-        return None
-    for compiler in compilers():
-        path = cache_folder() / _library(recipe, said["text"], compiler)
-        if path.exists():
-            return Built(path, _functions(said))
-    left = sorted(cache_folder().glob(f"{_stem(recipe, said['text'])}-*{_SUFFIX}"))  # of a compiler that is gone
-    return Built(left[0], _functions(said)) if left and not compilers() else None
-
-
-def _stem(recipe: Recipe, text: str) -> str:
-    return f"{recipe.name}-{key_of(text, level(), system())}"
-
-
-def _library(recipe: Recipe, text: str, compiler: Compiler) -> str:
-    """Return the name of the library that a compiler makes of a text, which goes by its hash."""
-    own = key_of(compiler.identity, *compiler.command, *flags(recipe.vector, level()))
-    return f"{_stem(recipe, text)}-{own}{_SUFFIX}"
-
-
-def _functions(said: dict[str, Any]) -> tuple[tuple[str, str], ...]:
-    return tuple((name, result) for name, result in said["functions"])
-
-
-# --- what is made -----------------------------------------------------------------------------------------------------
 
 
 def _folders() -> Iterator[Path]:
@@ -202,14 +74,14 @@ def _made(recipe: Recipe, folder: Path, useless: set[Path]) -> Built | None:
     translation = printed(recipe)
     text, said = key_of(translation.text), index(translation)
     for compiler in compilers():
-        path = folder / _library(recipe, text, compiler)
+        path = folder / library_name(recipe, text, compiler)
         try:
             with _alone(path):
                 there = path.exists() and path not in useless
                 problem = None if there else _compiled(recipe, translation.text, compiler, path)
             if problem is None:
                 write(folder / index_name(recipe), json.dumps(said))
-                return Built(path, _functions(said))
+                return Built(path, functions_of(said))
         except OSError as error:
             problem = str(error)
         problems.append(f"{' '.join(compiler.command)} cannot compile the kernels ({problem})")
@@ -225,7 +97,7 @@ def _compiled(recipe: Recipe, text: str, compiler: Compiler, path: Path) -> str 
     """Compile a text aside, and put the library in its place; return what is wrong, if anything."""
     _tell()
     with tempfile.TemporaryDirectory(prefix=".making-", dir=path.parent, ignore_cleanup_errors=True) as aside:
-        source, library = Path(aside) / f"{recipe.name}.c", Path(aside) / f"made{_SUFFIX}"
+        source, library = Path(aside) / f"{recipe.name}.c", Path(aside) / f"made{SUFFIX}"
         source.write_text(text, encoding="utf-8")
         said = Path(aside) / "said.txt"
         try:
@@ -264,14 +136,6 @@ def _run(command: list[str], environment: dict[str, str], said: Path) -> int:
 def _tell() -> None:
     sys.stderr.write("servotwin: compiling kernels for this machine, once\n")
     sys.stderr.flush()
-
-
-def write(path: Path, text: str) -> None:
-    """Write a file at once, so that nobody reads half of it."""
-    handle, aside = tempfile.mkstemp(suffix=".tmp", dir=path.parent)
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        file.write(text)
-    os.replace(aside, path)
 
 
 @contextlib.contextmanager

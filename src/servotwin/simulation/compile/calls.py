@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.simulation.compile import Recipe, is_plain, kernels, plain
-from servotwin.simulation.compile.kinds import Tuple
-from servotwin.simulation.compile.translate import words_of
+from servotwin.simulation.compile.kinds import Tuple, words_of
 
 _WORD = 8  # bytes
 

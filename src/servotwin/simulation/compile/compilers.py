@@ -8,7 +8,6 @@ import shutil
 import sys
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -87,6 +86,8 @@ def _zig() -> Compiler | None:
     """Return the compiler of the package ziglang, which brings clang along."""
     if find_spec("ziglang") is None:
         return None
+    from importlib.metadata import PackageNotFoundError, version  # which takes as long as all else
+
     try:
         own = version("ziglang")
     except PackageNotFoundError:

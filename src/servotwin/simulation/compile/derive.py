@@ -18,6 +18,7 @@ from importlib import import_module
 from types import FunctionType
 from typing import Any, cast
 
+from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.rewriting import (
     DOUBLE,
     ELEMENTARY,
@@ -30,48 +31,6 @@ from servotwin.simulation.compile.rewriting import (
 _PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest", "floor")  # single instructions in the vector form
 _ADDRESSES = "servotwin.simulation.compile.addresses"
 _LONG = 12  # a tuple of more numbers is a table
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """What to derive.
-
-    Parameters
-    ----------
-    name : str
-        Start of the derived module's name.
-    entries : tuple of str
-        "module:function"; the derived module has each under the function's name.
-    vector : bool
-        Whether the kernels run on many lanes side by side: everything is inlined, and exponentials and logarithms
-        become polynomials.
-    single : bool
-        Whether floats have 32 bits.
-    absent : tuple of str
-        Terms ("heat"), or numbers of one ("motor.L", of an input "sweep"), that all that will run lack: they have their
-        neutral values, and what depends on others is left out.
-    never : tuple of str
-        Constants that nothing will be equal to.
-    present : tuple of str
-        Numbers of terms that are positive in all that will run ("firmware.T_c").
-    knows : int
-        On what the acceleration may depend in what will run: flags of `terms.dependence`.
-    spares : tuple of str
-        Numbers of terms that it does well without, though other kernels read them: they act in what it leaves to them.
-    by_numbers : bool
-        Whether C calls the entries with their whole numbers, instead of with words.
-    """
-
-    name: str
-    entries: tuple[str, ...]
-    vector: bool = False
-    single: bool = False
-    absent: tuple[str, ...] = ()
-    never: tuple[str, ...] = ()
-    present: tuple[str, ...] = ()
-    knows: int = -1
-    spares: tuple[str, ...] = ()
-    by_numbers: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -185,3 +185,10 @@ def told(kind: Kind | None) -> str:
 def leaves(kind: Kind) -> int:
     """Return how many numbers a tuple holds, those in its tuples included; 1 for anything else."""
     return sum(map(leaves, kind.elements)) if isinstance(kind, Tuple) else 1
+
+
+def words_of(kind: Kind) -> int:
+    """Return how many words a value takes."""
+    if isinstance(kind, Tuple):
+        return sum(map(words_of, kind.elements))
+    return 1 + kind.dimensions if isinstance(kind, Array) else 1

@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.simulation.compile.building import Built, built, problems
-from servotwin.simulation.compile.derive import Recipe
+from servotwin.simulation.compile.finding import Built, built, problems
 from servotwin.simulation.compile.kinds import (
     BOOL,
     FLOAT32,
@@ -27,9 +26,10 @@ from servotwin.simulation.compile.kinds import (
     Scalar,
     Tuple,
     told,
+    words_of,
 )
+from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.signatures import signatures
-from servotwin.simulation.compile.translate import words_of
 
 Words = list[int | float]
 

@@ -21,7 +21,8 @@ from servotwin.models.engine.memory import Memory, time_of
 from servotwin.models.engine.motion import Motion
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.step import DIVERGED
-from servotwin.simulation.compile.derive import Recipe, derive
+from servotwin.simulation.compile.derive import derive
+from servotwin.simulation.compile.recipe import Recipe
 
 
 @cache

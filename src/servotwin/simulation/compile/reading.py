@@ -9,62 +9,29 @@ not known.
 from __future__ import annotations
 
 import ast
-import contextlib
-import json
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 from servotwin.models.engine import records
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.firmware import Firmware
-from servotwin.models.terms.numbers import NEUTRAL, Numbers
-from servotwin.simulation.compile.building import shipped_folder, source_key, write
-from servotwin.simulation.compile.derive import Recipe, derive
+from servotwin.models.terms.numbers import Numbers
+from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.inference import Module, Specialised
 from servotwin.simulation.compile.kinds import Kind, Record, Tuple
+from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.rewriting import flat_name
 from servotwin.simulation.compile.signatures import signatures
-from servotwin.simulation.compile.storage import cache_folder, key_of
+from servotwin.simulation.compile.unread import in_general
 
 _Number = tuple[tuple[str, ...], str]  # the fields of its record, and its own name
 _RUNS = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
 _COPYING = flat_name(records.__name__, "")  # functions that only take records out of memory, or put them there
 
 
-@cache
-def told(recipe: Recipe) -> Recipe:
-    """Return a recipe that knows of its absent terms by their first numbers alone, and follows all others."""
-    absent = tuple(f"{name}.{getattr(NEUTRAL, name)._fields[0]}" if name in Numbers._fields else name
-                   for name in recipe.absent)
-    return replace(recipe, name=f"{recipe.name}_told", absent=absent)
-
-
-@cache
-def in_general(recipe: Recipe) -> Recipe:
-    """Return the recipe for what a form leaves out, in which no way of going on is chosen by terms that it knows."""
-    return replace(told(recipe), name=f"{recipe.name}_in_general", never=(*recipe.never, "GLIDES"))
-
-
-@cache
-def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Return the numbers that the general form reads and a recipe's kernels do not know ("friction.K_m", "chip.beta").
-
-    With `of`, "module:function", it is asked of what these call alone. The answer is kept beside the kernels.
-    """
-    name = f"{recipe.name}-unread-{key_of(source_key(), repr((recipe, of)))}.json"
-    for folder in (shipped_folder(), cache_folder()):
-        with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
-            return tuple(map(str, json.loads((folder / name).read_text(encoding="utf-8"))["unread"]))
-    found = tuple(_unread(recipe, of))
-    with contextlib.suppress(OSError):  # to find it again costs its time alone
-        cache_folder().mkdir(parents=True, exist_ok=True)
-        write(cache_folder() / name, json.dumps({"unread": found}))
-    return found
-
-
-def _unread(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
+def unread_numbers(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
+    """Return the numbers that the general form reads and a recipe's kernels do not know, as `unread` keeps them."""
     general = _readers(replace(in_general(recipe), entries=_RUNS, vector=False, single=False))
     own = _readers(recipe if of else replace(recipe, never=(*recipe.never, "GLIDES")), of)  # glides are asked apart
     by_itself = set().union(*(own[name] for name in own.keys() - general.keys()))

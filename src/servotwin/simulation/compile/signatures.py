@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from importlib import import_module
 from types import FunctionType
@@ -12,19 +12,14 @@ from typing import Any, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import loop_tiles, tiles
-from servotwin.models.engine.buses import Buses
+from servotwin.models.engine import tiles
 from servotwin.models.engine.memory import Memories, Memory
 from servotwin.models.engine.records import record_of, rows_of
-from servotwin.models.engine.seats import Mate, Seat, Shared
-from servotwin.models.engine.tape import Tape
 from servotwin.models.engine.tiles import Lanes, Outputs
-from servotwin.models.engine.told import Tables
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation.compile.derive import Recipe
 from servotwin.simulation.compile.kinds import (
     BOOL,
     FLOAT32,
@@ -37,6 +32,7 @@ from servotwin.simulation.compile.kinds import (
     TranslationError,
     Tuple,
 )
+from servotwin.simulation.compile.recipe import Recipe
 
 Signature = tuple[str, tuple[Kind, ...]]
 _ENGINE = "servotwin.models.engine"
@@ -59,10 +55,6 @@ _MEMORIES = _tuple(Memories, _ROWS, firms=_records(record_of(Firm)))
 _LANES = _tuple(
     Lanes, _INDICES, numbers=_NUMBERS, chips=_records(rows_of(Chip, np.float64)), start=_TABLE, torque=_FLOATS,
     pieces=_TABLE, edges=_FLOATS, accuracy=FLOAT64, firmware=_records(record_of(Firmware)))
-_TABLES = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
-_BUSES = _tuple(Buses, _INDICES, memories=_MEMORIES, shared=_records(record_of(Shared)), ended=_FLOATS)
-_SEATS, _MATES = _records(record_of(Seat)), _records(record_of(Mate))
-_TAPE = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
 _RECORDED = (_TABLE, _INDICES, _INDICES)  # rows of torques, where those of a lane begin, and how many there are
 
 
@@ -73,12 +65,9 @@ def _outputs(real: Kind) -> Tuple:
 _GOING = (_LANES, _TABLE, *_RECORDED, _INDICES, _FLOATS, _FLOATS, _INDICES, _CUBE, _MEMORIES, _INDICES)
 _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
     "runs:start": (_LANES, _INDICES, _MEMORIES), "runs:go_on": (*_GOING, _FLOATS),
-    "loops:go_on": (*_GOING, _records(loop_tiles.TILE_TYPE)),
     "calm:go": (_LANES, _INDICES, _FLOATS, _SMALLS, _ROWS, _INDICES),
     "ending:look_at_lanes": (BOOL, _LANES, *_RECORDED, FLOAT64, _TABLE, _FLOATS, _SMALLS),
     "sights:one_by_one": (_LANES, _TABLE, *_RECORDED, _INDICES, _MEMORIES, _TABLE),
-    "buses:go_on": (_LANES, _TABLES, _BUSES, INT64, INT64, FLOAT64, FLOAT64, _SEATS, _MATES, _TAPE),
-    "buses:look": (_LANES, _TABLES, _BUSES, _SEATS, _MATES, _TABLE),
     "ticks:accept": (_FLOATS, _INDICES, _TABLE, _CUBE, _NUMBERS, _FLOATS, _FLOATS, _INDICES, _FLOATS),
     "ticks:change": (_INDICES, _TABLE, _INDICES, _NUMBERS, _FLOATS, _FLOATS, BOOL, _FLOATS, _FLOATS, _NUMBERS),
     "ticks:follow": (_INDICES, _TABLE, *(_FLOATS,) * 5, _TABLE, _FLOATS),
@@ -92,8 +81,35 @@ _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
     "lane_ticks:read_clocks": (_INDICES, _SMALLS, _FLOATS, _ROWS, _FLOATS),
     "lane_ticks:take_status": (_INDICES, _SMALLS, _INDICES),
     "lane_ticks:note_lost_buses": (_INDICES, _INDICES, _ROWS, _SMALLS, _FLOATS),
-    "lane_ticks:break_up": (_INDICES, _records(record_of(Shared)), _ROWS),
 }
+
+
+@cache
+def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
+    """Return what entries are called with that let digital servos go from tick to tick together."""
+    from servotwin.models.engine import loop_tiles
+
+    return {"loops:go_on": (*_GOING, _records(loop_tiles.TILE_TYPE))}
+
+
+@cache
+def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
+    """Return what entries are called with that move servos on a bus."""
+    from servotwin.models.engine.buses import Buses
+    from servotwin.models.engine.seats import Mate, Seat, Shared
+    from servotwin.models.engine.tape import Tape
+    from servotwin.models.engine.told import Tables
+
+    tables = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
+    shared, room = _records(record_of(Shared)), (_records(record_of(Seat)), _records(record_of(Mate)))
+    own = (_LANES, tables, _tuple(Buses, _INDICES, memories=_MEMORIES, shared=shared, ended=_FLOATS))
+    tape = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
+    return {"buses:go_on": (*own, INT64, INT64, FLOAT64, FLOAT64, *room, tape), "buses:look": (*own, *room, _TABLE),
+            "lane_ticks:break_up": (_INDICES, shared, _ROWS)}
+
+
+_ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
+    "loops:go_on": _of_ticks, "buses:go_on": _of_buses, "buses:look": _of_buses, "lane_ticks:break_up": _of_buses}
 
 
 def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ...]]:
@@ -124,8 +140,8 @@ def signatures(recipe: Recipe) -> list[Signature]:
 
 def _kinds_of(entry: str, recipe: Recipe) -> Iterator[tuple[Kind, ...]]:
     name = entry.removeprefix(f"{_ENGINE}.")
-    if name in _SIGNATURES:
-        yield _SIGNATURES[name]
+    if name in _SIGNATURES or name in _ELSEWHERE:
+        yield (_SIGNATURES if name in _SIGNATURES else _ELSEWHERE[name]())[name]
         return
     known = False
     for real, form in _tiles_of(recipe):

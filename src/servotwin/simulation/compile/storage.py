@@ -25,3 +25,13 @@ def cache_folder() -> Path:
 def key_of(*texts: str) -> str:
     """Return a short name for these texts."""
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
+
+
+def write(path: Path, text: str) -> None:
+    """Write a file at once, so that nobody reads half of it."""
+    import tempfile  # only who writes needs it
+
+    handle, aside = tempfile.mkstemp(suffix=".tmp", dir=path.parent)
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(text)
+    os.replace(aside, path)

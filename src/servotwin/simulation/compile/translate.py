@@ -90,13 +90,6 @@ def header() -> str:
     return Path(__file__).with_name("kernels.h").read_text(encoding="utf-8")
 
 
-def words_of(kind: Kind) -> int:
-    """Return how many words a value takes."""
-    if isinstance(kind, Tuple):
-        return sum(map(words_of, kind.elements))
-    return 1 + kind.dimensions if isinstance(kind, Array) else 1
-
-
 def _letters(kind: Kind | None) -> str:
     """Return a result as `Entry` has it."""
     if kind is None:

@@ -1,0 +1,138 @@
+"""Find the libraries of recipes: in the package, or in the user's cache.
+
+Two keys save work. The text of the sources names the text in C that was printed from them, so that nothing is derived
+again; this text, the compiler, its flags and the level of the processor name the library, so that an edited comment
+compiles nothing.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from servotwin import physics
+from servotwin.models import engine, terms
+from servotwin.simulation.compile.compilers import Compiler, compilers, flags, level, levels, system
+from servotwin.simulation.compile.recipe import Recipe
+from servotwin.simulation.compile.storage import cache_folder, key_of
+
+problems: list[str] = []  # why there is no library, as far as this process has found out
+WAY_OUT = ("install a C compiler (gcc or clang) or the package ziglang (pip install 'servotwin[compile]'); "
+           "SERVOTWIN_CC names another one")
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+@dataclass(frozen=True)
+class Built:
+    """A library of a recipe, and what it gives back.
+
+    Parameters
+    ----------
+    path : Path
+    functions : tuple of (str, str)
+        Name and result (see `translate.Entry`) of the function of each entry of `signatures`, in that order.
+    """
+
+    path: Path
+    functions: tuple[tuple[str, str], ...]
+
+
+@cache
+def sources() -> tuple[str, ...]:
+    """Return the text of everything from which C is printed; to read it is quicker than to derive."""
+    files = sorted(Path(__file__).parent.glob("*.[ph]*"))
+    for package in (physics, terms, engine):
+        files += sorted(Path(package.__path__[0]).glob("*.py"))
+    return tuple(file.read_text(encoding="utf-8") for file in files)
+
+
+@cache
+def source_key() -> str:
+    """Return a short name for all that kernels depend on, a recipe apart."""
+    return key_of(*sources())
+
+
+def is_ready(recipe: Recipe) -> bool:
+    """Tell whether a recipe can be used without deriving or compiling it."""
+    return bool(_shipped(recipe) or _known(recipe))
+
+
+def built(recipe: Recipe) -> Iterator[Built]:
+    """Return libraries of a recipe, the one to be tried first; made, where there is none, when it is asked for.
+
+    If one cannot be loaded, the next one is asked for: it was made for another C library, say, or is no library at all.
+    """
+    useless: set[Path] = set()
+    for found in (*_shipped(recipe), *_known(recipe)):
+        yield found
+        useless.add(found.path)
+    from servotwin.simulation.compile.building import made  # what is there already needs nothing of that
+
+    yield from made(recipe, useless)
+
+
+def index_name(recipe: Recipe) -> str:
+    """Return the name of the file that says what was printed of these sources."""
+    homes = {entry.split(":")[0] for entry in recipe.entries}
+    others = [inspect.getsource(import_module(home)) for home in sorted(homes) if not home.startswith("servotwin.")]
+    return f"{recipe.name}-{key_of(source_key(), repr(recipe), *others)}.json"
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    """Return what an index says; None where it is missing, or was not written by us."""
+    try:
+        said = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return said if isinstance(said, dict) and isinstance(said.get("text"), str) and _are_functions(
+        said.get("functions")) else None
+
+
+def _are_functions(said: Any) -> bool:
+    return isinstance(said, list) and all(
+        isinstance(one, list) and len(one) == 2 and all(isinstance(part, str) for part in one) for one in said)
+
+
+def shipped_folder() -> Path:
+    """Return where a wheel has its libraries."""
+    return Path(__file__).with_name("shipped")
+
+
+def _shipped(recipe: Recipe) -> list[Built]:
+    """Return the libraries that came with the package, that for the highest level of this processor first."""
+    said = _read(shipped_folder() / index_name(recipe))
+    paths = (shipped_folder() / f"{recipe.name}-{name}{SUFFIX}" for name in levels()) if said is not None else ()
+    return [Built(path, functions_of(said)) for path in paths if said is not None and path.exists()]
+
+
+def _known(recipe: Recipe) -> list[Built]:
+    """Return the library in the cache; that of a compiler that is gone only where there is none at all."""
+    said = _read(cache_folder() / index_name(recipe))
+    if said is None:
+        return []
+    paths = [cache_folder() / library_name(recipe, said["text"], compiler) for compiler in compilers()]
+    if not paths:
+        paths = sorted(cache_folder().glob(f"{_stem(recipe, said['text'])}-*{SUFFIX}"))
+    return [Built(path, functions_of(said)) for path in paths if path.exists()][:1]
+
+
+def _stem(recipe: Recipe, text: str) -> str:
+    return f"{recipe.name}-{key_of(text, level(), system())}"
+
+
+def library_name(recipe: Recipe, text: str, compiler: Compiler) -> str:
+    """Return the name of the library that a compiler makes of a text, which goes by its hash."""
+    own = key_of(compiler.identity, *compiler.command, *flags(recipe.vector, level()))
+    return f"{_stem(recipe, text)}-{own}{SUFFIX}"
+
+
+def functions_of(said: dict[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Return what an index says of the functions of a library, as `Built` has it."""
+    return tuple((name, result) for name, result in said["functions"])

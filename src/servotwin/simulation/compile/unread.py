@@ -1,0 +1,46 @@
+"""Which numbers of the terms a recipe's kernels do not know, as `reading` finds it: kept beside the kernels."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from dataclasses import replace
+from functools import cache
+
+from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.simulation.compile.finding import shipped_folder, source_key
+from servotwin.simulation.compile.recipe import Recipe
+from servotwin.simulation.compile.storage import cache_folder, key_of, write
+
+
+@cache
+def told(recipe: Recipe) -> Recipe:
+    """Return a recipe that knows of its absent terms by their first numbers alone, and follows all others."""
+    absent = tuple(f"{name}.{getattr(NEUTRAL, name)._fields[0]}" if name in Numbers._fields else name
+                   for name in recipe.absent)
+    return replace(recipe, name=f"{recipe.name}_told", absent=absent)
+
+
+@cache
+def in_general(recipe: Recipe) -> Recipe:
+    """Return the recipe for what a form leaves out, in which no way of going on is chosen by terms that it knows."""
+    return replace(told(recipe), name=f"{recipe.name}_in_general", never=(*recipe.never, "GLIDES"))
+
+
+@cache
+def unread(recipe: Recipe, of: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return the numbers that the general form reads and a recipe's kernels do not know ("friction.K_m", "chip.beta").
+
+    With `of`, "module:function", it is asked of what these call alone. The answer is kept beside the kernels.
+    """
+    name = f"{recipe.name}-unread-{key_of(source_key(), repr((recipe, of)))}.json"
+    for folder in (shipped_folder(), cache_folder()):
+        with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
+            return tuple(map(str, json.loads((folder / name).read_text(encoding="utf-8"))["unread"]))
+    from servotwin.simulation.compile.reading import unread_numbers  # which translates
+
+    found = tuple(unread_numbers(recipe, of))
+    with contextlib.suppress(OSError):  # to find it again costs its time alone
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        write(cache_folder() / name, json.dumps({"unread": found}))
+    return found
