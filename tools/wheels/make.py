@@ -25,6 +25,7 @@ from servotwin.simulation.compile import Recipe, source_key
 from servotwin.simulation.compile.building import index, printed
 from servotwin.simulation.compile.compilers import Compiler, compilers
 from servotwin.simulation.compile.finding import index_name, shipped_folder
+from servotwin.simulation.compile.storage import cache_folder
 from servotwin.simulation.compile.unread import unread
 from servotwin.simulation.lane_recipes import parts_of
 from servotwin.simulation.recipes import all_recipes
@@ -55,7 +56,7 @@ def compiled(recipe: Recipe, compiler: Compiler, targets: Sequence[Target], fold
             # Named without its folder, which macOS would note in the library
             call = replace(compiler, command=command).library_command(source, Path(made.name), recipe.vector, level)
             done = subprocess.run(call, capture_output=True, text=True, check=False, cwd=made.parent,
-                                  env=compiler.environment() | own)
+                                  env=compiler.environment(cache_folder()) | own)
             if done.returncode != 0:
                 raise RuntimeError(f"{' '.join(call)}\n{done.stderr}")
             made.replace(into / made.name)  # alone: for Windows, what lies beside it is for linkers

@@ -102,7 +102,7 @@ def _compiled(recipe: Recipe, text: str, compiler: Compiler, path: Path) -> str 
         said = Path(aside) / "said.txt"
         try:
             command = compiler.library_command(source, library, recipe.vector, level())
-            ended = _run(command, compiler.environment(), said)
+            ended = _run(command, compiler.environment(path.parent), said)
         except subprocess.TimeoutExpired:
             return f"it took more than {_LONGEST:g} s"
         if ended != 0 or not library.exists():
