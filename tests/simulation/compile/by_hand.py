@@ -64,8 +64,7 @@ class Both:
         source.write_text(translation.text)
         command = compilers()[0].library_command(source, library, own.recipe.vector, "x86-64-v2")
         done = subprocess.run([*(part for part in command if part != "-w" or not strict), *STRICT[:3 * strict]],
-            check=False, text=True,
-                              capture_output=True, env=compilers()[0].environment())
+                              check=False, text=True, capture_output=True, env=compilers()[0].environment(folder))
         assert done.returncode == 0, done.stderr
         self._library = ctypes.CDLL(str(library))
         self._functions = {

@@ -90,7 +90,7 @@ def programs(tmp_path_factory):
                        "-ffp-contract=off", "-fwrapv", "-fno-strict-aliasing", "-fno-sanitize=undefined",
                        f"-DKERNEL=servotwin_{name}", "-o", str(program), str(folder / "kernels.c"),
                        str(HARNESS / "replay.c"), "-lm"]
-            subprocess.run(command, check=True, env=compilers.Compiler((), "").environment())
+            subprocess.run(command, check=True, env=compilers.Compiler((), "").environment(folder))
     return found
 
 
