@@ -362,7 +362,7 @@ def test_threads_run_kernels_at_the_same_time(tmp_path):
 
     def work():
         span.append(time.perf_counter())
-        found.append(both.compiled("count", 100_000_000))
+        found.append(both.compiled("count", 400_000_000))
         span.append(time.perf_counter())
 
     found = []
@@ -375,7 +375,7 @@ def test_threads_run_kernels_at_the_same_time(tmp_path):
     begin, end = span
     within = [each for each in moments if begin + 0.2 * (end - begin) < each < end - 0.2 * (end - begin)]
     assert len(within) > 3
-    assert found == [both.compiled("count", 100_000_000)]
+    assert found == [both.compiled("count", 400_000_000)]
 
 
 def test_simulators_in_threads_give_the_same_bits(servo):
