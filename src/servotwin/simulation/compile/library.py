@@ -67,6 +67,8 @@ class Function:
         MisfitError
             If one is not of its kind.
         """
+        if len(arguments) != len(self._fillers):
+            raise MisfitError(f"got {len(arguments)} arguments, allowed: {len(self._fillers)}")
         values: Words = []
         for fill, argument in zip(self._fillers, arguments, strict=True):
             fill(argument, values)
@@ -121,7 +123,9 @@ class Entry:
         """Call the kernel as Python's own function is called."""
         if named:
             module, function = self.name.split(":")
-            arguments = inspect.signature(getattr(import_module(module), function)).bind(*arguments, **named).args
+            bound = inspect.signature(getattr(import_module(module), function)).bind(*arguments, **named)
+            bound.apply_defaults()
+            arguments = tuple(bound.arguments.values())
         return self.fitting(arguments)(arguments)
 
     def fitting(self, arguments: Sequence[Any]) -> Function:
