@@ -128,7 +128,7 @@ def on_a_bus(st, model, command, load, how):
 
 def without_compiler():
     """Let batches run the derived text as it is, in the forms that compiled ones take."""
-    from servotwin.simulation import lane_kinds, lane_runs, vector_going, vector_store
+    from servotwin.simulation import lane_runs, vector_going, vector_store
     from servotwin.simulation.compile import calls
     from servotwin.simulation.compile.plain import plain_module
 
@@ -136,7 +136,6 @@ def without_compiler():
     for module in (lane_runs, vector_going, vector_store, calls):
         module.kernels = kernels
     calls.is_plain = lambda: True
-    lane_kinds.unread = lambda recipe, of=(): ()  # laws change here, no numbers
 
 
 def called_laws(run):
@@ -188,7 +187,10 @@ if __name__ == "__main__":
 
     out, how, *wanted = sys.argv[1:]
     if how == "derived":
+        from servotwin.simulation import lane_kinds
+
         without_compiler()
+        lane_kinds.unread = lambda recipe, of=(): ()  # laws change here, no numbers
     found, laws = {}, {}
     if how == "laws":
         found = laws_compiled(wanted)

@@ -10,15 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "physics"))
-import one_law_runs
-
 import servotwin as st
 from servotwin.simulation import lane_runs
+
+HELPERS = str(Path(__file__).parents[1] / "physics")  # in the path of the script alone, not of who collects tests
 
 
 def compared(kind, width, known, grown, used):
     """Return what is printed of one servo; `used` gets the names of kernels."""
+    import one_law_runs
+
     used.clear()
     of = st.DigitalServo if kind == "digital" else st.PulseServo
     servo = st.load_servo("hitec-hs-755hb").replace((one_law_runs.PROGRAM if kind == "digital" else {}) | known)
@@ -35,10 +36,14 @@ def compared(kind, width, known, grown, used):
 
 def main(cases):
     """Print the results of all cases, in which kernels run as text."""
+    import one_law_runs
+
     one_law_runs.without_compiler()
     used, kernels = [], lane_runs.kernels
     lane_runs.kernels = lambda recipe: (used.append(recipe.name), kernels(recipe))[1]
     sys.stdout.write(json.dumps({"package": st.__file__, "cases": [compared(*case, used) for case in cases]}))
 
 
-main(json.loads(sys.argv[1]))
+if __name__ == "__main__":
+    sys.path.insert(0, HELPERS)
+    main(json.loads(sys.argv[1]))

@@ -78,7 +78,8 @@ def drawn_together(kind, name, rng):
     """Return parameters: one that terms read, some of its group, and two of any."""
     group = name.partition(".")[0]
     near = [other for other in kind.optional if other.startswith(f"{group}.")]
-    others = (*rng.choice(near, min(rng.integers(4), len(near)), replace=False), *rng.choice(kind.optional, 2))
+    some = len(near) if rng.integers(4) == 0 else min(rng.integers(4), len(near))  # some numbers go with all of a group
+    others = (*rng.choice(near, some, replace=False), *rng.choice(kind.optional, 2))
     found = {}
     for one in (name, *map(str, others)):
         found |= drawn(one, rng)

@@ -13,9 +13,8 @@ import servotwin as st
 from servotwin.simulation import lane_runs
 from servotwin.simulation.compile import compilers
 from servotwin.simulation.compile.building import printed
-from servotwin.simulation.compile.kinds import Array, Tuple
+from servotwin.simulation.compile.kinds import Array, Tuple, words_of
 from servotwin.simulation.compile.library import Function
-from servotwin.simulation.compile.translate import words_of
 
 HARNESS = Path(__file__).with_name("harness")
 TARGETS = ("wasm32-wasi", "x86_64-linux-musl")
