@@ -29,7 +29,11 @@
 #define CEILf(x) __builtin_ceilf(x)
 #define AS_TEXT(...) #__VA_ARGS__
 #define PRAGMA(...) _Pragma(AS_TEXT(__VA_ARGS__))
+#if defined(__clang__)
 #define SUM_IN_ANY_ORDER(...) PRAGMA(omp simd reduction(+ : __VA_ARGS__))
+#else /* gcc 12 takes the freedom without becoming any quicker */
+#define SUM_IN_ANY_ORDER(...)
+#endif
 #define CHECKED_SIZE(type, size) typedef char type##_has_its_size[sizeof(type) == (size) ? 1 : -1]
 
 typedef struct { double *p; int64_t n[1]; } array_double_1;
