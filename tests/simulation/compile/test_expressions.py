@@ -96,6 +96,7 @@ def carefully(expression, values):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:Generating overly large repr")
 @settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.lists(trees(), min_size=TREES, max_size=TREES, unique=True),
        st.lists(st.tuples(*(NUMBERS[kind] for _, kind in ARGUMENTS)), min_size=8, max_size=8))
