@@ -66,7 +66,8 @@ class Terms:
 
     def fit(self, recipe: Recipe) -> Any:
         """Tell for which lanes kernels are made: for those with nothing that they leave out, do not know or follow."""
-        return _without(self.suit(recipe), self.have_any(_unknown(recipe)))
+        suited = self.suit(recipe)
+        return _without(suited, self.have_any(_unknown(recipe))) if np.any(suited) else suited  # to look takes a second
 
     def suit(self, recipe: Recipe) -> Any:
         """Tell for which lanes kernels would be made, if they knew all numbers of the terms that they have."""
