@@ -21,7 +21,7 @@ STAMP = ENVIRONMENT / "installed"
 TASKS = {
     "setup": "make .venv and install servotwin with all tools",
     "paper": "set up, then write the report of the paper to paper-report/ (main job)",
-    "test": "set up, then run the tests (10 minutes, far more on a machine that has compiled nothing yet)",
+    "test": "set up, then run the tests (12 minutes, three more on a machine that has compiled nothing yet)",
     "validation": "set up, then run the slow tests: validation and coverage, browser (20 minutes more)",
     "sanitize": "set up, then run kernels with what gcc checks of memory and arithmetic (or the tests that are named)",
     "check": "set up, then lint, types, import rules",

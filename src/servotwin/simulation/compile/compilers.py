@@ -52,7 +52,8 @@ def flags(vector: bool, level: str) -> tuple[str, ...]:
     """Return how a text is compiled for a level of processors."""
     own: tuple[str, ...] = ()
     if level in _X86:
-        names = list(_X86)
+        names = [name for name in _X86 if vector or name != "x86-64-v4"]  # alone, its wide registers cost a tenth
+        level = level if level in names else names[-1]
         own = tuple(flag for name in names[:names.index(level) + 1] for flag in _X86[name])
     position = () if sys.platform == "win32" else ("-fPIC",)
     return ("-O3" if vector else "-O2", *_GENERAL, *position, *own)
