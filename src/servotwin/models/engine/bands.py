@@ -59,7 +59,8 @@ def start_of(begins: Starts, drive: float) -> float:
 def entered(numbers: Numbers, torque: float, u: float, forward: bool, w: float) -> tuple[int, int]:
     """Return the zone of the current and the sign of the share at a speed, under the voltage u behind the bridge."""
     zone = currents.zone_of(numbers, u, 0.0, 0.0, w, 0.0)
-    return zone, contacts.share_sign(numbers, zone, FORWARD if forward else BACKWARD, u, torque, _turning(w))
+    return zone, contacts.share_sign(
+        numbers, zone, FORWARD if forward else BACKWARD, RIGID, u, torque, _turning(w))
 
 
 def band_at(numbers: Numbers, torque: float, u: float, forward: bool, zone: int, share: int, w: float) -> Band:
@@ -77,8 +78,8 @@ def band_at(numbers: Numbers, torque: float, u: float, forward: bool, zone: int,
     if slows and (edge > last) == rises:
         edge, ends_at = last, CREEPS if slow > 0.0 else SPEED
     if share != 0:
-        still = share * contacts.through_gear(numbers, _torque(numbers, zone, u, 0.0), torque, _turning(0.0))
-        slope = share * contacts.through_gear(numbers, _torque(numbers, zone, u, 1.0), torque, _turning(1.0)) - still
+        still = share * contacts.through_gear(numbers, RIGID, _torque(numbers, zone, u, 0.0), torque, _turning(0.0))
+        slope = share * contacts.through_gear(numbers, RIGID, _torque(numbers, zone, u, 1.0), torque, _turning(1.0)) - still
         turn = -still / slope if slope != 0.0 else edge
         if slope * pull < 0.0 and (turn < edge if rises else turn > edge):
             edge, ends_at = max(turn, w) if rises else min(turn, w), SHARE

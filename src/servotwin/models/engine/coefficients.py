@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from servotwin.models.engine import contacts, currents
@@ -78,11 +79,15 @@ def apart_coefficients(numbers: Numbers, mode: Mode, u: float, tau: float) -> Ap
         output_rate = -shaft.output_acceleration(own, 1.0, 0.0, 0.0)
         output_pull = contacts.output_acceleration(numbers, mode.contact, external_torque(numbers.load, tau, 0.0), 0.0)
     if not at_rest(mode.motor):
+        left = 1.0  # of the motor's torque, after what friction takes of it
+        if mode.share != 0:
+            left -= share_slopes(numbers.friction, mode.motor == FORWARD, float(mode.share))[0]
         torque = motor.electromagnetic_torque(currents.current(numbers, zone, u, 0.0, 0.0), numbers.motor.K)
         drag = motor.back_emf(1.0, numbers.motor.K_b) * currents.torque_per_volt(
             numbers, currents.resistance(numbers, zone, u))
-        motor_rate = -shaft.motor_acceleration(own, -drag, 1.0, 0.0)
-        motor_pull = contacts.motor_acceleration(numbers, mode.motor, torque, 0.0)
+        motor_rate = -shaft.motor_acceleration(own, -left * drag, 1.0, 0.0)
+        motor_pull = shaft.motor_acceleration(own, left * torque, 0.0, contacts.motor_friction(
+            numbers, mode.motor, math.inf, 0.0))
     return Apart(output_rate, output_pull, motor_rate, motor_pull)
 
 

@@ -106,23 +106,28 @@ def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: 
                             has_friction(numbers))
     else:
         contact = sliding(w > 0.0, has_friction(numbers))
-    mode = Mode(zone, contact, mesh, FREE, share_sign(numbers, zone, contact, u, tau, y))
+    mode = Mode(zone, contact, mesh, FREE, share_sign(numbers, zone, contact, mesh, u, tau, y))
     if play.present(numbers.play) and pressing(numbers, mode, u, tau, y) < 0.0:
         return apart(numbers, zone, u, tau, y)
     return mode
 
 
-def share_sign(numbers: Numbers, zone: int, contact: int, u: float, tau: float, y: Vector) -> int:
-    """Return the sign of what the torques through a gear add to its friction before its magnitude is taken."""
-    if (contact != FORWARD and contact != BACKWARD) or not friction.shared(numbers.friction):
+def share_sign(numbers: Numbers, zone: int, contact: int, mesh: int, u: float, tau: float, y: Vector) -> int:
+    """Return the sign of what the torques through a gear add to its friction before its magnitude is taken.
+
+    `contact` is that of the body that slides against the gear: inside the play, of the motor.
+    """
+    if not slides(contact) or not friction.shared(numbers.friction):
         return 0
     torque = drive_torque(numbers, zone, u, y)
     tau_m = torque if torque != 0.0 else sign_of(zone) * NEXT_TO_NOTHING
-    return 1 if through_gear(numbers, tau_m, tau, y) >= 0.0 else -1
+    return 1 if through_gear(numbers, mesh, tau_m, tau, y) >= 0.0 else -1
 
 
-def through_gear(numbers: Numbers, tau_m: float, tau: float, y: Vector) -> float:
-    """Return the torque through the gear [N m] whose magnitude adds to sliding friction."""
+def through_gear(numbers: Numbers, mesh: int, tau_m: float, tau: float, y: Vector) -> float:
+    """Return the torque through the gear [N m] whose magnitude adds to sliding friction; inside the play, the motor's."""
+    if mesh == INSIDE:
+        return friction.share(numbers.friction, tau_m, 0.0)
     against = external_torque(numbers.load, tau, y[0])
     return friction.share(numbers.friction, tau_m, torque_on_gear(against, y[1], numbers.shaft.b_out))
 
@@ -138,15 +143,20 @@ def apart(numbers: Numbers, zone: int, u: float, tau: float, y: Vector) -> Mode:
     if y[6] == 0.0:
         motor = from_rest(torque, motor_hold(numbers, False, torque), motor_hold(numbers, True, torque), False, False,
                           dry)
-    return Mode(zone, contact, INSIDE, motor, 0)
+    return Mode(zone, contact, INSIDE, motor, share_sign(numbers, zone, motor, INSIDE, u, tau, y))
 
 
 def motor_acceleration(numbers: Numbers, motor: int, torque: float, w: float) -> float:
     """Return the acceleration [rad/s²] of the motor alone, inside the play."""
     if at_rest(motor):
         return 0.0
-    dry = joint_friction(numbers.friction, -numbers.play.bearing, motor, w, torque, 0.0)
+    dry = motor_friction(numbers, motor, w, torque)
     return shaft.motor_acceleration(numbers.shaft, torque, w, dry)
+
+
+def motor_friction(numbers: Numbers, motor: int, w: float, torque: float) -> float:
+    """Return the friction [N m] against +q of the motor alone, inside the play, that has a torque [N m]."""
+    return joint_friction(numbers.friction, -numbers.play.bearing, motor, w, torque, 0.0)
 
 
 def output_acceleration(numbers: Numbers, contact: int, against: float, w: float) -> float:

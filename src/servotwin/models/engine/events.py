@@ -16,7 +16,7 @@ from servotwin.models.engine.motion import APART, FIRST_ORDER, REST, Motion, mon
 from servotwin.models.engine.outright import first_end
 from servotwin.models.engine.rodas import not_constant
 from servotwin.models.terms import source
-from servotwin.models.terms.friction import varying
+from servotwin.models.terms.friction import fades
 from servotwin.physics.pieces import piece_rate, piece_value
 
 
@@ -28,7 +28,7 @@ def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float
     if kinds == 0 or (motion.kind == REST and not not_constant(motion.u) and not not_constant(motion.tau)):
         return math.inf, -1, state(motion, s1)
     straight = motion.kind == FIRST_ORDER and source.present(motion.numbers.source) and (
-        motion.mode.mesh == RIGID or not varying(motion.numbers.friction))
+        motion.mode.mesh == RIGID or not fades(motion.numbers.friction))
     if straight or motion.kind == APART:
         return _outright(motion, kinds, s0, s1)
     left, at_left = s0, state(motion, s0)

@@ -76,7 +76,7 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
         kinds |= 1 << RELEASE_FORWARD
     elif shaft != FREE:
         kinds |= 1 << SPEED
-        kinds |= 1 << SHARE if mode.share != 0 else 0
+    kinds |= 1 << SHARE if mode.share != 0 else 0
     if fades(numbers.friction) and slides(geared(numbers, mode)):
         kinds |= 1 << CREEPS
     low, high = currents.zone_limits(numbers, zone, u)
@@ -103,7 +103,7 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
 
 def _of_spring(numbers: Numbers, mode: Mode) -> int:
     """Return what else can end a mode of two bodies with a spring between them, as a sum of 1 << kind."""
-    kinds = 1 << SHARE if mode.share != 0 else 0
+    kinds = 0
     if not elastic.geared(numbers.elastic):
         return kinds
     if mode.motor == STUCK:
@@ -169,7 +169,7 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
         tau_m = currents.drive_torque(numbers, zone, u, y)
         if elastic.present(numbers.elastic):
             return mode.share * twist.through_gear(numbers, mode.mesh, tau_m, tau, y), math.nan
-        return mode.share * contacts.through_gear(numbers, tau_m, tau, y), math.nan
+        return mode.share * contacts.through_gear(numbers, mode.mesh, tau_m, tau, y), math.nan
     if elastic.present(numbers.elastic):
         return _spring_guard(numbers, mode, kind, u, du, tau, dtau, y, dy)
     if play.present(numbers.play) and kind >= MEET_FORWARD:
@@ -178,13 +178,16 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
 
 
 def share_along(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:
-    """Return the guard of a share at a state, and the speed [rad/s] at which it is zero if all else stays constant."""
+    """Return the guard of a share at a state, and the speed [rad/s] at which it is zero if all else stays constant.
+
+    The speed is that of the body that slides against the gear.
+    """
     if mode.share == 0:
         return 0.0, 0.0
     now = guard(numbers, mode, SHARE, u, 0.0, tau, 0.0, y, y)[0]
     still = (y[0], 0.0, y[2], y[3], y[4], y[5], 0.0)
     first = guard(numbers, mode, SHARE, u, 0.0, tau, 0.0, still, still)[0]
-    return now, first * y[1] / (first - now) if now != first else 0.0
+    return now, first * y[6] / (first - now) if now != first else 0.0
 
 
 def _release_guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
@@ -272,7 +275,10 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
             y = _with_current_at_edge(numbers, zone, kind, u, y)
             w_m = elastic.turning(numbers.elastic, y)
             return Mode(currents.zone_of(numbers, u, 0.0, y[0], w_m, y[2]), shaft, mesh, motor, share), y
-        return Mode(currents.neighbour(numbers, zone, kind == ZONE_UP), shaft, mesh, motor, share), y
+        zone = currents.neighbour(numbers, zone, kind == ZONE_UP)
+        if share != 0 and not elastic.present(numbers.elastic):
+            share = contacts.share_sign(numbers, zone, geared(numbers, mode), mesh, u, tau, y)
+        return Mode(zone, shaft, mesh, motor, share), y
     if kind == SHARE:
         return Mode(zone, shaft, mesh, motor, -share), y
     if kind == CREEPS:
@@ -297,10 +303,11 @@ def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vect
         shaft = FORWARD if kind == RELEASE_FORWARD else BACKWARD
         dry = contacts.holds(numbers) if mesh == INSIDE else contacts.has_friction(numbers)
         shaft = shaft if dry else FREE
-        share = 0 if mesh == INSIDE else contacts.share_sign(numbers, zone, shaft, u, tau, y)
+        share = share if mesh == INSIDE else contacts.share_sign(numbers, zone, shaft, mesh, u, tau, y)
         return Mode(zone, shaft, mesh, motor, share), y
     if kind == MOTOR_RELEASE_FORWARD or kind == MOTOR_RELEASE_BACKWARD:
-        return Mode(zone, shaft, mesh, FORWARD if kind == MOTOR_RELEASE_FORWARD else BACKWARD, 0), y
+        motor = FORWARD if kind == MOTOR_RELEASE_FORWARD else BACKWARD
+        return Mode(zone, shaft, mesh, motor, contacts.share_sign(numbers, zone, motor, mesh, u, tau, y)), y
     if play.present(numbers.play) and (kind == PART or kind == PART_OUTPUT or kind == PART_MOTOR):
         return contacts.apart(numbers, zone, u, tau, y), y
     q, w, i, T_w, T_h, q_m, w_m = y

@@ -110,7 +110,7 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
     on, behind = dependence(numbers, mode, u, still), source.present(numbers.source)
     if still and not on & ON_HEAT and (not on & ON_I or constant_current(mode.zone)):
         return _closed(REST, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if on == TWO_BODIES and behind and not friction.varying(numbers.friction) and not not_constant(tau):
+    if on & ~BY_SHARE == TWO_BODIES and behind and not not_constant(tau):
         output_rate, output_pull, motor_rate, motor_pull = apart_coefficients(numbers, mode, u.value, tau.value)
         laws = (output_rate, output_pull, motor_rate, motor_pull, 0.0, 0.0, 0.0, 0.0, 0.0)
         return _closed(APART, numbers, mode, u, tau, t0, y, laws, (0.0, 0.0), step)
@@ -150,7 +150,8 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
 def dependence(numbers: Numbers, mode: Mode, u: Piece, still: bool) -> int:
     """Return on what the acceleration depends in a mode, as the terms have it; `still` where nothing moves."""
     return (motor.depends(numbers.motor) | heat.depends(numbers.heat) | load.depends(numbers.load)
-            | friction.depends(numbers.friction, mode.contact) | play.depends(mode.mesh, still)
+            | friction.depends(numbers.friction, mode.motor if mode.mesh == INSIDE else mode.contact)
+            | play.depends(mode.mesh, still)
             | elastic.depends(numbers.elastic, still) | sensor.depends(numbers.sensor, numbers.source)
             | follower.depends(mode.zone, u))
 

@@ -61,10 +61,10 @@ def _by_speed(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, la
                               (guards.SHARE, share, turn), (guards.CREEPS, way * w - slow, way * slow)):
         if not kinds >> kind & 1 or left >= guards.BELOW:  # monotone: what holds at the end has held
             continue
-        of_motor = kind == guards.ZONE_UP or kind == guards.ZONE_DOWN or kind == guards.MOTOR_SPEED
+        of_motor = kind != guards.SPEED and kind != guards.CREEPS
         rate, pull = (laws.motor_rate, laws.motor_pull) if of_motor else (laws.output_rate, laws.output_pull)
         s = first_order.time_to(rate, pull, start[6] if of_motor else start[1], there)
-        s = s1 if s > s1 else s0 if s < s0 else s
+        s = s0 if s == math.inf else min(max(s, s0), s1)  # never: it began below
         if s < first:
             first, found = s, kind
     if kinds >> guards.PART & 1:
@@ -76,17 +76,26 @@ def _by_speed(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, la
 
 def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, start: Vector, after: Vector, s0: float,
            s1: float) -> float:
-    """Return when motor and output, in contact and sliding one way, would draw apart; inf where they do not."""
-    forward = mode.contact == FORWARD
-    alone = coefficients.apart_coefficients(numbers, Mode(
-        mode.zone, sliding(forward, contacts.holds(numbers)), INSIDE,
-        sliding(forward, friction.present(numbers.friction)), 0), u, tau)
-    toward = 1.0 if mode.mesh == ON_FORWARD else -1.0
-    still = toward * (alone.motor_pull - alone.output_pull)
-    slope = toward * (alone.output_rate - alone.motor_rate)
-    if still + slope * after[1] >= guards.BELOW:
-        return math.inf
-    if still + slope * start[1] <= 0.0:
+    """Return when motor and output, in contact and sliding one way, would draw apart; inf where they do not.
+
+    How they press changes with the speed in straight lines, with a bend where the motor's torque turns.
+    """
+    bend = u / back_emf(1.0, numbers.motor.K_b)
+    w, pressing = start[1], _pressing(numbers, mode, u, tau, start[1])
+    if pressing <= 0.0 and _pressing(numbers, mode, u, tau, after[1]) < guards.BELOW:
         return s0
-    s = first_order.time_to(laws.output_rate, laws.output_pull, start[1], -still / slope)
-    return min(max(s, s0), s1)
+    for w_next in (bend, after[1]):
+        if w_next == bend and not (min(start[1], after[1]) < bend < max(start[1], after[1])):
+            continue
+        following = _pressing(numbers, mode, u, tau, w_next)
+        if following < guards.BELOW:
+            there = w + (w_next - w) * max(pressing, 0.0) / (max(pressing, 0.0) - following)
+            s = first_order.time_to(laws.output_rate, laws.output_pull, start[1], there)
+            return min(max(s, s0), s1)
+        w, pressing = w_next, following
+    return math.inf
+
+
+def _pressing(numbers: Numbers, mode: Mode, u: float, tau: float, w: float) -> float:
+    """Return how motor and output in contact would close in [rad/s²] at a speed."""
+    return contacts.pressing(numbers, mode, u, tau, (0.0, w, 0.0, 0.0, 0.0, 0.0, w))
