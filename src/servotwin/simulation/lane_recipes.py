@@ -82,7 +82,7 @@ ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, absent=(*_NO_DIGITAL, "elastic"),
 PLAIN_DIGITAL = Recipe("plain_digital_runs", _ENTRIES, absent=(*_RARE, _PENDULUM, *_NO_DIGITAL, "elastic"),
                        never=_NOT_PLAIN, present=_DIGITAL, knows=ON_Q)
 
-_NOT_GLIDING = (*PLAIN_DIGITAL.absent, "load.stiffness")
+_NOT_TICKING = (*PLAIN_DIGITAL.absent, "load.stiffness")
 _TICKS = tuple(f"servotwin.models.engine.{name}" for name in (
     "loop_tiles:enter", "loop_rounds:watch", "loop_rounds:decide", "loop_rounds:move", "loop_rounds:move_on",
     "loop_rounds:follow"))
@@ -102,9 +102,11 @@ _DECIDED = tuple(f"firmware.{name}" for name in (
     "overload_output", "latches", "trip_current", "trip_time", "resets", "timeout", "loss", "failsafe", "soft_duty",
     "soft_time", "noise", "b_o", "weight", "h", "gate", "rest_travel", "whole", "minimum", "torque_limit"))
 # Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop
-_GLIDING = (Recipe("gliding", _ENTRIES, absent=_NOT_GLIDING, never=_NOT_PLAIN, present=_DIGITAL,
-                   spares=(*_GIVES_WAY, *_DECIDED)), ("servotwin.models.engine.glides:go",))
-_TICKING = (Recipe("ticking", ("servotwin.models.engine.loops:go_on",), vector=True, absent=_NOT_GLIDING,
+_LEGS = (Recipe("by_legs", _ENTRIES, absent=("source.I_max", "heat", "sensor.half_slack", _PENDULUM, "load.stiffness",
+                                             *_NO_DIGITAL, "elastic"), never=_NOT_PLAIN[:-1], present=_DIGITAL,
+                   spares=(*_GIVES_WAY, *_DECIDED, "motor.K", "follower.V_max", "shaft.b", "friction.varies",
+                           "friction.w_s", "friction.K_ms", "friction.K_es")), ("servotwin.models.engine.tick_legs:go",))
+_TICKING = (Recipe("ticking", ("servotwin.models.engine.loops:go_on",), vector=True, absent=_NOT_TICKING,
                    never=_NOT_PLAIN, present=_DIGITAL, spares=(*_GIVES_WAY, *_DECIDED, *_DECIDES_ALONE)), _TICKS)
 BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, absent=PLAIN_DIGITAL.absent,
                   never=PLAIN_DIGITAL.never, present=_DIGITAL)
@@ -120,8 +122,8 @@ def _sprung(name: str, entries: tuple[str, ...]) -> dict[bool, Recipe]:
 ELASTIC_RUNS = _sprung("elastic_runs", _ENTRIES)
 LOOK_ELASTIC = _sprung("look_elastic", LOOK_ONE_BY_ONE.entries)
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, absent=_PROGRAM)
-_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _GLIDING, _TICKING),
-          ALL_DIGITAL: ((ALL_DIGITAL, ()), _GLIDING)}
+_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _LEGS, _TICKING),
+          ALL_DIGITAL: ((ALL_DIGITAL, ()), _LEGS)}
 
 
 def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:

@@ -98,6 +98,15 @@ def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: 
         if smooth or abs(w) <= friction.core_speed(numbers.friction):
             return Mode(zone, CORE, mesh, FREE, 0)
         return Mode(zone, FORWARD if w > 0.0 else BACKWARD, mesh, FREE, 0)
+    mode = as_one(numbers, zone, u, tau, y, mesh)
+    if play.present(numbers.play) and pressing(numbers, mode, u, tau, y) < 0.0:
+        return apart(numbers, zone, u, tau, y)
+    return mode
+
+
+def as_one(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int) -> Mode:
+    """Return the mode of motor and output as one body, with true sticking, whether or not they press together."""
+    q, w = y[0], y[1]
     if w == 0.0:
         torque = drive_torque(numbers, zone, u, y)
         against = external_torque(numbers.load, tau, q)
@@ -106,10 +115,7 @@ def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: 
                             has_friction(numbers))
     else:
         contact = sliding(w > 0.0, has_friction(numbers))
-    mode = Mode(zone, contact, mesh, FREE, share_sign(numbers, zone, contact, mesh, u, tau, y))
-    if play.present(numbers.play) and pressing(numbers, mode, u, tau, y) < 0.0:
-        return apart(numbers, zone, u, tau, y)
-    return mode
+    return Mode(zone, contact, mesh, FREE, share_sign(numbers, zone, contact, mesh, u, tau, y))
 
 
 def share_sign(numbers: Numbers, zone: int, contact: int, mesh: int, u: float, tau: float, y: Vector) -> int:

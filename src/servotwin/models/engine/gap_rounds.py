@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine import gaps, tiles
+from servotwin.models.engine import legs, tiles
+from servotwin.models.engine.legs import Gone
+from servotwin.models.engine.modes import Vector
+from servotwin.models.terms.numbers import Numbers
 
 
 def phase(size: int, tile: Any, plan: Any) -> None:
@@ -18,8 +21,14 @@ def alone(tile: Any, plan: Any, j: int) -> None:
     """Move one lane through a time with or without drive."""
     servo = tile.servo
     y = (servo.q[j], servo.w[j], servo.i[j], servo.T_w[j], servo.T_h[j], servo.q_m[j], servo.w_m[j])
-    gone = gaps.go(tiles.numbers_at(tile.own, j), tile.hung.torque[j], plan.power[j], y, int(servo.mesh[j]),
-                   servo.wiper[j], plan.time[j])
-    servo.q[j], servo.w[j], servo.wiper[j] = gone.y[0], gone.y[1], gone.wiper
-    servo.q_m[j], servo.w_m[j], servo.mesh[j] = gone.y[5], gone.y[6], gone.mode.mesh
-    plan.lost[j] = plan.lost[j] if gone.done > 0.0 else 1.0
+    moved = gone(tiles.numbers_at(tile.own, j), tile.hung.torque[j], plan.power[j], y, int(servo.mesh[j]),
+                 servo.wiper[j], plan.time[j])
+    servo.q[j], servo.w[j], servo.wiper[j] = moved.y[0], moved.y[1], moved.wiper
+    servo.q_m[j], servo.w_m[j], servo.mesh[j] = moved.y[5], moved.y[6], moved.mode.mesh
+    plan.lost[j] = plan.lost[j] if moved.done > 0.0 else 1.0
+
+
+def gone(numbers: Numbers, torque: float, drive: float, y: Vector, mesh: int, wiper: float, time: float) -> Gone:
+    """Return where a servo goes within a time [s] under one drive (−1, 0, +1) and an external torque [N m]."""
+    u = drive * numbers.source.V
+    return legs.go(numbers, torque, u, y, legs.mode_from(numbers, torque, u, y, mesh), wiper, time)

@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from servotwin.models.engine import glides
+from servotwin.models.engine import loop_tiles
 from servotwin.models.engine.arcs import starting, way_to_edge
 from servotwin.models.engine.elementary import decay, fma
-from servotwin.models.engine.glides import Body
-from servotwin.models.engine.loop_tiles import body_at, firmware_at, path_at, piece_at, sensor_at, supply_at
+from servotwin.models.engine.loop_tiles import Body, body_at, firmware_at, path_at, piece_at, sensor_at, supply_at
 from servotwin.models.engine.memory import FRAMES, SAME
 from servotwin.models.engine.modes import CONDUCTING
 from servotwin.models.terms import bridge, control, duty
@@ -174,11 +173,11 @@ def _arc(body: Body, path: Bridge, supply: Source, d: float, q: float, w: float,
     """Return how a shaft moves at a duty, from an angle and a speed on."""
     path, supply = duty.at(path, body.motor, supply, d)
     v, R = bridge.loop(path, supply, CONDUCTING, duty.voltage(supply, d))
-    per_volt = 0.0 if d == OPEN else glides.torque_per_volt(body.motor, R)
+    per_volt = 0.0 if d == OPEN else loop_tiles.torque_per_volt(body.motor, R)
     torque = per_volt * v - body.tau
     start = starting(body.hold_forward, body.hold_backward, torque)
     way = start if w == 0.0 else math.copysign(1.0, w)
-    rate = glides.fading(body, per_volt)
+    rate = loop_tiles.fading(body, per_volt)
     pull = accelerated(body.shaft, torque - (
         body.against_forward if way > 0.0 else body.against_backward))
     once, twice = decay(rate, 1.0 / rate if rate > 0.0 else 0.0, time)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import controller, glides
-from servotwin.models.engine.glides import Body
+from servotwin.models.engine import contacts, controller
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
@@ -18,18 +17,22 @@ from servotwin.models.engine.memory import (
     put_memory,
     resumed,
 )
-from servotwin.models.engine.modes import RIGID, Mode, Vector
+from servotwin.models.engine.modes import BACKWARD, FORWARD, RIGID, Mode, Vector
+from servotwin.models.engine.motion import may_depend
 from servotwin.models.engine.records import reader, room, rows_of, tile_of, writer
 from servotwin.models.engine.runs import UNDERWAY, inputs_of
 from servotwin.models.engine.tiles import numbers_of
-from servotwin.models.terms import profile, trips
+from servotwin.models.terms import profile, sensor, shaft, source, trips
 from servotwin.models.terms.bridge import Bridge
 from servotwin.models.terms.control import NOWHERE, WAITING
 from servotwin.models.terms.duty import BRAKE
 from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.motor import Motor
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import Sensor
+from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
+from servotwin.physics.motor import back_emf, electromagnetic_torque, steady_armature_current
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
@@ -39,7 +42,23 @@ if TYPE_CHECKING:
     from servotwin.models.engine.memory import Memories
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
 
+_GIVEN = Piece()  # what a servo follows that a program drives
 TOGETHER = 64  # lanes: what they work with fits into the nearest cache
+
+
+class Body(NamedTuple):
+    """What moves: motor and shaft, the friction that it slides against [N m], and between which stops."""
+
+    motor: Motor
+    shaft: Shaft
+    dry: float  # 1: with dry friction
+    against_forward: float  # of a shaft that slides forward; negative of one that slides backward
+    against_backward: float
+    hold_forward: float  # most that friction holds against a start
+    hold_backward: float
+    lower: float
+    upper: float
+    tau: float  # constant, external
 
 
 class Loop(NamedTuple):
@@ -124,12 +143,33 @@ def tile_room() -> NDArray[Any]:
 
 def possible(numbers: Numbers, inputs: Inputs) -> bool:
     """Tell whether a servo's current always flows freely, so that every tick is two arcs at most, end stops apart."""
-    if not glides.possible(numbers, inputs) or numbers.bridge.pwm != BRAKE:
+    if source.regulated(numbers.source) or sensor.slack(numbers.sensor) or len(inputs.torque) > 0:
+        return False
+    if may_depend(numbers, _GIVEN) != 0 or numbers.bridge.pwm != BRAKE:
         return False
     if numbers.bridge.D_drive != 0.0 or numbers.bridge.V_br != 0.0 or numbers.bridge.off.D != 0.0:
         return False
     firmware = inputs.firmware[0]
     return bool(firmware.T_d == 0.0 or abs(firmware.T_d - firmware.T_c) <= SAME * firmware.T_c)
+
+
+def body_of(numbers: Numbers, tau: float) -> Body:
+    """Return what moves, under a constant external torque [N m]."""
+    backward, forward = contacts.holding_bounds(numbers, 0.0, -tau)
+    return Body(numbers.motor, numbers.shaft, 1.0 if contacts.has_friction(numbers) else 0.0,
+                contacts.friction_torque(numbers, FORWARD, 0.0, 0.0, 0.0),
+                contacts.friction_torque(numbers, BACKWARD, 0.0, 0.0, 0.0), forward, backward, numbers.stops.lower,
+                numbers.stops.upper, tau)
+
+
+def torque_per_volt(own: Motor, R: float) -> float:
+    """Return the torque [N m/V] that a voltage makes in a loop of so many ohms."""
+    return electromagnetic_torque(steady_armature_current(1.0, 0.0, R, own.K_b), own.K)
+
+
+def fading(body: Body, per_volt: float) -> float:
+    """Return λ [1/s] of a shaft whose motor has so much torque per volt."""
+    return shaft.accelerated(body.shaft, body.shaft.b + per_volt * back_emf(1.0, body.motor.K_b))
 
 
 def enter(lanes: Lanes, curve: Floats, torque: Floats, k: int, lane: int, duration: float, times: Floats,
@@ -151,7 +191,7 @@ def enter(lanes: Lanes, curve: Floats, torque: Floats, k: int, lane: int, durati
         return False
     put_memory(memories.rows[k], memory)
     put_firmware(tile.program, j, firmware)
-    put_body(tile.body, j, glides.body_of(numbers, inputs.constant_torque))
+    put_body(tile.body, j, body_of(numbers, inputs.constant_torque))
     put_path(tile.path, j, numbers.bridge)
     put_supply(tile.supply, j, numbers.source)
     put_sensor(tile.sensor, j, numbers.sensor)

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import controller, glides
+from servotwin.models.engine import controller, tick_legs
 from servotwin.models.engine import loop_rounds as rounds
 from servotwin.models.engine import loop_tiles as tiles
 from servotwin.models.engine.memory import SAME, in_force
-from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, STUCK, Vector
+from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK, Mode, Vector
 from servotwin.models.engine.runs import inputs_of
 from servotwin.models.engine.tiles import numbers_of
 from servotwin.models.terms import control, profile
@@ -132,6 +132,6 @@ def _write(times: Floats, outputs: Floats, memories: Memories, tile: Any, j: int
         if dry:
             contact = STUCK if way == 0.0 else FORWARD if way > 0.0 else BACKWARD
         here: Vector = (q, w, y[2], y[3], y[4], q, w)
-        glides.show(outputs[k], tile.place.output[j], q, w, here, contact, firm)
+        tick_legs.show_one(outputs[k], tile.place.output[j], here, Mode(0, contact, RIGID, FREE, 0), firm)
         tile.place.output[j] += 1
         tiles.await_output(times, tile, j)

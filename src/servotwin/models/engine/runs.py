@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from servotwin.models.engine import controller, glides, motion
-from servotwin.models.engine.glides import GLIDES
+from servotwin.models.engine import controller, motion, tick_legs
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
@@ -26,6 +25,7 @@ from servotwin.models.engine.memory import (
 )
 from servotwin.models.engine.modes import INSIDE, RIGID, Mode
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
+from servotwin.models.engine.tick_legs import LEGS
 from servotwin.models.engine.tiles import chip_of, numbers_of
 from servotwin.models.terms import duty, firmware, play
 from servotwin.models.terms.chip import Chip
@@ -140,8 +140,8 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
             memory = counted_anew(memory)
             until = instant(pulsed, inputs, memory, until - (origin_of(memory) - origin))
             origin = origin_of(memory)
-        if firmware.present(inputs.firmware[0]) and glides.way_of(numbers, inputs) == GLIDES:
-            memory, done = glides.go(numbers, inputs, memory, until, times, done, outputs)
+        if firmware.present(inputs.firmware[0]) and tick_legs.way_of(numbers, inputs) == LEGS:
+            memory, done = tick_legs.go(numbers, inputs, memory, until, times, done, outputs)
             if memory.point.time >= until or due(memory):
                 continue
         t, wiper = memory.point.time, memory.point.wiper

@@ -33,7 +33,7 @@ _COPYING = flat_name(records.__name__, "")  # functions that only take records o
 def unread_numbers(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
     """Return the numbers that the general form reads and a recipe's kernels do not know, as `unread` keeps them."""
     general = _readers(replace(in_general(recipe), entries=_RUNS, vector=False, single=False))
-    own = _readers(recipe if of else replace(recipe, never=(*recipe.never, "GLIDES")), of)  # glides are asked apart
+    own = _readers(recipe if of else replace(recipe, never=(*recipe.never, "LEGS")), of)  # legs are asked apart
     by_itself = set().union(*(own[name] for name in own.keys() - general.keys()))
     for path, key in _paths("", Numbers, ("chip", Chip), ("firmware", Firmware)):
         there = {name for name, read in general.items() if key in read}

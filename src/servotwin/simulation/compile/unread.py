@@ -24,7 +24,7 @@ def told(recipe: Recipe) -> Recipe:
 @cache
 def in_general(recipe: Recipe) -> Recipe:
     """Return the recipe for what a form leaves out, in which no way of going on is chosen by terms that it knows."""
-    return replace(told(recipe), name=f"{recipe.name}_in_general", never=(*recipe.never, "GLIDES"))
+    return replace(told(recipe), name=f"{recipe.name}_in_general", never=(*recipe.never, "LEGS"))
 
 
 @cache

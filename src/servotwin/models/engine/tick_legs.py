@@ -1,0 +1,200 @@
+"""Digital servos from tick to tick, leg by leg, without a motion being kept.
+
+Between two ticks the duty is constant. A leg that surely lasts until the next one is arithmetic: what its exponentials
+are over a whole tick is kept as long as its laws have the same rates. Any other tick goes from event to event. A servo
+at rest whose duty stays costs a comparison. Arrays of the inputs are looked at only where they are needed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.models.engine import contacts, controller, currents, first_order, legs
+from servotwin.models.engine.coefficients import Apart
+from servotwin.models.engine.memory import FRAMES, SAME, Inputs, Memory, Point, origin_of
+from servotwin.models.engine.modes import CONDUCTING, INSIDE, Mode, Vector, at_rest
+from servotwin.models.engine.motion import may_depend
+from servotwin.models.terms import control, duty, friction, play, sensor, source
+from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE
+from servotwin.models.terms.dependence import BY_SHARE, TWO_BODIES
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.play import with_motor
+from servotwin.models.terms.sensor import sensed_voltage
+from servotwin.physics.motor import back_emf
+from servotwin.physics.pieces import Piece
+from servotwin.physics.potentiometer import feedback_voltage
+
+if TYPE_CHECKING:
+    from servotwin.models.engine.tiles import Floats
+
+LEGS, STEPS = 0, 1  # from tick to tick: in this loop, or from event to event
+_GIVEN = Piece()  # what a servo follows that a program drives
+
+
+class Fade(NamedTuple):
+    """What `first_order.response` says of a rate and a time, and for which."""
+
+    rate: float
+    time: float
+    decay: float
+    g: float
+    G: float
+
+
+def possible(numbers: Numbers, inputs: Inputs) -> bool:
+    """Tell whether a servo always moves by legs."""
+    if source.regulated(numbers.source) or sensor.slack(numbers.sensor) or len(inputs.torque) > 0:
+        return False
+    return may_depend(numbers, _GIVEN) & ~(TWO_BODIES | BY_SHARE) == 0
+
+
+def way_of(numbers: Numbers, inputs: Inputs) -> int:
+    """Return which way a servo goes from tick to tick."""
+    return LEGS if possible(numbers, inputs) else STEPS
+
+
+def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Floats, done: int,
+       outputs: Floats) -> tuple[Memory, int]:
+    """Go on from tick to tick, as far as this way leads and at most to `until` [s]; return how many outputs are done.
+
+    The arguments are those of `runs.run`.
+    """
+    firmware, firm, frames, origin = inputs.firmware[0], controller.of(memory), memory.frames, origin_of(memory)
+    point, slack, tau = memory.point, SAME * inputs.firmware[0].T_c, inputs.constant_torque
+    t, y, T_c = point.time, point.y, inputs.firmware[0].T_c
+    last, gone = min(until, FRAMES * memory.beat), False
+    now, u, mode = numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0)
+    laws, known = Apart(0.0, 0.0, 0.0, 0.0), math.nan
+    output = motor = Fade(math.nan, 0.0, 0.0, 0.0, 0.0)
+    while t < last:
+        if controller.next_due(firmware, firm, frames) > t + slack:
+            break  # in the middle of a motion
+        controller.apply(firmware, firm, frames, t + slack)
+        if firm.duty != known:
+            now = duty.at_duty(numbers, firm.duty)
+        if controller.is_due(firmware, firm, frames, t + slack):
+            tick(now, inputs, firm, y, origin + t)
+            controller.apply(firmware, firm, frames, t + slack)
+        end = controller.next_due(firmware, firm, frames)
+        if end > until + slack:
+            break
+        end = min(end, until)
+        if firm.duty != known:
+            now = duty.at_duty(numbers, firm.duty)
+            u = duty.voltage(now.source, firm.duty)
+            mode, known = legs.mode_from(now, tau, u, y, mode.mesh), firm.duty
+            laws = legs.laws_of(now, mode, u, tau)
+        time = end - t
+        if abs(time - T_c) <= slack:
+            time = T_c
+        shows = done < times.size and (times[done] - origin < end - slack or end >= until)
+        if shows:
+            done = show(now, tau, u, y, mode, times, done, t, end, until, origin, outputs, firm)
+        if not legs.stands(mode):
+            output = faded(output, laws.output_rate, time)
+            motor = faded(motor, laws.motor_rate, time) if mode.mesh == INSIDE else motor
+            after = over(now, mode, laws, output, motor, y)
+            if lasts(now, mode, u, tau, y, after, time):
+                y = after
+            else:
+                way = legs.go(now, tau, u, y, mode, y[0], time)
+                if way.done == 0.0:
+                    gone = True
+                    break
+                if way.mode != mode:
+                    laws = legs.laws_of(now, way.mode, u, tau)
+                y, mode = way.y, way.mode
+        t = end
+    if t > point.time or gone:
+        point = Point(t, y, Mode(0, 0, mode.mesh, 0, 0), math.inf, y, point.step, y[0])
+        memory = Memory(frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
+                        memory.firm)
+    return memory, done
+
+
+def tick(now: Numbers, inputs: Inputs, firm: Any, y: Vector, time: float) -> None:
+    """Do what a tick does of a servo whose numbers are those at its duty, at a time since the start [s]."""
+    firmware, own = inputs.firmware[0], now.sensor
+    if controller.has_news(firmware, firm, time):
+        controller.listen(inputs, firm, time)
+    angle = y[0]
+    if firmware.per_volt != 0.0:
+        straight = own.step == 0.0 and len(inputs.curve) == 0
+        v = feedback_voltage(y[0], own.p, own.b_o) if straight else sensed_voltage(own, inputs.curve, y[0])
+        angle = controller.angle_of(firmware, firm, v, inputs.seed)
+    sensed = NOTHING_SENSED
+    if control.senses(firmware):
+        V_bus, i = controller.on_supply(now, firm.duty, y)
+        sensed = controller.sensed_of(now, i, V_bus, y)
+    controller.decide(firmware, firm, angle, sensed, time)
+
+
+def faded(known: Fade, rate: float, time: float) -> Fade:
+    """Return how a speed fades at a rate [1/s] within a time [s], as known where these are the same."""
+    if rate == known.rate and time == known.time:
+        return known
+    decay, g, G = first_order.response(rate, time)
+    return Fade(rate, time, decay, g, G)
+
+
+def over(numbers: Numbers, mode: Mode, laws: Apart, output: Fade, motor: Fade, y: Vector) -> Vector:
+    """Return the state after a time, as `legs.moved` has it."""
+    q, w = y[0] + y[1] * output.g + laws.output_pull * output.G, y[1] * output.decay + laws.output_pull * output.g
+    if mode.mesh != INSIDE:
+        return with_motor(numbers.play, mode.mesh, (q, w, y[2], y[3], y[4], q, w))
+    return (q, w, y[2], y[3], y[4], y[5] + y[6] * motor.g + laws.motor_pull * motor.G,
+            y[6] * motor.decay + laws.motor_pull * motor.g)
+
+
+def lasts(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, after: Vector, time: float) -> bool:
+    """Tell whether a mode surely lasts on the way from a state to the one after a time [s]; speeds are monotone."""
+    q, w, _, _, _, q_m, w_m = after
+    low, high = currents.zone_limits(numbers, mode.zone, u)
+    if not low < u - back_emf(w_m, numbers.motor.K_b) < high:
+        return False
+    if not (at_rest(mode.contact) or (y[1] * w >= 0.0 and w != 0.0 and numbers.stops.lower < q < numbers.stops.upper)):
+        return False
+    if mode.mesh == INSIDE:
+        if not at_rest(mode.motor) and (y[6] * w_m < 0.0 or w_m == 0.0):
+            return False
+        ahead, half = y[5] - y[0], numbers.play.half
+        most = time * max(max(y[6], w_m) - min(y[1], w), 0.0)
+        least = time * min(min(y[6], w_m) - max(y[1], w), 0.0)
+        if not (ahead + most < half and ahead + least > -half):
+            return False
+    if mode.share == 0 and not play.present(numbers.play):
+        return True
+    torque = currents.drive_torque(numbers, mode.zone, u, after)
+    if mode.share != 0 and not mode.share * contacts.through_gear(numbers, mode.mesh, torque, tau, after) > 0.0:
+        return False
+    if mode.mesh == INSIDE or not play.present(numbers.play):
+        return True
+    if mode.zone == CONDUCTING and friction.varying(numbers.friction) and (
+            torque * currents.drive_torque(numbers, mode.zone, u, y) <= 0.0):
+        return False  # there is a bend in how they press
+    return contacts.pressing(numbers, mode, u, tau, after) > 0.0
+
+
+def show(numbers: Numbers, tau: float, u: float, y: Vector, mode: Mode, times: Floats, done: int, t: float, end: float,
+         until: float, origin: float, outputs: Floats, firm: Any) -> int:
+    """Write the outputs within a tick, leg by leg; return how many are done."""
+    slack = SAME * (end - t)
+    while done < times.size and (times[done] - origin < end - slack or end >= until):
+        s = min(max(times[done] - origin - t, 0.0), end - t)
+        here = legs.go(numbers, tau, u, y, mode, y[0], s)
+        show_one(outputs, done, here.y, here.mode, firm)
+        done += 1
+    return done
+
+
+def show_one(outputs: Floats, done: int, y: Vector, mode: Mode, firm: Any) -> None:
+    """Put what shows of a servo into a column of the outputs, in the order of `runs.run`."""
+    outputs[0, done], outputs[1, done], outputs[2, done] = y[0], y[1], mode.contact
+    outputs[3, done] = math.copysign(1.0, firm.duty) if duty.drives(firm.duty) else 0.0
+    outputs[4, done], outputs[5, done] = 0.0, y[0]
+    for k in range(5):
+        outputs[6 + k, done] = y[2 + k]
+    outputs[11, done], outputs[12, done], outputs[13, done] = mode.mesh, mode.motor, 1
+    outputs[14, done], outputs[16, done], outputs[17, done] = firm.duty, firm.r, firm.trip
+    outputs[15, done] = firm.r if firm.goal == NOWHERE else firm.goal
