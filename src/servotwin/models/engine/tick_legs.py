@@ -65,14 +65,14 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     t, y, T_c = point.time, point.y, inputs.firmware[0].T_c
     last, gone = min(until, FRAMES * memory.beat), False
     now, u, mode = numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0)
-    laws, known = Apart(0.0, 0.0, 0.0, 0.0), math.nan
+    laws, met, known = Apart(0.0, 0.0, 0.0, 0.0), math.nan, math.nan  # duties of `now`, of the mode
     output = motor = Fade(math.nan, 0.0, 0.0, 0.0, 0.0)
     while t < last:
         if controller.next_due(firmware, firm, frames) > t + slack:
             break  # in the middle of a motion
         controller.apply(firmware, firm, frames, t + slack)
-        if firm.duty != known:
-            now = duty.at_duty(numbers, firm.duty)
+        if firm.duty != met:
+            now, met = duty.at_duty(numbers, firm.duty), firm.duty
         if controller.is_due(firmware, firm, frames, t + slack):
             tick(now, inputs, firm, y, origin + t)
             controller.apply(firmware, firm, frames, t + slack)
@@ -80,10 +80,11 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
         if end > until + slack:
             break
         end = min(end, until)
-        if firm.duty != known:
-            now = duty.at_duty(numbers, firm.duty)
-            u = duty.voltage(now.source, firm.duty)
-            mode, known = legs.mode_from(now, tau, u, y, mode.mesh), firm.duty
+        if firm.duty != met:
+            now, met = duty.at_duty(numbers, firm.duty), firm.duty
+        if met != known:
+            u, known = duty.voltage(now.source, met), met
+            mode = legs.mode_from(now, tau, u, y, mode.mesh)
             laws = legs.laws_of(now, mode, u, tau)
         time = end - t
         if abs(time - T_c) <= slack:

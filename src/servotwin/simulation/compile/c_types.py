@@ -46,6 +46,8 @@ def identifier(name: str) -> str:
     """Return a name as C may have it."""
     return f"{name}_" if name in _TAKEN or _OURS.fullmatch(name) else name
 
+_ROUNDED = ("whole(FLOOR(", "whole(CEIL(")
+
 
 class Types:
     """Structs, tables and small functions that a text needs, in the order in which they are asked for."""
@@ -156,6 +158,8 @@ class Types:
         if kind == to or kind is None or to is None:
             return text
         if isinstance(to, Scalar):
+            if to == FLOAT64 and text.startswith(_ROUNDED) and _enclosed(text.removeprefix("whole")):
+                return f"({text.removeprefix('whole(')[:-1]} + 0.0)"  # the whole number need not be one of integers
             return f"({text} != 0)" if to == BOOL else f"({to.c}){bracketed(text)}"
         if isinstance(kind, Fixed) and isinstance(to, Array):
             lengths = ", ".join(map(str, kind.shape))
