@@ -132,7 +132,19 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
     if firmware.present(inputs.firmware[0]) and not underway:
         controller.resume(inputs, memory)
     until = instant(pulsed, inputs, memory, memory.point.time + duration)
-    origin = origin_of(memory)
+    if firmware.present(inputs.firmware[0]) and tick_legs.way_of(numbers, inputs) == LEGS:
+        gone = tick_legs.go(numbers, inputs, memory, until, times, done, outputs)
+        memory, done = tick_legs.as_gone(memory, gone), gone.done
+        if gone.time >= until:
+            controller.pause(inputs, memory)
+            return memory, COMPLETED
+    return _run_on(numbers, chip, inputs, memory, until, times, done, outputs)
+
+
+def _run_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until: float, times: Floats, done: int,
+            outputs: Floats) -> tuple[Memory, int]:
+    """Go on to a time [s] from event to event, and by legs wherever these lead on; see `run`."""
+    pulsed, origin = pulsed_chip(chip), origin_of(memory)
     m = motion.nothing(numbers, memory.u, memory.tau)
     idle = 0
     while memory.point.time < until:
@@ -141,7 +153,8 @@ def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: 
             until = instant(pulsed, inputs, memory, until - (origin_of(memory) - origin))
             origin = origin_of(memory)
         if firmware.present(inputs.firmware[0]) and tick_legs.way_of(numbers, inputs) == LEGS:
-            memory, done = tick_legs.go(numbers, inputs, memory, until, times, done, outputs)
+            gone = tick_legs.go(numbers, inputs, memory, until, times, done, outputs)
+            memory, done = tick_legs.as_gone(memory, gone), gone.done
             if memory.point.time >= until or due(memory):
                 continue
         t, wiper = memory.point.time, memory.point.wiper

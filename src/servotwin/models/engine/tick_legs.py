@@ -42,6 +42,16 @@ class Fade(NamedTuple):
     G: float
 
 
+class Gone(NamedTuple):
+    """To when a servo has gone [s], by the times of its memory, in which state and mesh; outputs done; whether at all."""
+
+    time: float
+    y: Vector
+    mesh: int
+    done: int
+    moved: bool
+
+
 def possible(numbers: Numbers, inputs: Inputs) -> bool:
     """Tell whether a servo always moves by legs."""
     if source.regulated(numbers.source) or sensor.slack(numbers.sensor) or len(inputs.torque) > 0:
@@ -55,8 +65,8 @@ def way_of(numbers: Numbers, inputs: Inputs) -> int:
 
 
 def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Floats, done: int,
-       outputs: Floats) -> tuple[Memory, int]:
-    """Go on from tick to tick, as far as this way leads and at most to `until` [s]; return how many outputs are done.
+       outputs: Floats) -> Gone:
+    """Go on from tick to tick, as far as this way leads and at most to `until` [s].
 
     The arguments are those of `runs.run`.
     """
@@ -107,11 +117,16 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
                     laws = legs.laws_of(now, way.mode, u, tau)
                 y, mode = way.y, way.mode
         t = end
-    if t > point.time or gone:
-        point = Point(t, y, Mode(0, 0, mode.mesh, 0, 0), math.inf, y, point.step, y[0])
-        memory = Memory(frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
-                        memory.firm)
-    return memory, done
+    return Gone(t, y, mode.mesh, done, t > point.time or gone)
+
+
+def as_gone(memory: Memory, gone: Gone) -> Memory:
+    """Return the memory of a servo that has gone on so."""
+    if not gone.moved:
+        return memory
+    point = Point(gone.time, gone.y, Mode(0, 0, gone.mesh, 0, 0), math.inf, gone.y, memory.point.step, gone.y[0])
+    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
+                  memory.firm)
 
 
 def tick(now: Numbers, inputs: Inputs, firm: Any, y: Vector, time: float) -> None:
