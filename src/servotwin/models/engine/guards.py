@@ -29,12 +29,13 @@ from servotwin.models.engine.modes import (
     at_rest,
     slides,
 )
-from servotwin.models.terms import elastic, play, source
+from servotwin.models.terms import elastic, friction, play, source
 from servotwin.models.terms.friction import core_speed, creeping_speed, fades, smoothed, varying
-from servotwin.models.terms.load import external_torque
+from servotwin.models.terms.load import external_torque, stiffness_at
 from servotwin.models.terms.motor import inductive
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.physics import motor
+from servotwin.physics.load_friction import torque_on_gear
 
 # What can end a mode: first what a shaft and a zone of its own have, then what play adds.
 SPEED, CORE_FORWARD, CORE_BACKWARD, ZONE_UP, ZONE_DOWN, UPPER, LOWER, RELEASE_FORWARD, RELEASE_BACKWARD = range(9)
@@ -168,13 +169,28 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
     if kind == SHARE:
         tau_m = currents.drive_torque(numbers, zone, u, y)
         if elastic.present(numbers.elastic):
-            return mode.share * twist.through_gear(numbers, mode.mesh, tau_m, tau, y), math.nan
+            return mode.share * twist.through_gear(numbers, mode.mesh, tau_m, tau, y), _share_rate(
+                numbers, mode, u, du, dtau, y, dy)
         return mode.share * contacts.through_gear(numbers, mode.mesh, tau_m, tau, y), math.nan
     if elastic.present(numbers.elastic):
         return _spring_guard(numbers, mode, kind, u, du, tau, dtau, y, dy)
     if play.present(numbers.play) and kind >= MEET_FORWARD:
         return _play_guard(numbers, mode, kind, u, tau, dtau, y, dy)
     return _release_guard(numbers, mode, kind, u, du, tau, dtau, y, dy)
+
+
+def _share_rate(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, y: Vector, dy: Vector) -> float:
+    """Return the rate of the guard of a share through a gear with a spring; nan where it is not known."""
+    di = dy[2]
+    if not inductive(numbers.motor):
+        R = currents.resistance(numbers, mode.zone, u)
+        di = motor.steady_armature_current(du, elastic.turning(numbers.elastic, dy), R, numbers.motor.K_b)
+    slope = twist.torque_slope(numbers, mode.mesh, y, dy)
+    tau_e = -slope
+    if elastic.behind(numbers.elastic):
+        against = dtau + slope + stiffness_at(numbers.load, y[0]) * y[1]
+        tau_e = torque_on_gear(against, dy[1], numbers.shaft.b_out)
+    return mode.share * friction.share(numbers.friction, motor.electromagnetic_torque(di, numbers.motor.K), tau_e)
 
 
 def share_along(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:

@@ -149,8 +149,9 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
 
 def dependence(numbers: Numbers, mode: Mode, u: Piece, still: bool) -> int:
     """Return on what the acceleration depends in a mode, as the terms have it; `still` where nothing moves."""
+    alone = mode.mesh == INSIDE or elastic.geared(numbers.elastic)  # it is the motor that moves against the gear
     return (motor.depends(numbers.motor) | heat.depends(numbers.heat) | load.depends(numbers.load)
-            | friction.depends(numbers.friction, mode.motor if mode.mesh == INSIDE else mode.contact)
+            | friction.depends(numbers.friction, mode.motor if alone else mode.contact)
             | play.depends(mode.mesh, still)
             | elastic.depends(numbers.elastic, still) | sensor.depends(numbers.sensor, numbers.source)
             | follower.depends(mode.zone, u))

@@ -14,11 +14,11 @@ import math
 from servotwin.models.engine.modes import NOWHERE, Mode, Vector
 from servotwin.models.engine.rates import rates_of
 from servotwin.models.terms import elastic, source
-from servotwin.models.terms.dependence import ON_I, ON_Q, TWO_BODIES
+from servotwin.models.terms.dependence import BY_SHARE, ON_I, ON_Q, TWO_BODIES
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.pieces import Piece
 
-_LINEAR = TWO_BODIES | ON_Q | ON_I
+_LINEAR = TWO_BODIES | ON_Q | ON_I | BY_SHARE
 _LONGEST = 2.0  # of a series, in times of the fastest rate
 _TERMS = 40
 _ROUNDING = 1e-18  # of the state: what a term may be

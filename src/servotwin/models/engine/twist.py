@@ -29,7 +29,7 @@ from servotwin.models.engine.modes import (
     slides,
 )
 from servotwin.models.terms import elastic, friction, shaft
-from servotwin.models.terms.friction import holding_friction, sliding_friction
+from servotwin.models.terms.friction import holding_friction, sliding_against
 from servotwin.models.terms.load import external_torque
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import from_rest, sliding
@@ -159,10 +159,10 @@ def _of_two(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tu
     driving, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y[0])
     between = torque(numbers, mode.mesh, y)
     if elastic.behind(numbers.elastic):
-        return (_shaft_acceleration(numbers, mode.contact, driving, against + between, y[1]),
+        return (_shaft_acceleration(numbers, mode, driving, against + between, y[1]),
                 behind_acceleration(numbers, between, y))
     return (contacts.output_acceleration(numbers, mode.contact, against - between, y[1]),
-            _motor_acceleration(numbers, mode.motor, driving, between, y[6]))
+            _motor_acceleration(numbers, mode, driving, between, y[6]))
 
 
 def behind_acceleration(numbers: Numbers, between: float, y: Vector) -> float:
@@ -172,20 +172,30 @@ def behind_acceleration(numbers: Numbers, between: float, y: Vector) -> float:
     return shaft_acceleration(between, y[6], 0.0, weight, own.b, own.J)
 
 
-def _shaft_acceleration(numbers: Numbers, contact: int, driving: float, against: float, w: float) -> float:
-    if at_rest(contact):
+def _shaft_acceleration(numbers: Numbers, mode: Mode, driving: float, against: float, w: float) -> float:
+    if at_rest(mode.contact):
         return 0.0
-    dry = contacts.friction_torque(numbers, contact, w, driving, torque_on_gear(against, w, numbers.shaft.b_out))
+    dry = 0.0
+    if slides(mode.contact):
+        tau_e = torque_on_gear(against, w, numbers.shaft.b_out)
+        dry = _dry(numbers, mode.contact, mode.share, w, driving, tau_e, numbers.load.coulomb)
     return shaft.acceleration(numbers.shaft, driving, w, dry, against)
 
 
-def _motor_acceleration(numbers: Numbers, contact: int, driving: float, between: float, w: float) -> float:
-    if at_rest(contact):
+def _motor_acceleration(numbers: Numbers, mode: Mode, driving: float, between: float, w: float) -> float:
+    if at_rest(mode.motor):
         return 0.0
     dry = 0.0
-    if slides(contact):
-        dry = sliding_friction(numbers.friction, contact == FORWARD, w, driving, -between)
-    return shaft.motor_acceleration(numbers.shaft, driving - between, w, -dry if contact == BACKWARD else dry)
+    if slides(mode.motor):
+        dry = _dry(numbers, mode.motor, mode.share, w, driving, -between, 0.0)
+    return shaft.motor_acceleration(numbers.shaft, driving - between, w, dry)
+
+
+def _dry(numbers: Numbers, contact: int, share: int, w: float, tau_m: float, tau_e: float, more: float) -> float:
+    """Return the friction [N m] against +q of a body that slides against the gear, and `more` of a load."""
+    forward = contact == FORWARD
+    dry = sliding_against(numbers.friction, forward, share, w, tau_m, tau_e) + more
+    return dry if forward else -dry
 
 
 def rebound(numbers: Numbers, mode: Mode, upper: bool, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:

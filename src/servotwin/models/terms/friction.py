@@ -140,6 +140,13 @@ def sliding_friction(friction: Friction, forward: bool, w: float, tau_m: float, 
         load_friction_motor_quad=friction.K_mq, load_friction_external_quad=friction.K_eq)
 
 
+def sliding_against(friction: Friction, forward: bool, sign: int, w: float, tau_m: float, tau_e: float) -> float:
+    """Return the same while the share keeps its sign: beyond its zero too, where it is known and nothing fades."""
+    if sign == 0 or fades(friction):
+        return sliding_friction(friction, forward, w, tau_m, tau_e)
+    return sliding_friction(friction, forward, math.inf, 0.0, 0.0) + sign * share(friction, tau_m, tau_e)
+
+
 def holding_friction(friction: Friction, forward: bool, tau_m: float, tau_e: float) -> float:
     """Return the torque [N m] up to which the gear holds against a start forward or backward."""
     F = coulomb(friction, forward)
