@@ -53,9 +53,8 @@ def longest(A: tuple[Vector, ...]) -> float:
 
 def propagate(A: tuple[Vector, ...], start: Vector, s: float) -> Vector:
     """Return the state at s after the start [s], at most as long after as a series holds."""
-    y, (q, w, i, T_w, T_h, q_m, w_m) = A[3], start
-    r = _along(A, start)
-    r = (r[0] + y[0], r[1] + y[1], r[2] + y[2], 0.0, 0.0, r[5] + y[5], r[6] + y[6])
+    q, w, i, T_w, T_h, q_m, w_m = start
+    r = rates(A, start)
     size = 1.0 + abs(w) + abs(w_m) + abs(i)
     n, part = 1, s
     while n < _TERMS:
@@ -67,6 +66,12 @@ def propagate(A: tuple[Vector, ...], start: Vector, s: float) -> Vector:
         n += 1
         part *= s / n
     return q, w, i, T_w, T_h, q_m, w_m
+
+
+def rates(A: tuple[Vector, ...], y: Vector) -> Vector:
+    """Return the rates at a state."""
+    r, b = _along(A, y), A[3]
+    return (r[0] + b[0], r[1] + b[1], r[2] + b[2], 0.0, 0.0, r[5] + b[5], r[6] + b[6])
 
 
 def _along(A: tuple[Vector, ...], y: Vector) -> Vector:

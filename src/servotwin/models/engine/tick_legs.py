@@ -10,12 +10,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import contacts, controller, currents, first_order, legs
+from servotwin.models.engine import contacts, controller, currents, first_order, legs, pairs, spring_legs
 from servotwin.models.engine.coefficients import Apart
 from servotwin.models.engine.memory import FRAMES, SAME, Inputs, Memory, Point, origin_of
 from servotwin.models.engine.modes import CONDUCTING, INSIDE, Mode, Vector, at_rest
 from servotwin.models.engine.motion import may_depend
-from servotwin.models.terms import control, duty, friction, play, sensor, source
+from servotwin.models.engine.spring_legs import Law
+from servotwin.models.terms import control, duty, elastic, friction, play, sensor, source
 from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE
 from servotwin.models.terms.dependence import BY_SHARE, TWO_BODIES
 from servotwin.models.terms.numbers import Numbers
@@ -56,7 +57,10 @@ def possible(numbers: Numbers, inputs: Inputs) -> bool:
     """Tell whether a servo always moves by legs."""
     if source.regulated(numbers.source) or sensor.slack(numbers.sensor) or len(inputs.torque) > 0:
         return False
-    return may_depend(numbers, _GIVEN) & ~(TWO_BODIES | BY_SHARE) == 0
+    on = may_depend(numbers, _GIVEN)
+    if elastic.present(numbers.elastic):
+        return pairs.linear(numbers, on, _GIVEN, _GIVEN)
+    return on & ~(TWO_BODIES | BY_SHARE) == 0
 
 
 def way_of(numbers: Numbers, inputs: Inputs) -> int:
@@ -76,6 +80,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     last, gone = min(until, FRAMES * memory.beat), False
     now, u, mode = numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0)
     laws, met, known = Apart(0.0, 0.0, 0.0, 0.0), math.nan, math.nan  # duties of `now`, of the mode
+    law = spring_legs.NO_LAW
     output = motor = Fade(math.nan, 0.0, 0.0, 0.0, 0.0)
     while t < last:
         if controller.next_due(firmware, firm, frames) > t + slack:
@@ -94,15 +99,27 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
             now, met = duty.at_duty(numbers, firm.duty), firm.duty
         if met != known:
             u, known = duty.voltage(now.source, met), met
-            mode = legs.mode_from(now, tau, u, y, mode.mesh)
-            laws = legs.laws_of(now, mode, u, tau)
+            if elastic.present(numbers.elastic):
+                mode = spring_legs.mode_from(now, tau, u, y, mode.mesh)
+                law = spring_legs.law_of(law, now, mode, u, tau)
+            else:
+                mode = legs.mode_from(now, tau, u, y, mode.mesh)
+                laws = legs.laws_of(now, mode, u, tau)
         time = end - t
         if abs(time - T_c) <= slack:
             time = T_c
         shows = done < times.size and (times[done] - origin < end - slack or end >= until)
         if shows:
-            done = show(now, tau, u, y, mode, times, done, t, end, until, origin, outputs, firm)
-        if not legs.stands(mode):
+            done = show(now, law, inputs, u, y, mode, times, done, t, end, until, origin, outputs, firm)
+        if elastic.present(numbers.elastic):
+            sprung = spring_legs.go(now, law, tau, u, y, mode, time, inputs.accuracy)
+            if sprung.done == 0.0:
+                gone = True
+                break
+            if sprung.mode != mode:
+                law = spring_legs.law_of(law, now, sprung.mode, u, tau)
+            y, mode = sprung.y, sprung.mode
+        elif not legs.stands(mode):
             output = faded(output, laws.output_rate, time)
             motor = faded(motor, laws.motor_rate, time) if mode.mesh == INSIDE else motor
             after = over(now, mode, laws, output, motor, y)
@@ -192,13 +209,14 @@ def lasts(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, after: 
     return contacts.pressing(numbers, mode, u, tau, after) > 0.0
 
 
-def show(numbers: Numbers, tau: float, u: float, y: Vector, mode: Mode, times: Floats, done: int, t: float, end: float,
-         until: float, origin: float, outputs: Floats, firm: Any) -> int:
+def show(numbers: Numbers, law: Law, inputs: Inputs, u: float, y: Vector, mode: Mode, times: Floats, done: int,
+         t: float, end: float, until: float, origin: float, outputs: Floats, firm: Any) -> int:
     """Write the outputs within a tick, leg by leg; return how many are done."""
-    slack = SAME * (end - t)
+    slack, tau = SAME * (end - t), inputs.constant_torque
     while done < times.size and (times[done] - origin < end - slack or end >= until):
         s = min(max(times[done] - origin - t, 0.0), end - t)
-        here = legs.go(numbers, tau, u, y, mode, y[0], s)
+        here = (spring_legs.go(numbers, law, tau, u, y, mode, s, inputs.accuracy) if elastic.present(numbers.elastic)
+                else legs.go(numbers, tau, u, y, mode, y[0], s))
         show_one(outputs, done, here.y, here.mode, firm)
         done += 1
     return done
