@@ -29,7 +29,7 @@ from servotwin.models.engine.modes import (
     at_rest,
     slides,
 )
-from servotwin.models.terms import elastic, friction, play, source
+from servotwin.models.terms import elastic, friction, heat, play, source
 from servotwin.models.terms.friction import core_speed, creeping_speed, fades, smoothed, varying
 from servotwin.models.terms.load import external_torque, stiffness_at
 from servotwin.models.terms.motor import inductive
@@ -57,9 +57,15 @@ EVENT_NAMES = ("speed zero", "core left", "core left", "zone", "zone", "upper st
 
 def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
     """Return the mode of a state in a zone; `smooth` keeps a smoothed friction in one piece."""
+    if heat.present(numbers.heat):
+        return _settled(warm(numbers, y), zone, u, tau, y, mesh, smooth)
+    return _settled(numbers, zone, u, tau, y, mesh, smooth)
+
+
+def _settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
     if elastic.present(numbers.elastic):
-        return twist.settled(warm(numbers, y), zone, u, tau, y, mesh)
-    return contacts.settled(warm(numbers, y), zone, u, tau, y, mesh, smooth)
+        return twist.settled(numbers, zone, u, tau, y, mesh)
+    return contacts.settled(numbers, zone, u, tau, y, mesh, smooth)
 
 
 def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
@@ -142,10 +148,9 @@ def creeping(numbers: Numbers, mode: Mode, y: Vector) -> bool:
 def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
           dy: Vector) -> tuple[float, float]:
     """Return a guard and its time derivative (nan where it is not known); the mode ends when it falls below zero."""
-    zone, shaft = mode.zone, mode.contact
     q, w, dw = y[0], y[1], dy[1]
     if kind == SPEED:
-        sign = 1.0 if shaft == FORWARD else -1.0
+        sign = 1.0 if mode.contact == FORWARD else -1.0
         return sign * w - core_speed(numbers.friction), sign * dw
     if kind == CREEPS:
         sign = 1.0 if geared(numbers, mode) == FORWARD else -1.0
@@ -159,7 +164,15 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
         return numbers.stops.upper - q, -w
     if kind == LOWER:
         return q - numbers.stops.lower, w
-    numbers = warm(numbers, y)
+    if heat.present(numbers.heat):
+        return _by_torque(warm(numbers, y), mode, kind, u, du, tau, dtau, y, dy)
+    return _by_torque(numbers, mode, kind, u, du, tau, dtau, y, dy)
+
+
+def _by_torque(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
+               dy: Vector) -> tuple[float, float]:
+    """Return a guard that depends on currents and torques."""
+    zone, q = mode.zone, y[0]
     if kind == ZONE_UP or kind == ZONE_DOWN:
         w_m, dw_m = elastic.turning(numbers.elastic, y), elastic.turning(numbers.elastic, dy)
         x = currents.zone_variable(numbers, zone, u, q, w_m, y[2])
@@ -284,7 +297,12 @@ def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, d
 
 def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     """Return mode and state just after the guard `kind` of `mode` has reached zero."""
-    numbers = warm(numbers, y)
+    if heat.present(numbers.heat):
+        return _crossed(warm(numbers, y), mode, kind, u, tau, y)
+    return _crossed(numbers, mode, kind, u, tau, y)
+
+
+def _crossed(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     zone, shaft, mesh, motor, share = mode
     if kind == ZONE_UP or kind == ZONE_DOWN:
         if currents.by_current(numbers, zone):

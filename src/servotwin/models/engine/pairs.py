@@ -53,6 +53,8 @@ def longest(A: tuple[Vector, ...]) -> float:
 
 def propagate(A: tuple[Vector, ...], start: Vector, s: float) -> Vector:
     """Return the state at s after the start [s], at most as long after as a series holds."""
+    if A[2] == NOWHERE:
+        return _without_current(A, start, s)
     q, w, i, T_w, T_h, q_m, w_m = start
     r = rates(A, start)
     size = 1.0 + abs(w) + abs(w_m) + abs(i)
@@ -63,6 +65,26 @@ def propagate(A: tuple[Vector, ...], start: Vector, s: float) -> Vector:
         if abs(part) * (abs(r[0]) + abs(r[1]) + abs(r[2]) + abs(r[5]) + abs(r[6])) < _ROUNDING * size:
             break
         r = _along(A, r)
+        n += 1
+        part *= s / n
+    return q, w, i, T_w, T_h, q_m, w_m
+
+
+def _without_current(A: tuple[Vector, ...], start: Vector, s: float) -> Vector:
+    """Return the same where no current has inertia: of two angles, whose rates are the speeds, and two speeds."""
+    q, w, i, T_w, T_h, q_m, w_m = start
+    by_q, by_w, _, b, _, by_q_m, by_w_m = A
+    a, c, a_m, c_m = by_q[1], by_w[1], by_q_m[1], by_w_m[1]
+    d, e, d_m, e_m = by_q[6], by_w[6], by_q_m[6], by_w_m[6]
+    least = _ROUNDING * (1.0 + abs(w) + abs(w_m))
+    v, v_m = w, w_m
+    x, x_m = (q * a + q_m * a_m) + (w * c + w_m * c_m) + b[1], (q * d + q_m * d_m) + (w * e + w_m * e_m) + b[6]
+    n, part = 1, s
+    while n < _TERMS:
+        q, w, q_m, w_m = q + part * v, w + part * x, q_m + part * v_m, w_m + part * x_m
+        if abs(part) * (abs(v) + abs(x) + abs(v_m) + abs(x_m)) < least:
+            break
+        v, v_m, x, x_m = x, x_m, (v * a + v_m * a_m) + (x * c + x_m * c_m), (v * d + v_m * d_m) + (x * e + x_m * e_m)
         n += 1
         part *= s / n
     return q, w, i, T_w, T_h, q_m, w_m

@@ -15,7 +15,12 @@ from servotwin.physics import electronics, friction, motor, potentiometer
 
 def rates_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> Vector:
     """Return the rate of every number of the state."""
-    numbers = warm(numbers, y)
+    if heat.present(numbers.heat):
+        return _rates(warm(numbers, y), mode, u, tau, y)
+    return _rates(numbers, mode, u, tau, y)
+
+
+def _rates(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> Vector:
     i, w_m = y[2], turning(numbers.elastic, y)
     di = dT_w = dT_h = 0.0
     if inductive(numbers.motor):
