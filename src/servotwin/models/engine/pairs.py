@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 
+from servotwin.models.engine.elementary import fma
 from servotwin.models.engine.modes import NOWHERE, Mode, Vector
 from servotwin.models.engine.rates import rates_of
 from servotwin.models.terms import elastic, source
@@ -21,6 +22,7 @@ from servotwin.physics.pieces import Piece
 _LINEAR = TWO_BODIES | ON_Q | ON_I | BY_SHARE
 _LONGEST = 2.0  # of a series, in times of the fastest rate
 _TERMS = 40
+_INVERSES = (0.0, *(1.0 / n for n in range(1, _TERMS + 1)))
 _ROUNDING = 1e-18  # of the state: what a term may be
 
 
@@ -81,12 +83,13 @@ def _without_current(A: tuple[Vector, ...], start: Vector, s: float) -> Vector:
     x, x_m = (q * a + q_m * a_m) + (w * c + w_m * c_m) + b[1], (q * d + q_m * d_m) + (w * e + w_m * e_m) + b[6]
     n, part = 1, s
     while n < _TERMS:
-        q, w, q_m, w_m = q + part * v, w + part * x, q_m + part * v_m, w_m + part * x_m
-        if abs(part) * (abs(v) + abs(x) + abs(v_m) + abs(x_m)) < least:
+        q, w, q_m, w_m = fma(part, v, q), fma(part, x, w), fma(part, v_m, q_m), fma(part, x_m, w_m)
+        if part * (abs(v) + abs(x) + abs(v_m) + abs(x_m)) < least:
             break
-        v, v_m, x, x_m = x, x_m, (v * a + v_m * a_m) + (x * c + x_m * c_m), (v * d + v_m * d_m) + (x * e + x_m * e_m)
+        x, x_m, v, v_m = (fma(x, c, fma(x_m, c_m, fma(v, a, v_m * a_m))),
+                          fma(x_m, e_m, fma(x, e, fma(v_m, d_m, v * d))), x, x_m)
         n += 1
-        part *= s / n
+        part *= s * _INVERSES[n]
     return q, w, i, T_w, T_h, q_m, w_m
 
 
