@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from servotwin.models.engine.elementary import fma
-from servotwin.models.engine.modes import NOWHERE, Mode, Vector
+from servotwin.models.engine.modes import NOWHERE, Mode, Vector, sign_of
 from servotwin.models.engine.rates import rates_of
 from servotwin.models.terms import elastic, source
 from servotwin.models.terms.dependence import BY_SHARE, ON_I, ON_Q, TWO_BODIES
@@ -35,14 +35,19 @@ def linear(numbers: Numbers, on: int, u: Piece, tau: Piece) -> bool:
 
 
 def law(numbers: Numbers, mode: Mode, u: float, tau: float) -> tuple[Vector, ...]:
-    """Return what each number of the state adds to the rates; in the place of the temperatures b, and nothing."""
-    b = rates_of(numbers, mode, u, tau, NOWHERE)
-    return (_less(rates_of(numbers, mode, u, tau, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)), b),
-            _less(rates_of(numbers, mode, u, tau, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)), b),
-            _less(rates_of(numbers, mode, u, tau, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)), b),
-            b, NOWHERE,
-            _less(rates_of(numbers, mode, u, tau, (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)), b),
-            _less(rates_of(numbers, mode, u, tau, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)), b))
+    """Return what each number of the state adds to the rates; in the place of the temperatures b, and nothing.
+
+    Voltage and torque are in b alone, so that the rest is the same to the last digit at any duty.
+    """
+    only_drops = sign_of(mode.zone) * numbers.bridge.D_drive  # leave nothing to drive the current
+    driven = 0.0 if u == 0.0 else only_drops if only_drops != 0.0 else 1.0
+    b = rates_of(numbers, mode, driven, 0.0, NOWHERE)
+    return (_less(rates_of(numbers, mode, driven, 0.0, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)), b),
+            _less(rates_of(numbers, mode, driven, 0.0, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)), b),
+            _less(rates_of(numbers, mode, driven, 0.0, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)), b),
+            rates_of(numbers, mode, u, tau, NOWHERE), NOWHERE,
+            _less(rates_of(numbers, mode, driven, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)), b),
+            _less(rates_of(numbers, mode, driven, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)), b))
 
 
 def longest(A: tuple[Vector, ...]) -> float:

@@ -20,16 +20,17 @@ from servotwin.physics.pieces import Piece
 
 
 class Law(NamedTuple):
-    """The law of two bodies, as `pairs.law` has it, in which mode and with which resistance it holds, and how long."""
+    """The law of two bodies, as `pairs.law` has it; in which mode, driven or not, at which resistance; how long."""
 
     A: tuple[Vector, ...]
     mode: Mode
+    driven: bool
     R: float
     longest: float
 
 
 _NOTHING = (NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE, NOWHERE)
-NO_LAW = Law(_NOTHING, Mode(0, 0, 0, 0, 0), 0.0, 0.0)
+NO_LAW = Law(_NOTHING, Mode(0, 0, 0, 0, 0), False, 0.0, 0.0)
 
 
 def mode_from(numbers: Numbers, torque: float, u: float, y: Vector, mesh: int) -> Mode:
@@ -40,13 +41,14 @@ def mode_from(numbers: Numbers, torque: float, u: float, y: Vector, mesh: int) -
 
 def law_of(known: Law, numbers: Numbers, mode: Mode, u: float, tau: float) -> Law:
     """Return the law in a mode: where it is the known one with another voltage, with what that alone changes."""
-    R = numbers.bridge.R_drive if u != 0.0 else numbers.bridge.off.R
-    if mode == known.mode and R == known.R:
+    driven = u != 0.0
+    R = numbers.bridge.R_drive if driven else numbers.bridge.off.R
+    if mode == known.mode and driven == known.driven and R == known.R:
         A = known.A
-        return Law((A[0], A[1], A[2], rates_of(numbers, mode, u, tau, NOWHERE), A[4], A[5], A[6]), mode, R,
+        return Law((A[0], A[1], A[2], rates_of(numbers, mode, u, tau, NOWHERE), A[4], A[5], A[6]), mode, driven, R,
                    known.longest)
     A = pairs.law(numbers, mode, u, tau)
-    return Law(A, mode, R, min(pairs.longest(A), elastic.longest_step(numbers.elastic, numbers.shaft)))
+    return Law(A, mode, driven, R, min(pairs.longest(A), elastic.longest_step(numbers.elastic, numbers.shaft)))
 
 
 def go(numbers: Numbers, law: Law, torque: float, u: float, y: Vector, mode: Mode, time: float,
