@@ -175,16 +175,26 @@ def output_acceleration(numbers: Numbers, contact: int, against: float, w: float
 
 def pressing(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> float:
     """Return how motor and output in contact would close in [rad/s²] if each went on alone; below 0 they part."""
-    torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y[0])
     w = y[1]
-    if w == 0.0:
-        alone = apart(numbers, mode.zone, u, tau, (y[0], 0.0, y[2], y[3], y[4], y[5], 0.0))
-        motor, contact = alone.motor, alone.contact
-    else:  # a mode that ends where the speed is zero keeps its law there, or it would end by its parting first
-        forward = mode.contact == FORWARD if slides(mode.contact) else w > 0.0
-        motor = sliding(forward, friction.present(numbers.friction))
-        contact = sliding(forward, holds(numbers))
-    gain = motor_acceleration(numbers, motor, torque, w) - output_acceleration(numbers, contact, against, w)
+    if w != 0.0:
+        return pressing_along(numbers, mode, u, tau, y)
+    alone = apart(numbers, mode.zone, u, tau, (y[0], 0.0, y[2], y[3], y[4], y[5], 0.0))
+    return _closing(numbers, mode, alone.motor, alone.contact, u, tau, y)
+
+
+def pressing_along(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> float:
+    """Return the same of bodies that slide.
+
+    A mode that ends where the speed is zero keeps its law there, or it would end by its parting first.
+    """
+    forward = mode.contact == FORWARD if slides(mode.contact) else y[1] > 0.0
+    return _closing(numbers, mode, sliding(forward, friction.present(numbers.friction)),
+                    sliding(forward, holds(numbers)), u, tau, y)
+
+
+def _closing(numbers: Numbers, mode: Mode, motor: int, contact: int, u: float, tau: float, y: Vector) -> float:
+    torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y[0])
+    gain = motor_acceleration(numbers, motor, torque, y[1]) - output_acceleration(numbers, contact, against, y[1])
     return gain if mode.mesh == ON_FORWARD else -gain
 
 

@@ -98,4 +98,4 @@ def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, star
 
 def _pressing(numbers: Numbers, mode: Mode, u: float, tau: float, w: float) -> float:
     """Return how motor and output in contact would close in [rad/s²] at a speed."""
-    return contacts.pressing(numbers, mode, u, tau, (0.0, w, 0.0, 0.0, 0.0, 0.0, w))
+    return contacts.pressing_along(numbers, mode, u, tau, (0.0, w, 0.0, 0.0, 0.0, 0.0, w))
