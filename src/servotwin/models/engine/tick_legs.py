@@ -10,8 +10,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import contacts, controller, currents, first_order, legs, pairs, spring_legs
+from servotwin.models.engine import contacts, controller, currents, legs, pairs, spring_legs
 from servotwin.models.engine.coefficients import Apart
+from servotwin.models.engine.elementary import decay, fma
 from servotwin.models.engine.memory import FRAMES, SAME, Inputs, Memory, Point, origin_of
 from servotwin.models.engine.modes import CONDUCTING, INSIDE, Mode, Vector, at_rest
 from servotwin.models.engine.motion import may_depend
@@ -34,13 +35,12 @@ _GIVEN = Piece()  # what a servo follows that a program drives
 
 
 class Fade(NamedTuple):
-    """What `first_order.response` says of a rate and a time, and for which."""
+    """∫ e^-λs ds and ∫∫ e^-λs ds² over a time, and for which rate and time."""
 
     rate: float
     time: float
-    decay: float
-    g: float
-    G: float
+    once: float
+    twice: float
 
 
 class Gone(NamedTuple):
@@ -81,7 +81,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     now, u, mode = numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0)
     laws, met, known = Apart(0.0, 0.0, 0.0, 0.0), math.nan, math.nan  # duties of `now`, of the mode
     law = spring_legs.NO_LAW
-    output = motor = Fade(math.nan, 0.0, 0.0, 0.0, 0.0)
+    output = motor = Fade(math.nan, 0.0, 0.0, 0.0)
     while t < last:
         if controller.next_due(firmware, firm, frames) > t + slack:
             break  # in the middle of a motion
@@ -167,17 +167,19 @@ def faded(known: Fade, rate: float, time: float) -> Fade:
     """Return how a speed fades at a rate [1/s] within a time [s], as known where these are the same."""
     if rate == known.rate and time == known.time:
         return known
-    decay, g, G = first_order.response(rate, time)
-    return Fade(rate, time, decay, g, G)
+    once, twice = decay(rate, 1.0 / rate if rate > 0.0 else 0.0, time)
+    return Fade(rate, time, once, twice)
 
 
 def over(numbers: Numbers, mode: Mode, laws: Apart, output: Fade, motor: Fade, y: Vector) -> Vector:
-    """Return the state after a time, as `legs.moved` has it."""
-    q, w = y[0] + y[1] * output.g + laws.output_pull * output.G, y[1] * output.decay + laws.output_pull * output.g
+    """Return the state after a time."""
+    q, w, i, T_w, T_h, q_m, w_m = y
+    there = fma(-laws.output_rate, w, laws.output_pull)
+    q, w = fma(there, output.twice, fma(w, output.time, q)), fma(there, output.once, w)
     if mode.mesh != INSIDE:
-        return with_motor(numbers.play, mode.mesh, (q, w, y[2], y[3], y[4], q, w))
-    return (q, w, y[2], y[3], y[4], y[5] + y[6] * motor.g + laws.motor_pull * motor.G,
-            y[6] * motor.decay + laws.motor_pull * motor.g)
+        return with_motor(numbers.play, mode.mesh, (q, w, i, T_w, T_h, q, w))
+    there = fma(-laws.motor_rate, w_m, laws.motor_pull)
+    return q, w, i, T_w, T_h, fma(there, motor.twice, fma(w_m, motor.time, q_m)), fma(there, motor.once, w_m)
 
 
 def lasts(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, after: Vector, time: float) -> bool:

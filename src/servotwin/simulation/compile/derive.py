@@ -28,7 +28,7 @@ from servotwin.simulation.compile.rewriting import (
     local_names,
 )
 
-_PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest", "floor")  # single instructions in the vector form
+_PRIMITIVES = ("fma", "two_power", "binary_exponent", "nearest", "floor")  # single instructions
 _ADDRESSES = "servotwin.simulation.compile.addresses"
 _LONG = 12  # a tuple of more numbers is a table
 
@@ -130,7 +130,7 @@ class Derivation:
         module, name = function.__module__, function.__name__
         if hasattr(function, "text"):
             return self._generated(function)
-        if module == _ADDRESSES or (self.recipe.vector and module == ELEMENTARY and name in _PRIMITIVES):
+        if module == _ADDRESSES or (module == ELEMENTARY and name in _PRIMITIVES):
             flat = flat_name(module, name)
             self.imports[flat], self.primitives[flat] = (module, name), name
             return flat
