@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from servotwin.models.engine import gaps, tiles
+from servotwin.models.engine.modes import Vector
 
 
 def phase(size: int, tile: Any, plan: Any) -> None:
@@ -17,9 +18,9 @@ def phase(size: int, tile: Any, plan: Any) -> None:
 def alone(tile: Any, plan: Any, j: int) -> None:
     """Move one lane through a time with or without drive."""
     servo = tile.servo
-    y = (servo.q[j], servo.w[j], servo.i[j], servo.T_w[j], servo.T_h[j], servo.q_m[j], servo.w_m[j])
+    y = Vector(servo.q[j], servo.w[j], servo.i[j], servo.T_w[j], servo.T_h[j], servo.q_m[j], servo.w_m[j])
     gone = gaps.go(tiles.numbers_at(tile.own, j), tile.hung.torque[j], plan.power[j], y, int(servo.mesh[j]),
                    servo.wiper[j], plan.time[j])
-    servo.q[j], servo.w[j], servo.wiper[j] = gone.y[0], gone.y[1], gone.wiper
-    servo.q_m[j], servo.w_m[j], servo.mesh[j] = gone.y[5], gone.y[6], gone.mode.mesh
+    servo.q[j], servo.w[j], servo.wiper[j] = gone.y.q, gone.y.w, gone.wiper
+    servo.q_m[j], servo.w_m[j], servo.mesh[j] = gone.y.q_m, gone.y.w_m, gone.mode.mesh
     plan.lost[j] = plan.lost[j] if gone.done > 0.0 else 1.0

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from servotwin.models.engine import contacts, currents, first_order, guards
 from servotwin.models.engine.coefficients import Apart, apart_coefficients, linear_coefficients
 from servotwin.models.engine.courses import Course, both
-from servotwin.models.engine.modes import INSIDE, Mode, Vector, at_rest
+from servotwin.models.engine.modes import INSIDE, Mode, Vector, at_rest, moving
 from servotwin.models.engine.outright import first_end
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import with_motor
@@ -33,7 +33,7 @@ class Gone(NamedTuple):
 def go(numbers: Numbers, torque: float, drive: float, y: Vector, mesh: int, wiper: float, time: float) -> Gone:
     """Return where a servo goes within `time` [s] under one drive (−1, 0, +1) and a constant external torque [N m]."""
     u = drive * numbers.source.V
-    mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, y[0], y[6], 0.0), u, torque, y, mesh, False)
+    mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, y.q, y.w_m, 0.0), u, torque, y, mesh, False)
     for _ in range(MOST_LEGS):
         still = at_rest(mode.contact) and (mode.mesh != INSIDE or at_rest(mode.motor))
         if still or not time > 0.0:
@@ -42,9 +42,9 @@ def go(numbers: Numbers, torque: float, drive: float, y: Vector, mesh: int, wipe
         after = moved(numbers, mode, laws, y, time)
         s, kind = first_end(numbers, mode, guards.guards(numbers, mode, u, False), u, torque, laws, y, after, 0.0, time)
         y = after if kind < 0 else moved(numbers, mode, laws, y, s)
-        wiper = wiper_at(numbers.sensor, wiper, y[0])
+        wiper = wiper_at(numbers.sensor, wiper, y.q)
         if kind < 0:
-            return Gone(y, mode, wiper, 1.0 if math.isfinite(y[0] + y[5]) else 0.0)
+            return Gone(y, mode, wiper, 1.0 if math.isfinite(y.q + y.q_m) else 0.0)
         mode, y = guards.cross(numbers, mode, kind, u, torque, y)
         time -= s
     return Gone(y, mode, wiper, 0.0)
@@ -55,14 +55,14 @@ def laws_of(numbers: Numbers, mode: Mode, u: float, torque: float, y: Vector) ->
     if mode.mesh == INSIDE:
         return apart_coefficients(numbers, mode, u, torque)
     a, _, f, _, _, _, _, _, _ = linear_coefficients(
-        numbers, mode, (u, 0.0, 0.0, 0.0, 0.0), (torque, 0.0), y[0], y[1])
+        numbers, mode, (u, 0.0, 0.0, 0.0, 0.0), (torque, 0.0), y.q, y.w)
     return Apart(2.0 * a, f, 2.0 * a, f)
 
 
 def moved(numbers: Numbers, mode: Mode, laws: Apart, y: Vector, s: float) -> Vector:
     """Return the state s [s] after y."""
     if mode.mesh == INSIDE:
-        return both(Course(laws.output_rate, laws.output_pull, y[0], y[1]),
-                    Course(laws.motor_rate, laws.motor_pull, y[5], y[6]), y, s)
-    q, w = first_order.propagate(laws.output_rate, laws.output_pull, y[0], y[1], s)
-    return with_motor(numbers.play, mode.mesh, (q, w, y[2], y[3], y[4], y[5], y[6]))
+        return both(Course(laws.output_rate, laws.output_pull, y.q, y.w),
+                    Course(laws.motor_rate, laws.motor_pull, y.q_m, y.w_m), y, s)
+    q, w = first_order.propagate(laws.output_rate, laws.output_pull, y.q, y.w, s)
+    return with_motor(numbers.play, mode.mesh, moving(y, q, w, y.w_m))

@@ -23,6 +23,7 @@ from servotwin.models.engine.modes import (
     Mode,
     Vector,
     at_rest,
+    one_body,
 )
 from servotwin.models.engine.motion import may_depend
 from servotwin.models.terms import bridge, control, duty, sensor, shaft, source
@@ -101,7 +102,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     p, b_o, seed = numbers.sensor.p, numbers.sensor.b_o, inputs.seed
     straight = numbers.sensor.step == 0.0 and len(inputs.curve) == 0
     measures, senses = firmware.per_volt != 0.0, control.senses(firmware)
-    t, q, w, y = point.time, point.y[0], point.y[1], point.y
+    t, q, w, y = point.time, point.y.q, point.y.w, point.y
     last, gone = min(until, FRAMES * memory.beat), False
     while t < last:
         if controller.next_due(firmware, firm, frames) > t + slack:
@@ -147,9 +148,9 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
             q, w, done = before_q, before_w, before_done
             gone = True
             break
-        t, y = end, (q, w, y[2], y[3], y[4], q, w)
+        t, y = end, one_body(q, w, y)
     if t > point.time or gone:
-        here = (q, w, y[2], y[3], y[4], q, w)
+        here = one_body(q, w, y)
         point = Point(t, here, Mode(0, 0, RIGID, 0, 0), math.inf, here, point.step, q)
         memory = Memory(frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
                         memory.firm)
@@ -235,7 +236,7 @@ def show(outputs: Floats, done: int, q: float, w: float, y: Vector, contact: int
     outputs[0, done], outputs[1, done], outputs[2, done] = q, w, contact
     outputs[3, done] = math.copysign(1.0, firm.duty) if duty.drives(firm.duty) else 0.0
     outputs[4, done], outputs[5, done] = 0.0, q
-    outputs[6, done], outputs[7, done], outputs[8, done], outputs[9, done], outputs[10, done] = y[2], y[3], y[4], q, w
+    outputs[6, done], outputs[7, done], outputs[8, done], outputs[9, done], outputs[10, done] = y.i, y.T_w, y.T_h, q, w
     outputs[11, done], outputs[12, done], outputs[13, done] = RIGID, 0, 1
     outputs[14, done], outputs[16, done], outputs[17, done] = firm.duty, firm.r, firm.trip
     outputs[15, done] = firm.r if firm.goal == NOWHERE else firm.goal

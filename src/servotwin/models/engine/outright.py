@@ -23,22 +23,22 @@ def first_end(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, la
     """
     first, found = _by_speed(numbers, mode, kinds, u, tau, laws, start, after, s0, s1)
     end = min(first, s1)
-    output = Course(laws.output_rate, laws.output_pull, start[0], start[1])
+    output = Course(laws.output_rate, laws.output_pull, start.q, start.w)
     at_end = after if end == s1 else both(output, output, start, end)
     stops = numbers.stops
-    if kinds & guards.STOPS and not (start[1] * at_end[1] >= 0.0 and stops.lower <= at_end[0] <= stops.upper):
+    if kinds & guards.STOPS and not (start.w * at_end.w >= 0.0 and stops.lower <= at_end.q <= stops.upper):
         wall = Course(0.0, 0.0, 0.0, 0.0)
         s, side = leaves(
             output, wall, stops.lower if kinds & 1 << guards.LOWER else -math.inf,
             stops.upper if kinds & 1 << guards.UPPER else math.inf, s0, end,
-            lead_of(output, wall, at_end[0], at_end[1], 0.0, 0.0))
+            lead_of(output, wall, at_end.q, at_end.w, 0.0, 0.0))
         if s < first:
             first, found, end = s, guards.UPPER if side > 0 else guards.LOWER, s
     if kinds & guards.MEETINGS:
-        own, half = Course(laws.motor_rate, laws.motor_pull, start[5], start[6]), numbers.play.half
+        own, half = Course(laws.motor_rate, laws.motor_pull, start.q_m, start.w_m), numbers.play.half
         at_end = after if end == s1 else both(output, own, start, end)
         s, side = leaves(own, output, -half, half, s0, end,
-                         lead_of(own, output, at_end[5], at_end[6], at_end[0], at_end[1]))
+                         lead_of(own, output, at_end.q_m, at_end.w_m, at_end.q, at_end.w))
         if s < first:
             first, found = s, guards.MEET_FORWARD if side > 0 else guards.MEET_BACKWARD
     return first, found
@@ -48,7 +48,7 @@ def _by_speed(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, la
               after: Vector, s0: float, s1: float) -> tuple[float, int]:
     """Return the same of all events that come at a speed, of which each body's is monotone."""
     low, high = currents.zone_limits(numbers, mode.zone, u)
-    w, w_m = after[1], after[6]
+    w, w_m = after.w, after.w_m
     x, per_speed = u - back_emf(w_m, numbers.motor.K_b), back_emf(1.0, numbers.motor.K_b)
     way, way_m = 1.0 if mode.contact == FORWARD else -1.0, 1.0 if mode.motor == FORWARD else -1.0
     slow = creeping_speed(numbers.friction)
@@ -63,7 +63,7 @@ def _by_speed(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, la
             continue
         of_motor = kind == guards.ZONE_UP or kind == guards.ZONE_DOWN or kind == guards.MOTOR_SPEED
         rate, pull = (laws.motor_rate, laws.motor_pull) if of_motor else (laws.output_rate, laws.output_pull)
-        s = first_order.time_to(rate, pull, start[6] if of_motor else start[1], there)
+        s = first_order.time_to(rate, pull, start.w_m if of_motor else start.w, there)
         s = s1 if s > s1 else s0 if s < s0 else s
         if s < first:
             first, found = s, kind
@@ -84,9 +84,9 @@ def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, star
     toward = 1.0 if mode.mesh == ON_FORWARD else -1.0
     still = toward * (alone.motor_pull - alone.output_pull)
     slope = toward * (alone.output_rate - alone.motor_rate)
-    if still + slope * after[1] >= guards.BELOW:
+    if still + slope * after.w >= guards.BELOW:
         return math.inf
-    if still + slope * start[1] <= 0.0:
+    if still + slope * start.w <= 0.0:
         return s0
-    s = first_order.time_to(laws.output_rate, laws.output_pull, start[1], -still / slope)
+    s = first_order.time_to(laws.output_rate, laws.output_pull, start.w, -still / slope)
     return min(max(s, s0), s1)

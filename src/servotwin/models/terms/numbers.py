@@ -57,4 +57,4 @@ def at_temperature(numbers: Numbers, T_w: float, T_h: float) -> Numbers:
 
 def warm(numbers: Numbers, y: Vector) -> Numbers:
     """Return the numbers at the temperatures of a state; the numbers themselves where they stay."""
-    return at_temperature(numbers, y[3], y[4]) if numbers.heat.C_w > 0.0 else numbers
+    return at_temperature(numbers, y.T_w, y.T_h) if numbers.heat.C_w > 0.0 else numbers
