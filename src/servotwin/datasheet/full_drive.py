@@ -226,7 +226,7 @@ class FullDrive:
 
 def _state(angle: float, speed: float) -> Vector:
     cool = REFERENCE_TEMPERATURE
-    return angle, speed, 0.0, cool, cool, angle, speed
+    return Vector(angle, speed, 0.0, cool, cool, angle, speed)
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:

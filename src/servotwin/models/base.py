@@ -12,6 +12,7 @@ from servotwin import physics
 from servotwin.errors import CommandError, InputError, LoadError, MissingParameterError, UnknownNameError
 from servotwin.models import outputs
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
+from servotwin.models.engine.modes import Vector
 from servotwin.models.terms import load as load_term
 from servotwin.models.terms import motor, shaft
 from servotwin.models.terms.numbers import Numbers
@@ -36,10 +37,10 @@ PULSE_RANGE = (3e-4, 2.7e-3)  # s, of what chips accept where the servo does not
 
 
 class Place(NamedTuple):
-    """A state: its signal name, its place among the numbers of the engine, and the factor from there to the signal."""
+    """A state: its signal name, its name in `engine.modes.Vector`, and the factor from there to the signal."""
 
     name: str
-    at: int
+    at: str
     factor: float
 
 
@@ -180,7 +181,7 @@ class Model(ABC):
     @property
     def states(self) -> tuple[Place, ...]:
         """Which signals are states of this servo, and where the engine keeps them."""
-        return tuple(Place(name, k, 1.0) for k, name in enumerate(self.layout))
+        return tuple(Place(name, at, 1.0) for name, at in zip(self.layout, Vector._fields, strict=False))
 
     @abstractmethod
     def pack(self, load: Load) -> Numbers:

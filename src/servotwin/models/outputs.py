@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from servotwin import physics
 from servotwin.models.engine import observe
-from servotwin.models.engine.modes import FREE, RIGID, Mode
+from servotwin.models.engine.modes import FREE, RIGID, Mode, Vector
 from servotwin.models.terms import duty
 from servotwin.models.terms.bridge import heeds_silence, off_now
 from servotwin.models.terms.numbers import at_temperature
@@ -153,8 +153,8 @@ def torques_of(model: Shown, samples: Samples, drive: Pieces, load: Load) -> Tor
         return cast("Torques", _torques(plant, mode, w, w, i, external))
     mode = mode._replace(mesh=samples.mesh, motor=samples.motor)
     if any_of(plant.elastic.k != 0.0):
-        y = (samples.angle, w, 0.0, 0.0, 0.0, samples.motor_angle, samples.motor_speed)
-        return cast("Torques", _torques_of_two(plant, mode, y, i, external))
+        y: Any = (samples.angle, w, 0.0, 0.0, 0.0, samples.motor_angle, samples.motor_speed)
+        return cast("Torques", _torques_of_two(plant, mode, Vector(*y), i, external))
     return cast("Torques", _torques(plant, mode, w, samples.motor_speed, i, external))
 
 

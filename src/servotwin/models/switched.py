@@ -53,13 +53,13 @@ class SwitchedServo(Model):
     def states(self) -> tuple[Place, ...]:
         """Which signals are states of this servo, and where the engine keeps them."""
         N = self.value("gear.gear_reduction")
-        places = [Place("output_angle", 0, 1.0), Place("output_speed", 1, 1.0)]
+        places = [Place("output_angle", "q", 1.0), Place("output_speed", "w", 1.0)]
         if "armature_current" in self.layout:
-            places.append(Place("armature_current", 2, 1.0))
+            places.append(Place("armature_current", "i", 1.0))
         if self.heats:
-            places += [Place("winding_temperature", 3, 1.0), Place("housing_temperature", 4, 1.0)]
+            places += [Place("winding_temperature", "T_w", 1.0), Place("housing_temperature", "T_h", 1.0)]
         if self.servo.get("gear.backlash") is not None or self.servo.get("gear.stiffness") is not None:
-            places += [Place("motor_angle", 5, N), Place("motor_speed", 6, N)]
+            places += [Place("motor_angle", "q_m", N), Place("motor_speed", "w_m", N)]
         return tuple(places)
 
     @property

@@ -12,6 +12,7 @@ import numpy as np
 
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model
+from servotwin.models.engine.modes import Vector
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
 from servotwin.models.terms.source import Source
@@ -299,8 +300,9 @@ class _AllAlong:
     def _at(self, bus: BusVoltage, samples: Sequence[Samples], k: int) -> float:
         bus.begin()
         for plan, s in zip(self.plans, samples, strict=True):
-            y = (s.angle[k], s.speed[k], s.current[k], s.winding[k], s.housing[k], s.motor_angle[k], s.motor_speed[k])
-            if not np.isfinite(y[0]):  # after the run has ended
+            y = Vector(s.angle[k], s.speed[k], s.current[k], s.winding[k], s.housing[k], s.motor_angle[k],
+                       s.motor_speed[k])
+            if not np.isfinite(y.q):  # after the run has ended
                 return math.nan
             bus.connect(plan, y, float(s.drive[k]), 0.0 if s.duty is None else float(s.duty[k]), int(s.silent[k]))
         return bus.volts()

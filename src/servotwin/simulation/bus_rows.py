@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import guards, motion, rodas, tape
-from servotwin.models.engine.modes import Mode
+from servotwin.models.engine.modes import Mode, Vector
 from servotwin.models.engine.motion import Motion
 from servotwin.models.engine.rates import jacobian
-from servotwin.models.engine.seats import vector_of
 from servotwin.models.engine.shared_source import on_stiff_source
 from servotwin.models.engine.step import at_pulses
 from servotwin.models.terms import duty
@@ -95,8 +94,8 @@ class _Maker:
         plain = self._plan.numbers
         numbers = duty.at_duty(plain, now) if self._plan.digital else at_pulses(plain, int(silent))
         base = motion.nothing(numbers, Piece(value=u), tau)._replace(
-            kind=int(kind), mode=mode, t0=anchor, length=length, next_step=next_step, end=vector_of(rest[14:21]),
-            start=vector_of(rest[21:28]))
+            kind=int(kind), mode=mode, t0=anchor, length=length, next_step=next_step, end=Vector(*rest[14:21]),
+            start=Vector(*rest[21:28]))
         if how == tape.ALONE:
             m = _alone(base, step, self._plan.accuracy)
         else:
@@ -110,8 +109,9 @@ class _Maker:
             both = self._given[first:first + 2 * m.kind].tolist()
             return motion.by_series(numbers, mode, u, tau, m.t0, m.start, m.length, tuple(both[:m.kind]),
                                     tuple(both[m.kind:]))
-        dense = self._given[first:first + _STEPS * _STEPS].reshape(_STEPS, _STEPS).tolist()
-        return motion.by_step(numbers, mode, u, tau, m.t0, m.start, m.length, tuple(map(vector_of, dense)), m.end)
+        rows = self._given[first:first + _STEPS * _STEPS].reshape(_STEPS, _STEPS).tolist()
+        dense = tuple(Vector(*row) for row in rows)
+        return motion.by_step(numbers, mode, u, tau, m.t0, m.start, m.length, dense, m.end)
 
 
 def _alone(m: Motion, step: float, accuracy: float) -> Motion:
@@ -121,7 +121,7 @@ def _alone(m: Motion, step: float, accuracy: float) -> Motion:
     if m.kind != motion.STEP:
         return m
     jac = jacobian(m.numbers, m.mode, piece_value(m.u, m.t0), piece_rate(m.u, m.t0), piece_rate(m.tau, m.t0),
-                   m.start[0], m.start[1])
+                   m.start.q, m.start.w)
     _, _, stages = rodas.step(m.numbers, m.mode, m.u, m.tau, jac, m.t0, m.start, m.length)
     return m._replace(stages=stages)
 

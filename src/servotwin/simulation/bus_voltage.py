@@ -52,7 +52,7 @@ class BusVoltage:
             1 while pulses stay away from it.
         """
         numbers = duty.at_duty(plan.numbers, now) if plan.digital else at_pulses(plan.numbers, silent)
-        if drive == 0.0 and not (coasts(numbers.bridge) and (y[2] != 0.0 or y[6] != 0.0)):
+        if drive == 0.0 and not (coasts(numbers.bridge) and (y.i != 0.0 or y.w_m != 0.0)):
             return
         mate = self._mates[self._connected]
         mate.numbers = shared_source.on_stiff_source(numbers, drive == 0.0)

@@ -158,13 +158,14 @@ class State:
     @property
     def values(self) -> tuple[float, ...]:
         """Angle [rad], speed [rad/s] and what else the servo remembers (SI)."""
-        return tuple(place.factor * self.memory.point.y[place.at] for place in self.places)
+        return tuple(place.factor * getattr(self.memory.point.y, place.at) for place in self.places)
 
     def __getitem__(self, name: str) -> float:
         """Return one value by its signal name."""
         for place in self.places:
             if place.name == name:
-                return place.factor * self.memory.point.y[place.at]
+                value: float = place.factor * getattr(self.memory.point.y, place.at)
+                return value
         raise KeyError(f"{name!r} is no state; there are: {', '.join(self.names)}")
 
 
@@ -251,7 +252,7 @@ def failure(status: Status, time: float) -> SimulationError:
 def _keep(record: Record, plan: Plan, before: Memory, trip: int, memory: Memory, m: Motion, event: int) -> None:
     """Add a step to a record: its chip's doings, its motion, its event."""
     origin, point, was = origin_of(memory), memory.point, before.point
-    start, now, angle = origin + was.time, origin + point.time, was.y[0]
+    start, now, angle = origin + was.time, origin + point.time, was.y.q
     if memory.chip is not before.chip:
         keep_switch(record, before.chip, memory.chip, start, angle, plan.heeds_silence)
         if (plan.refuses and memory.chip.number > before.chip.number
@@ -266,7 +267,7 @@ def _keep(record: Record, plan: Plan, before: Memory, trip: int, memory: Memory,
     if record.tell is not None:
         record.tell(now)
     if event >= 0 and event not in guards.KINKS:
-        record.events.append(Event(now, event_name(event, point.mode), point.y[0]))
+        record.events.append(Event(now, event_name(event, point.mode), point.y.q))
 
 
 def keep_switch(record: Record, before: Frame, after: Frame, time: float, angle: float, heeds: bool) -> None:

@@ -97,7 +97,7 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
         bad = status != 0
         raw.status[part], raw.ended[part] = status, np.where(bad, ended, work.duration)
         y = memories.rows[some]["point"]["y"]
-        raw.final[part] = y[:, [0, 1, 3, 4]]
+        raw.final[part] = np.column_stack([y["q"], y["w"], y["T_w"], y["T_h"]])
         failed = bad[:, None] & (times >= ended[:, None])
         ahead = np.arange(len(times)) >= own[:, None]
         for k, name in enumerate(ALL_FIELDS):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
+from servotwin.models.engine.modes import Vector
 from servotwin.models.engine.records import mapped
 from servotwin.models.outputs import FIELDS as FIELDS_OF
 from servotwin.models.terms.numbers import Numbers
@@ -215,7 +216,7 @@ class Chunk:
         for k in np.flatnonzero(~inside).tolist():
             one = mapped(partial(_number, k), spread)
             try:
-                check_start(self.model.states, one, start[:, k].tolist())
+                check_start(self.model.states, one, Vector(*start[:, k].tolist()))
             except InputError as error:
                 raise InputError(f"{error.what} of lane {self.which[k]}", got=error.got,
                                  allowed=error.allowed) from None

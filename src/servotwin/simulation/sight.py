@@ -104,11 +104,11 @@ class Sight:
                 numbers, u = _on_bus(plan, segment, y, bus_voltage)
             else:
                 numbers = warm(numbers, y)
-            wiper = wiper_at(numbers.sensor, segment.wiper, y[0])
+            wiper = wiper_at(numbers.sensor, segment.wiper, y.q)
             shown = self._shown(numbers, (plan.curve, m.mode, u, tau, y, wiper, segment.drive, segment.error), segment)
         except (ArithmeticError, ValueError):  # numbers beyond what a float holds
             shown = [math.nan] * len(Observed._fields)
-        return self._pick((*shown, y[0], y[1], *self._command(plan, time)))
+        return self._pick((*shown, y.q, y.w, *self._command(plan, time)))
 
     def points(self, plan: Plan, segments: Sequence[Segment], times: Sequence[float],
                bus_voltages: Sequence[float] | None = None) -> list[Row]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.models.base import Place
+from servotwin.models.engine.modes import Vector
 from servotwin.models.terms import elastic
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE
@@ -27,8 +28,8 @@ def accuracy_of(value: Any) -> float:
     return float(value)
 
 
-def start_vector(places: Sequence[Place], plant: Numbers, angle: Any, initial: Mapping[str, Any]) -> Any:
-    """Return the numbers of `engine.modes.Vector`, at rest and at ambient temperature but for `initial`.
+def start_vector(places: Sequence[Place], plant: Numbers, angle: Any, initial: Mapping[str, Any]) -> Vector:
+    """Return a state at rest and at ambient temperature but for `initial`.
 
     Parameters
     ----------
@@ -42,33 +43,32 @@ def start_vector(places: Sequence[Place], plant: Numbers, angle: Any, initial: M
 
     Returns
     -------
-    tuple
+    Vector
         Seven numbers or columns; the motor in the middle of its play, and no spring twisted, unless `initial` says
         otherwise.
     """
-    y: list[Any] = [angle, 0.0, 0.0, plant.heat.T_amb, plant.heat.T_amb, None, None if np.any(plant.elastic.k) else 0.0]
-    moved = {place.at: initial[place.name] / place.factor for place in places if place.name in initial}
-    for index, value in moved.items():
-        y[index] = value
-    if y[5] is None:
-        y[5] = y[0]
-    if y[6] is None or (not np.any(plant.play.half) and not np.any(plant.elastic.k)):
-        y[6] = y[1]
-    return tuple(y)
+    sprung = bool(np.any(plant.elastic.k))
+    given = {place.at: initial[place.name] / place.factor for place in places if place.name in initial}
+    y = Vector(angle, 0.0, 0.0, plant.heat.T_amb, plant.heat.T_amb, angle, 0.0)._replace(**given)
+    if "q_m" not in given:
+        y = y._replace(q_m=y.q)
+    if ("w_m" not in given and sprung) or not (sprung or np.any(plant.play.half)):
+        y = y._replace(w_m=y.w)
+    return y
 
 
-def check_start(places: Sequence[Place], plant: Numbers, y: Sequence[float]) -> None:
+def check_start(places: Sequence[Place], plant: Numbers, y: Vector) -> None:
     """Raise InputError if a start [rad] is beyond a stop, or the motor outside its play."""
-    if not plant.stops.lower <= y[0] <= plant.stops.upper:
-        raise InputError(f"initial {places[0].name}", got=y[0],
+    if not plant.stops.lower <= y.q <= plant.stops.upper:
+        raise InputError(f"initial {places[0].name}", got=y.q,
                          allowed=f"{plant.stops.lower:.6g} to {plant.stops.upper:.6g} rad, between the stops")
-    if plant.heat.C_w > 0.0 and not y[3] > COLDEST_WINDING:
-        raise InputError("initial winding_temperature", got=y[3],
+    if plant.heat.C_w > 0.0 and not y.T_w > COLDEST_WINDING:
+        raise InputError("initial winding_temperature", got=y.T_w,
                          allowed=f"more than {COLDEST_WINDING:.2f} K, where copper's law has no resistance left")
-    if plant.heat.C_w > 0.0 and not y[4] > 0.0:
-        raise InputError("initial housing_temperature", got=y[4], allowed="a positive number of kelvin")
-    if abs(y[5] - y[0]) > plant.play.half + _SLACK and not elastic.present(plant.elastic):
-        N = next(place.factor for place in places if place.at == 5)
-        raise InputError("initial motor_angle", got=N * y[5],
-                         allowed=f"{N * (y[0] - plant.play.half):.6g} to {N * (y[0] + plant.play.half):.6g} rad, "
+    if plant.heat.C_w > 0.0 and not y.T_h > 0.0:
+        raise InputError("initial housing_temperature", got=y.T_h, allowed="a positive number of kelvin")
+    if abs(y.q_m - y.q) > plant.play.half + _SLACK and not elastic.present(plant.elastic):
+        N = next(place.factor for place in places if place.at == "q_m")
+        raise InputError("initial motor_angle", got=N * y.q_m,
+                         allowed=f"{N * (y.q - plant.play.half):.6g} to {N * (y.q + plant.play.half):.6g} rad, "
                          "within the play of the gear")

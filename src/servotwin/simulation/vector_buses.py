@@ -151,7 +151,7 @@ class BusSet:
 
     def shaft(self, name: str) -> Array:
         """Return angle [rad] or speed [rad/s] of each shaft."""
-        return np.asarray(self.rows["point"]["y"][:, ("output_angle", "output_speed").index(name)])
+        return np.asarray(self.rows["point"]["y"]["q" if name == "output_angle" else "w"])
 
     @property
     def time(self) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.engine.memory import Memories, put_started
-from servotwin.models.engine.modes import INSIDE, RIGID
+from servotwin.models.engine.modes import INSIDE, NOWHERE, RIGID
 from servotwin.models.engine.records import columns_of, put_columns, tiles_with
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.tiles import Lanes as Columns
@@ -194,7 +194,7 @@ class LaneNumbers:
             If an angle is beyond a stop; names the lane.
         """
         rest = nothing_yet(1)
-        put_started(rest, 0, (0.0,) * 7, RIGID)
+        put_started(rest, 0, NOWHERE, RIGID)
         memories = taken(rest, np.zeros(len(which), np.int64))
         place = np.full(self.count, -1)
         place[which] = np.arange(len(which))
@@ -204,16 +204,14 @@ class LaneNumbers:
                 continue
             part = Chunk(chunk.lanes, chunk.commands, own)
             q = part.model.start_angle(cast("Any", command[own, None])) if angle is None else angle[place[own], None]
-            y = np.empty((7, len(own), 1))
-            for k, values in enumerate(start_vector(part.model.states, part.numbers, q, {})):
-                y[k] = values
+            y = start_vector(part.model.states, part.numbers, q, {})
             if angle is not None:
                 self.check_angles(angle[place[own]], own)
             play = self.now("play", own).half > 0.0
             point = memories.rows["point"]
-            for name in ("y", "anchor"):
-                point[name][place[own]] = y[:, :, 0].T
-            point["wiper"][place[own]] = y[0, :, 0]
+            for name, values in y._asdict().items():
+                point["y"][name][place[own]] = point["anchor"][name][place[own]] = np.ravel(values)
+            point["wiper"][place[own]] = np.ravel(y.q)
             point["mode"]["mesh"][place[own]] = np.where(play, INSIDE, RIGID)
         return memories
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-SHAFT = {"output_angle": ("q", 0), "output_speed": ("w", 1)}  # where tiles and records have them
+SHAFT = {"output_angle": "q", "output_speed": "w"}  # where tiles and records have them
 _WORD = 8  # bytes
 _WORTH = 64  # tiles for a thread: fewer cost more in waking it
 
@@ -147,7 +147,8 @@ class Store:
         point["mode"]["mesh"] = np.where(
             play, np.where((mesh == RIGID) | (mesh > ON_BACKWARD), INSIDE, mesh), np.where(sprung, mesh, RIGID))
         rigid = ~(play | sprung)
-        point["y"][rigid, 5:7] = point["y"][rigid, 0:2]
+        y = point["y"]
+        y["q_m"][rigid], y["w_m"][rigid] = y["q"][rigid], y["w"][rigid]
         anchors = point["anchor_time"].copy()
         if common is not None:
             point["anchor_time"][common.joined >= 0] = math.inf  # unless their bus is the same as then
@@ -346,7 +347,7 @@ class _Tiles:
                 for k in range(len(self.rows))]
 
     def shaft(self, name: str) -> Array:
-        return np.asarray(self.rows["servo"][SHAFT[name][0]].reshape(-1)[:len(self.which)], dtype=np.float64)
+        return np.asarray(self.rows["servo"][SHAFT[name]].reshape(-1)[:len(self.which)], dtype=np.float64)
 
     @property
     def time(self) -> Array:
@@ -409,7 +410,7 @@ class _Records:
         return [piece_of(array) for array in self.memories]
 
     def shaft(self, name: str) -> Array:
-        return np.asarray(self.rows["point"]["y"][:, SHAFT[name][1]])
+        return np.asarray(self.rows["point"]["y"][SHAFT[name]])
 
     @property
     def time(self) -> Array:

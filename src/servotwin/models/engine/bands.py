@@ -79,7 +79,8 @@ def band_at(numbers: Numbers, torque: float, u: float, forward: bool, zone: int,
         edge, ends_at = last, CREEPS if slow > 0.0 else SPEED
     if share != 0:
         still = share * contacts.through_gear(numbers, RIGID, _torque(numbers, zone, u, 0.0), torque, _turning(0.0))
-        slope = share * contacts.through_gear(numbers, RIGID, _torque(numbers, zone, u, 1.0), torque, _turning(1.0)) - still
+        slope = share * contacts.through_gear(
+            numbers, RIGID, _torque(numbers, zone, u, 1.0), torque, _turning(1.0)) - still
         turn = -still / slope if slope != 0.0 else edge
         if slope * pull < 0.0 and (turn < edge if rises else turn > edge):
             edge, ends_at = max(turn, w) if rises else min(turn, w), SHARE
@@ -141,7 +142,7 @@ def leg(numbers: Numbers, torque: float, u: float, forward: bool, zone: int, sha
     """Return where a shaft slides to within its band, or creeps to, in `time` [s] at most."""
     arc, ends_at, creeps = band_at(numbers, torque, u, forward, zone, share, w)
     if creeps and fades(numbers.friction):
-        y = (q, w, 0.0, 0.0, 0.0, q, w)
+        y = Vector(q, w, 0.0, 0.0, 0.0, q, w)
         crept = creep.creep(numbers, mode_of(numbers, forward, zone, share), u, torque, y, time, tolerance)
         return Leg(crept.q, crept.w, max(time - crept.time, 0.0), crept.ends_by, crept.done)
     once, twice = decay(arc.rate, arc.per_rate, time)
@@ -158,4 +159,4 @@ def _torque(numbers: Numbers, zone: int, u: float, w: float) -> float:
 
 def _turning(w: float) -> Vector:
     """Return the state of a shaft at the angle 0 with a speed."""
-    return 0.0, w, 0.0, 0.0, 0.0, 0.0, w
+    return Vector(0.0, w, 0.0, 0.0, 0.0, 0.0, w)

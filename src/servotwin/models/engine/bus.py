@@ -164,7 +164,7 @@ def _come(count: int, shared: Any, seats: Any, mates: Any, written: Tape, time: 
         if step.status_of(y) != COMPLETED:
             return step.status_of(y)
         t = seat.clock
-        point = Point(t, y, mode if own else mode_of(mate.mode), t, y, seat.point.step, crew.wiper_of(seat, y[0]))
+        point = Point(t, y, mode if own else mode_of(mate.mode), t, y, seat.point.step, crew.wiper_of(seat, y.q))
         crew.move(seat, mate.unit, shared, mates, point, shared.kind if own else -1, written)
     return COMPLETED
 
@@ -231,7 +231,7 @@ def _measure(inputs: Inputs, j: int, count: int, shared: Any, seats: Any, mates:
     t_in = piece_value(since(piece, origin), now)
     here = crew.point_now(seat, shared, mates, time)
     if not frame.accepted(chip, t_in):
-        tape.write_event(written, j, origin + now, tape.REFUSED, Mode(0, 0, 0, 0, 0), here.y[0])
+        tape.write_event(written, j, origin + now, tape.REFUSED, Mode(0, 0, 0, 0, 0), here.y.q)
     v_m, V_bus = 0.0, chip.V_oc
     if chip.beta != 0.0 or chip.c_s != 0.0:
         _, v_m, V_bus = _currents(j, count, shared, seats, mates, here.y, time)
@@ -260,7 +260,7 @@ def _tick(inputs: Inputs, firm: Any, j: int, count: int, shared: Any, seats: Any
     if control.senses(program):
         sensed = _sensed(j, count, shared, seats, mates, vector_of(seat.point.y), time)
     point = point_of(seat.point)
-    controller.work(inputs, numbers_of(seat.numbers).sensor, firm, point.y[0], point.wiper, sensed,
+    controller.work(inputs, numbers_of(seat.numbers).sensor, firm, point.y.q, point.wiper, sensed,
                     seat.origin + seat.clock)
 
 
@@ -289,9 +289,9 @@ def _currents(j: int, count: int, shared: Any, seats: Any, mates: Any, y: Vector
         V_bus = bus_voltage(count, shared, seats, mates, time)
     stiff = warm(shared_source.on_stiff_source(own, False), y)
     u = shared_source.part_on_bus(drive, own.bridge, seat.shown.duty, y) * V_bus if drive != 0.0 else 0.0
-    zone = currents.zone_of(stiff, u, 0.0, y[0], y[6], y[2])
-    i = y[2] if inductive(stiff.motor) else currents.current(stiff, zone, u, y[0], y[6])
-    return i, terminal_voltage(stiff.bridge, stiff.source, stiff.motor, u, y[6], i, V_bus), V_bus
+    zone = currents.zone_of(stiff, u, 0.0, y.q, y.w_m, y.i)
+    i = y.i if inductive(stiff.motor) else currents.current(stiff, zone, u, y.q, y.w_m)
+    return i, terminal_voltage(stiff.bridge, stiff.source, stiff.motor, u, y.w_m, i, V_bus), V_bus
 
 
 def _alone_on_bus(seat: Any, numbers: Numbers, y: Vector) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin.models.engine import contacts, currents, first_order, second_order
 from servotwin.models.engine.coefficients import linear_coefficients
 from servotwin.models.engine.memory import BEAT, FRAMES, point_of
-from servotwin.models.engine.modes import RIGID, Mode, at_rest
+from servotwin.models.engine.modes import RIGID, Mode, Vector, at_rest
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.tiles import numbers_of
 from servotwin.models.terms.numbers import Numbers
@@ -33,7 +33,7 @@ def go(lanes: Lanes, which: Indices, duration: Floats, status: Any, rows: Any, d
             left += 1
             continue
         y, numbers = point_of(rows[k].point).y, numbers_of(lanes, lane)
-        q, w, still = after(numbers, lanes.pieces[lanes.piece_first[lane], 1], lanes.torque[lane], y[0], y[1],
+        q, w, still = after(numbers, lanes.pieces[lanes.piece_first[lane], 1], lanes.torque[lane], y.q, y.w,
                             duration[0])
         if not still:
             left += 1
@@ -41,14 +41,14 @@ def go(lanes: Lanes, which: Indices, duration: Floats, status: Any, rows: Any, d
         done[k] = 1
         point = rows[k].point
         point.time, point.anchor_time, point.wiper = time, math.inf, q
-        point.y[0], point.y[1], point.y[5], point.y[6] = q, w, q, w
+        point.y.q, point.y.w, point.y.q_m, point.y.w_m = q, w, q, w
     return left
 
 
 def after(numbers: Numbers, u: float, tau: float, q: float, w: float, time: float) -> tuple[float, float, bool]:
     """Return angle and speed after a time [s] under constant inputs, and whether the mode lasts so long."""
     zone = currents.zone_of(numbers, u, 0.0, q, w, 0.0)
-    mode = contacts.settled(numbers, zone, u, tau, (q, w, 0.0, 0.0, 0.0, q, w), RIGID, False)
+    mode = contacts.settled(numbers, zone, u, tau, Vector(q, w, 0.0, 0.0, 0.0, q, w), RIGID, False)
     if at_rest(mode.contact):
         return q, w, True
     coefficients = linear_coefficients(numbers, mode, (u, 0.0, 0.0, 0.0, 0.0), (tau, 0.0), q, w)

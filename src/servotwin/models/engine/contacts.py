@@ -19,6 +19,7 @@ from servotwin.models.engine.modes import (
     Mode,
     Vector,
     at_rest,
+    moving,
     sign_of,
     slides,
 )
@@ -89,7 +90,7 @@ def core_friction(own: Friction, dry: float) -> tuple[float, float]:
 
 def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int, smooth: bool) -> Mode:
     """Return the mode of a state in a zone; `smooth` keeps a smoothed friction in one piece."""
-    q, w = y[0], y[1]
+    w = y.w
     if play.present(numbers.play) and mesh == INSIDE:
         return apart(numbers, zone, u, tau, y)
     if friction.smoothed(numbers.friction):
@@ -106,7 +107,7 @@ def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: 
 
 def as_one(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int) -> Mode:
     """Return the mode of motor and output as one body, with true sticking, whether or not they press together."""
-    q, w = y[0], y[1]
+    q, w = y.q, y.w
     if w == 0.0:
         torque = drive_torque(numbers, zone, u, y)
         against = external_torque(numbers.load, tau, q)
@@ -131,22 +132,22 @@ def share_sign(numbers: Numbers, zone: int, contact: int, mesh: int, u: float, t
 
 
 def through_gear(numbers: Numbers, mesh: int, tau_m: float, tau: float, y: Vector) -> float:
-    """Return the torque through the gear [N m] whose magnitude adds to sliding friction; inside the play, the motor's."""
+    """Return the torque through the gear [N m] whose magnitude adds to friction that slides: inside, the motor's."""
     if mesh == INSIDE:
         return friction.share(numbers.friction, tau_m, 0.0)
-    against = external_torque(numbers.load, tau, y[0])
-    return friction.share(numbers.friction, tau_m, torque_on_gear(against, y[1], numbers.shaft.b_out))
+    against = external_torque(numbers.load, tau, y.q)
+    return friction.share(numbers.friction, tau_m, torque_on_gear(against, y.w, numbers.shaft.b_out))
 
 
 def apart(numbers: Numbers, zone: int, u: float, tau: float, y: Vector) -> Mode:
     """Return the mode of two bodies inside the play."""
-    torque, against = drive_torque(numbers, zone, u, y), external_torque(numbers.load, tau, y[0])
+    torque, against = drive_torque(numbers, zone, u, y), external_torque(numbers.load, tau, y.q)
     held, dry = holds(numbers), friction.present(numbers.friction)
-    contact, motor = sliding(y[1] > 0.0, held), sliding(y[6] > 0.0, dry)
-    if y[1] == 0.0:
+    contact, motor = sliding(y.w > 0.0, held), sliding(y.w_m > 0.0, dry)
+    if y.w == 0.0:
         hold = output_friction(numbers)
-        contact = from_rest(-against, hold, hold, y[0] >= numbers.stops.upper, y[0] <= numbers.stops.lower, held)
-    if y[6] == 0.0:
+        contact = from_rest(-against, hold, hold, y.q >= numbers.stops.upper, y.q <= numbers.stops.lower, held)
+    if y.w_m == 0.0:
         motor = from_rest(torque, motor_hold(numbers, False, torque), motor_hold(numbers, True, torque), False, False,
                           dry)
     return Mode(zone, contact, INSIDE, motor, share_sign(numbers, zone, motor, INSIDE, u, tau, y))
@@ -175,10 +176,10 @@ def output_acceleration(numbers: Numbers, contact: int, against: float, w: float
 
 def pressing(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> float:
     """Return how motor and output in contact would close in [rad/s²] if each went on alone; below 0 they part."""
-    w = y[1]
+    w = y.w
     if w != 0.0:
         return pressing_along(numbers, mode, u, tau, y)
-    alone = apart(numbers, mode.zone, u, tau, (y[0], 0.0, y[2], y[3], y[4], y[5], 0.0))
+    alone = apart(numbers, mode.zone, u, tau, moving(y, y.q, 0.0, 0.0))
     return _closing(numbers, mode, alone.motor, alone.contact, u, tau, y)
 
 
@@ -187,39 +188,39 @@ def pressing_along(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector
 
     A mode that ends where the speed is zero keeps its law there, or it would end by its parting first.
     """
-    forward = mode.contact == FORWARD if slides(mode.contact) else y[1] > 0.0
+    forward = mode.contact == FORWARD if slides(mode.contact) else y.w > 0.0
     return _closing(numbers, mode, sliding(forward, friction.present(numbers.friction)),
                     sliding(forward, holds(numbers)), u, tau, y)
 
 
 def _closing(numbers: Numbers, mode: Mode, motor: int, contact: int, u: float, tau: float, y: Vector) -> float:
-    torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y[0])
-    gain = motor_acceleration(numbers, motor, torque, y[1]) - output_acceleration(numbers, contact, against, y[1])
+    torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y.q)
+    gain = motor_acceleration(numbers, motor, torque, y.w) - output_acceleration(numbers, contact, against, y.w)
     return gain if mode.mesh == ON_FORWARD else -gain
 
 
 def rebound(numbers: Numbers, mode: Mode, upper: bool, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     """Return mode and state after the output has hit a stop; with it the motor, unless it only follows."""
     q = numbers.stops.upper if upper else numbers.stops.lower
-    w = rebound_speed(y[1], numbers.stops.restitution)
+    w = rebound_speed(y.w, numbers.stops.restitution)
     pushes = mode.mesh == (ON_FORWARD if upper else ON_BACKWARD)
     as_one = not play.present(numbers.play) or pushes
     mesh = mode.mesh if as_one else INSIDE
-    after: Vector = (q, w, y[2], y[3], y[4], y[5], y[6])
+    after = moving(y, q, w, y.w_m)
     if as_one:
         after = with_motor(numbers.play, mesh, after)
     zone = mode.zone
     if source.present(numbers.source):  # the current goes with the speed
-        zone = currents.zone_of(numbers, u, 0.0, q, after[6], y[2])
+        zone = currents.zone_of(numbers, u, 0.0, q, after.w_m, y.i)
     if mesh == INSIDE:
         back = output_acceleration(numbers, sliding(w > 0.0, holds(numbers)), external_torque(numbers.load, tau, q), w)
     else:
         back = acceleration(numbers, Mode(zone, sliding(w > 0.0, has_friction(numbers)), mesh, FREE, 0), u, tau, after)
     low = back * w < 0.0 and 0.5 * w * w < abs(back) * REST_HEIGHT * max(abs(q), 1.0)
     if abs(w) < REST_SPEED or low:
-        after = (q, 0.0, y[2], y[3], y[4], after[5], after[6] if mesh == INSIDE else 0.0)
+        after = moving(after, q, 0.0, after.w_m if mesh == INSIDE else 0.0)
         if source.present(numbers.source):
-            zone = currents.zone_of(numbers, u, 0.0, q, after[6], y[2])
+            zone = currents.zone_of(numbers, u, 0.0, q, after.w_m, y.i)
     return settled(numbers, zone, u, tau, after, mesh, False), after
 
 
@@ -227,9 +228,10 @@ def acceleration(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) 
     """Return ẇ [rad/s²] of motor and output moving as one."""
     if at_rest(mode.contact):
         return 0.0
-    q, w = y[0], y[1]
+    q, w = y.q, y.w
     torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, q)
-    dry = friction_torque(numbers, mode.contact, w, torque, torque_on_gear(against, w, numbers.shaft.b_out))
+    dry = joint_friction(numbers.friction, numbers.load.coulomb, mode.contact, w, torque,
+                         torque_on_gear(against, w, numbers.shaft.b_out))
     return shaft.acceleration(numbers.shaft, torque, w, dry, against)
 
 
@@ -238,6 +240,6 @@ def accelerations(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector)
     if mode.mesh != INSIDE:
         dw = acceleration(numbers, mode, u, tau, y)
         return dw, dw
-    torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y[0])
-    return (output_acceleration(numbers, mode.contact, against, y[1]),
-            motor_acceleration(numbers, mode.motor, torque, y[6]))
+    torque, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y.q)
+    return (output_acceleration(numbers, mode.contact, against, y.w),
+            motor_acceleration(numbers, mode.motor, torque, y.w_m))

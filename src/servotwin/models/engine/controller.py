@@ -44,7 +44,7 @@ def serve(numbers: Numbers, inputs: Inputs, memory: Memory) -> None:
     if not is_due(firmware, firm, memory.frames, latest):
         return
     sensed = sensed_by(numbers, firm, point.y) if control.senses(firmware) else NOTHING_SENSED
-    work(inputs, numbers.sensor, firm, point.y[0], point.wiper, sensed, origin_of(memory) + point.time)
+    work(inputs, numbers.sensor, firm, point.y.q, point.wiper, sensed, origin_of(memory) + point.time)
     apply(firmware, firm, memory.frames, latest)
 
 
@@ -101,14 +101,14 @@ def sensed_by(numbers: Numbers, firm: Any, y: Vector) -> Sensed:
 def sensed_of(numbers: Numbers, i: float, V_bus: float, y: Vector) -> Sensed:
     """Return what a program measures at a current [A] and a voltage of the bus [V]."""
     cold = numbers.bridge.R_drive - numbers.source.R_b
-    return Sensed(i, V_bus, back_emf(turning(numbers.elastic, y), numbers.motor.K_b), cold, y[4])
+    return Sensed(i, V_bus, back_emf(turning(numbers.elastic, y), numbers.motor.K_b), cold, y.T_h)
 
 
 def on_supply(numbers: Numbers, now: float, y: Vector) -> tuple[float, float]:
     """Return the voltage of the bus [V], and the current while it flows [A], of numbers at the duty of `now`."""
     u, w = duty.voltage(numbers.source, now), turning(numbers.elastic, y)
-    zone = currents.zone_of(numbers, u, 0.0, y[0], w, y[2])
-    i = currents.flowing(numbers, zone, u, y[0], w, y[2])
+    zone = currents.zone_of(numbers, u, 0.0, y.q, w, y.i)
+    i = currents.flowing(numbers, zone, u, y.q, w, y.i)
     V = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)
     return V / duty.share_of(numbers.bridge, now), i / duty.on_share_of(numbers.bridge, now)
 

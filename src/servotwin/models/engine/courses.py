@@ -47,7 +47,7 @@ def both(output: Course, own: Course, y: Vector, s: float) -> Vector:
     """Return the state s [s] after y, at which output and motor began their courses."""
     q, w = first_order.propagate(output.rate, output.pull, output.q, output.w, s)
     q_m, w_m = first_order.propagate(own.rate, own.pull, own.q, own.w, s)
-    return q, w, y[2], y[3], y[4], q_m, w_m
+    return Vector(q, w, y.i, y.T_w, y.T_h, q_m, w_m)
 
 
 def lead_at(one: Course, other: Course, s: float) -> Lead:

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 from servotwin.models.engine import contacts, currents, twist
 from servotwin.models.engine.contacts import friction_torque
-from servotwin.models.engine.guards import SHARE, SPEED, ZONE_DOWN, ZONE_UP, creeping, geared, turns_alone
-from servotwin.models.engine.modes import BACKWARD, FORWARD, Mode, Vector, slides
+from servotwin.models.engine.guards import SHARE, SPEED, ZONE_DOWN, ZONE_UP, creeping, geared, geared_speed, turns_alone
+from servotwin.models.engine.modes import BACKWARD, FORWARD, NOWHERE, Mode, Vector, moving, slides
 from servotwin.models.terms import shaft
 from servotwin.models.terms.elastic import behind
 from servotwin.models.terms.friction import creeping_speed, fades, share, static_share
@@ -83,9 +83,9 @@ class _Between(NamedTuple):
 def creeps(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> bool:
     """Tell whether a shaft that slides does so at a speed at which static friction fades."""
     slow = creeping_speed(numbers.friction)
-    if abs(y[1]) != slow:
-        return abs(y[1]) < slow
-    return contacts.acceleration(numbers, mode, u, tau, y) * y[1] < 0.0
+    if abs(y.w) != slow:
+        return abs(y.w) < slow
+    return contacts.acceleration(numbers, mode, u, tau, y) * y.w < 0.0
 
 
 def longest_step(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> float:
@@ -105,22 +105,23 @@ def part_before(numbers: Numbers, mode: Mode, before: Vector, after: Vector) -> 
     """
     if not fades(numbers.friction) or not slides(geared(numbers, mode)) or creeping(numbers, mode, before):
         return 1.0
-    by, way = 6 if turns_alone(numbers, mode) else 1, 1.0 if geared(numbers, mode) == FORWARD else -1.0
-    w, w_after, slow = way * before[by], way * after[by], creeping_speed(numbers.friction)
+    way = 1.0 if geared(numbers, mode) == FORWARD else -1.0
+    w, w_after = way * geared_speed(numbers, mode, before), way * geared_speed(numbers, mode, after)
+    slow = creeping_speed(numbers.friction)
     return 1.0 if w_after >= _INTO * slow else (w - 0.5 * (1.0 + _INTO) * slow) / (w - w_after)
 
 
 def _gain(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: float) -> float:
     """Return the magnitude of the acceleration [rad/s²] that a body sliding in the gear has at a speed."""
     inside = turns_alone(numbers, mode)
-    at: Vector = (y[0], y[1] if inside else w, y[2], y[3], y[4], y[5], y[6] if behind(numbers.elastic) else w)
+    at = moving(y, y.q, y.w if inside else w, y.w_m if behind(numbers.elastic) else w)
     output, motor = twist.accelerations(warm(numbers, at), mode, u, tau, at)
     return abs(motor if inside else output)
 
 
 def creep(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, limit: float, tolerance: float) -> Crept:
     """Return where a shaft creeps to: to where its law changes, or within `limit` [s]; with a relative error."""
-    q, w = y[0], y[1]
+    q, w = y.q, y.w
     course = _course(numbers, mode, u, tau, 1.0 if w > 0.0 or (w == 0.0 and mode.contact == FORWARD) else -1.0)
     dw = _acceleration(numbers, course, w)
     there, ends_by = _next_change(numbers, mode, u, course, w, w == 0.0 or dw * course.way > 0.0)
@@ -143,15 +144,15 @@ def creep(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, limit: 
 def at_time(numbers: Numbers, mode: Mode, u: float, tau: float, start: Vector, end: Vector, length: float,
             s: float) -> tuple[float, float]:
     """Return angle and speed at s within a creep of a length [s] from one state to another."""
-    course = _course(numbers, mode, u, tau, 1.0 if start[1] + end[1] > 0.0 else -1.0)
-    there = _within(numbers, course, start[0], math.sqrt(abs(start[1])), math.sqrt(abs(end[1])), length, s)
+    course = _course(numbers, mode, u, tau, 1.0 if start.w + end.w > 0.0 else -1.0)
+    there = _within(numbers, course, start.q, math.sqrt(abs(start.w)), math.sqrt(abs(end.w)), length, s)
     return there.q, there.w
 
 
 def _course(numbers: Numbers, mode: Mode, u: float, tau: float, way: float) -> _Course:
     against = external_torque(numbers.load, tau, 0.0)
-    m_0 = currents.drive_torque(numbers, mode.zone, u, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-    m_1 = currents.drive_torque(numbers, mode.zone, u, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+    m_0 = currents.drive_torque(numbers, mode.zone, u, NOWHERE)
+    m_1 = currents.drive_torque(numbers, mode.zone, u, Vector(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     e_0, e_1 = torque_on_gear(against, 0.0, numbers.shaft.b_out), torque_on_gear(against, 1.0, numbers.shaft.b_out)
     return _Course(way, m_0, m_1 - m_0, e_0, e_1 - e_0, against)
 

@@ -118,7 +118,7 @@ def is_connected(seat: Any) -> bool:
     coast = path.silence.coast if seat.decided.silent > 0 else path.off.coast
     if duty.present(seat.numbers.bridge):
         coast = numbers_now(seat).bridge.off.coast
-    return bool(coast > 0.0 and (seat.point.y[2] != 0.0 or seat.point.y[6] != 0.0))
+    return bool(coast > 0.0 and (seat.point.y.i != 0.0 or seat.point.y.w_m != 0.0))
 
 
 def tau_by(seat: Any, origin: float) -> Piece:
@@ -196,7 +196,7 @@ def point_now(seat: Any, shared: Any, mates: Any, time: float) -> Point:
         m = motion.prepared(motion.begin(numbers, p.mode, u, tau_by(seat, seat.origin), p.anchor_time, p.anchor,
                                          p.step, seat.limit - p.anchor_time, seat.accuracy))
         y = motion.state(m, t - m.t0)
-    return Point(t, y, p.mode, p.anchor_time, p.anchor, p.step, wiper_of(seat, y[0]))
+    return Point(t, y, p.mode, p.anchor_time, p.anchor, p.step, wiper_of(seat, y.q))
 
 
 def wiper_of(seat: Any, q: float) -> float:
@@ -212,7 +212,7 @@ def move(seat: Any, unit: int, shared: Any, mates: Any, point: Point, event: int
         else:
             tape.write_alone(written, unit, seat, point.time)
     if event >= 0:
-        tape.write_event(written, unit, seat.origin + point.time, event, point.mode, point.y[0])
+        tape.write_event(written, unit, seat.origin + point.time, event, point.mode, point.y.q)
     put_point(seat.point, point)
     seat.arrival = _UNKNOWN
 
@@ -225,7 +225,7 @@ def bring(seat: Any, unit: int, shared: Any, mates: Any, time: float, written: T
 
 def hear(seat: Any, unit: int, now: Frame, written: Tape) -> None:
     """Take another state of a servo's chip from now on."""
-    before, angle, time, heeds = decided_of(seat.decided), seat.point.y[0], seat.origin + seat.clock, (
+    before, angle, time, heeds = decided_of(seat.decided), seat.point.y.q, seat.origin + seat.clock, (
         heeds_silence(seat))
     put_decided(seat.decided, now)
     nothing = Mode(0, 0, 0, 0, 0)
@@ -243,7 +243,7 @@ def obey(seat: Any, unit: int, firm: Any, written: Tape) -> None:
     show(seat, firm)
     if seat.shown.trip != trip_before:
         tape.write_event(written, unit, seat.origin + seat.clock, tape.TRIPS + seat.shown.trip, Mode(0, 0, 0, 0, 0),
-                         seat.point.y[0])
+                         seat.point.y.q)
     if seat.shown.duty != duty_before:
         forget(seat)
 

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from servotwin.models.engine.memory import BEAT, NOTHING, SAME, Memory, Point
-from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, RIGID, Mode
+from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, RIGID, Mode, Vector
 from servotwin.models.engine.records import reader, writer
 from servotwin.models.terms.control import Programs
 from servotwin.models.terms.frame import Decision, Frame
@@ -82,7 +82,7 @@ def remembered(side: Side, regular: bool, half_slack: float, firm: Programs) -> 
     q, w = 1.0 * held.q, 1.0 * held.w  # float64, whatever tiles hold
     pushed = ON_FORWARD if held.mesh == ON_FORWARD else ON_BACKWARD if held.mesh == ON_BACKWARD else RIGID
     mesh = INSIDE if held.mesh == INSIDE else pushed
-    y = (q, w, 1.0 * held.i, 1.0 * held.T_w, 1.0 * held.T_h, q if held.mesh == RIGID else 1.0 * held.q_m,
+    y = Vector(q, w, 1.0 * held.i, 1.0 * held.T_w, 1.0 * held.T_h, q if held.mesh == RIGID else 1.0 * held.q_m,
          w if held.mesh == RIGID else 1.0 * held.w_m)
     chip = Frame(
         number, side.counted.first_draw + number, 1.0 * held.drive,
@@ -105,9 +105,9 @@ def side_of(memory: Memory, period: float) -> Side:
     to_next = max(to_next, 0.0)
     pending, later = chip.pending, chip.later
     held = Held(
-        y[0], y[1], chip.drive, chip.drive_end - now if chip.drive != 0.0 else 0.0,
+        y.q, y.w, chip.drive, chip.drive_end - now if chip.drive != 0.0 else 0.0,
         chip.clock - now, chip.error, pending.time - now, pending.sign, pending.duration, pending.error,
-        later.time - now, later.sign, later.duration, later.error, memory.point.wiper, y[2], y[3], y[4], y[5], y[6],
+        later.time - now, later.sign, later.duration, later.error, memory.point.wiper, y.i, y.T_w, y.T_h, y.q_m, y.w_m,
         1.0 * memory.point.mode.mesh, memory.point.step)
     return Side(held, Hour(period, (number - 1) * period, period - to_next, period),
                 Counted(number, chip.draws - number))

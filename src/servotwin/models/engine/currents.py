@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine.modes import CONDUCTING, NO_CURRENT, Vector, constant_current, in_linear_zone, sign_of
+from servotwin.models.engine.modes import (
+    CONDUCTING,
+    NO_CURRENT,
+    Vector,
+    constant_current,
+    in_linear_zone,
+    limited,
+    sign_of,
+)
 from servotwin.models.terms import bridge, follower, source
 from servotwin.models.terms.elastic import turning
 from servotwin.models.terms.motor import inductive
@@ -78,9 +86,9 @@ def current(numbers: Numbers, zone: int, u: float, q: float, w: float) -> float:
         return motor.steady_armature_current(v, w, numbers.motor.R, numbers.motor.K_b)
     if zone == NO_CURRENT:
         return 0.0
-    if constant_current(zone):
+    if limited(zone):
         return sign_of(zone) * numbers.source.I_max
-    v, R = loop(numbers, zone, u)
+    v, R = bridge.loop(numbers.bridge, numbers.source, zone, u)
     return motor.steady_armature_current(v, w, R, numbers.motor.K_b)
 
 
@@ -96,7 +104,7 @@ def current_rate(numbers: Numbers, zone: int, u: float, q: float, w: float, i: f
         return motor.armature_current_rate(v, i, w, numbers.motor.R, numbers.motor.L, numbers.motor.K_b)
     if constant_current(zone):
         return 0.0
-    v, R = loop(numbers, zone, u)
+    v, R = bridge.loop(numbers.bridge, numbers.source, zone, u)
     return motor.armature_current_rate(v, i, w, R, numbers.motor.L, numbers.motor.K_b)
 
 
@@ -115,7 +123,7 @@ def current_slope(numbers: Numbers, zone: int, du: float) -> float:
 
 def drive_torque(numbers: Numbers, zone: int, u: float, y: Vector) -> float:
     """Return the motor's torque N k_a i [N m]."""
-    i = flowing(numbers, zone, u, y[0], turning(numbers.elastic, y), y[2])
+    i = y.i if inductive(numbers.motor) else current(numbers, zone, u, y.q, turning(numbers.elastic, y))
     return motor.electromagnetic_torque(i, numbers.motor.K)
 
 

@@ -30,6 +30,7 @@ WHICH = (
     6, 7, 8, 9, 0, 3, 4, 5, 6, 7, 8, 9, 10, 0, 5, 6, 7, 8, 9, 10, 11, 0, 6, 7, 8, 9, 10, 11, 12, 0, 5, 6, 7, 10, 11,
     12, 13, 0, 5, 6, 7, 8, 12, 13, 14,
 )
+_PLACES = tuple(7 * j for j in WHICH)
 WEIGHTS = (
     0.05260015195876773, 0.0197250569845379, 0.0591751709536137, 0.02958758547680685, 0.08876275643042054,
     0.2413651341592667, -0.8845494793282861, 0.924834003261792, 0.037037037037037035, 0.17082860872947386,
@@ -77,27 +78,31 @@ def step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector
     """Return the state after a step of `h` [s], and its error relative to 1 + |state|."""
     ks = [0.0] * NUMBERS
     for j in range(STAGES):
-        put_rates(ks, j, _rates(numbers, mode, u, tau, t + FRACTIONS[j] * h, moved(y, ks, j, h)))
+        at = t + FRACTIONS[j] * h
+        put_rates(ks, j, rates_of(numbers, mode, piece_value(u, at), piece_value(tau, at), moved(y, ks, j, h)))
     after = moved(y, ks, STAGES, h)
     return after, error_of(y, after, ks, h)
 
 
 def put_rates(ks: Any, stage: int, rates: Vector) -> None:
     """Note the rates of a stage."""
-    for n in range(7):
-        ks[7 * stage + n] = rates[n]
+    k = 7 * stage
+    ks[k], ks[k + 1], ks[k + 2], ks[k + 3], ks[k + 4], ks[k + 5], ks[k + 6] = rates
 
 
 def error_of(y: Vector, after: Vector, ks: Any, h: float) -> float:
     """Return the error of a step relative to 1 + |state|."""
     sum_5 = sum_3 = 0.0
+    before, behind = y[:], after[:]
     for n in range(7):
         e5 = e3 = 0.0
+        at = n
         for j in range(STAGES):
-            k = ks[7 * j + n]
+            k = ks[at]
+            at += 7
             e5 += ERROR_5[j] * k
             e3 += ERROR_3[j] * k
-        scale = 1.0 + max(abs(y[n]), abs(after[n]))
+        scale = 1.0 + max(abs(before[n]), abs(behind[n]))
         sum_5 += (e5 / scale) ** 2
         sum_3 += (e3 / scale) ** 2
     return h * sum_5 / math.sqrt(sum_5 + 0.01 * sum_3) if sum_5 != 0.0 else 0.0
@@ -111,13 +116,14 @@ def dense(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vecto
         at = moved(y, ks, j, h)
         if j == STAGES:
             after = at
-        put_rates(ks, j, _rates(numbers, mode, u, tau, t + FRACTIONS[j] * h, at))
+        time = t + FRACTIONS[j] * h
+        put_rates(ks, j, rates_of(numbers, mode, piece_value(u, time), piece_value(tau, time), at))
     return dense_of(y, after, ks, h)
 
 
 def dense_of(y: Vector, after: Vector, ks: Any, h: float) -> tuple[Vector, ...]:
     """Return the same from the rates of all sixteen stages."""
-    way, left, right = _difference(y, after), _rates_in(ks, 0), _rates_in(ks, STAGES)
+    way, left, right = _difference(y, after), rates_in(ks, 0), rates_in(ks, STAGES)
     first = _sum(way, left, -1.0, h, left, 0.0)
     second = _sum(way, left, 2.0, -h, right, -h)
     return (way, first, second, _row(ks, 0, h), _row(ks, 16, h), _row(ks, 32, h), _row(ks, 48, h))
@@ -127,31 +133,28 @@ def interpolate(y: Vector, vectors: tuple[Vector, ...], x: float) -> Vector:
     """Return the state at the fraction x of a step that began at y."""
     z = 1.0 - x
     f0, f1, f2, f3, f4, f5, f6 = vectors
-    return (
-        y[0] + x * (f0[0] + z * (f1[0] + x * (f2[0] + z * (f3[0] + x * (f4[0] + z * (f5[0] + x * f6[0])))))),
-        y[1] + x * (f0[1] + z * (f1[1] + x * (f2[1] + z * (f3[1] + x * (f4[1] + z * (f5[1] + x * f6[1])))))),
-        y[2] + x * (f0[2] + z * (f1[2] + x * (f2[2] + z * (f3[2] + x * (f4[2] + z * (f5[2] + x * f6[2])))))),
-        y[3] + x * (f0[3] + z * (f1[3] + x * (f2[3] + z * (f3[3] + x * (f4[3] + z * (f5[3] + x * f6[3])))))),
-        y[4] + x * (f0[4] + z * (f1[4] + x * (f2[4] + z * (f3[4] + x * (f4[4] + z * (f5[4] + x * f6[4])))))),
-        y[5] + x * (f0[5] + z * (f1[5] + x * (f2[5] + z * (f3[5] + x * (f4[5] + z * (f5[5] + x * f6[5])))))),
-        y[6] + x * (f0[6] + z * (f1[6] + x * (f2[6] + z * (f3[6] + x * (f4[6] + z * (f5[6] + x * f6[6])))))),
+    return Vector(
+        y.q + x * (f0.q + z * (f1.q + x * (f2.q + z * (f3.q + x * (f4.q + z * (f5.q + x * f6.q)))))),
+        y.w + x * (f0.w + z * (f1.w + x * (f2.w + z * (f3.w + x * (f4.w + z * (f5.w + x * f6.w)))))),
+        y.i + x * (f0.i + z * (f1.i + x * (f2.i + z * (f3.i + x * (f4.i + z * (f5.i + x * f6.i)))))),
+        y.T_w + x * (f0.T_w + z * (f1.T_w + x * (f2.T_w + z * (f3.T_w + x * (f4.T_w + z * (f5.T_w + x * f6.T_w)))))),
+        y.T_h + x * (f0.T_h + z * (f1.T_h + x * (f2.T_h + z * (f3.T_h + x * (f4.T_h + z * (f5.T_h + x * f6.T_h)))))),
+        y.q_m + x * (f0.q_m + z * (f1.q_m + x * (f2.q_m + z * (f3.q_m + x * (f4.q_m + z * (f5.q_m + x * f6.q_m)))))),
+        y.w_m + x * (f0.w_m + z * (f1.w_m + x * (f2.w_m + z * (f3.w_m + x * (f4.w_m + z * (f5.w_m + x * f6.w_m)))))),
     )
 
 
-def _rates(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t: float, y: Vector) -> Vector:
-    return rates_of(numbers, mode, piece_value(u, t), piece_value(tau, t), y)
-
-
-def _rates_in(ks: Any, stage: int) -> Vector:
+def rates_in(ks: Any, stage: int) -> Vector:
+    """Return the rates of a stage."""
     k = 7 * stage
-    return (ks[k], ks[k + 1], ks[k + 2], ks[k + 3], ks[k + 4], ks[k + 5], ks[k + 6])
+    return Vector(ks[k], ks[k + 1], ks[k + 2], ks[k + 3], ks[k + 4], ks[k + 5], ks[k + 6])
 
 
 def moved(y: Vector, ks: Any, stage: int, h: float) -> Vector:
     """Return the state from which a stage takes its rates."""
     a = b = c = d = e = f = g = 0.0
     for n in range(FIRST[stage], FIRST[stage + 1]):
-        k, weight = 7 * WHICH[n], WEIGHTS[n]
+        k, weight = _PLACES[n], WEIGHTS[n]
         a += weight * ks[k]
         b += weight * ks[k + 1]
         c += weight * ks[k + 2]
@@ -159,7 +162,8 @@ def moved(y: Vector, ks: Any, stage: int, h: float) -> Vector:
         e += weight * ks[k + 4]
         f += weight * ks[k + 5]
         g += weight * ks[k + 6]
-    return (y[0] + h * a, y[1] + h * b, y[2] + h * c, y[3] + h * d, y[4] + h * e, y[5] + h * f, y[6] + h * g)
+    q, w, i, T_w, T_h, q_m, w_m = y
+    return Vector(q + h * a, w + h * b, i + h * c, T_w + h * d, T_h + h * e, q_m + h * f, w_m + h * g)
 
 
 def _row(ks: Any, at: int, h: float) -> Vector:
@@ -173,14 +177,14 @@ def _row(ks: Any, at: int, h: float) -> Vector:
         e += weight * ks[k + 4]
         f += weight * ks[k + 5]
         g += weight * ks[k + 6]
-    return (a, b, c, d, e, f, g)
+    return Vector(a, b, c, d, e, f, g)
 
 
 def _difference(x: Vector, y: Vector) -> Vector:
-    return (y[0] - x[0], y[1] - x[1], y[2] - x[2], y[3] - x[3], y[4] - x[4], y[5] - x[5], y[6] - x[6])
+    return Vector(y.q - x.q, y.w - x.w, y.i - x.i, y.T_w - x.T_w, y.T_h - x.T_h, y.q_m - x.q_m, y.w_m - x.w_m)
 
 
 def _sum(x: Vector, y: Vector, a: float, b: float, z: Vector, c: float) -> Vector:
-    return (a * x[0] + b * y[0] + c * z[0], a * x[1] + b * y[1] + c * z[1], a * x[2] + b * y[2] + c * z[2],
-            a * x[3] + b * y[3] + c * z[3], a * x[4] + b * y[4] + c * z[4], a * x[5] + b * y[5] + c * z[5],
-            a * x[6] + b * y[6] + c * z[6])
+    return Vector(a * x.q + b * y.q + c * z.q, a * x.w + b * y.w + c * z.w, a * x.i + b * y.i + c * z.i,
+            a * x.T_w + b * y.T_w + c * z.T_w, a * x.T_h + b * y.T_h + c * z.T_h, a * x.q_m + b * y.q_m + c * z.q_m,
+            a * x.w_m + b * y.w_m + c * z.w_m)

@@ -12,7 +12,17 @@ import math
 from servotwin.models.engine import guards
 from servotwin.models.engine.coefficients import Apart
 from servotwin.models.engine.modes import RIGID, Vector
-from servotwin.models.engine.motion import APART, FIRST_ORDER, REST, Motion, monotone_until, prepared, rates, state
+from servotwin.models.engine.motion import (
+    APART,
+    FIRST_ORDER,
+    REST,
+    Motion,
+    monotone_until,
+    prepared,
+    rates,
+    state,
+    state_and_rates,
+)
 from servotwin.models.engine.outright import first_end
 from servotwin.models.engine.rodas import not_constant
 from servotwin.models.terms import source
@@ -57,12 +67,15 @@ def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b
     """Return when the first of several guards falls below zero in [a, b], and which; (inf, -1) where none does."""
     first, found = math.inf, -1
     rates_a, rates_b = rates(motion, a, at_a), rates(motion, b, at_b)
+    t = motion.t0 + b
+    u, du, tau, dtau = piece_value(motion.u, t), piece_rate(motion.u, t), piece_value(motion.tau, t), piece_rate(
+        motion.tau, t)
     for kind in range(guards.KINDS):
         if kinds >> kind == 0:
             break
         if not kinds >> kind & 1:
             continue
-        end = _guard(motion, kind, b, at_b, rates_b)
+        end = guards.guard(motion.numbers, motion.mode, kind, u, du, tau, dtau, at_b, rates_b)
         if end[0] >= guards.BELOW and not end[1] > 0.0:
             continue  # it does not fall below zero, nor rises from there
         begin = _guard(motion, kind, a, at_a, rates_a)
@@ -85,8 +98,8 @@ def _guard(motion: Motion, kind: int, s: float, y: Vector, dy: Vector) -> tuple[
 
 def _at(motion: Motion, kind: int, s: float, rate: bool) -> tuple[float, float]:
     """Return a guard and its rate at s; with `rate` the rate alone, and nan for its own."""
-    y = state(motion, s)
-    value, slope = _guard(motion, kind, s, y, rates(motion, s, y))
+    y, dy = state_and_rates(motion, s)
+    value, slope = _guard(motion, kind, s, y, dy)
     return (slope, math.nan) if rate else (value, slope)
 
 

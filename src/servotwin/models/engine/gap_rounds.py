@@ -20,11 +20,11 @@ def phase(size: int, tile: Any, plan: Any) -> None:
 def alone(tile: Any, plan: Any, j: int) -> None:
     """Move one lane through a time with or without drive."""
     servo = tile.servo
-    y = (servo.q[j], servo.w[j], servo.i[j], servo.T_w[j], servo.T_h[j], servo.q_m[j], servo.w_m[j])
+    y = Vector(servo.q[j], servo.w[j], servo.i[j], servo.T_w[j], servo.T_h[j], servo.q_m[j], servo.w_m[j])
     moved = gone(tiles.numbers_at(tile.own, j), tile.hung.torque[j], plan.power[j], y, int(servo.mesh[j]),
                  servo.wiper[j], plan.time[j])
-    servo.q[j], servo.w[j], servo.wiper[j] = moved.y[0], moved.y[1], moved.wiper
-    servo.q_m[j], servo.w_m[j], servo.mesh[j] = moved.y[5], moved.y[6], moved.mode.mesh
+    servo.q[j], servo.w[j], servo.wiper[j] = moved.y.q, moved.y.w, moved.wiper
+    servo.q_m[j], servo.w_m[j], servo.mesh[j] = moved.y.q_m, moved.y.w_m, moved.mode.mesh
     plan.lost[j] = plan.lost[j] if moved.done > 0.0 else 1.0
 
 

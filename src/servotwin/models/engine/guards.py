@@ -27,6 +27,7 @@ from servotwin.models.engine.modes import (
     Mode,
     Vector,
     at_rest,
+    moving,
     slides,
 )
 from servotwin.models.terms import elastic, friction, heat, play, source
@@ -138,24 +139,29 @@ def geared(numbers: Numbers, mode: Mode) -> int:
     return mode.motor if turns_alone(numbers, mode) else mode.contact
 
 
+def geared_speed(numbers: Numbers, mode: Mode, y: Vector) -> float:
+    """Return the speed of what the gear's friction acts on; of rates, its acceleration."""
+    return y.w_m if turns_alone(numbers, mode) else y.w
+
+
 def creeping(numbers: Numbers, mode: Mode, y: Vector) -> bool:
     """Tell whether a body moves at speeds at which its friction fades."""
     if not fades(numbers.friction) or not slides(geared(numbers, mode)):
         return False
-    return abs(y[6] if turns_alone(numbers, mode) else y[1]) <= creeping_speed(numbers.friction)
+    return abs(geared_speed(numbers, mode, y)) <= creeping_speed(numbers.friction)
 
 
 def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
           dy: Vector) -> tuple[float, float]:
     """Return a guard and its time derivative (nan where it is not known); the mode ends when it falls below zero."""
-    q, w, dw = y[0], y[1], dy[1]
+    q, w, dw = y.q, y.w, dy.w
     if kind == SPEED:
         sign = 1.0 if mode.contact == FORWARD else -1.0
         return sign * w - core_speed(numbers.friction), sign * dw
     if kind == CREEPS:
         sign = 1.0 if geared(numbers, mode) == FORWARD else -1.0
-        by = 6 if turns_alone(numbers, mode) else 1
-        return sign * y[by] - creeping_speed(numbers.friction), sign * dy[by]
+        return (sign * geared_speed(numbers, mode, y) - creeping_speed(numbers.friction),
+                sign * geared_speed(numbers, mode, dy))
     if kind == CORE_FORWARD:
         return core_speed(numbers.friction) - w, -dw
     if kind == CORE_BACKWARD:
@@ -172,11 +178,11 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
 def _by_torque(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
                dy: Vector) -> tuple[float, float]:
     """Return a guard that depends on currents and torques."""
-    zone, q = mode.zone, y[0]
+    zone, q = mode.zone, y.q
     if kind == ZONE_UP or kind == ZONE_DOWN:
         w_m, dw_m = elastic.turning(numbers.elastic, y), elastic.turning(numbers.elastic, dy)
-        x = currents.zone_variable(numbers, zone, u, q, w_m, y[2])
-        rate = currents.zone_rate(numbers, zone, du, w_m, dw_m, dy[2])
+        x = currents.zone_variable(numbers, zone, u, q, w_m, y.i)
+        rate = currents.zone_rate(numbers, zone, du, w_m, dw_m, dy.i)
         low, high = currents.zone_limits(numbers, zone, u)
         return (high - x, -rate) if kind == ZONE_UP else (x - low, rate)
     if kind == SHARE:
@@ -194,15 +200,15 @@ def _by_torque(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau
 
 def _share_rate(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, y: Vector, dy: Vector) -> float:
     """Return the rate of the guard of a share through a gear with a spring; nan where it is not known."""
-    di = dy[2]
+    di = dy.i
     if not inductive(numbers.motor):
         R = currents.resistance(numbers, mode.zone, u)
         di = motor.steady_armature_current(du, elastic.turning(numbers.elastic, dy), R, numbers.motor.K_b)
     slope = twist.torque_slope(numbers, mode.mesh, y, dy)
     tau_e = -slope
     if elastic.behind(numbers.elastic):
-        against = dtau + slope + stiffness_at(numbers.load, y[0]) * y[1]
-        tau_e = torque_on_gear(against, dy[1], numbers.shaft.b_out)
+        against = dtau + slope + stiffness_at(numbers.load, y.q) * y.w
+        tau_e = torque_on_gear(against, dy.w, numbers.shaft.b_out)
     return mode.share * friction.share(numbers.friction, motor.electromagnetic_torque(di, numbers.motor.K), tau_e)
 
 
@@ -214,15 +220,15 @@ def share_along(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -
     if mode.share == 0:
         return 0.0, 0.0
     now = guard(numbers, mode, SHARE, u, 0.0, tau, 0.0, y, y)[0]
-    still = (y[0], 0.0, y[2], y[3], y[4], y[5], 0.0)
+    still = moving(y, y.q, 0.0, 0.0)
     first = guard(numbers, mode, SHARE, u, 0.0, tau, 0.0, still, still)[0]
-    return now, first * y[6] / (first - now) if now != first else 0.0
+    return now, first * y.w_m / (first - now) if now != first else 0.0
 
 
 def _release_guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: float, dtau: float, y: Vector,
                    dy: Vector) -> tuple[float, float]:
-    torque, against = 0.0, external_torque(numbers.load, tau, y[0])
-    di = dy[2]
+    torque, against = 0.0, external_torque(numbers.load, tau, y.q)
+    di = dy.i
     if mode.mesh == INSIDE:
         di = 0.0
         backward = forward = contacts.output_friction(numbers)
@@ -242,10 +248,10 @@ def _spring_guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, 
     mesh, slope = mode.mesh, twist.torque_slope(numbers, mode.mesh, y, dy)
     if kind == MOTOR_SPEED:
         sign = 1.0 if mode.motor == FORWARD else -1.0
-        return sign * y[6], sign * dy[6]
+        return sign * y.w_m, sign * dy.w_m
     if kind == MEET_FORWARD or kind == MEET_BACKWARD or kind == PART:
         return _meeting(numbers, mesh, kind, y, dy)
-    di = dy[2] if inductive(numbers.motor) else currents.current_slope(numbers, mode.zone, du)
+    di = dy.i if inductive(numbers.motor) else currents.current_slope(numbers, mode.zone, du)
     rate = motor.electromagnetic_torque(di, numbers.motor.K) - slope
     if kind == MOTOR_RELEASE_FORWARD or kind == MOTOR_RELEASE_BACKWARD:
         net, backward, forward = twist.at_motor(numbers, mode.zone, mesh, u, y)
@@ -274,22 +280,22 @@ def _meeting(numbers: Numbers, mesh: int, kind: int, y: Vector, dy: Vector) -> t
 def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, dtau: float, y: Vector,
                 dy: Vector) -> tuple[float, float]:
     if kind == MEET_FORWARD:
-        return numbers.play.half - (y[5] - y[0]), y[1] - y[6]
+        return numbers.play.half - (y.q_m - y.q), y.w - y.w_m
     if kind == MEET_BACKWARD:
-        return numbers.play.half + (y[5] - y[0]), y[6] - y[1]
+        return numbers.play.half + (y.q_m - y.q), y.w_m - y.w
     if kind == PART:
         return contacts.pressing(numbers, mode, u, tau, y), math.nan
     if kind == MOTOR_SPEED:
         sign = 1.0 if mode.motor == FORWARD else -1.0
-        return sign * y[6], sign * dy[6]
+        return sign * y.w_m, sign * dy.w_m
     pushes = mode.mesh == ON_FORWARD
     if kind == PART_OUTPUT:  # it starts away from the motor
-        against = external_torque(numbers.load, tau, y[0])
+        against = external_torque(numbers.load, tau, y.q)
         if mode.contact == (ON_UPPER if pushes else ON_LOWER):
             return math.inf, 0.0
         return contacts.output_friction(numbers) + (against if pushes else -against), dtau if pushes else -dtau
     torque = currents.drive_torque(numbers, mode.zone, u, y)
-    rate = motor.electromagnetic_torque(dy[2], numbers.motor.K)
+    rate = motor.electromagnetic_torque(dy.i, numbers.motor.K)
     if kind == MOTOR_RELEASE_FORWARD or (kind == PART_MOTOR and not pushes):
         return contacts.motor_hold(numbers, True, torque) - torque, -rate
     return contacts.motor_hold(numbers, False, torque) + torque, rate
@@ -308,7 +314,7 @@ def _crossed(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: V
         if currents.by_current(numbers, zone):
             y = _with_current_at_edge(numbers, zone, kind, u, y)
             w_m = elastic.turning(numbers.elastic, y)
-            return Mode(currents.zone_of(numbers, u, 0.0, y[0], w_m, y[2]), shaft, mesh, motor, share), y
+            return Mode(currents.zone_of(numbers, u, 0.0, y.q, w_m, y.i), shaft, mesh, motor, share), y
         zone = currents.neighbour(numbers, zone, kind == ZONE_UP)
         if share != 0 and not elastic.present(numbers.elastic):
             share = contacts.share_sign(numbers, zone, geared(numbers, mode), mesh, u, tau, y)
@@ -318,8 +324,8 @@ def _crossed(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: V
     if kind == CREEPS:
         slow = creeping_speed(numbers.friction)
         w = slow if geared(numbers, mode) == FORWARD else -slow
-        after: Vector = (y[0], y[1] if turns_alone(numbers, mode) else w, y[2], y[3], y[4], y[5],
-                         y[6] if elastic.behind(numbers.elastic) else w)
+        after = moving(y, y.q, y.w if turns_alone(numbers, mode) else w,
+                       y.w_m if elastic.behind(numbers.elastic) else w)
         return mode, after
     if elastic.present(numbers.elastic):
         return _cross_spring(numbers, mode, kind, u, tau, y)
@@ -330,9 +336,9 @@ def _crossed(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: V
     if kind == UPPER or kind == LOWER:
         return contacts.rebound(numbers, mode, kind == UPPER, u, tau, y)
     if kind == RELEASE_FORWARD or kind == RELEASE_BACKWARD:
-        if kind == RELEASE_FORWARD and y[0] >= numbers.stops.upper:
+        if kind == RELEASE_FORWARD and y.q >= numbers.stops.upper:
             return Mode(zone, ON_UPPER, mesh, motor, 0), y
-        if kind == RELEASE_BACKWARD and y[0] <= numbers.stops.lower:
+        if kind == RELEASE_BACKWARD and y.q <= numbers.stops.lower:
             return Mode(zone, ON_LOWER, mesh, motor, 0), y
         shaft = FORWARD if kind == RELEASE_FORWARD else BACKWARD
         dry = contacts.holds(numbers) if mesh == INSIDE else contacts.has_friction(numbers)
@@ -344,46 +350,45 @@ def _crossed(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: V
         return Mode(zone, shaft, mesh, motor, contacts.share_sign(numbers, zone, motor, mesh, u, tau, y)), y
     if play.present(numbers.play) and (kind == PART or kind == PART_OUTPUT or kind == PART_MOTOR):
         return contacts.apart(numbers, zone, u, tau, y), y
-    q, w, i, T_w, T_h, q_m, w_m = y
+    q, w, i = y.q, y.w, y.i
     if play.present(numbers.play) and (kind == MEET_FORWARD or kind == MEET_BACKWARD):
         y = play.met(numbers.play, numbers.shaft, kind == MEET_FORWARD, y)
         mesh = ON_FORWARD if kind == MEET_FORWARD else ON_BACKWARD
-        upper = q >= numbers.stops.upper and y[1] > 0.0
-        hits = upper or (q <= numbers.stops.lower and y[1] < 0.0)
+        upper = q >= numbers.stops.upper and y.w > 0.0
+        hits = upper or (q <= numbers.stops.lower and y.w < 0.0)
         if hits and w != 0.0:  # it goes to and fro between motor and stop without any way to go: in the end both stand
-            y = (q, 0.0, i, T_w, T_h, y[5], 0.0)
+            y = moving(y, q, 0.0, 0.0)
         if source.present(numbers.source):
-            zone = currents.zone_of(numbers, u, 0.0, q, y[6], i)
+            zone = currents.zone_of(numbers, u, 0.0, q, y.w_m, i)
         if hits and w == 0.0:  # it rests on a stop: both hit it at once
             return contacts.rebound(numbers, Mode(zone, shaft, mesh, motor, 0), upper, u, tau, y)
     elif kind == MOTOR_SPEED:
-        y = (q, w, i, T_w, T_h, q_m, 0.0)
+        y = moving(y, q, w, 0.0)
     else:
-        y = (q, 0.0, i, T_w, T_h, q_m, w_m if mesh == INSIDE else 0.0)
+        y = moving(y, q, 0.0, y.w_m if mesh == INSIDE else 0.0)
     return contacts.settled(numbers, zone, u, tau, y, mesh, False), y
 
 
 def _cross_spring(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     """Return mode and state of two bodies with a spring between them after a guard has reached zero."""
     zone, contact, mesh, motor, _ = mode
-    q, w, i, T_w, T_h, other, w_other = y
     if kind == UPPER or kind == LOWER:
         return twist.rebound(numbers, mode, kind == UPPER, u, tau, y)
     if kind == RELEASE_FORWARD or kind == RELEASE_BACKWARD:
         forward = kind == RELEASE_FORWARD
         contact = FREE if not twist.is_dry(numbers) else FORWARD if forward else BACKWARD
-        if forward and q >= numbers.stops.upper:
+        if forward and y.q >= numbers.stops.upper:
             contact = ON_UPPER
-        if not forward and q <= numbers.stops.lower:
+        if not forward and y.q <= numbers.stops.lower:
             contact = ON_LOWER
         return twist.with_share(numbers, Mode(zone, contact, mesh, motor, 0), u, tau, y), y
     if kind == MOTOR_RELEASE_FORWARD or kind == MOTOR_RELEASE_BACKWARD:
         motor = FORWARD if kind == MOTOR_RELEASE_FORWARD else BACKWARD
         return twist.with_share(numbers, Mode(zone, contact, mesh, motor, 0), u, tau, y), y
     if kind == MOTOR_SPEED:
-        y = (q, w, i, T_w, T_h, other, 0.0)
+        y = moving(y, y.q, y.w, 0.0)
     elif kind == SPEED:
-        y = (q, 0.0, i, T_w, T_h, other, w_other)
+        y = moving(y, y.q, 0.0, y.w_m)
     elif kind == MEET_FORWARD or kind == MEET_BACKWARD:
         mesh = PUSH_FORWARD if kind == MEET_FORWARD else PUSH_BACKWARD
     elif mesh == PUSH_FORWARD and twist.twist_rate(numbers, y) < 0.0 and numbers.elastic.c > 0.0:
@@ -399,4 +404,4 @@ def _with_current_at_edge(numbers: Numbers, zone: int, kind: int, u: float, y: V
     """Return the state with the current where a zone of the current ends."""
     low, high = currents.zone_limits(numbers, zone, u)
     i = high if kind == ZONE_UP else low
-    return (y[0], y[1], 0.0 if i == 0.0 else i, y[3], y[4], y[5], y[6])
+    return Vector(y.q, y.w, 0.0 if i == 0.0 else i, y.T_w, y.T_h, y.q_m, y.w_m)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from servotwin.models.engine.memory import Point
-from servotwin.models.engine.modes import INSIDE, RIGID, Mode
+from servotwin.models.engine.modes import INSIDE, RIGID, Mode, Vector
 from servotwin.models.engine.observe import on_bus
 from servotwin.models.terms.follower import Follower
 from servotwin.models.terms.numbers import Numbers
@@ -64,7 +64,7 @@ def placed(point: Point, angle: float, speed: float, sets_angle: bool, sets_spee
     if sets_speed:
         w = speed
         w_motor = w_motor if play or sprung else speed
-    y = (q, w, i, T_w, T_h, q_motor, w_motor)
+    y = Vector(q, w, i, T_w, T_h, q_motor, w_motor)
     mode = Mode(point.mode.zone, point.mode.contact, INSIDE if play else RIGID, point.mode.motor,
                 point.mode.share)
     return Point(point.time, y, mode, math.inf, y, point.step, wiper)

@@ -9,7 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 from servotwin.models.engine import contacts, creep, dormand_prince
-from servotwin.models.engine.dormand_prince import STAGES
+from servotwin.models.engine.dormand_prince import STAGES, rates_in
 from servotwin.models.engine.modes import INSIDE, NO_CURRENT, Vector, at_rest, sign_of
 from servotwin.models.engine.motion import LONG_STEP
 from servotwin.models.engine.rates import rates_of
@@ -78,8 +78,8 @@ def series(source: Source, state: int, mates: Any, count: int, time: float, leng
         put_law(mate.law, _linear(mate, time))
         law = mate.law
         plain = plain and law.L == 0.0 and law.stiffness == 0.0 and law.slope == 0.0
-        mate.speed[0] = mate.start[1] if law.moves > 0.0 else 0.0
-        mate.current[0] = mate.start[2]
+        mate.speed[0] = mate.start.w if law.moves > 0.0 else 0.0
+        mate.current[0] = mate.start.i
     if plain:
         return _plain_series(source, state, mates, count, length)
     return _general_series(source, state, mates, count, length)
@@ -157,13 +157,13 @@ def _meeting(source: Source, state: int, mates: Any, count: int) -> tuple[float,
 
 def _linear(mate: Any, time: float) -> Linear:
     numbers, mode, tau, y = numbers_of(mate.numbers), mode_of(mate.mode), piece_of(mate.tau), mate.start
-    friction = contacts.friction_torque(numbers, mode.contact, y[1], 0.0, 0.0)
+    friction = contacts.friction_torque(numbers, mode.contact, y.w, 0.0, 0.0)
     against = piece_value(tau, time) - numbers.load.stiffness * numbers.load.rest_angle + friction
     conducts = 0.0 if mode.zone == NO_CURRENT else 1.0
     own, R = numbers.motor, numbers.bridge.R_drive
     return Linear(mate.sign, own.K, own.K_b, R, own.L, numbers.shaft.J, numbers.shaft.b, numbers.load.stiffness,
                   sign_of(mode.zone) * numbers.bridge.D_drive, conducts / R, conducts,
-                  0.0 if at_rest(mode.contact) else 1.0, against, tau.slope, y[0])
+                  0.0 if at_rest(mode.contact) else 1.0, against, tau.slope, y.q)
 
 
 def _series_voltage(source: Source, state: int, mates: Any, count: int, n: int) -> float:
@@ -246,16 +246,12 @@ def _stage(source: Source, state: int, mates: Any, count: int, time: float, h: f
 def _put_dense(mate: Any, h: float) -> None:
     vectors = dormand_prince.dense_of(vector_of(mate.start), vector_of(mate.end), mate.stages, h)
     for k in range(_SIZE):
-        vector = vectors[k]
-        for n in range(_SIZE):
-            mate.dense[_SIZE * k + n] = vector[n]
+        dormand_prince.put_rates(mate.dense, k, vectors[k])
 
 
 def between(mate: Any, x: float) -> Vector:
     """Return the state of a mate at the fraction x of a step."""
     d = mate.dense
     return dormand_prince.interpolate(vector_of(mate.start), (
-        (d[0], d[1], d[2], d[3], d[4], d[5], d[6]), (d[7], d[8], d[9], d[10], d[11], d[12], d[13]),
-        (d[14], d[15], d[16], d[17], d[18], d[19], d[20]), (d[21], d[22], d[23], d[24], d[25], d[26], d[27]),
-        (d[28], d[29], d[30], d[31], d[32], d[33], d[34]), (d[35], d[36], d[37], d[38], d[39], d[40], d[41]),
-        (d[42], d[43], d[44], d[45], d[46], d[47], d[48])), x)
+        rates_in(d, 0), rates_in(d, 1), rates_in(d, 2), rates_in(d, 3), rates_in(d, 4), rates_in(d, 5),
+        rates_in(d, 6)), x)

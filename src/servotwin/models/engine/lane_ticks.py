@@ -21,8 +21,9 @@ from servotwin.models.engine.crossing import (
 )
 from servotwin.models.engine.imposing import carried, impulse_work, placed
 from servotwin.models.engine.memory import memory_at, point_of, put_memory, put_point, time_of
-from servotwin.models.engine.modes import INSIDE
+from servotwin.models.engine.modes import INSIDE, LOST
 from servotwin.models.engine.records import TILE
+from servotwin.models.engine.seats import put_vector
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.ticks import ANGLE, SPEED, shaft_at, stops_at
 from servotwin.models.engine.together import APART
@@ -84,8 +85,7 @@ def note_failures(lanes: Indices, how: Indices, at: Floats, records: Any, status
     for k in range(lanes.size):
         if how[k] != COMPLETED:
             status[lanes[k]], ended[lanes[k]] = how[k], at[k]
-            for i in range(7):
-                records[k].point.y[i] = math.nan
+            put_vector(records[k].point.y, LOST)
 
 
 def forget_motions(rows: Any) -> None:
@@ -123,7 +123,7 @@ def impose_on_records(has: Indices, given: Floats, numbers: Any, which: Indices,
         half, angle, sprung = own.play.half[i], 0.0, own.elastic.k[i] > 0.0
         if has[SPEED] != 0:
             alone = half > 0.0 or (sprung and own.elastic.J[i] == 0.0)
-            work[lane] += impulse_work(shaft_at(own.shaft, i), alone, point.y[1], given[SPEED, lane])
+            work[lane] += impulse_work(shaft_at(own.shaft, i), alone, point.y.w, given[SPEED, lane])
         if has[ANGLE] != 0:
             angle = within_stops(own, i, given[ANGLE, lane])
         put_point(rows[places[k]].point, placed(point, angle, given[SPEED, lane], has[ANGLE] != 0, has[SPEED] != 0,
@@ -146,7 +146,7 @@ def show_tiles(which: Indices, tile_rows: Any, shaft: Floats) -> None:
 def show_records(which: Indices, rows: Any, shaft: Floats) -> None:
     """Put angles [rad] and speeds [rad/s] of lanes in records into the rows of `shaft`."""
     for k in range(which.size):
-        shaft[0, which[k]], shaft[1, which[k]] = rows[k].point.y[0], rows[k].point.y[1]
+        shaft[0, which[k]], shaft[1, which[k]] = rows[k].point.y.q, rows[k].point.y.w
 
 
 def read_clocks(which: Indices, status: Any, ended: Floats, rows: Any, clock: Floats) -> None:
@@ -167,8 +167,7 @@ def note_lost_buses(which: Indices, own: Indices, rows: Any, status: Any, ended:
     for k in range(which.size):
         if own[k] != COMPLETED and status[which[k]] == COMPLETED:
             status[which[k]], ended[which[k]] = own[k], time_of(rows[k])
-            for i in range(7):
-                rows[k].point.y[i] = math.nan
+            put_vector(rows[k].point.y, LOST)
 
 
 def break_up(joined: Indices, shared: Any, rows: Any) -> None:

@@ -45,7 +45,7 @@ class Ending(NamedTuple):
 
 def mode_from(numbers: Numbers, torque: float, u: float, y: Vector, mesh: int) -> Mode:
     """Return the mode in which a servo goes on, under a voltage behind the bridge and an external torque [N m]."""
-    zone = currents.zone_of(numbers, u, 0.0, y[0], y[6], 0.0)
+    zone = currents.zone_of(numbers, u, 0.0, y.q, y.w_m, 0.0)
     return contacts.settled(numbers, zone, u, torque, y, mesh, False)
 
 
@@ -65,10 +65,10 @@ def laws_of(numbers: Numbers, mode: Mode, u: float, torque: float) -> Apart:
 def moved(numbers: Numbers, mode: Mode, laws: Apart, y: Vector, s: float) -> Vector:
     """Return the state s [s] after y."""
     if mode.mesh == INSIDE:
-        return both(Course(laws.output_rate, laws.output_pull, y[0], y[1]),
-                    Course(laws.motor_rate, laws.motor_pull, y[5], y[6]), y, s)
-    q, w = first_order.propagate(laws.output_rate, laws.output_pull, y[0], y[1], s)
-    return with_motor(numbers.play, mode.mesh, (q, w, y[2], y[3], y[4], y[5], y[6]))
+        return both(Course(laws.output_rate, laws.output_pull, y.q, y.w),
+                    Course(laws.motor_rate, laws.motor_pull, y.q_m, y.w_m), y, s)
+    q, w = first_order.propagate(laws.output_rate, laws.output_pull, y.q, y.w, s)
+    return with_motor(numbers.play, mode.mesh, Vector(q, w, y.i, y.T_w, y.T_h, y.q_m, y.w_m))
 
 
 def ending(numbers: Numbers, mode: Mode, laws: Apart, u: float, torque: float, y: Vector, time: float,
@@ -92,10 +92,10 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: 
         laws = laws_of(numbers, mode, u, torque)
         end = ending(numbers, mode, laws, u, torque, y, time, held > 0)
         if end.kind < 0:
-            wiper = wiper_at(numbers.sensor, wiper, end.after[0])
-            return Gone(end.after, mode, wiper, held, 1.0 if math.isfinite(end.after[0] + end.after[5]) else 0.0)
+            wiper = wiper_at(numbers.sensor, wiper, end.after.q)
+            return Gone(end.after, mode, wiper, held, 1.0 if math.isfinite(end.after.q + end.after.q_m) else 0.0)
         y = moved(numbers, mode, laws, y, end.time)
-        wiper = wiper_at(numbers.sensor, wiper, y[0])
+        wiper = wiper_at(numbers.sensor, wiper, y.q)
         mode, y = guards.cross(numbers, mode, end.kind, u, torque, y)
         short = short + 1 if end.time <= _SHORT * time else 0
         if short >= _MOST_SHORT and held == 0:
@@ -106,11 +106,11 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: 
 
 def together(numbers: Numbers, mode: Mode, u: float, torque: float, y: Vector) -> tuple[int, Mode, Vector]:
     """Return 1, mode and state of motor and output as one body, if they are at an end of the play; else 0."""
-    ahead, half = y[5] - y[0], numbers.play.half
+    ahead, half = y.q_m - y.q, numbers.play.half
     if mode.mesh == INSIDE and not abs(abs(ahead) - half) <= _AT_END * half:
         return 0, mode, y
     mesh = mode.mesh
     if mesh == INSIDE:
         y = play.met(numbers.play, numbers.shaft, ahead > 0.0, y)
         mesh = ON_FORWARD if ahead > 0.0 else ON_BACKWARD
-    return 1, contacts.as_one(numbers, currents.zone_of(numbers, u, 0.0, y[0], y[6], 0.0), u, torque, y, mesh), y
+    return 1, contacts.as_one(numbers, currents.zone_of(numbers, u, 0.0, y.q, y.w_m, 0.0), u, torque, y, mesh), y

@@ -17,7 +17,7 @@ from servotwin.models.engine.memory import (
     put_memory,
     resumed,
 )
-from servotwin.models.engine.modes import BACKWARD, FORWARD, RIGID, Mode, Vector
+from servotwin.models.engine.modes import BACKWARD, FORWARD, RIGID, Mode, one_body
 from servotwin.models.engine.motion import may_depend
 from servotwin.models.engine.records import reader, room, rows_of, tile_of, writer
 from servotwin.models.engine.runs import UNDERWAY, inputs_of
@@ -196,8 +196,8 @@ def enter(lanes: Lanes, curve: Floats, torque: Floats, k: int, lane: int, durati
     put_supply(tile.supply, j, numbers.source)
     put_sensor(tile.sensor, j, numbers.sensor)
     tile.plan.delayed[j] = 1.0 if delayed else 0.0
-    tile.plan.alone[j] = 1.0 if _is_alone(numbers, inputs, memory.point.y[4]) else 0.0
-    tile.loop.q[j], tile.loop.w[j] = memory.point.y[0], memory.point.y[1]
+    tile.plan.alone[j] = 1.0 if _is_alone(numbers, inputs, memory.point.y.T_h) else 0.0
+    tile.loop.q[j], tile.loop.w[j] = memory.point.y.q, memory.point.y.w
     tile.loop.coming[j] = firm.duties[(firm.head - 1) % WAITING] if firm.waiting > 0 else firm.duty
     tile.clock.tick[j], tile.clock.left[j] = tick, left
     tile.clock.last[j] = 1.0 if abs(until - t - left * firmware.T_c) <= slack else 0.0
@@ -283,7 +283,7 @@ def leave(lanes: Lanes, durations: Floats, first_output: Indices, memories: Memo
         firm.head = (firm.head + 1) % WAITING
         memory = memory_at(memories, k)
         q, w, y = tile.loop.q[j], tile.loop.w[j], memory.point.y
-        here: Vector = (q, w, y[2], y[3], y[4], q, w)
+        here = one_body(q, w, y)
         t = tile.clock.tick[j] * firmware.T_c + firmware.t_phi
         gone = (frames * memory.beat + t) - (origin_of(memory) + memory.point.time)
         point = Point(t, here, Mode(0, 0, RIGID, 0, 0), math.inf, here, memory.point.step, q)

@@ -13,7 +13,7 @@ from servotwin.models.engine import controller, tick_legs
 from servotwin.models.engine import loop_rounds as rounds
 from servotwin.models.engine import loop_tiles as tiles
 from servotwin.models.engine.memory import SAME, in_force
-from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK, Mode, Vector
+from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK, Mode, one_body
 from servotwin.models.engine.runs import inputs_of
 from servotwin.models.engine.tiles import numbers_of
 from servotwin.models.terms import control, profile
@@ -106,7 +106,7 @@ def _decide_alone(lanes: Lanes, curve: Floats, memories: Memories, tile: Any, j:
     if tile.plan.delayed[j] > 0.0:
         firm.duty = tile.loop.coming[j]
     q, w, y = tile.loop.q[j], tile.loop.w[j], memories.rows[k].point.y
-    here = (q, w, y[2], y[3], y[4], q, w)
+    here = one_body(q, w, y)
     angle = q
     if firmware.per_volt != 0.0:
         v = sensed_voltage(numbers.sensor, curve, q)
@@ -131,7 +131,7 @@ def _write(times: Floats, outputs: Floats, memories: Memories, tile: Any, j: int
         contact = FREE
         if dry:
             contact = STUCK if way == 0.0 else FORWARD if way > 0.0 else BACKWARD
-        here: Vector = (q, w, y[2], y[3], y[4], q, w)
+        here = one_body(q, w, y)
         tick_legs.show_one(outputs[k], tile.place.output[j], here, Mode(0, contact, RIGID, FREE, 0), firm)
         tile.place.output[j] += 1
         tiles.await_output(times, tile, j)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID, Mode, Vector
+from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID, Mode, Vector, one_body
 from servotwin.models.engine.records import record_reader, record_writer
 from servotwin.models.terms import control, firmware, frame
 from servotwin.models.terms.control import Firm, Programs
@@ -89,7 +89,7 @@ put_point = record_writer("put_point", Point)
 
 def started(y: Vector, mesh: int, firm: Programs) -> Memory:
     """Return the memory of a servo at t = 0, in no mode yet; `firm` is what its program remembers."""
-    point = Point(0.0, y, Mode(0, 0, mesh, 0, 0), math.inf, y, FIRST_STEP, y[0])
+    point = Point(0.0, y, Mode(0, 0, mesh, 0, 0), math.inf, y, FIRST_STEP, y.q)
     return Memory(0, BEAT, point, frame.AT_START, NOTHING, math.inf, NOTHING, math.inf, firm)
 
 
@@ -180,13 +180,12 @@ def silent_now(memory: Memory) -> int:
 def with_bodies(memory: Memory, half_play: float, sprung: bool) -> Memory:
     """Return a memory in which no motion has begun, of a servo of two bodies, with play or a spring between, or one."""
     p = memory.point
-    q, w, i, T_w, T_h, q_m, _ = p.y
     mesh = p.mode.mesh if half_play > 0.0 and RIGID < p.mode.mesh <= ON_BACKWARD else INSIDE
     y = p.y
     if not sprung:  # a spring may have been twisted beyond a play that is there now
-        y = (q, w, i, T_w, T_h, min(max(q_m, q - half_play), q + half_play), y[6])
+        y = y._replace(q_m=min(max(y.q_m, y.q - half_play), y.q + half_play))
     if half_play == 0.0 and not sprung:
-        mesh, y = RIGID, (q, w, i, T_w, T_h, q, w)
+        mesh, y = RIGID, one_body(y.q, y.w, y)
     mode = Mode(p.mode.zone, p.mode.contact, mesh, p.mode.motor, p.mode.share)
     return forgotten(memory._replace(point=p._replace(y=y, mode=mode)))
 

@@ -6,6 +6,7 @@ is. All quantities are at the output shaft (a bare motor has N = 1).
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 
@@ -23,14 +24,35 @@ class Mode(NamedTuple):
     share: int
 
 
-Vector = tuple[float, float, float, float, float, float, float]
-"""Angle, speed and current; temperatures of winding and housing; angle and speed of the motor, at the output shaft.
+class Vector(NamedTuple):
+    """The state, or its rates: `y.w` is the speed, `dy.w` the acceleration.
 
-Without inductance the current is kept as 0, without heat the temperatures stay; where motor and output are one body,
-the motor's angle and speed go with the output's. A body behind an elastic shaft has the motor's places.
-"""
+    Without inductance the current is kept as 0, without heat the temperatures stay; where motor and output are one
+    body, the motor's angle and speed go with the output's. A body behind an elastic shaft has the motor's places.
+    """
 
-NOWHERE: Vector = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    q: float  # angle [rad]
+    w: float  # speed [rad/s]
+    i: float  # current [A]
+    T_w: float  # temperature of the winding [K]
+    T_h: float  # and of the housing
+    q_m: float  # angle of the motor, at the output shaft
+    w_m: float
+
+
+NOWHERE = Vector(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+LOST = Vector(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+
+
+def moving(y: Vector, q: float, w: float, w_m: float) -> Vector:
+    """Return a state with the output at another angle, and other speeds of output and motor."""
+    return Vector(q, w, y.i, y.T_w, y.T_h, y.q_m, w_m)
+
+
+def one_body(q: float, w: float, y: Vector) -> Vector:
+    """Return a state with another angle and speed, motor and output being one body."""
+    return Vector(q, w, y.i, y.T_w, y.T_h, q, w)
+
 
 SATURATED_BACKWARD, LINEAR_BACKWARD, DEAD, LINEAR, SATURATED = -2, -1, 0, 1, 2
 # Behind a bridge, in the order of the voltage that drives the current. Conducting: without drops, either way.

@@ -52,7 +52,6 @@ from servotwin.models.terms.dependence import (
     TWO_BODIES,
 )
 from servotwin.models.terms.numbers import Numbers
-from servotwin.models.terms.play import with_motor
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
@@ -138,10 +137,10 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
         wave = (wave[0], u.slope, u.amplitude, u.frequency, u.phase + u.frequency * (t0 - u.start))
     torque = (tau.value + tau.slope * (t0 - tau.start), tau.slope)
     if on & ON_I and not constant_current(mode.zone):
-        against = (torque[0] + contacts.friction_torque(numbers, mode.contact, y[1], 0.0, 0.0), torque[1])
-        coefficients = speed_coefficients(numbers, mode, wave, against, y[1], y[2])
+        against = (torque[0] + contacts.friction_torque(numbers, mode.contact, y.w, 0.0, 0.0), torque[1])
+        coefficients = speed_coefficients(numbers, mode, wave, against, y.w, y.i)
         return _closed(WITH_CURRENT, numbers, mode, u, tau, t0, y, coefficients, against, step)
-    coefficients = linear_coefficients(numbers, mode, wave, torque, y[0], y[1])
+    coefficients = linear_coefficients(numbers, mode, wave, torque, y.q, y.w)
     _, c, _, f1, fs, _, _, _, _ = coefficients
     kind = FIRST_ORDER if c == 0.0 and f1 == 0.0 and fs == 0.0 else SECOND_ORDER
     return _closed(kind, numbers, mode, u, tau, t0, y, coefficients, (0.0, 0.0), step)
@@ -189,13 +188,13 @@ def by_step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Ve
 
 def _integrated(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
                 limit: float, accuracy: float) -> Motion:
-    jac = jacobian(numbers, mode, piece_value(u, t0), piece_rate(u, t0), piece_rate(tau, t0), y[0], y[1])
+    jac = jacobian(numbers, mode, piece_value(u, t0), piece_rate(u, t0), piece_rate(tau, t0), y.q, y.w)
     h = min(step, limit)
     h = min(h, period(u, tau, t0, t0 + h) / 6.0)
     for _ in range(60):
         y1, error, stages = rodas.step(numbers, mode, u, tau, jac, t0, y, h)
-        size = max(abs(error[0]) / (1.0 + abs(y1[0])), abs(error[1]) / (1.0 + abs(y1[1])),
-                   abs(error[2]) / (1.0 + abs(y1[2]))) / (_TOLERANCE * accuracy)
+        size = max(abs(error[0]) / (1.0 + abs(y1.q)), abs(error[1]) / (1.0 + abs(y1.w)),
+                   abs(error[2]) / (1.0 + abs(y1.i))) / (_TOLERANCE * accuracy)
         if not size < 1e6:
             size = 1e6
         factor = min(5.0, max(0.1, 0.85 * size**-0.2)) if size > 0.0 else 5.0
@@ -277,20 +276,20 @@ def state(motion: Motion, s: float) -> Vector:
     if kind == FIRST_ORDER:
         c = motion.coefficients
         q, w = first_order.propagate(2.0 * c[0], c[2], c[7], c[8], s)
-        return _moved(motion, q, w, start[2])
+        return _moved(motion, q, w, start.i)
     if kind == SECOND_ORDER:
         q, w = second_order.propagate(motion.coefficients, s)
-        return _moved(motion, q, w, start[2])
+        return _moved(motion, q, w, start.i)
     if kind == APART:
         c = motion.coefficients
-        return both(Course(c[0], c[1], start[0], start[1]), Course(c[2], c[3], start[5], start[6]), start, s)
+        return both(Course(c[0], c[1], start.q, start.w), Course(c[2], c[3], start.q_m, start.w_m), start, s)
     if kind == WITH_CURRENT:
         w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
         against = motion.against[0] + motion.against[1] * s
-        return _moved(motion, start[0] + way, w, current_of(motion.numbers, dw, w, against))
+        return _moved(motion, start.q + way, w, current_of(motion.numbers, dw, w, against))
     if kind == HELD:
         rate, final = motion.coefficients[0], motion.coefficients[1]
-        return _moved(motion, start[0], start[1], start[2] + (start[2] - final) * math.expm1(-rate * s))
+        return _moved(motion, start.q, start.w, start.i + (start.i - final) * math.expm1(-rate * s))
     if kind == SERIES:
         q = w = i = 0.0
         for n in range(len(motion.coefficients) - 1, -1, -1):
@@ -298,7 +297,7 @@ def state(motion: Motion, s: float) -> Vector:
             q = q * s + motion.coefficients[n] / (n + 1)
         for n in range(len(motion.against) - 1, -1, -1):
             i = i * s + motion.against[n]
-        return _moved(motion, start[0] + q * s, w, i)
+        return _moved(motion, start.q + q * s, w, i)
     if motion.t0 + s >= motion.t0 + motion.length:  # the end, reached as a difference of two times
         return motion.end
     if s == 0.0:
@@ -308,7 +307,7 @@ def state(motion: Motion, s: float) -> Vector:
     if kind == CREEP:
         q, w = creep.at_time(motion.numbers, motion.mode, motion.u.value, motion.tau.value, start, motion.end,
                              motion.length, s)
-        return _moved(motion, q, w, start[2])
+        return _moved(motion, q, w, start.i)
     x = s / motion.length
     if kind == STEP:
         return rodas.interpolate(start, motion.end, motion.dense, x)
@@ -319,38 +318,48 @@ def state(motion: Motion, s: float) -> Vector:
 
 def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:
     """Return the state of one body, at rest inside the play the motor's own."""
-    _, _, _, T_w, T_h, q_m, w_m = motion.start
-    mesh = motion.mode.mesh
+    y, mesh = motion.start, motion.mode.mesh
     if mesh == INSIDE or elastic.present(motion.numbers.elastic):
-        return q, w, i, T_w, T_h, q_m, w_m
-    if mesh == RIGID:
-        return q, w, i, T_w, T_h, q, w
-    return with_motor(motion.numbers.play, mesh, (q, w, i, T_w, T_h, q_m, w_m))
+        return Vector(q, w, i, y.T_w, y.T_h, y.q_m, y.w_m)
+    q_m = q if mesh == RIGID else q + play.ahead(motion.numbers.play, mesh)
+    return Vector(q, w, i, y.T_w, y.T_h, q_m, w)
 
 
 def rates(motion: Motion, s: float, y: Vector) -> Vector:
     """Return the rates of the state at s, where it is y."""
     kind = motion.kind
-    _, w, _, _, _, _, w_m = y
+    w, w_m = y.w, y.w_m
     if kind == REST:
         return NOWHERE
     if kind == FIRST_ORDER or kind == SECOND_ORDER:
-        dw = second_order.acceleration(motion.coefficients, s, y[0], w)
-        return w, dw, 0.0, 0.0, 0.0, w_m, dw
+        dw = second_order.acceleration(motion.coefficients, s, y.q, w)
+        return Vector(w, dw, 0.0, 0.0, 0.0, w_m, dw)
     if kind == APART:
         c = motion.coefficients
-        return w, c[1] - c[0] * w, 0.0, 0.0, 0.0, w_m, c[3] - c[2] * w_m
+        return Vector(w, c[1] - c[0] * w, 0.0, 0.0, 0.0, w_m, c[3] - c[2] * w_m)
     numbers = motion.numbers
     if kind == WITH_CURRENT:
         w, dw = second_order.propagate(motion.coefficients, s)
         ddw = second_order.acceleration(motion.coefficients, s, w, dw)
-        return w, dw, current_of(numbers, ddw, dw, motion.against[1]), 0.0, 0.0, w_m, dw
+        return Vector(w, dw, current_of(numbers, ddw, dw, motion.against[1]), 0.0, 0.0, w_m, dw)
     if kind == HELD:
-        return 0.0, 0.0, motion.coefficients[0] * (motion.coefficients[1] - y[2]), 0.0, 0.0, 0.0, 0.0
+        return Vector(0.0, 0.0, motion.coefficients[0] * (motion.coefficients[1] - y.i), 0.0, 0.0, 0.0, 0.0)
     if is_step(motion):
         t = motion.t0 + s
         return rates_of(numbers, motion.mode, piece_value(motion.u, t), piece_value(motion.tau, t), y)
     return NOWHERE
+
+
+def state_and_rates(motion: Motion, s: float) -> tuple[Vector, Vector]:
+    """Return the state at s after the anchor and its rates; with inductance both are found by one solution."""
+    if motion.kind == WITH_CURRENT:
+        numbers, against = motion.numbers, motion.against
+        w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
+        ddw = second_order.acceleration(motion.coefficients, s, w, dw)
+        y = _moved(motion, motion.start.q + way, w, current_of(numbers, dw, w, against[0] + against[1] * s))
+        return y, Vector(w, dw, current_of(numbers, ddw, dw, against[1]), 0.0, 0.0, y.w_m, dw)
+    y = state(motion, s)
+    return y, rates(motion, s, y)
 
 
 def scales(motion: Motion) -> tuple[float, float]:

@@ -142,8 +142,8 @@ def torques(numbers: Numbers, mode: Mode, w: float, w_motor: float, i: float, ex
 def torques_of_two(numbers: Numbers, mode: Mode, y: Vector, i: float, external: float) -> Torques:
     """Return the same where a spring stands between two bodies; its damper counts as gear, or as load behind it."""
     own, spring, dry, acceleration = numbers.shaft, numbers.elastic, numbers.load.coulomb, 0.0
-    tau, w, w_motor = electromagnetic_torque(i, numbers.motor.K), y[1], elastic.turning(numbers.elastic, y)
-    ahead, rate = elastic.ahead(spring, y[0], y[5]), elastic.ahead(spring, y[1], y[6])
+    tau, w, w_motor = electromagnetic_torque(i, numbers.motor.K), y.w, elastic.turning(numbers.elastic, y)
+    ahead, rate = elastic.ahead(spring, y.q, y.q_m), elastic.ahead(spring, y.w, y.w_m)
     between = elastic.torque_at(spring, mode.mesh, ahead, rate)
     taken, lost = elastic.damper_loss(spring, between, ahead, rate), 0.0
     if elastic.behind(spring):
@@ -152,7 +152,7 @@ def torques_of_two(numbers: Numbers, mode: Mode, y: Vector, i: float, external: 
                                    torque_on_gear(against, w, own.b_out), tau - against)
         if not at_rest(mode.contact):
             acceleration = shaft.acceleration(own, tau, w, servo + of_load, against)
-        lost = taken + (spring.b * y[6] + pendulum_torque(y[5], spring.gravity, spring.hanging_angle)) * y[6]
+        lost = taken + (spring.b * y.w_m + pendulum_torque(y.q_m, spring.gravity, spring.hanging_angle)) * y.w_m
         taken = 0.0
     else:
         against = external

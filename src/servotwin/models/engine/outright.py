@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine import coefficients, contacts, currents, first_order, guards
+from servotwin.models.engine import contacts, currents, first_order, guards
 from servotwin.models.engine.coefficients import Apart
 from servotwin.models.engine.courses import Course, both, lead_of, leaves
-from servotwin.models.engine.modes import FORWARD, INSIDE, ON_FORWARD, Mode, Vector
-from servotwin.models.terms import friction
+from servotwin.models.engine.modes import FORWARD, Mode, Vector
 from servotwin.models.terms.friction import creeping_speed
 from servotwin.models.terms.numbers import Numbers
-from servotwin.models.terms.shaft import sliding
 from servotwin.physics.motor import back_emf
 
 
@@ -23,22 +21,22 @@ def first_end(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, la
     """
     first, found = _by_speed(numbers, mode, kinds, u, tau, laws, start, after, s0, s1)
     end = min(first, s1)
-    output = Course(laws.output_rate, laws.output_pull, start[0], start[1])
+    output = Course(laws.output_rate, laws.output_pull, start.q, start.w)
     at_end = after if end == s1 else both(output, output, start, end)
     stops = numbers.stops
-    if kinds & guards.STOPS and not (start[1] * at_end[1] >= 0.0 and stops.lower <= at_end[0] <= stops.upper):
+    if kinds & guards.STOPS and not (start.w * at_end.w >= 0.0 and stops.lower <= at_end.q <= stops.upper):
         wall = Course(0.0, 0.0, 0.0, 0.0)
         s, side = leaves(
             output, wall, stops.lower if kinds & 1 << guards.LOWER else -math.inf,
             stops.upper if kinds & 1 << guards.UPPER else math.inf, s0, end,
-            lead_of(output, wall, at_end[0], at_end[1], 0.0, 0.0))
+            lead_of(output, wall, at_end.q, at_end.w, 0.0, 0.0))
         if s < first:
             first, found, end = s, guards.UPPER if side > 0 else guards.LOWER, s
     if kinds & guards.MEETINGS:
-        own, half = Course(laws.motor_rate, laws.motor_pull, start[5], start[6]), numbers.play.half
+        own, half = Course(laws.motor_rate, laws.motor_pull, start.q_m, start.w_m), numbers.play.half
         at_end = after if end == s1 else both(output, own, start, end)
         s, side = leaves(own, output, -half, half, s0, end,
-                         lead_of(own, output, at_end[5], at_end[6], at_end[0], at_end[1]))
+                         lead_of(own, output, at_end.q_m, at_end.w_m, at_end.q, at_end.w))
         if s < first:
             first, found = s, guards.MEET_FORWARD if side > 0 else guards.MEET_BACKWARD
     return first, found
@@ -48,7 +46,7 @@ def _by_speed(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, la
               after: Vector, s0: float, s1: float) -> tuple[float, int]:
     """Return the same of all events that come at a speed, of which each body's is monotone."""
     low, high = currents.zone_limits(numbers, mode.zone, u)
-    w, w_m = after[1], after[6]
+    w, w_m = after.w, after.w_m
     x, per_speed = u - back_emf(w_m, numbers.motor.K_b), back_emf(1.0, numbers.motor.K_b)
     way, way_m = 1.0 if mode.contact == FORWARD else -1.0, 1.0 if mode.motor == FORWARD else -1.0
     slow = creeping_speed(numbers.friction)
@@ -63,7 +61,7 @@ def _by_speed(numbers: Numbers, mode: Mode, kinds: int, u: float, tau: float, la
             continue
         of_motor = kind != guards.SPEED and kind != guards.CREEPS
         rate, pull = (laws.motor_rate, laws.motor_pull) if of_motor else (laws.output_rate, laws.output_pull)
-        s = first_order.time_to(rate, pull, start[6] if of_motor else start[1], there)
+        s = first_order.time_to(rate, pull, start.w_m if of_motor else start.w, there)
         s = s0 if s == math.inf else min(max(s, s0), s1)  # never: it began below
         if s < first:
             first, found = s, kind
@@ -81,16 +79,16 @@ def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, star
     How they press changes with the speed in straight lines, with a bend where the motor's torque turns.
     """
     bend = u / back_emf(1.0, numbers.motor.K_b)
-    w, pressing = start[1], _pressing(numbers, mode, u, tau, start[1])
-    if pressing <= 0.0 and _pressing(numbers, mode, u, tau, after[1]) < guards.BELOW:
+    w, pressing = start.w, _pressing(numbers, mode, u, tau, start.w)
+    if pressing <= 0.0 and _pressing(numbers, mode, u, tau, after.w) < guards.BELOW:
         return s0
-    for w_next in (bend, after[1]):
-        if w_next == bend and not (min(start[1], after[1]) < bend < max(start[1], after[1])):
+    for w_next in (bend, after.w):
+        if w_next == bend and not (min(start.w, after.w) < bend < max(start.w, after.w)):
             continue
         following = _pressing(numbers, mode, u, tau, w_next)
         if following < guards.BELOW:
             there = w + (w_next - w) * max(pressing, 0.0) / (max(pressing, 0.0) - following)
-            s = first_order.time_to(laws.output_rate, laws.output_pull, start[1], there)
+            s = first_order.time_to(laws.output_rate, laws.output_pull, start.w, there)
             return min(max(s, s0), s1)
         w, pressing = w_next, following
     return math.inf
@@ -98,4 +96,4 @@ def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, star
 
 def _pressing(numbers: Numbers, mode: Mode, u: float, tau: float, w: float) -> float:
     """Return how motor and output in contact would close in [rad/s²] at a speed."""
-    return contacts.pressing_along(numbers, mode, u, tau, (0.0, w, 0.0, 0.0, 0.0, 0.0, w))
+    return contacts.pressing_along(numbers, mode, u, tau, Vector(0.0, w, 0.0, 0.0, 0.0, 0.0, w))

@@ -42,19 +42,19 @@ def law(numbers: Numbers, mode: Mode, u: float, tau: float) -> tuple[Vector, ...
     only_drops = sign_of(mode.zone) * numbers.bridge.D_drive  # leave nothing to drive the current
     driven = 0.0 if u == 0.0 else only_drops if only_drops != 0.0 else 1.0
     b = rates_of(numbers, mode, driven, 0.0, NOWHERE)
-    return (_less(rates_of(numbers, mode, driven, 0.0, (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)), b),
-            _less(rates_of(numbers, mode, driven, 0.0, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)), b),
-            _less(rates_of(numbers, mode, driven, 0.0, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)), b),
+    return (_less(rates_of(numbers, mode, driven, 0.0, Vector(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)), b),
+            _less(rates_of(numbers, mode, driven, 0.0, Vector(0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0)), b),
+            _less(rates_of(numbers, mode, driven, 0.0, Vector(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0)), b),
             rates_of(numbers, mode, u, tau, NOWHERE), NOWHERE,
-            _less(rates_of(numbers, mode, driven, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)), b),
-            _less(rates_of(numbers, mode, driven, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)), b))
+            _less(rates_of(numbers, mode, driven, 0.0, Vector(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)), b),
+            _less(rates_of(numbers, mode, driven, 0.0, Vector(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)), b))
 
 
 def longest(A: tuple[Vector, ...]) -> float:
     """Return how long a series holds [s]."""
     by_q, by_w, by_i, _, _, by_q_m, by_w_m = A
-    damping = abs(by_w[1]) + abs(by_w_m[6]) + abs(by_i[2])
-    ringing = math.sqrt(abs(by_q[1]) + abs(by_q_m[6])) + math.sqrt(abs(by_i[1] * by_w[2]) + abs(by_i[6] * by_w_m[2]))
+    damping = abs(by_w.w) + abs(by_w_m.w_m) + abs(by_i.i)
+    ringing = math.sqrt(abs(by_q.w) + abs(by_q_m.w_m)) + math.sqrt(abs(by_i.w * by_w.i) + abs(by_i.w_m * by_w_m.i))
     return _LONGEST / max(damping + ringing, 1e-9)
 
 
@@ -67,25 +67,25 @@ def propagate(A: tuple[Vector, ...], start: Vector, s: float) -> Vector:
     size = 1.0 + abs(w) + abs(w_m) + abs(i)
     n, part = 1, s
     while n < _TERMS:
-        q, w, i, q_m, w_m = (q + part * r[0], w + part * r[1], i + part * r[2], q_m + part * r[5],
-                             w_m + part * r[6])
-        if abs(part) * (abs(r[0]) + abs(r[1]) + abs(r[2]) + abs(r[5]) + abs(r[6])) < _ROUNDING * size:
+        q, w, i, q_m, w_m = (q + part * r.q, w + part * r.w, i + part * r.i, q_m + part * r.q_m,
+                             w_m + part * r.w_m)
+        if abs(part) * (abs(r.q) + abs(r.w) + abs(r.i) + abs(r.q_m) + abs(r.w_m)) < _ROUNDING * size:
             break
         r = _along(A, r)
         n += 1
         part *= s / n
-    return q, w, i, T_w, T_h, q_m, w_m
+    return Vector(q, w, i, T_w, T_h, q_m, w_m)
 
 
 def _without_current(A: tuple[Vector, ...], start: Vector, s: float) -> Vector:
     """Return the same where no current has inertia: of two angles, whose rates are the speeds, and two speeds."""
     q, w, i, T_w, T_h, q_m, w_m = start
     by_q, by_w, _, b, _, by_q_m, by_w_m = A
-    a, c, a_m, c_m = by_q[1], by_w[1], by_q_m[1], by_w_m[1]
-    d, e, d_m, e_m = by_q[6], by_w[6], by_q_m[6], by_w_m[6]
+    a, c, a_m, c_m = by_q.w, by_w.w, by_q_m.w, by_w_m.w
+    d, e, d_m, e_m = by_q.w_m, by_w.w_m, by_q_m.w_m, by_w_m.w_m
     least = _ROUNDING * (1.0 + abs(w) + abs(w_m))
     v, v_m = w, w_m
-    x, x_m = (q * a + q_m * a_m) + (w * c + w_m * c_m) + b[1], (q * d + q_m * d_m) + (w * e + w_m * e_m) + b[6]
+    x, x_m = (q * a + q_m * a_m) + (w * c + w_m * c_m) + b.w, (q * d + q_m * d_m) + (w * e + w_m * e_m) + b.w_m
     n, part = 1, s
     while n < _TERMS:
         q, w, q_m, w_m = fma(part, v, q), fma(part, x, w), fma(part, v_m, q_m), fma(part, x_m, w_m)
@@ -95,26 +95,26 @@ def _without_current(A: tuple[Vector, ...], start: Vector, s: float) -> Vector:
                           fma(x_m, e_m, fma(x, e, fma(v_m, d_m, v * d))), x, x_m)
         n += 1
         part *= s * _INVERSES[n]
-    return q, w, i, T_w, T_h, q_m, w_m
+    return Vector(q, w, i, T_w, T_h, q_m, w_m)
 
 
 def rates(A: tuple[Vector, ...], y: Vector) -> Vector:
     """Return the rates at a state."""
     r, b = _along(A, y), A[3]
-    return (r[0] + b[0], r[1] + b[1], r[2] + b[2], 0.0, 0.0, r[5] + b[5], r[6] + b[6])
+    return Vector(r.q + b.q, r.w + b.w, r.i + b.i, 0.0, 0.0, r.q_m + b.q_m, r.w_m + b.w_m)
 
 
 def _along(A: tuple[Vector, ...], y: Vector) -> Vector:
     """Return A y."""
     by_q, by_w, by_i, _, _, by_q_m, by_w_m = A
     q, w, i, _, _, q_m, w_m = y
-    return (w * by_w[0] + w_m * by_w_m[0] + q * by_q[0],
-            q * by_q[1] + w * by_w[1] + i * by_i[1] + q_m * by_q_m[1] + w_m * by_w_m[1],
-            q * by_q[2] + w * by_w[2] + i * by_i[2] + q_m * by_q_m[2] + w_m * by_w_m[2],
+    return Vector(w * by_w.q + w_m * by_w_m.q + q * by_q.q,
+            q * by_q.w + w * by_w.w + i * by_i.w + q_m * by_q_m.w + w_m * by_w_m.w,
+            q * by_q.i + w * by_w.i + i * by_i.i + q_m * by_q_m.i + w_m * by_w_m.i,
             0.0, 0.0,
-            w * by_w[5] + w_m * by_w_m[5] + q_m * by_q_m[5],
-            q * by_q[6] + w * by_w[6] + i * by_i[6] + q_m * by_q_m[6] + w_m * by_w_m[6])
+            w * by_w.q_m + w_m * by_w_m.q_m + q_m * by_q_m.q_m,
+            q * by_q.w_m + w * by_w.w_m + i * by_i.w_m + q_m * by_q_m.w_m + w_m * by_w_m.w_m)
 
 
 def _less(one: Vector, other: Vector) -> Vector:
-    return (one[0] - other[0], one[1] - other[1], one[2] - other[2], 0.0, 0.0, one[5] - other[5], one[6] - other[6])
+    return Vector(one.q - other.q, one.w - other.w, one.i - other.i, 0.0, 0.0, one.q_m - other.q_m, one.w_m - other.w_m)

@@ -21,16 +21,15 @@ def rates_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> V
 
 
 def _rates(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> Vector:
-    i, w_m = y[2], turning(numbers.elastic, y)
     di = dT_w = dT_h = 0.0
     if inductive(numbers.motor):
-        di = currents.current_rate(numbers, mode.zone, u, y[0], w_m, i)
-    else:
-        i = currents.current(numbers, mode.zone, u, y[0], w_m)
+        di = currents.current_rate(numbers, mode.zone, u, y.q, turning(numbers.elastic, y), y.i)
     if heat.present(numbers.heat):
-        dT_w, dT_h = heat.warming_rates(numbers.heat, numbers.motor.R, i, y[3], y[4])
+        i = y.i if inductive(numbers.motor) else currents.current(
+            numbers, mode.zone, u, y.q, turning(numbers.elastic, y))
+        dT_w, dT_h = heat.warming_rates(numbers.heat, numbers.motor.R, i, y.T_w, y.T_h)
     dw, dw_m = twist.accelerations(numbers, mode, u, tau, y)
-    return y[1], dw, di, dT_w, dT_h, y[6], dw_m
+    return Vector(y.w, dw, di, dT_w, dT_h, y.w_m, dw_m)
 
 
 def jacobian(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, q: float, w: float) -> tuple[float, ...]:

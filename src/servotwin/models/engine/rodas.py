@@ -96,16 +96,16 @@ def step(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, jac: tuple[float, .
             u_now = piece_value(u, t + FRACTIONS[j] * h)
         if follows_tau:
             tau_now = piece_value(tau, t + FRACTIONS[j] * h)
-        _, F, E, _, _, _, _ = rates_of(numbers, mode, u_now, tau_now, (qs, ws, cs, T_w, T_h, qs, ws))
+        dy = rates_of(numbers, mode, u_now, tau_now, Vector(qs, ws, cs, T_w, T_h, qs, ws))
         hd = h * WEIGHTS[j]
         rq = rq * inv_h + ws
-        rw = rw * inv_h + F + hd * Ft
-        ri = ri * inv_h + E + hd * Et
+        rw = rw * inv_h + dy.w + hd * Ft
+        ri = ri * inv_h + dy.i + hd * Et
         kw = (rw + Fq * rq / g + Fi * (ri + Eq * rq / g) / e) * pivot
         ks[j] = ((rq + kw) / g, kw, (ri + Eq * (rq + kw) / g + Ew * kw) / e)
     error = ks[7]
     q, w = qs + error[0], ws + error[1]
-    return ((q, w, cs + error[2], T_w, T_h, q, w), error,
+    return (Vector(q, w, cs + error[2], T_w, T_h, q, w), error,
             (ks[0], ks[1], ks[2], ks[3], ks[4], ks[5], ks[6], ks[7]))
 
 
@@ -134,7 +134,7 @@ def interpolate(y0: Vector, y1: Vector, dense: tuple[Triple, Triple, Triple], x:
     """Return the state at the fraction x of the step from y0 to y1."""
     z = 1.0 - x
     d1, d2, d3 = dense
-    q = z * y0[0] + x * (y1[0] + z * (d1[0] + x * (d2[0] + x * d3[0])))
-    w = z * y0[1] + x * (y1[1] + z * (d1[1] + x * (d2[1] + x * d3[1])))
-    i = z * y0[2] + x * (y1[2] + z * (d1[2] + x * (d2[2] + x * d3[2])))
-    return q, w, i, y0[3], y0[4], q, w
+    q = z * y0.q + x * (y1.q + z * (d1[0] + x * (d2[0] + x * d3[0])))
+    w = z * y0.w + x * (y1.w + z * (d1[1] + x * (d2[1] + x * d3[1])))
+    i = z * y0.i + x * (y1.i + z * (d1[2] + x * (d2[2] + x * d3[2])))
+    return Vector(q, w, i, y0.T_w, y0.T_h, q, w)

@@ -23,7 +23,7 @@ from servotwin.models.engine.memory import (
     since,
     time_of,
 )
-from servotwin.models.engine.modes import INSIDE, RIGID, Mode
+from servotwin.models.engine.modes import INSIDE, RIGID, Mode, Vector
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
 from servotwin.models.engine.tick_legs import LEGS
 from servotwin.models.engine.tiles import chip_of, numbers_of
@@ -48,7 +48,7 @@ def start(lanes: Lanes, which: Indices, memories: Memories) -> None:
         lane, y = which[k], lanes.start
         numbers = numbers_of(lanes, lane)
         put_started(
-            memories, k, (y[0, lane], y[1, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane]),
+            memories, k, Vector(y[0, lane], y[1, lane], y[2, lane], y[3, lane], y[4, lane], y[5, lane], y[6, lane]),
             INSIDE if play.present(numbers.play) else RIGID)
 
 
@@ -169,11 +169,11 @@ def _run_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until:
         while done < times.size and (times[done] - origin < shown or memory.point.time >= until):
             m = motion.prepared(m)
             y = motion.state(m, min(times[done] - origin, until) - m.t0)
-            outputs[0, done], outputs[1, done], outputs[2, done] = y[0], y[1], m.mode.contact
+            outputs[0, done], outputs[1, done], outputs[2, done] = y.q, y.w, m.mode.contact
             outputs[3, done], outputs[4, done] = memory.chip.drive, memory.chip.error
-            outputs[5, done] = wiper_at(numbers.sensor, wiper, y[0])
-            for k in range(5):
-                outputs[6 + k, done] = y[2 + k]
+            outputs[5, done] = wiper_at(numbers.sensor, wiper, y.q)
+            outputs[6, done], outputs[7, done], outputs[8, done] = y.i, y.T_w, y.T_h
+            outputs[9, done], outputs[10, done] = y.q_m, y.w_m
             outputs[11, done], outputs[12, done], outputs[13, done] = m.mode.mesh, m.mode.motor, memory.chip.silent
             if firmware.present(inputs.firmware[0]):
                 firm = memory.firm[0]

@@ -26,12 +26,10 @@ if TYPE_CHECKING:
     Coefficients = list[float]
     Numerals = list[float]
     Stages = list[float]
-    State = list[float]
 else:
     Coefficients = tuple[(float,) * ROOM]
     Numerals = tuple[(float,) * DENSE]
     Stages = tuple[(float,) * NUMBERS]
-    State = Vector
 
 
 class Track(NamedTuple):
@@ -115,9 +113,9 @@ class Mate(NamedTuple):
     sign: float  # of the bus voltage in its circuit
     returns: int  # 1: through diodes, against the bus alone
     tau: Piece
-    start: State  # where the common motion began
-    end: State  # where it ends when nothing happens
-    y: State  # where it is looked at
+    start: Vector  # where the common motion began
+    end: Vector  # where it ends when nothing happens
+    y: Vector  # where it is looked at
     speed: Coefficients  # of power series
     current: Coefficients
     law: Linear  # of the series
@@ -154,6 +152,8 @@ decided_of = record_reader("decided_of", Frame)
 put_decided = record_writer("put_decided", Frame)
 piece_of = record_reader("piece_of", Piece)
 put_piece = record_writer("put_piece", Piece)
+vector_of = record_reader("vector_of", Vector)
+put_vector = record_writer("put_vector", Vector)
 mode_of = record_reader("mode_of", Mode)
 put_mode = record_writer("put_mode", Mode)
 put_law = record_writer("put_law", Linear)
@@ -168,14 +168,3 @@ def drive_of(seat: Any) -> float:
         return math.copysign(1.0, seat.shown.duty) if duty.drives(seat.shown.duty) else 0.0
     drive: float = seat.decided.drive
     return drive
-
-
-def vector_of(values: Any) -> Vector:
-    """Return a state that stands in a record."""
-    return (values[0], values[1], values[2], values[3], values[4], values[5], values[6])
-
-
-def put_vector(values: Any, y: Vector) -> None:
-    """Put a state into a record."""
-    for n in range(7):
-        values[n] = y[n]

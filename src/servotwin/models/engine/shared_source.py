@@ -55,7 +55,7 @@ def sign_on_bus(drive: float, y: Vector) -> float:
     if drive != 0.0:
         return drive
     # against the current, or against the one that the back-EMF would drive
-    return -math.copysign(1.0, y[2]) if y[2] != 0.0 else math.copysign(1.0, y[6])
+    return -math.copysign(1.0, y.i) if y.i != 0.0 else math.copysign(1.0, y.w_m)
 
 
 def part_on_bus(drive: float, path: Bridge, now: float, y: Vector) -> float:
@@ -78,12 +78,12 @@ def _demand(mates: Any, count: int) -> tuple[float, float, float]:
     for k in range(count):
         mate = mates[k]
         if mate.numbers.motor.L > 0.0:
-            given += mate.sign * mate.y[2]
+            given += mate.sign * mate.y.i
         elif mate.mode.zone != NO_CURRENT:
             R, D, K_b = _loop(mate)
             g += mate.sign * motor.steady_armature_current(mate.sign, 0.0, R, K_b)
             v = bridge.driving_voltage(0.0, sign_of(mate.mode.zone), D)
-            h -= mate.sign * motor.steady_armature_current(v, mate.y[6], R, K_b)
+            h -= mate.sign * motor.steady_armature_current(v, mate.y.w_m, R, K_b)
     return g, h, given
 
 
@@ -105,7 +105,7 @@ def bus_voltage(source: Source, state: int, mates: Any, count: int) -> float:
         if mate.mode.zone != NO_CURRENT:
             R, D, K_b = _loop(mate)
             v, L = bridge.driving_voltage(0.0, sign_of(mate.mode.zone), D), mate.numbers.motor.L
-            above -= mate.sign * motor.armature_current_rate(v, mate.y[2], mate.y[6], R, L, K_b)
+            above -= mate.sign * motor.armature_current_rate(v, mate.y.i, mate.y.w_m, R, L, K_b)
             below += mate.sign * motor.armature_current_rate(mate.sign, 0.0, 0.0, R, L, K_b)
     return above / below
 
@@ -169,7 +169,7 @@ def put_in_zones(source: Source, mates: Any, count: int, V_bus: float) -> tuple[
 def _zone(mate: Any, V_bus: float) -> int:
     y = vector_of(mate.y)
     numbers = warm(numbers_of(mate.numbers), y)
-    return let_through(mate, currents.zone_of(numbers, behind(mate, V_bus), 0.0, y[0], y[6], y[2]))
+    return let_through(mate, currents.zone_of(numbers, behind(mate, V_bus), 0.0, y.q, y.w_m, y.i))
 
 
 def let_through(mate: Any, zone: int) -> int:

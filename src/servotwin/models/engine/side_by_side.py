@@ -10,7 +10,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import arcs, bands, coils, gap_rounds, phases, stride_rounds, strides, tiles, windows
-from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK
+from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK, Vector
 from servotwin.models.engine.noise import gaussian
 
 if TYPE_CHECKING:
@@ -187,9 +187,9 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
                 own, tiles.winding_at(tile.winding, j), torque, drive, q, w, i, wiper, x)
             contact = coils.contact_of(own, torque, w, i)
         elif form == tiles.GAPS:
-            gone = gap_rounds.gone(own, torque, drive, (q, w, 0.0, T_w, T_h, q_m, w_m), int(mesh), wiper, x)
-            q, w, wiper, contact = gone.y[0], gone.y[1], gone.wiper, gone.mode.contact
-            q_m, w_m, mesh, done = gone.y[5], gone.y[6], float(gone.mode.mesh), gone.done
+            gone = gap_rounds.gone(own, torque, drive, Vector(q, w, 0.0, T_w, T_h, q_m, w_m), int(mesh), wiper, x)
+            q, w, wiper, contact = gone.y.q, gone.y.w, gone.wiper, gone.mode.contact
+            q_m, w_m, mesh, done = gone.y.q_m, gone.y.w_m, float(gone.mode.mesh), gone.done
         elif form == tiles.STRIDES:
             to, wiper, done = stride_rounds.seen(slack, drive, x, q, w, wiper, more, tile, plan, j)
             q, w, T_w, T_h = to.q, to.w, to.T_w, to.T_h

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import contacts, currents
 from servotwin.models.engine.memory import memory_at, time_of
-from servotwin.models.engine.modes import RIGID
+from servotwin.models.engine.modes import RIGID, Vector
 from servotwin.models.engine.observe import Observed, observed, told_by
 from servotwin.models.engine.records import TILE
 from servotwin.models.engine.runs import as_now, inputs_of, mode_under, told
@@ -47,10 +47,10 @@ def side_by_side(lanes: Lanes, curve: Floats, which: Indices, tile_rows: Any, se
         q, w, drive, error = 1.0 * servo.q[j], 1.0 * servo.w[j], 1.0 * servo.drive[j], 1.0 * servo.error[j]  # float64
         wiper, mesh = 1.0 * servo.wiper[j] if slack(numbers.sensor) else q, int(servo.mesh[j])
         q_m, w_m = (q, w) if mesh == RIGID else (1.0 * servo.q_m[j], 1.0 * servo.w_m[j])
-        y = (q, w, 1.0 * servo.i[j], 1.0 * servo.T_w[j], 1.0 * servo.T_h[j], q_m, w_m)
+        y = Vector(q, w, 1.0 * servo.i[j], 1.0 * servo.T_w[j], 1.0 * servo.T_h[j], q_m, w_m)
         numbers = warm(numbers, y)
         u = drive * numbers.source.V
-        mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, q, w_m, y[2]), u, tau, y, mesh, False)
+        mode = contacts.settled(numbers, currents.zone_of(numbers, u, 0.0, q, w_m, y.i), u, tau, y, mesh, False)
         put(seen, lane, observed(numbers, curve, mode, u, tau, y, wiper, drive, error))
 
 

@@ -23,7 +23,7 @@ from servotwin.models.engine.dormand_prince import (
     WHICH,
 )
 from servotwin.models.engine.elementary import fma
-from servotwin.models.engine.modes import BACKWARD, Mode
+from servotwin.models.engine.modes import BACKWARD, Mode, Vector
 from servotwin.models.engine.rates import rates_of
 from servotwin.models.engine.records import made, reader, rows_of, tile_of, writer
 from servotwin.models.engine.strides import State
@@ -152,7 +152,7 @@ def _pace(numbers: Numbers, slots: Any, k: int, j: int) -> None:
     """Set the rates of the lane in a slot, by time or by speed, in the rows from k on."""
     at, stride, pace = slots.after, slots.stride, slots.pace
     q, w = at.q[j], at.w[j]
-    y = (q, w, 0.0, at.T_w[j], at.T_h[j], q, w)
+    y = Vector(q, w, 0.0, at.T_w[j], at.T_h[j], q, w)
     dq, dw, _, dT_w, dT_h, _, _ = rates_of(numbers, mode_in(slots.busy, j), stride.u[j], stride.tau[j], y)
     rise, steep = stride.rise[j], 2.0 * stride.at_stage[j] if stride.curved[j] > 0.0 else 1.0
     per = rise * steep / dw if rise != 0.0 and dw != 0.0 else 1.0

@@ -35,7 +35,7 @@ NO_LAW = Law(_NOTHING, Mode(0, 0, 0, 0, 0), False, 0.0, 0.0)
 
 def mode_from(numbers: Numbers, torque: float, u: float, y: Vector, mesh: int) -> Mode:
     """Return the mode in which a servo goes on, under a voltage behind the bridge and an external torque [N m]."""
-    zone = currents.zone_of(numbers, u, 0.0, y[0], turning(numbers.elastic, y), y[2])
+    zone = currents.zone_of(numbers, u, 0.0, y.q, turning(numbers.elastic, y), y.i)
     return twist.settled(numbers, zone, u, torque, y, mesh)
 
 
@@ -57,7 +57,7 @@ def go(numbers: Numbers, law: Law, torque: float, u: float, y: Vector, mode: Mod
     if time <= law.longest:
         after = pairs.propagate(law.A, y, time)
         if not _ends(numbers, mode, law.A, torque, u, y, after):
-            return Gone(after, mode, after[0], 0, 1.0)
+            return Gone(after, mode, after.q, 0, 1.0)
     return _by_steps(numbers, torque, u, y, mode, time, accuracy)
 
 
@@ -79,11 +79,11 @@ def _ends(numbers: Numbers, mode: Mode, A: tuple[Vector, ...], torque: float, u:
 
 def _by_steps(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, time: float, accuracy: float) -> Gone:
     voltage, against = Piece(0.0, u, 0.0, 0.0, 0.0, 0.0, 0.0), Piece(0.0, torque, 0.0, 0.0, 0.0, 0.0, 0.0)
-    point, m, idle = Point(0.0, y, mode, 0.0, y, time, y[0]), motion.nothing(numbers, voltage, against), 0
+    point, m, idle = Point(0.0, y, mode, 0.0, y, time, y.q), motion.nothing(numbers, voltage, against), 0
     while point.time < time:
         before = point.time
         point, m, _, status = step.onward(numbers, point, voltage, against, m, before == 0.0, time, time, accuracy)
         idle = idle + 1 if point.time == before else 0
         if status != COMPLETED or idle > MOST_IDLE:
-            return Gone(y, mode, y[0], 0, 0.0)
-    return Gone(point.y, point.mode, point.y[0], 0, 1.0)
+            return Gone(y, mode, y.q, 0, 0.0)
+    return Gone(point.y, point.mode, point.y.q, 0, 1.0)

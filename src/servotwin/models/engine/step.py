@@ -89,8 +89,8 @@ def onward(numbers: Numbers, point: Point, u: Piece, tau: Piece, m: Motion, new:
     `m` is the motion so far, which is taken up again if it is still the right one and the inputs are not `new`. Return
     the point, the motion, the event (−1: none) and a status.
     """
-    same = m.t0 == point.anchor_time and m.mode == point.mode and m.start == point.anchor
-    if new or not same or motion.is_step(m):
+    if new or motion.is_step(m) or not (
+            m.t0 == point.anchor_time and m.mode == point.mode and m.start == point.anchor):
         m = motion.begin(numbers, point.mode, u, tau, point.anchor_time, point.anchor, point.step,
                          limit - point.anchor_time, accuracy)
     if m.kind == motion.IMPOSSIBLE:
@@ -109,7 +109,7 @@ def pulse_width(inputs: Inputs, memory: Memory) -> float:
 def anchored(numbers: Numbers, u: Piece, tau: Piece, time: float, point: Point) -> Point:
     """Return a point whose motion begins now, under inputs that are new."""
     y, v = point.y, piece_value(u, time)
-    zone = currents.zone_of(warm(numbers, y), v, piece_rate(u, time), y[0], turning(numbers.elastic, y), y[2])
+    zone = currents.zone_of(warm(numbers, y), v, piece_rate(u, time), y.q, turning(numbers.elastic, y), y.i)
     mode = guards.settled(numbers, zone, v, piece_value(tau, time), y, point.mode.mesh, in_one_piece(numbers, u))
     return Point(time, y, mode, time, y, point.step, point.wiper)
 
@@ -145,7 +145,7 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
     else:
         s, kind, y = events.first_event(m, kinds, point.time - t0, end - t0)
     if kind < 0:
-        wiper = wiper_at(m.numbers.sensor, point.wiper, y[0])
+        wiper = wiper_at(m.numbers.sensor, point.wiper, y.q)
         if integrated and end == step_end and m.ends_by >= 0:
             after, y = guards.cross(m.numbers, m.mode, m.ends_by, piece_value(m.u, end), piece_value(m.tau, end), y)
             return Point(end, y, after, end, y, point.step, wiper), m.ends_by, status_of(y)
@@ -153,16 +153,18 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
             return Point(end, y, m.mode, end, y, m.next_step, wiper), -1, status_of(y)
         return Point(end, y, m.mode, t0, point.anchor, point.step, wiper), -1, status_of(y)
     t = min(max(t0 + s, point.time), end)
-    y = motion.state(motion.prepared(m), s)
-    wiper = wiper_at(m.numbers.sensor, point.wiper, y[0])
+    if integrated:
+        m = motion.prepared(m)
+    y = motion.state(m, s)
+    wiper = wiper_at(m.numbers.sensor, point.wiper, y.q)
     after, y = guards.cross(m.numbers, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), y)
     return Point(t, y, after, t, y, point.step, wiper), kind, status_of(y)
 
 
 def status_of(y: Vector) -> int:
     """Tell whether a state is finite, as a code."""
-    total = y[0] + y[1] + y[2] + y[3] + y[4] + y[5] + y[6]
-    return COMPLETED if math.isfinite(total) else DIVERGED
+    q, w, i, T_w, T_h, q_m, w_m = y
+    return COMPLETED if math.isfinite(q + w + i + T_w + T_h + q_m + w_m) else DIVERGED
 
 
 def at_pulses(numbers: Numbers, silent: int) -> Numbers:
@@ -182,9 +184,9 @@ def source(numbers: Numbers, now: Frame) -> Piece:
 def circuit(numbers: Numbers, u: float, y: Vector) -> tuple[float, float, float]:
     """Return the current [A], the voltages at the motor's terminals and of the bus [V], for u [V] behind the bridge."""
     numbers = warm(numbers, y)
-    w, i = turning(numbers.elastic, y), y[2]
-    zone = currents.zone_of(numbers, u, 0.0, y[0], w, i)
-    i = currents.flowing(numbers, zone, u, y[0], w, i)
+    w, i = turning(numbers.elastic, y), y.i
+    zone = currents.zone_of(numbers, u, 0.0, y.q, w, i)
+    i = currents.flowing(numbers, zone, u, y.q, w, i)
     V_bus = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)
     return i, bridge.terminal_voltage(numbers.bridge, numbers.source, numbers.motor, u, w, i, V_bus), V_bus
 

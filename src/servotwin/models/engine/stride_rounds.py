@@ -164,7 +164,7 @@ def _goes_on(slack: bool, tile: Any, plan: Any, slots: Any, k: int) -> bool:
         if slack:
             tiles.drag(tile, to.q, j)
         mode, y = guards.cross(numbers, mode, found.crossed, u, tau, strides.vector_of(to))
-        to = State(y[0], y[1], y[3], y[4])
+        to = State(y.q, y.w, y.T_w, y.T_h)
         _put_mode(busy, k, mode)
     put_before_in(slots.before, k, to)
     if left > 0.0 and not strides.stays(numbers, mode, u):

@@ -76,12 +76,12 @@ class Judged(NamedTuple):
 
 def vector_of(state: State) -> Vector:
     """Return a state as the general engine has it."""
-    return state.q, state.w, 0.0, state.T_w, state.T_h, state.q, state.w
+    return Vector(state.q, state.w, 0.0, state.T_w, state.T_h, state.q, state.w)
 
 
 def way_from_rest(numbers: Numbers, u: float, tau: float, state: State) -> float:
     """Return which way a shaft at rest starts under a voltage behind the bridge and its load: −1, 0, +1."""
-    y: Vector = (state.q, 0.0, 0.0, state.T_w, state.T_h, state.q, 0.0)
+    y = Vector(state.q, 0.0, 0.0, state.T_w, state.T_h, state.q, 0.0)
     numbers = warm(numbers, y)
     tau_m = currents.drive_torque(numbers, currents.zone_of(numbers, u, 0.0, state.q, 0.0, 0.0), u, y)
     against = external_torque(numbers.load, tau, state.q)
@@ -109,7 +109,7 @@ def cooled(numbers: Numbers, T_w: float, T_h: float, time: float) -> tuple[float
 
 def acceleration(numbers: Numbers, mode: Mode, u: float, tau: float, state: State, w: float) -> float:
     """Return the acceleration [rad/s²] at a state, with a speed of its own."""
-    y: Vector = (state.q, w, 0.0, state.T_w, state.T_h, state.q, w)
+    y = Vector(state.q, w, 0.0, state.T_w, state.T_h, state.q, w)
     return contacts.acceleration(warm(numbers, y), mode, u, tau, y)
 
 

@@ -91,7 +91,7 @@ def _write(tape: Tape, unit: int, how: int, seat: Any, until: float, mode: Mode,
               u,
               tau.start - seat.origin, tau.value, tau.slope, tau.amplitude, tau.frequency, tau.phase, tau.sweep,
               1.0 * kind, length, next_step, 1.0 * first, 1.0 * returns, point.anchor_time, point.step,
-              y[0], y[1], y[2], y[3], y[4], y[5], y[6], z[0], z[1], z[2], z[3], z[4], z[5], z[6],
+              y.q, y.w, y.i, y.T_w, y.T_h, y.q_m, y.w_m, z.q, z.w, z.i, z.T_w, z.T_h, z.q_m, z.w_m,
               shown.duty, shown.goal, shown.reference, 1.0 * shown.trip)
     n = tape.used[0]
     for k in range(ROW):

@@ -44,7 +44,7 @@ class Fade(NamedTuple):
 
 
 class Gone(NamedTuple):
-    """To when a servo has gone [s], by the times of its memory, in which state and mesh; outputs done; whether at all."""
+    """Until when a servo has gone [s], its state and mesh there, how many outputs are done, and whether it moved."""
 
     time: float
     y: Vector
@@ -126,7 +126,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
             if lasts(now, mode, u, tau, y, after, time):
                 y = after
             else:
-                way = legs.go(now, tau, u, y, mode, y[0], time)
+                way = legs.go(now, tau, u, y, mode, y.q, time)
                 if way.done == 0.0:
                     gone = True
                     break
@@ -141,7 +141,7 @@ def as_gone(memory: Memory, gone: Gone) -> Memory:
     """Return the memory of a servo that has gone on so."""
     if not gone.moved:
         return memory
-    point = Point(gone.time, gone.y, Mode(0, 0, gone.mesh, 0, 0), math.inf, gone.y, memory.point.step, gone.y[0])
+    point = Point(gone.time, gone.y, Mode(0, 0, gone.mesh, 0, 0), math.inf, gone.y, memory.point.step, gone.y.q)
     return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
                   memory.firm)
 
@@ -151,10 +151,10 @@ def tick(now: Numbers, inputs: Inputs, firm: Any, y: Vector, time: float) -> Non
     firmware, own = inputs.firmware[0], now.sensor
     if controller.has_news(firmware, firm, time):
         controller.listen(inputs, firm, time)
-    angle = y[0]
+    angle = y.q
     if firmware.per_volt != 0.0:
         straight = own.step == 0.0 and len(inputs.curve) == 0
-        v = feedback_voltage(y[0], own.p, own.b_o) if straight else sensed_voltage(own, inputs.curve, y[0])
+        v = feedback_voltage(y.q, own.p, own.b_o) if straight else sensed_voltage(own, inputs.curve, y.q)
         angle = controller.angle_of(firmware, firm, v, inputs.seed)
     sensed = NOTHING_SENSED
     if control.senses(firmware):
@@ -177,25 +177,25 @@ def over(numbers: Numbers, mode: Mode, laws: Apart, output: Fade, motor: Fade, y
     there = fma(-laws.output_rate, w, laws.output_pull)
     q, w = fma(there, output.twice, fma(w, output.time, q)), fma(there, output.once, w)
     if mode.mesh != INSIDE:
-        return with_motor(numbers.play, mode.mesh, (q, w, i, T_w, T_h, q, w))
+        return with_motor(numbers.play, mode.mesh, Vector(q, w, i, T_w, T_h, q, w))
     there = fma(-laws.motor_rate, w_m, laws.motor_pull)
-    return q, w, i, T_w, T_h, fma(there, motor.twice, fma(w_m, motor.time, q_m)), fma(there, motor.once, w_m)
+    return Vector(q, w, i, T_w, T_h, fma(there, motor.twice, fma(w_m, motor.time, q_m)), fma(there, motor.once, w_m))
 
 
 def lasts(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, after: Vector, time: float) -> bool:
     """Tell whether a mode surely lasts on the way from a state to the one after a time [s]; speeds are monotone."""
-    q, w, _, _, _, q_m, w_m = after
+    q, w, w_m = after.q, after.w, after.w_m
     low, high = currents.zone_limits(numbers, mode.zone, u)
     if not low < u - back_emf(w_m, numbers.motor.K_b) < high:
         return False
-    if not (at_rest(mode.contact) or (y[1] * w >= 0.0 and w != 0.0 and numbers.stops.lower < q < numbers.stops.upper)):
+    if not (at_rest(mode.contact) or (y.w * w >= 0.0 and w != 0.0 and numbers.stops.lower < q < numbers.stops.upper)):
         return False
     if mode.mesh == INSIDE:
-        if not at_rest(mode.motor) and (y[6] * w_m < 0.0 or w_m == 0.0):
+        if not at_rest(mode.motor) and (y.w_m * w_m < 0.0 or w_m == 0.0):
             return False
-        ahead, half = y[5] - y[0], numbers.play.half
-        most = time * max(max(y[6], w_m) - min(y[1], w), 0.0)
-        least = time * min(min(y[6], w_m) - max(y[1], w), 0.0)
+        ahead, half = y.q_m - y.q, numbers.play.half
+        most = time * max(max(y.w_m, w_m) - min(y.w, w), 0.0)
+        least = time * min(min(y.w_m, w_m) - max(y.w, w), 0.0)
         if not (ahead + most < half and ahead + least > -half):
             return False
     if mode.share == 0 and not play.present(numbers.play):
@@ -218,7 +218,7 @@ def show(numbers: Numbers, law: Law, inputs: Inputs, u: float, y: Vector, mode: 
     while done < times.size and (times[done] - origin < end - slack or end >= until):
         s = min(max(times[done] - origin - t, 0.0), end - t)
         here = (spring_legs.go(numbers, law, tau, u, y, mode, s, inputs.accuracy) if elastic.present(numbers.elastic)
-                else legs.go(numbers, tau, u, y, mode, y[0], s))
+                else legs.go(numbers, tau, u, y, mode, y.q, s))
         show_one(outputs, done, here.y, here.mode, firm)
         done += 1
     return done
@@ -226,11 +226,11 @@ def show(numbers: Numbers, law: Law, inputs: Inputs, u: float, y: Vector, mode: 
 
 def show_one(outputs: Floats, done: int, y: Vector, mode: Mode, firm: Any) -> None:
     """Put what shows of a servo into a column of the outputs, in the order of `runs.run`."""
-    outputs[0, done], outputs[1, done], outputs[2, done] = y[0], y[1], mode.contact
+    outputs[0, done], outputs[1, done], outputs[2, done] = y.q, y.w, mode.contact
     outputs[3, done] = math.copysign(1.0, firm.duty) if duty.drives(firm.duty) else 0.0
-    outputs[4, done], outputs[5, done] = 0.0, y[0]
-    for k in range(5):
-        outputs[6 + k, done] = y[2 + k]
+    outputs[4, done], outputs[5, done] = 0.0, y.q
+    outputs[6, done], outputs[7, done], outputs[8, done], outputs[9, done], outputs[10, done] = (
+        y.i, y.T_w, y.T_h, y.q_m, y.w_m)
     outputs[11, done], outputs[12, done], outputs[13, done] = mode.mesh, mode.motor, 1
     outputs[14, done], outputs[16, done], outputs[17, done] = firm.duty, firm.r, firm.trip
     outputs[15, done] = firm.r if firm.goal == NOWHERE else firm.goal

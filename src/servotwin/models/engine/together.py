@@ -129,10 +129,10 @@ def state_at(shared: Any, mate: Any, s: float) -> Vector:
         w = w * s + x
         q = q * s + x / (n + 1)
         i = i * s + current[n]
-    q = start[0] + q * s
+    q = start.q + q * s
     if mate.mode.mesh == RIGID:
-        return (q, w, i, start[3], start[4], q, w)
-    y = (q, w, i, start[3], start[4], start[5], start[6])
+        return Vector(q, w, i, start.T_w, start.T_h, q, w)
+    y = Vector(q, w, i, start.T_w, start.T_h, start.q_m, start.w_m)
     return with_motor(numbers_of(mate.numbers).play, mate.mode.mesh, y)
 
 
@@ -166,25 +166,25 @@ def _is_calm(shared: Any, mate: Any) -> bool:
     if mode.mesh != RIGID or mode.zone == NO_CURRENT or mate.numbers.friction.varies > 0.0:
         return False
     sign = sign_of(mode.zone)
-    if sign != 0.0 and not _keeps_its_sign(mate.current, terms, end[2], sign, length):
+    if sign != 0.0 and not _keeps_its_sign(mate.current, terms, end.i, sign, length):
         return False
     if mode.contact == STUCK:
         return _holds(mate, terms, length)
     if mode.contact != FORWARD and mode.contact != BACKWARD:
         return False
-    if not _keeps_its_sign(mate.speed, terms, end[1], 1.0 if mode.contact == FORWARD else -1.0, length):
+    if not _keeps_its_sign(mate.speed, terms, end.w, 1.0 if mode.contact == FORWARD else -1.0, length):
         return False
-    return bool(mate.numbers.stops.lower < end[0] < mate.numbers.stops.upper)
+    return bool(mate.numbers.stops.lower < end.q < mate.numbers.stops.upper)
 
 
 def _holds(mate: Any, terms: int, length: float) -> bool:
     """Tell that a mate stays stuck."""
-    i0, i1 = mate.current[0], mate.end[2]
+    i0, i1 = mate.current[0], mate.end.i
     if (mate.numbers.load.stiffness != 0.0 or mate.tau.slope != 0.0 or mate.tau.amplitude != 0.0
             or turns(mate.current, terms, length)):
         return False
     numbers = numbers_of(mate.numbers)
-    against = external_torque(numbers.load, mate.tau.value, mate.end[0])
+    against = external_torque(numbers.load, mate.tau.value, mate.end.q)
     low, high = contacts.holding_bounds(numbers, 0.0, 0.0)
     return bool(-low < numbers.motor.K * min(i0, i1) - against and numbers.motor.K * max(i0, i1) - against < high)
 

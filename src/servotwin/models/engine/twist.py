@@ -11,7 +11,6 @@ from servotwin.models.engine import contacts, currents
 from servotwin.models.engine.contacts import NEXT_TO_NOTHING, REST_HEIGHT, REST_SPEED
 from servotwin.models.engine.currents import drive_torque
 from servotwin.models.engine.modes import (
-    BACKWARD,
     BEHIND,
     FORWARD,
     FREE,
@@ -25,6 +24,7 @@ from servotwin.models.engine.modes import (
     Mode,
     Vector,
     at_rest,
+    moving,
     sign_of,
     slides,
 )
@@ -40,12 +40,12 @@ from servotwin.physics.shaft import pendulum_torque, shaft_acceleration, twist_t
 
 def twist(numbers: Numbers, y: Vector) -> float:
     """Return by how much the first body is ahead of the second [rad]."""
-    return elastic.ahead(numbers.elastic, y[0], y[5])
+    return elastic.ahead(numbers.elastic, y.q, y.q_m)
 
 
 def twist_rate(numbers: Numbers, y: Vector) -> float:
     """Return by how much the first body is faster than the second [rad/s]; of the state's rates, how this changes."""
-    return elastic.ahead(numbers.elastic, y[1], y[6])
+    return elastic.ahead(numbers.elastic, y.w, y.w_m)
 
 
 def torque(numbers: Numbers, mesh: int, y: Vector) -> float:
@@ -84,7 +84,7 @@ def on_gear(numbers: Numbers, mesh: int, tau: float, y: Vector) -> float:
     """Return the torque that the gear feels from its output side [N m], positive in +q."""
     between = torque(numbers, mesh, y)
     if elastic.behind(numbers.elastic):
-        return torque_on_gear(external_torque(numbers.load, tau, y[0]) + between, y[1], numbers.shaft.b_out)
+        return torque_on_gear(external_torque(numbers.load, tau, y.q) + between, y.w, numbers.shaft.b_out)
     return -between
 
 
@@ -110,7 +110,7 @@ def with_share(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) ->
 
 def at_output(numbers: Numbers, zone: int, mesh: int, u: float, tau: float, y: Vector) -> tuple[float, float, float]:
     """Return the torque that drives the output's body [N m], and what friction holds of it backward and forward."""
-    between, against = torque(numbers, mesh, y), external_torque(numbers.load, tau, y[0])
+    between, against = torque(numbers, mesh, y), external_torque(numbers.load, tau, y.q)
     if elastic.behind(numbers.elastic):
         driving = drive_torque(numbers, zone, u, y)
         against += between
@@ -136,13 +136,13 @@ def settled(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: 
     if mesh <= ON_BACKWARD:  # not known yet
         mesh = mesh_of(numbers, y)
     dry, motor = is_dry(numbers), FREE
-    contact = sliding(y[1] > 0.0, dry)
-    if y[1] == 0.0:
+    contact = sliding(y.w > 0.0, dry)
+    if y.w == 0.0:
         net, backward, forward = at_output(numbers, zone, mesh, u, tau, y)
-        contact = from_rest(net, backward, forward, y[0] >= numbers.stops.upper, y[0] <= numbers.stops.lower, dry)
+        contact = from_rest(net, backward, forward, y.q >= numbers.stops.upper, y.q <= numbers.stops.lower, dry)
     if elastic.geared(numbers.elastic):
-        motor = sliding(y[6] > 0.0, friction.present(numbers.friction))
-        if y[6] == 0.0:
+        motor = sliding(y.w_m > 0.0, friction.present(numbers.friction))
+        if y.w_m == 0.0:
             net, backward, forward = at_motor(numbers, zone, mesh, u, y)
             motor = from_rest(net, backward, forward, False, False, friction.present(numbers.friction))
     return with_share(numbers, Mode(zone, contact, mesh, motor, 0), u, tau, y)
@@ -156,20 +156,20 @@ def accelerations(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector)
 
 
 def _of_two(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:
-    driving, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y[0])
+    driving, against = drive_torque(numbers, mode.zone, u, y), external_torque(numbers.load, tau, y.q)
     between = torque(numbers, mode.mesh, y)
     if elastic.behind(numbers.elastic):
-        return (_shaft_acceleration(numbers, mode, driving, against + between, y[1]),
+        return (_shaft_acceleration(numbers, mode, driving, against + between, y.w),
                 behind_acceleration(numbers, between, y))
-    return (contacts.output_acceleration(numbers, mode.contact, against - between, y[1]),
-            _motor_acceleration(numbers, mode, driving, between, y[6]))
+    return (contacts.output_acceleration(numbers, mode.contact, against - between, y.w),
+            _motor_acceleration(numbers, mode, driving, between, y.w_m))
 
 
 def behind_acceleration(numbers: Numbers, between: float, y: Vector) -> float:
     """Return ẇ [rad/s²] of the body behind an elastic shaft."""
     own = numbers.elastic
-    weight = pendulum_torque(y[5], own.gravity, own.hanging_angle) if own.gravity != 0.0 else 0.0
-    return shaft_acceleration(between, y[6], 0.0, weight, own.b, own.J)
+    weight = pendulum_torque(y.q_m, own.gravity, own.hanging_angle) if own.gravity != 0.0 else 0.0
+    return shaft_acceleration(between, y.w_m, 0.0, weight, own.b, own.J)
 
 
 def _shaft_acceleration(numbers: Numbers, mode: Mode, driving: float, against: float, w: float) -> float:
@@ -201,13 +201,13 @@ def _dry(numbers: Numbers, contact: int, share: int, w: float, tau_m: float, tau
 def rebound(numbers: Numbers, mode: Mode, upper: bool, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
     """Return mode and state after the output has hit a stop; what is at the other end of the spring goes on."""
     q = numbers.stops.upper if upper else numbers.stops.lower
-    w = rebound_speed(y[1], numbers.stops.restitution)
-    after: Vector = (q, w, y[2], y[3], y[4], y[5], y[6])
+    w = rebound_speed(y.w, numbers.stops.restitution)
+    after = moving(y, q, w, y.w_m)
     leaving = Mode(zone_now(numbers, mode.zone, u, after), sliding(w > 0.0, is_dry(numbers)), mode.mesh, mode.motor, 0)
     back = accelerations(numbers, leaving, u, tau, after)[0]
     low = back * w < 0.0 and 0.5 * w * w < abs(back) * REST_HEIGHT * max(abs(q), 1.0)
     if abs(w) < REST_SPEED or low:
-        after = (q, 0.0, y[2], y[3], y[4], y[5], y[6])
+        after = moving(y, q, 0.0, y.w_m)
     return settled(numbers, zone_now(numbers, mode.zone, u, after), u, tau, after, mode.mesh), after
 
 
@@ -215,4 +215,4 @@ def zone_now(numbers: Numbers, zone: int, u: float, y: Vector) -> int:
     """Return the zone after the output's speed has jumped, with which that of a motor on the same shaft goes."""
     if elastic.geared(numbers.elastic):
         return zone
-    return currents.zone_of(numbers, u, 0.0, y[0], y[1], y[2])
+    return currents.zone_of(numbers, u, 0.0, y.q, y.w, y.i)

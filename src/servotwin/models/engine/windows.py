@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import tiles
 from servotwin.models.engine.memory import SAME
+from servotwin.models.engine.modes import Vector
 from servotwin.models.engine.step import circuit
 from servotwin.models.terms import frame
 from servotwin.models.terms.chip import Chip
@@ -95,8 +96,8 @@ def measure(size: int, form: int, tile: Any, plan: Any) -> None:
     if form == tiles.BANDS or tiles.has_more(form):
         for j in range(size):
             numbers, w = tiles.numbers_at(tile.own, j), tile.servo.w[j]
-            y = (0.0, w, tile.servo.i[j], tile.servo.T_w[j], tile.servo.T_h[j], 0.0,
-                 tile.servo.w_m[j] if form == tiles.GAPS else w)
+            y = Vector(0.0, w, tile.servo.i[j], tile.servo.T_w[j], tile.servo.T_h[j], 0.0,
+                       tile.servo.w_m[j] if form == tiles.GAPS else w)
             _, v_m, V_bus = circuit(numbers, tile.servo.drive[j] * numbers.source.V, y)
             plan.v_m[j] = v_m
             plan.V_bus[j] = V_bus

@@ -88,7 +88,7 @@ def loop(bridge: Bridge, source: Source, zone: int, u: float) -> tuple[float, fl
     if zone == SHORT_FORWARD or zone == SHORT_BACKWARD:
         return driving_voltage(0.0, sign, bridge.D_drive), bridge.R_drive - source.R_b
     R = bridge.R_drive
-    if regulated(source) and sign * u < 0.0:  # returned past a regulator
+    if sign * u < 0.0 and regulated(source):  # returned past a regulator
         R -= source.R_b
     return driving_voltage(u, sign, bridge.D_drive), R
 

@@ -63,7 +63,7 @@ def depends(elastic: Elastic, still: bool) -> int:
 
 def turning(elastic: Elastic, y: Vector) -> float:
     """Return the speed of the motor [rad/s], of its rates the acceleration."""
-    return y[1] if elastic.J > 0.0 else y[6]
+    return y.w if elastic.J > 0.0 else y.w_m
 
 
 def ahead(elastic: Elastic, q: float, other: float) -> float:

@@ -47,14 +47,16 @@ def at_temperature(numbers: Numbers, T_w: float, T_h: float) -> Numbers:
     R = winding_resistance(T_w, cold.R)
     more = R - cold.R
     field = magnet_factor(T_h, numbers.heat.magnet)
+    between = Off(off.D, off.R + more, off.coast)
+    same = silence.R == off.R and silence.D == off.D and silence.coast == off.coast
+    silent = between if same else Off(silence.D, silence.R + more, silence.coast)
     return Numbers(
         Motor(cold.K * field, cold.K_b * field, R, cold.L),
-        Bridge(bridge.D_drive, bridge.R_drive + more, Off(off.D, off.R + more, off.coast),
-               Off(silence.D, silence.R + more, silence.coast), bridge.V_br, bridge.pwm, bridge.one_way),
+        Bridge(bridge.D_drive, bridge.R_drive + more, between, silent, bridge.V_br, bridge.pwm, bridge.one_way),
         numbers.source, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play,
         numbers.sensor, numbers.heat, numbers.elastic)
 
 
 def warm(numbers: Numbers, y: Vector) -> Numbers:
     """Return the numbers at the temperatures of a state; the numbers themselves where they stay."""
-    return at_temperature(numbers, y[3], y[4]) if numbers.heat.C_w > 0.0 else numbers
+    return at_temperature(numbers, y.T_w, y.T_h) if numbers.heat.C_w > 0.0 else numbers

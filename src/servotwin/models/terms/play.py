@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from servotwin import physics
-from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vector
+from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vector, moving
 from servotwin.models.terms.dependence import TWO_BODIES
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.shaft import Shaft
@@ -45,17 +45,20 @@ def depends(mesh: int, still: bool) -> int:
 
 def met(play: Play, shaft: Shaft, forward: bool, y: Vector) -> Vector:
     """Return the state after motor and output have met at an end of the play: one speed, momentum kept."""
-    w = impact_speed(shaft.J - shaft.J_out, y[6], shaft.J_out, y[1])
+    w = impact_speed(shaft.J - shaft.J_out, y.w_m, shaft.J_out, y.w)
     if abs(w) < _LAST_IMPACT:
         w = 0.0
-    return with_motor(play, ON_FORWARD if forward else ON_BACKWARD, (y[0], w, y[2], y[3], y[4], y[5], w))
+    return with_motor(play, ON_FORWARD if forward else ON_BACKWARD, moving(y, y.q, w, w))
 
 
 def with_motor(play: Play, mesh: int, y: Vector) -> Vector:
     """Return a state of one body with the motor where the play has it."""
-    q, w, i, T_w, T_h, _, _ = y
-    ahead = play.half if mesh == ON_FORWARD else -play.half if mesh == ON_BACKWARD else 0.0
-    return (q, w, i, T_w, T_h, q + ahead, w)
+    return Vector(y.q, y.w, y.i, y.T_w, y.T_h, y.q + ahead(play, mesh), y.w)
+
+
+def ahead(play: Play, mesh: int) -> float:
+    """Return by which angle the motor is ahead of the output [rad] where they touch."""
+    return play.half if mesh == ON_FORWARD else -play.half if mesh == ON_BACKWARD else 0.0
 
 
 def pack(model: Given, load_inertia: Any) -> Play:
