@@ -16,8 +16,10 @@ from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID
 from servotwin.models.engine.records import TILE, columns_of, room
 from servotwin.models.engine.ticks import ANGLE, SPEED
 from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.play import Play
 from servotwin.simulation import lane_recipes, lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
@@ -83,7 +85,7 @@ class Store:
         numbers, lanes = self.numbers, slice(self.numbers.count)
         own = columns_of(Numbers, numbers.columns.numbers, lanes), columns_of(Chip, numbers.columns.chips, lanes)
         programs = numbers.columns.firmware
-        kinds = kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
+        kinds = kinds_of(*own, numbers.count, self._dtype, np.zeros(numbers.count, np.bool_),
                          numbers.torque.count > 0, bool(numbers.curve.size),
                          Firmware(*(programs[name] for name in Firmware._fields)) if numbers.digital else NO_FIRMWARE)
         if numbers.supplies.lanes:
@@ -140,7 +142,7 @@ class Store:
 
     def _go_on_from(self, memories: Memories, others: Indices, common: Common | None) -> None:
         """Take the memories of all lanes, of which some have other numbers than when they were made."""
-        play, sprung = self.numbers.now("play").half > 0.0, self.numbers.now("elastic").k > 0.0
+        play, sprung = self.numbers.now(Play).half > 0.0, self.numbers.now(Elastic).k > 0.0
         point = memories.rows["point"]
         point["anchor_time"][others] = math.inf
         mesh = point["mode"]["mesh"]
