@@ -14,7 +14,7 @@ from servotwin.models.engine.demands import needed
 from servotwin.models.engine.motion import may_depend
 from servotwin.models.engine.records import numbers_in
 from servotwin.models.terms.chip import NO_CHIP, Chip
-from servotwin.models.terms.dependence import FADING, PLAY, PROGRAM, PWM, RECORDED, SLACK, SPRING, STEEP_W, TABLE
+from servotwin.models.terms.dependence import FADING, PLAY, PWM, RECORDED, SLACK, SPRING, STEEP_W, TABLE
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.rooms import NOTHING, ROOMS
@@ -203,13 +203,6 @@ def goes_together(numbers: Numbers, pulsed: bool) -> bool:
     """Tell whether all lanes take about as long, for none has a term that would let it run on its own."""
     asked = Terms(numbers, NO_CHIP, NO_FIRMWARE).ask(STEEP_W | PLAY | recipes.STRIDING)
     return pulsed and not _any(asked)
-
-
-def looking(recipe: Recipe) -> Recipe:
-    """Return how lanes are looked at that run one by one in this way."""
-    digital = recipe.always & PROGRAM != 0
-    return (recipes.LOOK_ELASTIC[digital] if recipe.always & SPRING else recipes.LOOK_DIGITAL if digital
-            else recipes.LOOK_ONE_BY_ONE)
 
 
 def _without(some: Any, *others: Any) -> Any:

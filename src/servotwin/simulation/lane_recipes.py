@@ -101,24 +101,14 @@ _TICKING = (Recipe("ticking", ("servotwin.models.engine.loops:go_on",), vector=T
                    leaves=_LEFT_BY_TICKS, always=PROGRAM | PWM), _TICKS)
 BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, knows=PLAIN_DIGITAL.knows,
                   always=PROGRAM | PWM)
-
-
-def _sprung(name: str, entries: tuple[str, ...]) -> dict[bool, Recipe]:
-    """Return the recipes of servos with a spring between two bodies, analog and digital."""
-    return {False: Recipe(name, entries, knows=~(_DIGITAL | _MEAN | PLAY), always=SPRING),
-            True: Recipe(f"{name}_digital", entries, knows=~(_NOT_DIGITAL | PLAY), always=SPRING | PROGRAM | PWM)}
-
-
-ELASTIC_RUNS = _sprung("elastic_runs", _ENTRIES)
+ELASTIC_RUNS = {
+    False: Recipe("elastic_runs", _ENTRIES, knows=~(_DIGITAL | _MEAN | PLAY), always=SPRING),
+    True: Recipe("elastic_runs_digital", _ENTRIES, knows=~(_NOT_DIGITAL | PLAY), always=SPRING | PROGRAM | PWM)}
 
 # --- What shows of lanes ----------------------------------------------------------------------------------------------
 
-_ONE = ("servotwin.models.engine.sights:one_by_one",)
-LOOK_SIDE_BY_SIDE = Recipe("look_side_by_side", ("servotwin.models.engine.sights:side_by_side",),
-                           knows=~(_DIGITAL | SPRING | _MEAN))
-LOOK_ONE_BY_ONE = Recipe("look_one_by_one", _ONE, knows=ALL_RUNS.knows)
-LOOK_DIGITAL = Recipe("look_digital", _ONE, knows=ALL_DIGITAL.knows, always=ALL_DIGITAL.always)
-LOOK_ELASTIC = _sprung("look_elastic", _ONE)
+LOOK = Recipe("look", tuple(f"servotwin.models.engine.sights:{name}" for name in ("side_by_side", "one_by_one")))
+"""Lanes of all forms: to look leaves out little where terms are absent."""
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, knows=~_DIGITAL)
 _PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _GLIDING, _TICKING),
           ALL_DIGITAL: ((ALL_DIGITAL, ()), _GLIDING)}

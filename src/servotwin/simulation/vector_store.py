@@ -23,7 +23,7 @@ from servotwin.models.terms.play import Play
 from servotwin.simulation import lane_recipes, lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
-from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of, looking
+from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
 from servotwin.simulation.lane_memory import copied, flat, memories_of, nothing_yet, put, put_back, put_memories, taken
 from servotwin.simulation.lane_runs import some_of
 from servotwin.simulation.lanes import ALL_FIELDS
@@ -356,7 +356,7 @@ class _Tiles:
         return np.asarray(edge + since)
 
     def look(self, store: Store, seen: Array) -> None:
-        self._look = self._look or call_of(lane_recipes.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns,
+        self._look = self._look or call_of(lane_recipes.LOOK, "side_by_side", store.columns,
                                            store.inputs[0], self.which, self.rows, seen)
         self._look()
 
@@ -418,7 +418,7 @@ class _Records:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
     def look(self, store: Store, seen: Array) -> None:
-        self._look = self._look or call_of(looking(self.recipe), "one_by_one", store.columns, *store.inputs,
+        self._look = self._look or call_of(lane_recipes.LOOK, "one_by_one", store.columns, *store.inputs,
                                            self.which, self.memories, seen)
         self._look()
 
