@@ -31,8 +31,7 @@ from servotwin.physics.pieces import Piece
 
 _COMES_UP: dict[str, tuple[int, ...]] = {
     "CORE": (STEEP_W,), "INSIDE": (PLAY,), "ON_FORWARD": (PLAY,), "ON_BACKWARD": (PLAY,),
-    "LINEAR": (FOLLOWS,), "LINEAR_BACKWARD": (FOLLOWS,), "DEAD": (FOLLOWS,), "SATURATED": (FOLLOWS,),
-    "SATURATED_BACKWARD": (FOLLOWS,),
+    "LINEAR": (FOLLOWS,), "LINEAR_BACKWARD": (FOLLOWS,),  # without the other zones clang makes slower bands
     "LIMITED_FORWARD": (REGULATED,), "LIMITED_BACKWARD": (REGULATED,), "SHORT_FORWARD": (REGULATED,),
     "SHORT_BACKWARD": (REGULATED,),
     "WITH_CURRENT": (ON_I,), "HELD": (ON_I,), "CREEP": (FADING,), "APART": (PLAY,), "PAIR": (SPRING,),
