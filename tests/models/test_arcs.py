@@ -153,7 +153,7 @@ def assert_same(raw, other, tolerance):
 def plain(work):
     raw = empty_raw(work)
     lanes = lane_runs.lanes_of(work)
-    (kind,) = lane_runs.kinds_of(work.numbers, work.chip, work.lanes, True, "float64", lane_runs.swept(lanes),
+    (kind,) = lane_runs.kinds_of(work.numbers, work.chip, work.lanes, "float64", lane_runs.swept(lanes),
                                    work.torque.count > 0, False)
     with np.errstate(all="ignore"):
         rows = room(1, tiles.tile_type("float64", kind.form))

@@ -292,7 +292,7 @@ def alone(name):
 def test_fleets_go_by_strides(name):
     model, _, loads, _, _ = fleet(name)
     numbers, nobody = model.pack(loads[0]), np.zeros(3, np.bool_)
-    (kind,) = lane_runs.kinds_of(numbers, model.chip(), 3, True, "float32", nobody, nobody, False)
+    (kind,) = lane_runs.kinds_of(numbers, model.chip(), 3, "float32", nobody, nobody, False)
     assert (kind.form, kind.dtype, kind.banded) == (tiles.STRIDES, "float64", FLEETS[name][2])
 
 

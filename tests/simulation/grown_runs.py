@@ -21,7 +21,7 @@ def compared(kind, width, known, grown, used):
     import one_law_runs
 
     used.clear()
-    of = st.DigitalServo if kind == "digital" else st.PulseServo
+    of = {"digital": st.DigitalServo, "inductive": st.PulseServoInductive}.get(kind, st.PulseServo)
     servo = st.load_servo("hitec-hs-755hb").replace((one_law_runs.PROGRAM if kind == "digital" else {}) | known)
     without, grown_one = of(servo), of(servo.replace(grown))
     load = st.loads.Constant(0.05)

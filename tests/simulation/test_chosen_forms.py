@@ -82,7 +82,7 @@ def form_of(model, load=NO_LOAD, dtype="float64", told=False, bent=False):
     """Return the name of the kernels that a servo takes as a lane."""
     pulsed = isinstance(model, PULSED)
     (kind,) = lane_kinds.kinds_of(
-        model.pack(load), model.chip() if pulsed else NO_CHIP, 1, pulsed, dtype, NOBODY, NOBODY | told, bent,
+        model.pack(load), model.chip() if pulsed else NO_CHIP, 1, dtype, NOBODY, NOBODY | told, bent,
         model.firmware() or NO_FIRMWARE)
     return kind.recipe.name
 
@@ -177,4 +177,4 @@ def test_many_lanes_are_asked_what_each_of_them_is(servo):
         found = by_groups(may_depend, lanes, numbers, Piece())
         for k in range(lanes):
             own = mapped(lambda value, k=k: value[k].item() if isinstance(value, np.ndarray) else value, numbers)
-            assert found[k] == may_depend(own, Piece())
+            assert np.broadcast_to(found, lanes)[k] == may_depend(own, Piece())

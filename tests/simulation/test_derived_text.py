@@ -8,7 +8,7 @@ from servotwin.simulation import bus_run, lane_recipes, vector_calls
 from servotwin.simulation.compile.derive import derive
 
 RECIPES = (bus_run.PLAIN_BUSES, bus_run.ALL_BUSES, bus_run.DIGITAL_BUSES, lane_recipes.ALL_RUNS,
-           lane_recipes.PLAIN_RUNS, lane_recipes.ALL_DIGITAL, lane_recipes.LOOK_DIGITAL, lane_recipes.BY_TICKS,
+           lane_recipes.PLAIN_RUNS, lane_recipes.ALL_DIGITAL, lane_recipes.LOOK, lane_recipes.BY_TICKS,
            vector_calls.TICKS)
 
 

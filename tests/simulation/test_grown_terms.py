@@ -5,6 +5,7 @@ What docs/theory/growing.md says of it is done here, step by step, in a copy of 
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import pytest
 import servotwin
 
 PACKAGE = Path(servotwin.__file__).parent
+PAGE = Path(__file__).parents[2] / "docs/theory/growing.md"
 GROUPS, FRICTION = "parameters/groups.py", "models/terms/friction.py"
 PARAMETER = "    bearing_coulomb_torque: float | None = parameter("
 SLIDES = "    F = coulomb(friction, forward)\n    if friction.varies == 0.0:\n        return F\n    speed"
@@ -54,6 +56,7 @@ def share_balance(""")],
     FRICTION: [
         reads("quadratic_friction"), ("    K_eq: float\n", "    K_eq: float\n    K_w: float\n"),
         ("0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)", "0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)"),
+        ('**dict.fromkeys(_SHARES, _VARIES)}', '**dict.fromkeys(_SHARES, _VARIES), "K_w": CURVED_W}'),
         ("_replace(breakaway=", f"_replace(K_w={value('quadratic_friction')}, breakaway="),
         ("    gear_friction_budget,\n", "    gear_friction_budget,\n    quadratic_friction,\n"),
         (SLIDES,
@@ -63,16 +66,27 @@ def share_balance(""")],
         ("    return (STEEP_W if contact == CORE else 0 if",
          "    return (STEEP_W if contact == CORE else CURVED_W if friction.K_w > 0.0 and not at_rest(contact)"
          " else 0 if")]}
-# An off state: one more word and the resistance, the loop in `pack`, and what the word means
+# An off state: one more word and the resistance, and the loop in `pack`
+OFF_STATE = '    off_state: str | None = choice(("brake", "coast"), "what the bridge does between drives")\n'
 AN_OFF_STATE = {
-    GROUPS: [parameters("off_resistance"), ('off_state: str | None = choice(("brake", "coast"),',
-                                            'off_state: str | None = choice(("brake", "coast", "resist"),')],
+    GROUPS: [(OFF_STATE, OFF_STATE.replace('"coast")', '"coast", "resist")')
+              + '    off_resistance: float | None = parameter("R_off", "resistance", NOT_NEGATIVE, "of the brake", '
+                "THEORY.of(0.0, 1e3))\n")],
     "models/terms/bridge.py": [
-        ("READS = (\n", 'READS = (\n    "friction.off_resistance",\n'),
-        ("    off, silence = (Off(V_br + opens * (V_oc + V_ce0), R_a + (R_b * opens if battery else 0.0), opens)",
-         f"    R_off = {value('off_resistance')}\n"
-         "    off, silence = (Off(V_br + opens * (V_oc + V_ce0), R_a + R_off + (R_b * opens if battery else "
-         "0.0), opens)")]}
+        ("READS = (\n", 'READS = (\n    "electronics.off_resistance",\n'),
+        ("    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, silence, V_br, 0.0, 0.0)\n",
+         "    resists = 1.0 * np.equal(model.servo.get('electronics.off_state'), 'resist')\n"
+         "    R_off = resists * model.value_or('electronics.off_resistance', 0.0)\n"
+         "    off, silence = (own._replace(R=own.R + R_off) for own in (off, silence))\n"
+         "    return Bridge(V_ce0 + V_br, R_a + r_c + R_b, off, silence, V_br, 0.0, 0.0)\n")]}
+HEATS = {"thermal.winding_capacity": 0.5, "thermal.housing_capacity": 5.0, "thermal.winding_to_housing": 10.0,
+         "thermal.housing_to_ambient": 20.0}
+PLAYS = {"gear.backlash": 0.02, "gear.output_inertia": 1e-3}
+FORMS = {  # of servos that resist between drives: what they have anyway, by the kernels that they take
+    "side_by_side_float64": ("pulse", {}), "by_bands": ("pulse", {"friction.load_friction": 0.05}),
+    "by_coils": ("inductive", {"motor.armature_inductance": 5e-4}), "by_strides": ("pulse", HEATS),
+    "by_gaps": ("pulse", PLAYS), "plain_runs": ("pulse", {"potentiometer.quantisation": 1e-3}),
+    "gap_runs": ("pulse", PLAYS | {"potentiometer.quantisation": 1e-3}), "runs": ("pulse", PLAYS | HEATS)}
 # A number in each room, and of friction one of which `depends` says nothing
 NUMBERS = {
     FRICTION: [("    K_eq: float\n", "    K_eq: float\n    new: float = 0.0\n"),
@@ -122,8 +136,7 @@ NUMBERS = {
 }
 ROOMS = {  # by how much, and what the servo has anyway
     "friction": (0.2, {}), "shaft": (0.05, {}),
-    "heat": (50.0, {"thermal.winding_capacity": 0.5, "thermal.housing_capacity": 5.0,
-                    "thermal.winding_to_housing": 10.0, "thermal.housing_to_ambient": 20.0}),
+    "heat": (50.0, HEATS),
     "source": (0.5, {}), "bridge": (0.5, {}), "chip": (5e-5, {}), "load": (0.05, {}),
     "stops": (0.3, {"stops.upper_angle": 0.3, "stops.restitution": 0.2}), "sensor": (0.05, {}),
     "elastic": (0.5, {}), "firmware": (0.05, {})}
@@ -157,6 +170,19 @@ def check(cases):
         assert told["apart"] < 1e-9, (name, told)
 
 
+def files_of(section):
+    """Return the files that the steps of a section of the page name, behind their numbers."""
+    text = PAGE.read_text(encoding="utf-8").split(f"\n## {section}\n")[1].split("\n## ")[0]
+    return {name for line in re.findall(r"^\d\. (.*?):", text, re.MULTILINE) for name in re.findall(r"`(.*?)`", line)}
+
+
+@pytest.mark.parametrize(("section", "growth", "most"), [
+    ("A friction law", A_FRICTION_LAW, 4), ("An off state of the bridge", AN_OFF_STATE, 6)])
+def test_the_page_names_the_files_that_are_touched(section, growth, most):
+    assert files_of(section) == set(growth)
+    assert len(growth) <= most
+
+
 @pytest.mark.slow
 def test_a_friction_law(tmp_path):
     law = {"friction.quadratic_friction": 0.02}
@@ -165,8 +191,12 @@ def test_a_friction_law(tmp_path):
 
 @pytest.mark.slow
 def test_an_off_state_of_the_bridge(tmp_path):
-    state = {"electronics.off_state": "resist", "friction.off_resistance": 5.0}
-    check(dict(enumerate(grown(tmp_path, AN_OFF_STATE, [["pulse", 800.0, {}, state]]))))
+    state = {"electronics.off_state": "resist", "electronics.off_resistance": 5.0}
+    cases = [[kind, 800.0, known, state] for kind, known in FORMS.values()]
+    told = dict(zip(FORMS, grown(tmp_path, AN_OFF_STATE, cases), strict=True))
+    check(told)
+    for form, found in told.items():
+        assert form in found["used"], (form, found)
 
 
 @pytest.mark.slow

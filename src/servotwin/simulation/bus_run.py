@@ -35,9 +35,9 @@ from servotwin.simulation.lane_runs import programs_of
 Array = NDArray[np.float64]
 
 _ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("go_on", "look"))
-ALL_BUSES = Recipe("buses", _ENTRIES, absent=ALL_RUNS.absent)
-PLAIN_BUSES = Recipe("plain_buses", _ENTRIES, absent=PLAIN_RUNS.absent, never=PLAIN_RUNS.never)
-DIGITAL_BUSES = Recipe("digital_buses", _ENTRIES, absent=ALL_DIGITAL.absent, present=ALL_DIGITAL.present)
+ALL_BUSES, PLAIN_BUSES, DIGITAL_BUSES = (
+    Recipe(name, _ENTRIES, knows=form.knows, always=form.always)
+    for name, form in (("buses", ALL_RUNS), ("plain_buses", PLAIN_RUNS), ("digital_buses", ALL_DIGITAL)))
 PLAIN, RARE, OTHER = 0, 1, 2  # terms of a servo: what the plain form follows, what others do, and neither
 SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 
@@ -111,11 +111,11 @@ def way_of(numbers: Numbers, digital: bool, knowing: bool = True) -> Any:
 
     With `knowing` it is asked too which numbers of its terms kernels know: `OTHER` has one that no form knows.
     """
-    terms = Terms(numbers, NO_CHIP, NO_FIRMWARE, False)
+    terms = Terms(numbers, NO_CHIP, NO_FIRMWARE)
     if is_plain():  # a fast form has no worth
         return OTHER
     if not knowing:
-        return np.where(terms.suit(PLAIN_RUNS), PLAIN, RARE)
+        return np.where(terms.suit(PLAIN_RUNS.knows), PLAIN, RARE)
     every = ALL_DIGITAL if digital else ALL_RUNS
     return np.where(terms.fit(every), np.where(terms.fit(PLAIN_RUNS), PLAIN, RARE), OTHER)
 

@@ -12,6 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError
+from servotwin.models.terms.elastic import Elastic
+from servotwin.models.terms.play import Play
+from servotwin.models.terms.shaft import Shaft
+from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile.calls import program, tick_address
 from servotwin.simulation.compile.layout import GIVEN, HANDLE, MESSAGES, STAGES, TICK, VERSION
 from servotwin.simulation.vector_calls import Room, programs_of
@@ -187,13 +191,13 @@ class CEntry:
 
     def travel(self) -> tuple[Array, Array]:
         """Return the stops of each lane [rad]; infinite where there are none."""
-        stops = self._parts().numbers.now("stops")
+        stops = self._parts().numbers.now(Stops)
         return np.array(stops.lower), np.array(stops.upper)
 
     def own_inertia(self) -> Array:
         """Return of each lane what turns with the output without its load, the motor included unless it has play."""
         numbers = self._parts().numbers
-        shaft, apart = numbers.now("shaft"), (numbers.now("play").half > 0.0) | (numbers.now("elastic").k > 0.0)
+        shaft, apart = numbers.now(Shaft), (numbers.now(Play).half > 0.0) | (numbers.now(Elastic).k > 0.0)
         known = numbers.imposed.load_inertia
         load = np.where(np.isnan(known), numbers.load_total, known)
         return np.asarray(np.where(apart, shaft.J_out, shaft.J) - load)

@@ -40,15 +40,18 @@ class _Column(np.ndarray[Any, np.dtype[Any]]):
         return bool(yes)
 
 
-def by_groups(law: Callable[..., int], lanes: int, *arguments: Any) -> NDArray[np.int64]:
-    """Return what a law says of each lane, whose arguments are named tuples of numbers and of columns (lanes,)."""
+def by_groups(law: Callable[..., int], lanes: int, *arguments: Any) -> NDArray[np.int64] | int:
+    """Return what a law says of each lane, or of all of them if its questions do not divide them.
+
+    Its arguments are named tuples of numbers and of columns of so many lanes.
+    """
     group: _Which = [np.arange(lanes)]
     found, waiting = np.empty(lanes, np.int64), [group[0]]
 
     def column(values: Any) -> Any:
         if not isinstance(values, np.ndarray):
             return values
-        own = values.view(_Column)
+        own = values.reshape(-1).view(_Column)
         own.which = group
         return own
 
@@ -56,7 +59,10 @@ def by_groups(law: Callable[..., int], lanes: int, *arguments: Any) -> NDArray[n
     while waiting:
         group[0] = which = waiting.pop()
         try:
-            found[which] = law(*given)
+            said = law(*given)
+            if len(which) == lanes:
+                return said
+            found[which] = said
         except _DividedError as divided:
             waiting += [which[divided.holds], which[~divided.holds]]
     return found

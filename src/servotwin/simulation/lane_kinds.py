@@ -2,76 +2,86 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from functools import cache, cached_property
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache, cached_property, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine import tiles
+from servotwin.models.engine.demands import needed
 from servotwin.models.engine.motion import may_depend
 from servotwin.models.engine.records import numbers_in
 from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.dependence import FADING, PLAY, PWM, RECORDED, SLACK, SPRING, STEEP_W, TABLE
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
-from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.rooms import NOTHING, ROOMS
 from servotwin.physics.pieces import Piece
 from servotwin.simulation import lane_recipes as recipes
 from servotwin.simulation.compile import Recipe, is_plain
-from servotwin.simulation.compile.unread import in_general, told, unread
+from servotwin.simulation.compile.unread import in_general, unread
 from servotwin.simulation.lane_groups import by_groups
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 _SMALLEST = 2.0**-150  # what is not more is zero in float32
-_NOTHING: dict[str, Any] = {**NEUTRAL._asdict(), "chip": NO_CHIP, "firmware": NO_FIRMWARE}
 
 
 class Terms:
-    """What lanes have, each question asked once."""
+    """What lanes ask of whoever follows them, and what they have; each question is asked once."""
 
-    def __init__(self, numbers: Numbers, chip: Chip, firmware: Firmware, swept: Any) -> None:
+    def __init__(self, numbers: Numbers, chip: Chip, firmware: Firmware, swept: Any = False, inputs: Any = 0) -> None:
         self.numbers, self.chip = numbers, chip
-        self._rooms: dict[str, Any] = {**numbers._asdict(), "chip": chip, "firmware": firmware}
-        self._known: dict[str, Any] = {"sweep": swept}
+        self._rooms: dict[str, Any] = numbers._asdict() | dict(zip(
+            (name for name in ROOMS if name not in Numbers._fields), (chip, firmware), strict=True))
+        self._known: dict[str, Any] = {}
+        self._firmware, self._inputs = firmware, inputs
+        self._wave: Any = Piece(sweep=swept if np.ndim(swept) else float(swept))
 
     @cached_property
-    def _depends(self) -> Any:
-        """On what the acceleration may depend, of all lanes or each."""
-        swept = self._known["sweep"]
-        wave: Any = Piece(sweep=swept if np.ndim(swept) else float(swept))
-        try:  # most columns do not matter to it
-            return may_depend(self.numbers, wave)
-        except ValueError:  # an array is neither true nor false
-            lanes = max(len(x) for x in (*numbers_in(self.numbers), swept) if isinstance(x, np.ndarray))
-            return by_groups(may_depend, lanes, self.numbers, wave)
+    def demands(self) -> Any:
+        """What all lanes, or each, ask for: flags of `terms.dependence`."""
+        return (_said(may_depend, self.numbers, self._wave) | _said(needed, self.numbers, self.chip, self._firmware)
+                | self._inputs)
 
-    def have(self, name: str) -> Any:
-        """Tell which lanes have a term ("heat", told by its first number), or a number of one ("motor.L")."""
-        if name not in self._known:
-            room, *fields = name.split(".")
-            own, nothing = self._rooms[room], _NOTHING[room]
-            for field in fields or nothing._fields[:1]:
-                own, nothing = getattr(own, field), getattr(nothing, field)
-            self._known[name] = own != nothing
-        return self._known[name]
+    def ask(self, flags: int) -> Any:
+        """Tell which lanes ask for some of this."""
+        return (self.demands & flags) != 0
 
-    def have_any(self, names: Iterable[str]) -> Any:
-        """Tell which lanes have one of some terms or numbers."""
+    def have(self, path: str) -> Any:
+        """Tell in which lanes a number of a term ("motor.L") is not what it is where the term is absent."""
+        if path not in self._known:
+            room, *fields = path.split(".")
+            self._known[path] = reduce(getattr, fields, self._rooms[room]) != reduce(getattr, fields, NOTHING[room])
+        return self._known[path]
+
+    def have_any(self, paths: Iterable[str]) -> Any:
+        """Tell which lanes have one of some numbers."""
         found: Any = False
-        for name in names:
-            found = _either(found, self.have(name))
+        for path in paths:
+            found = _either(found, self.have(path))
         return found
 
     def fit(self, recipe: Recipe) -> Any:
-        """Tell for which lanes kernels are made: for those with nothing that they leave out, do not know or follow."""
-        suited = self.suit(recipe)
+        """Tell for which lanes kernels are made: for those whose numbers they know, and all of whose terms."""
+        suited = self.suit(recipe.knows)
         return _without(suited, self.have_any(_unknown(recipe))) if np.any(suited) else suited  # to look takes a second
 
-    def suit(self, recipe: Recipe) -> Any:
-        """Tell for which lanes kernels would be made, if they knew all numbers of the terms that they have."""
-        return _without((self._depends & ~recipe.knows) == 0, self.have_any(recipe.absent))
+    def suit(self, knows: int) -> Any:
+        """Tell for which lanes kernels would be made that follow this, if they knew all numbers."""
+        return (self.demands & ~knows) == 0
+
+
+def _said(law: Callable[..., int], *given: Any) -> Any:
+    """Return what a law says of one servo, or of each whose numbers are columns."""
+    try:  # most columns do not matter to it
+        return law(*given)
+    except ValueError:  # an array is neither true nor false
+        lanes = max(x.size for each in given for x in numbers_in(each) if isinstance(x, np.ndarray))
+        return by_groups(law, lanes, *given)
 
 
 @cache
@@ -115,46 +125,44 @@ class OneByOne(NamedTuple):
     recipe: Recipe
 
 
-def kinds_of(numbers: Numbers, chip: Chip, lanes: int, pulsed: bool, dtype: str, swept: Mask, recorded: Mask,
+def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, recorded: Mask,
              curved: bool, firmware: Firmware = NO_FIRMWARE) -> list[SideBySide | OneByOne]:
     """Return how lanes run, whose numbers are numbers or arrays (lanes,).
 
     `swept` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
     potentiometers have a table.
     """
-    terms = Terms(numbers, chip, firmware, swept.any() and swept)
-    recording = recorded.any() and recorded
-    if _any(terms.have("elastic")) or _any(numbers.bridge.pwm > 0.0):
-        return _alone(terms, recording, lanes)
+    inputs = recorded * RECORDED if recorded.any() else 0
+    terms = Terms(numbers, chip, firmware, swept.any() and swept, inputs | TABLE * curved)
+    if _any(terms.ask(SPRING | PWM)):
+        return _alone(terms, lanes)
     found: list[SideBySide | OneByOne] = []
-    left: Any = True
-    if pulsed and not curved and not is_plain():
-        side = _may_go_side_by_side(terms, recording, dtype)
-        for form, wanted, of_bands in _forms(terms):
-            own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
-            which = _and(side, wanted, left)
-            if _any(which):
-                which = _and(which, terms.fit(recipes.side_by_side(form, own_type, True, of_bands)))
-                left = _without(left, which)
-                found.append(_together(terms, form, own_type, _indices(which, lanes)))
-    loose = pulsed and _without(terms.have("play"), recording)
-    for recipe, wanted in ((recipes.PLAIN_RUNS, True), (recipes.PENDULUM_RUNS, True), (recipes.GAP_RUNS, loose)):
-        which = _and(left, wanted, not is_plain())
+    left: Any = not is_plain()
+    side = _stays(terms) if dtype == "float32" else True
+    for form, knows, made_for in recipes.SIDES:
+        own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
+        which = _and(terms.suit(knows), not made_for or terms.ask(made_for), side, left)
+        if _any(which):
+            which = _and(which, terms.fit(recipes.side_by_side(form, own_type, True, True)))
+            left = _without(left, which)
+            found.append(_together(terms, form, own_type, _indices(which, lanes)))
+    for recipe, wanted in ((recipes.PLAIN_RUNS, True), (recipes.PENDULUM_RUNS, True), (
+            recipes.GAP_RUNS, terms.ask(PLAY))):
+        which = _and(left, wanted)
         if _any(which):
             which = _and(which, terms.fit(recipe))
             left = _without(left, which)
             found.append(OneByOne(_indices(which, lanes), recipe))
+    left = True if is_plain() else left
     return [kind for kind in (*found, *_at_last(terms, left, recipes.ALL_RUNS, lanes)) if len(kind.which)]
 
 
-def _alone(terms: Terms, recording: Any, lanes: int) -> list[SideBySide | OneByOne]:
+def _alone(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
-    digital = _any(terms.numbers.bridge.pwm > 0.0)
-    sprung, left = terms.have("elastic"), _not(terms.have("elastic"))
-    found = [*_at_last(terms, sprung, recipes.ELASTIC_RUNS[digital], lanes)]
-    which = _without(left, recording) if digital and not is_plain() else False
-    if _any(which):
-        which = _and(which, terms.fit(recipes.PLAIN_DIGITAL))
+    digital, sprung = _any(terms.ask(PWM)), terms.ask(SPRING)
+    found, left = [*_at_last(terms, sprung, recipes.ELASTIC_RUNS[digital], lanes)], _not(sprung)
+    if digital and not is_plain() and _any(left):
+        which = _and(left, terms.fit(recipes.PLAIN_DIGITAL))
         left = _without(left, which)
         found.append(OneByOne(_indices(which, lanes), recipes.PLAIN_DIGITAL))
     found += _at_last(terms, left, recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS, lanes)
@@ -164,61 +172,37 @@ def _alone(terms: Terms, recording: Any, lanes: int) -> list[SideBySide | OneByO
 def _at_last(terms: Terms, left: Any, recipe: Recipe, lanes: int) -> Iterator[OneByOne]:
     """Return how those run that no faster form takes: none that its kernels do not know either, as terms are now."""
     if is_plain():  # a fast form has no worth, nor to ask for it
-        yield OneByOne(_indices(left, lanes), told(recipe))
+        yield OneByOne(_indices(left, lanes), recipe)
     elif _any(left):
         which = _and(left, terms.fit(recipe))
         yield OneByOne(_indices(which, lanes), recipe)
         yield OneByOne(_indices(_without(left, which), lanes), in_general(recipe))
 
 
-def _may_go_side_by_side(terms: Terms, recording: Any, dtype: str) -> Any:
-    """Tell which pulse servos may go side by side, if there is a form for their terms."""
-    numbers, bridge = terms.numbers, terms.numbers.bridge
-    side = (_without(True, recording) & (numbers.sensor.step == 0.0) & (numbers.motor.K_b > 0.0)
-            & (bridge.silence.coast == bridge.off.coast))
-    if dtype == "float32":  # what is not zero has to stay so
-        for x in (*numbers_in(numbers), *numbers_in(terms.chip)):
-            fits = (x == 0.0) | (abs(x) > _SMALLEST)
-            side = side if fits is True else side & fits
-    return side
-
-
-def _forms(terms: Terms) -> list[tuple[int, Any, bool]]:
-    """Return the forms of going side by side, for which lanes each is if it knows their terms, and if in bands."""
-    bridge = terms.numbers.bridge
-    banded, striding = terms.have_any(recipes.BANDED), terms.have_any(recipes.STRIDING)
-    braked = (bridge.off.D == 0.0) & (bridge.D_drive < terms.numbers.source.V)
-    by_bands = _either(banded, terms.have("sensor.half_slack") & _not(braked))
-    return [(tiles.ONE_FORMULA, _without(braked, by_bands), False),
-            (tiles.ARCS, _without(True, braked, by_bands), False), (tiles.BANDS, by_bands, True),
-            (tiles.STRIDES, _without(striding, banded), False), (tiles.STRIDES, _and(striding, banded), True),
-            (tiles.COILS, terms.have("motor.L"), False), (tiles.GAPS, terms.have("play"), False)]
+def _stays(terms: Terms) -> Any:
+    """Tell in which lanes what is not zero stays so in float32."""
+    stays: Any = True
+    for x in (*numbers_in(terms.numbers), *numbers_in(terms.chip)):
+        fits = (x == 0.0) | (abs(x) > _SMALLEST)
+        stays = stays if fits is True else stays & fits
+    return stays
 
 
 def _together(terms: Terms, form: int, dtype: str, which: Indices) -> SideBySide:
     """Return how some lanes run side by side, by what some of them have."""
-    own = terms.numbers.friction
+    asked = terms.demands[which] if np.ndim(terms.demands) else terms.demands
 
-    def some(flag: Any) -> bool:
-        return _any(flag[which] if np.ndim(flag) else flag)
+    def some(flags: int) -> bool:
+        return _any((asked & flags) != 0)
 
-    return SideBySide(which, form, some(terms.have("sensor.half_slack")), dtype,
-                      form == tiles.BANDS and some(own.varies * own.w_s > 0.0),
-                      form == tiles.STRIDES and some(terms.have_any(recipes.BANDED)))
+    return SideBySide(which, form, some(SLACK), dtype, form == tiles.BANDS and some(FADING),
+                      form == tiles.STRIDES and some(recipes.BANDED))
 
 
 def goes_together(numbers: Numbers, pulsed: bool) -> bool:
     """Tell whether all lanes take about as long, for none has a term that would let it run on its own."""
-    terms = Terms(numbers, NO_CHIP, NO_FIRMWARE, False)
-    return pulsed and not _any(terms.have_any(("friction.kappa", "play", *recipes.STRIDING)))
-
-
-def looking(recipe: Recipe) -> Recipe:
-    """Return how lanes are looked at that run one by one in this way."""
-    digital = "firmware.T_c" in recipe.present
-    look = (recipes.LOOK_ELASTIC[digital] if "elastic.k" in recipe.present else recipes.LOOK_DIGITAL if digital
-            else recipes.LOOK_ONE_BY_ONE)
-    return told(look) if recipe.absent == told(recipe).absent else look
+    asked = Terms(numbers, NO_CHIP, NO_FIRMWARE).ask(STEEP_W | PLAY | recipes.STRIDING)
+    return pulsed and not _any(asked)
 
 
 def _without(some: Any, *others: Any) -> Any:

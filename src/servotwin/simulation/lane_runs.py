@@ -33,7 +33,7 @@ def run(work: Work) -> Raw:
     """Run all lanes of a chunk: side by side where that is possible, one after the other where not."""
     raw = empty_raw(work)
     lanes = lanes_of(work)
-    for kind in kinds_of(work.numbers, work.chip or NO_CHIP, work.lanes, work.law == "pulse", work.dtype, swept(lanes),
+    for kind in kinds_of(work.numbers, work.chip or NO_CHIP, work.lanes, work.dtype, swept(lanes),
                          work.torque.count > 0, bool(work.curve), work.firmware or NO_FIRMWARE):
         if isinstance(kind, OneByOne):
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)

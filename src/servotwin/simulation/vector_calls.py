@@ -17,7 +17,6 @@ from servotwin.simulation import lane_recipes
 from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.compile.layout import GIVEN, STAGES
-from servotwin.simulation.lane_kinds import looking
 from servotwin.simulation.lane_memory import nothing_yet
 from servotwin.simulation.lanes import ALL_FIELDS
 
@@ -101,7 +100,7 @@ def calls_in_tiles(some: Any, store: Store, room: Room, command: Array) -> dict[
         "impose": [call_of(TICKS, "impose_on_tiles", room.has, room.given, store.columns.numbers, which, places,
                            store.work, rows)],
         "advance": [advance, *lost], "show": [call_of(TICKS, "show_tiles", which, rows, room.shaft)],
-        "look": [call_of(lane_recipes.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns, store.inputs[0], which, rows,
+        "look": [call_of(lane_recipes.LOOK, "side_by_side", store.columns, store.inputs[0], which, rows,
                          room.seen)]}
 
 
@@ -122,7 +121,7 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
         "impose": [call_of(TICKS, "impose_on_records", room.has, room.given, store.columns.numbers, which,
                            np.arange(len(which)), store.work, rows)],
         "advance": advance, "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
-        "look": [call_of(looking(some.recipe), "one_by_one", store.columns, *store.inputs, which, some.memories,
+        "look": [call_of(lane_recipes.LOOK, "one_by_one", store.columns, *store.inputs, which, some.memories,
                          room.seen)]}
     return found | _clock(some, store, room)
 

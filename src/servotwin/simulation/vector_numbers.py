@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, LoadError
 from servotwin.models.engine.memory import Memories, put_started
 from servotwin.models.engine.modes import INSIDE, NOWHERE, RIGID
-from servotwin.models.engine.records import columns_of, put_columns, tiles_with
+from servotwin.models.engine.records import columns_of, fields_of, put_columns, tiles_with
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.tiles import Lanes as Columns
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import NO_FIRMWARE
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.models.terms.play import Play
 from servotwin.models.terms.sensor import table_of
+from servotwin.models.terms.stops import Stops
 from servotwin.simulation import lane_runs
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
@@ -86,7 +88,7 @@ class LaneNumbers:
             self.reduction[chunk.which] = flat(chunk.model.value("gear.gear_reduction"))
             self.V_oc[chunk.which] = flat(chunk.model.value_or("supply.open_circuit_voltage", math.nan))
         for k in np.concatenate([*supplies.lanes, np.zeros(0, np.int64)]).tolist():
-            check_rigid(f"lane {k} on a bus", Elastic(*(x[0] for x in self.now("elastic", np.array([k])))))
+            check_rigid(f"lane {k} on a bus", Elastic(*(x[0] for x in self.now(Elastic, np.array([k])))))
         self.given = self.columns.numbers.copy()
         if imposed is not None:
             hung, fed = (np.flatnonzero(~np.isnan(values)) for values in imposed)
@@ -120,9 +122,10 @@ class LaneNumbers:
                           np.zeros(0), none, none - 1, self.accuracy, programs)
         return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
 
-    def now(self, room: str, which: Indices | None = None) -> Any:
-        """Return a record of numbers of some lanes, or of all, as they are now, each an array."""
-        return columns_of(type(getattr(NEUTRAL, room)), self.columns.numbers[room],
+    def now(self, kind: Any, which: Indices | None = None) -> Any:
+        """Return a term's record of numbers of some lanes, or of all, as they are now, each an array."""
+        name = next(name for name, term in fields_of(Numbers) if term is kind)
+        return columns_of(kind, self.columns.numbers[name],
                           slice(self.count) if which is None else which)
 
     def impose(self, which: Indices, J_L: Array | None, V: Array | None) -> bool:
@@ -207,7 +210,7 @@ class LaneNumbers:
             y = start_vector(part.model.states, part.numbers, q, {})
             if angle is not None:
                 self.check_angles(angle[place[own]], own)
-            play = self.now("play", own).half > 0.0
+            play = self.now(Play, own).half > 0.0
             point = memories.rows["point"]
             for name, values in y._asdict().items():
                 point["y"][name][place[own]] = point["anchor"][name][place[own]] = np.ravel(values)
@@ -217,7 +220,7 @@ class LaneNumbers:
 
     def check_angles(self, angle: Array, which: Indices) -> None:
         """Raise InputError if an angle [rad] is beyond a stop; names the lane."""
-        lower, upper, _ = self.now("stops", which)
+        lower, upper, _ = self.now(Stops, which)
         good = (angle >= lower - SLACK) & (angle <= upper + SLACK)
         if not good.all():
             k = int(np.argmin(good))

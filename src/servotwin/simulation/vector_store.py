@@ -16,12 +16,14 @@ from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID
 from servotwin.models.engine.records import TILE, columns_of, room
 from servotwin.models.engine.ticks import ANGLE, SPEED
 from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.play import Play
 from servotwin.simulation import lane_recipes, lane_runs
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
-from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of, looking
+from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
 from servotwin.simulation.lane_memory import copied, flat, memories_of, nothing_yet, put, put_back, put_memories, taken
 from servotwin.simulation.lane_runs import some_of
 from servotwin.simulation.lanes import ALL_FIELDS
@@ -83,7 +85,7 @@ class Store:
         numbers, lanes = self.numbers, slice(self.numbers.count)
         own = columns_of(Numbers, numbers.columns.numbers, lanes), columns_of(Chip, numbers.columns.chips, lanes)
         programs = numbers.columns.firmware
-        kinds = kinds_of(*own, numbers.count, numbers.pulsed, self._dtype, np.zeros(numbers.count, np.bool_),
+        kinds = kinds_of(*own, numbers.count, self._dtype, np.zeros(numbers.count, np.bool_),
                          numbers.torque.count > 0, bool(numbers.curve.size),
                          Firmware(*(programs[name] for name in Firmware._fields)) if numbers.digital else NO_FIRMWARE)
         if numbers.supplies.lanes:
@@ -140,7 +142,7 @@ class Store:
 
     def _go_on_from(self, memories: Memories, others: Indices, common: Common | None) -> None:
         """Take the memories of all lanes, of which some have other numbers than when they were made."""
-        play, sprung = self.numbers.now("play").half > 0.0, self.numbers.now("elastic").k > 0.0
+        play, sprung = self.numbers.now(Play).half > 0.0, self.numbers.now(Elastic).k > 0.0
         point = memories.rows["point"]
         point["anchor_time"][others] = math.inf
         mesh = point["mode"]["mesh"]
@@ -355,7 +357,7 @@ class _Tiles:
         return np.asarray(edge + since)
 
     def look(self, store: Store, seen: Array) -> None:
-        self._look = self._look or call_of(lane_recipes.LOOK_SIDE_BY_SIDE, "side_by_side", store.columns,
+        self._look = self._look or call_of(lane_recipes.LOOK, "side_by_side", store.columns,
                                            store.inputs[0], self.which, self.rows, seen)
         self._look()
 
@@ -417,7 +419,7 @@ class _Records:
         return np.asarray(self.rows["frames"] * self.rows["beat"] + self.rows["point"]["time"])
 
     def look(self, store: Store, seen: Array) -> None:
-        self._look = self._look or call_of(looking(self.recipe), "one_by_one", store.columns, *store.inputs,
+        self._look = self._look or call_of(lane_recipes.LOOK, "one_by_one", store.columns, *store.inputs,
                                            self.which, self.memories, seen)
         self._look()
 

@@ -22,6 +22,7 @@ from servotwin.models.engine.modes import (
     limited,
     sign_of,
 )
+from servotwin.models.terms.dependence import DROPS, ONE_WAY, PULSES, PWM, SHOWN, SILENCE, STRAIGHT
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.motor import Motor, inductive
 from servotwin.models.terms.source import Source, loaded_voltage, regulated
@@ -57,6 +58,16 @@ class Bridge(NamedTuple):
 
 
 NO_BRIDGE = Bridge(0.0, 0.0, Off(0.0, 0.0, 0.0), Off(0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+ACTS = {"D_drive": STRAIGHT, "R_drive": STRAIGHT, "off.R": STRAIGHT, "off.coast": SHOWN | PULSES, "silence.R": STRAIGHT,
+        "silence.coast": SHOWN | PULSES, "V_br": SHOWN | PULSES, "pwm": PWM, "one_way": ONE_WAY}
+"""Where each number acts; whether a bridge is open shows of its voltages, which pulses are compared with."""
+
+
+def needs(bridge: Bridge, source: Source) -> int:
+    """Return what there is to be followed of the bridge."""
+    brakes = bridge.off.D == 0.0 and bridge.D_drive < source.V
+    return ((0 if brakes else DROPS) | (SILENCE if heeds_silence(bridge) else 0) | (PWM if bridge.pwm > 0.0 else 0)
+            | (ONE_WAY if bridge.one_way > 0.0 else 0))
 
 
 def coasts(bridge: Bridge) -> bool:

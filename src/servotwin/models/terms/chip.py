@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from servotwin.models.terms.dependence import PULSES
 from servotwin.models.terms.given import Given
 
 READS = (
@@ -36,11 +37,20 @@ class Chip(NamedTuple):
 
 
 NO_CHIP = Chip(*[0.0] * 14)  # of a plant that follows its command at all times
+ACTS = dict.fromkeys((
+    "T_0", "slope", "beta", "c_s", "noise", "half_deadband", "K", "t_min", "tau_s", "shortest", "longest", "timeout",
+    "frame_period", "V_oc"), PULSES)
+"""Where each number acts."""
 
 
 def present(chip: Chip) -> bool:
     """Tell whether pulses are decided upon, frame by frame."""
     return chip.frame_period > 0.0
+
+
+def needs(chip: Chip) -> int:
+    """Return what there is to be followed of the chip."""
+    return PULSES if chip.K != 0.0 else 0  # edges may come at times of their own
 
 
 def pack(model: Given, period: Any, timeout: Any) -> Chip:

@@ -14,7 +14,7 @@ import numpy as np
 from servotwin.errors import LoadError
 from servotwin.loads import Load
 from servotwin.models.engine.modes import PUSH_BACKWARD, PUSH_FORWARD, SPRUNG, Vector
-from servotwin.models.terms.dependence import ON_Q, TWO_BODIES
+from servotwin.models.terms.dependence import ON_Q, SPRING, TWO_BODIES
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.shaft import Shaft
 from servotwin.parameters.group import Relation
@@ -39,6 +39,8 @@ class Elastic(NamedTuple):
 
 
 NO_ELASTIC = Elastic(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+ACTS = dict.fromkeys(("k", "c", "half", "J", "b", "gravity", "hanging_angle"), SPRING)
+"""Where each number acts."""
 
 
 def present(elastic: Elastic) -> bool:
@@ -59,6 +61,11 @@ def geared(elastic: Elastic) -> bool:
 def depends(elastic: Elastic, still: bool) -> int:
     """Return on what the acceleration depends through the spring, unless both bodies stand still."""
     return TWO_BODIES | ON_Q if elastic.k > 0.0 and not still else 0
+
+
+def needs(elastic: Elastic) -> int:
+    """Return what else there is to be followed of the spring."""
+    return SPRING if elastic.k > 0.0 else 0
 
 
 def turning(elastic: Elastic, y: Vector) -> float:

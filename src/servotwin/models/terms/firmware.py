@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from servotwin.models.terms import sensor
+from servotwin.models.terms.dependence import AT_COMMANDS, BEYOND, PROGRAM
 from servotwin.models.terms.given import Given
 
 READS = tuple(f"firmware.{name}" for name in (
@@ -91,11 +92,28 @@ class Firmware(NamedTuple):
 
 
 NO_FIRMWARE = Firmware(*[0.0] * len(Firmware._fields))
+ACTS = {
+    **dict.fromkeys((  # in measuring, P and D, and limits that are compared with at every tick
+        "T_c", "t_phi", "T_d", "quantum", "weight", "h", "gate", "k_p", "k_d", "of_measurement", "m", "delta",
+        "duty_limit", "I_m", "senses_bus", "lower", "upper", "overload_duty", "trip_current", "trip_temperature",
+        "undervoltage", "timeout", "per_volt", "noise", "b_o"), PROGRAM),
+    **dict.fromkeys((
+        "k_i", "k_v", "k_a", "threshold", "I_limit", "kappa", "at_rest", "rest_travel", "whole", "minimum",
+        "torque_limit", "slew", "brakes", "v", "a", "v_0", "overload_time", "stall_travel", "overload_output",
+        "latches", "trip_time", "resets", "restart_time", "loss", "failsafe", "soft_duty", "soft_time"), BEYOND),
+    **dict.fromkeys((
+        "resolution", "goals", "latency", "per_second", "at_nothing", "shortest", "longest", "T_f"), AT_COMMANDS)}
+"""Where each number acts."""
 
 
 def present(firmware: Firmware) -> bool:
     """Tell whether a program decides on the drive."""
     return firmware.T_c > 0.0
+
+
+def needs(firmware: Firmware) -> int:
+    """Return what there is to be followed of the program."""
+    return PROGRAM if firmware.T_c > 0.0 else 0
 
 
 def pack(model: Given, period: Any) -> Firmware:

@@ -16,7 +16,7 @@ from servotwin.models.engine.modes import (
     SATURATED_BACKWARD,
     in_linear_zone,
 )
-from servotwin.models.terms.dependence import CURVED_T
+from servotwin.models.terms.dependence import CURVED_T, FOLLOWS
 from servotwin.physics.electronics import error_beyond_deadband, proportional_voltage
 from servotwin.physics.pieces import Piece
 
@@ -32,6 +32,10 @@ class Follower(NamedTuple):
 
 
 NO_FOLLOWER = Follower(1.0, 0.0, math.inf)
+ACTS = {"gain": FOLLOWS, "half_deadband": FOLLOWS, "V_max": FOLLOWS}
+"""Where each number acts."""
+INPUTS = {"sweep": CURVED_T}
+"""Where numbers of a command act, by their names in its pieces."""
 
 
 def depends(zone: int, u: Piece) -> int:

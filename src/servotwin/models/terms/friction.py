@@ -13,7 +13,7 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.engine.modes import CORE, at_rest
-from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, FADING, STEEP_W
+from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, DRY, FADING, STEEP_W
 from servotwin.models.terms.given import Given
 from servotwin.physics.friction import breakaway_torque, coulomb_torque
 from servotwin.physics.load_friction import (
@@ -56,6 +56,10 @@ class Friction(NamedTuple):
 
 
 NO_FRICTION = Friction(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_VARIES = BY_SHARE | FADING | CURVED_W
+ACTS = {"F_forward": DRY, "F_backward": DRY, "breakaway": DRY, "kappa": STEEP_W, "varies": _VARIES,
+        "w_s": FADING | CURVED_W, "alpha": FADING | CURVED_W, **dict.fromkeys(_SHARES, _VARIES)}
+"""Where each number acts."""
 
 
 def present(friction: Friction) -> bool:

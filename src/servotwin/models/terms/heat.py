@@ -27,6 +27,8 @@ class Heat(NamedTuple):
 
 
 NO_HEAT = Heat(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+ACTS = dict.fromkeys(("C_w", "C_h", "G_wh", "G_ha", "T_amb", "magnet"), ON_HEAT)
+"""Where each number acts."""
 
 
 def present(heat: Heat) -> bool:

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from servotwin import loads
-from servotwin.models.terms.dependence import CURVED_Q, ON_Q
+from servotwin.models.terms.dependence import CURVED_Q, DRY, ON_Q
 from servotwin.physics.shaft import pendulum_stiffness, pendulum_torque, spring_torque
 
 _TOO_FAR = 1e12  # rad
@@ -23,6 +23,8 @@ class Load(NamedTuple):
 
 
 NO_LOAD = Load(0.0, 0.0, 0.0, 0.0, 0.0)
+ACTS = {"coulomb": DRY, "stiffness": ON_Q, "rest_angle": ON_Q, "gravity": CURVED_Q, "hanging_angle": CURVED_Q}
+"""Where each number acts."""
 
 
 def dry(load: Load) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from servotwin import physics
-from servotwin.models.terms.dependence import ON_I
+from servotwin.models.terms.dependence import FREE_RUNNING, ON_I, STRAIGHT
 from servotwin.models.terms.given import Given
 
 
@@ -19,6 +19,8 @@ class Motor(NamedTuple):
 
 
 NO_MOTOR = Motor(0.0, 0.0, 1.0, 0.0)
+ACTS = {"K": STRAIGHT, "K_b": STRAIGHT, "R": STRAIGHT, "L": ON_I}
+"""Where each number acts."""
 
 
 def inductive(motor: Motor) -> bool:
@@ -29,6 +31,11 @@ def inductive(motor: Motor) -> bool:
 def depends(motor: Motor) -> int:
     """Return on what the acceleration depends through the motor."""
     return ON_I if motor.L > 0.0 else 0
+
+
+def needs(motor: Motor) -> int:
+    """Return what else there is to be followed of the motor."""
+    return 0 if motor.K_b > 0.0 else FREE_RUNNING
 
 
 def pack(model: Given, reduction: float, inductance: float) -> Motor:

@@ -8,7 +8,7 @@ import numpy as np
 
 from servotwin import physics
 from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vector, moving
-from servotwin.models.terms.dependence import TWO_BODIES
+from servotwin.models.terms.dependence import PLAY, TWO_BODIES
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.shaft import Shaft
 from servotwin.parameters.group import Relation
@@ -31,6 +31,8 @@ class Play(NamedTuple):
 
 
 NO_PLAY = Play(0.0, 0.0)
+ACTS = {"half": PLAY, "bearing": PLAY}
+"""Where each number acts."""
 
 
 def present(play: Play) -> bool:
@@ -41,6 +43,11 @@ def present(play: Play) -> bool:
 def depends(mesh: int, still: bool) -> int:
     """Return on what the acceleration depends through the play, unless both bodies stand still."""
     return TWO_BODIES if mesh == INSIDE and not still else 0
+
+
+def needs(play: Play) -> int:
+    """Return what else there is to be followed of the play."""
+    return PLAY if play.half > 0.0 else 0
 
 
 def met(play: Play, shaft: Shaft, forward: bool, y: Vector) -> Vector:

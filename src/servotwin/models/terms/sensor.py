@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from servotwin import physics
-from servotwin.models.terms.dependence import ON_Q
+from servotwin.models.terms.dependence import FOLLOWS, ON_Q, PROGRAM, PULSES, SLACK, STEPS
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.source import Source
 from servotwin.physics.backlash import play
@@ -36,6 +36,8 @@ class Sensor(NamedTuple):
 
 
 NO_SENSOR = Sensor(0.0, 0.0, 0.0, 0.0)
+ACTS = {"b_o": FOLLOWS | PULSES | PROGRAM, "half_slack": SLACK, "step": STEPS}
+"""Where each number acts."""
 
 
 def slack(sensor: Sensor) -> bool:
@@ -46,6 +48,11 @@ def slack(sensor: Sensor) -> bool:
 def depends(sensor: Sensor, source: Source) -> int:
     """Return on what the acceleration depends through the potentiometer: a bridge does not follow it."""
     return ON_Q if sensor.p != 0.0 and source.V == 0.0 else 0
+
+
+def needs(sensor: Sensor) -> int:
+    """Return what else there is to be followed of the potentiometer."""
+    return (SLACK if sensor.half_slack > 0.0 else 0) | (STEPS if sensor.step > 0.0 else 0)
 
 
 def error_of(sensor: Sensor, u: float, q: float) -> float:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from servotwin import loads, physics
 from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, ON_LOWER, ON_UPPER, STUCK
+from servotwin.models.terms.dependence import BY_SHARE, SHOWN, SPRING, STRAIGHT, TWO_BODIES
 from servotwin.models.terms.given import Given
 from servotwin.physics.friction import sticks
 from servotwin.physics.shaft import shaft_acceleration
@@ -21,6 +22,9 @@ class Shaft(NamedTuple):
 
 
 NO_SHAFT = Shaft(1.0, 0.0, 0.0, 0.0)
+_OF_OUTPUT = TWO_BODIES | SPRING | SHOWN
+ACTS = {"J": STRAIGHT, "b": STRAIGHT, "J_out": _OF_OUTPUT, "b_out": _OF_OUTPUT | BY_SHARE}
+"""Where each number acts."""
 
 
 def accelerated(shaft: Shaft, torque: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from servotwin.models.terms.dependence import FOLLOWS, REGULATED, STRAIGHT
 from servotwin.models.terms.given import Given
 from servotwin.physics.supply import source_voltage
 
@@ -21,6 +22,8 @@ class Source(NamedTuple):
 
 
 NO_SOURCE = Source(0.0, 0.0, math.inf)
+ACTS = {"V": STRAIGHT, "R_b": STRAIGHT, "I_max": REGULATED}
+"""Where each number acts."""
 
 
 def present(source: Source) -> bool:
@@ -31,6 +34,11 @@ def present(source: Source) -> bool:
 def regulated(source: Source) -> bool:
     """Tell whether the source gives so much at most."""
     return source.I_max < math.inf
+
+
+def needs(source: Source) -> int:
+    """Return what there is to be followed of the source, or of what stands in its place."""
+    return (0 if source.V > 0.0 else FOLLOWS) | (REGULATED if source.I_max < math.inf else 0)
 
 
 def loaded_voltage(source: Source, taken: float) -> float:

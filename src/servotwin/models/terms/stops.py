@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from servotwin.models.terms.dependence import AT_STOPS
 from servotwin.models.terms.given import Given
 
 READS = ("stops.lower_angle", "stops.upper_angle", "stops.restitution")
@@ -20,6 +21,8 @@ class Stops(NamedTuple):
 
 
 NO_STOPS = Stops(-math.inf, math.inf, 0.0)
+ACTS = {"restitution": AT_STOPS}
+"""Where each number acts; the angles say when the shaft gets there."""
 
 
 def pack(model: Given) -> Stops:

@@ -2,8 +2,9 @@
 
 What they do not know would be as if it were not there. They know a number that a function of their own reads, which the
 general form has not. Else all functions that read it in the general form have to be among them, and no function of
-their own may read what these read beside it: it would be another form of their law. Terms that a recipe leaves out are
-not known.
+their own may read what these read beside it: it would be another form of their law; and it may not belong to a term
+that is left out. Of a number whose term says where it acts, less is asked: they know it where they read it at all, and
+need not where they follow nothing of that.
 """
 
 from __future__ import annotations
@@ -11,12 +12,9 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 from servotwin.models.engine import records
-from servotwin.models.terms.chip import Chip
-from servotwin.models.terms.firmware import Firmware
-from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.rooms import ACTS, paths
 from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.inference import Module, Specialised
 from servotwin.simulation.compile.kinds import Kind, Record, Tuple
@@ -35,12 +33,17 @@ def unread_numbers(recipe: Recipe, of: tuple[str, ...]) -> Iterator[str]:
     general = _readers(replace(in_general(recipe), entries=_RUNS, vector=False, single=False))
     own = _readers(recipe if of else replace(recipe, never=(*recipe.never, "LEGS")), of)  # legs are asked apart
     by_itself = set().union(*(own[name] for name in own.keys() - general.keys()))
-    for path, key in _paths("", Numbers, ("chip", Chip), ("firmware", Firmware)):
+    left_out = {path.split(".")[0] for path in ACTS} - {path.split(".")[0] for path in ACTS.keys() - recipe.absent}
+    for path, record, number in paths():
+        key, acts = (record._fields, number), ACTS.get(path, 0)
         there = {name for name, read in general.items() if key in read}
         beside = {other for name in there for other in general[name] if other[0] == key[0]}
-        left_out = path.split(".")[0] in recipe.absent
-        if there and key not in by_itself and path not in recipe.spares and (
-                left_out or not there <= own.keys() or beside & by_itself):
+        if acts:
+            known = not acts & recipe.knows or any(key in read for read in own.values())
+        else:
+            known = key in by_itself or (
+                path.split(".")[0] not in left_out and there <= own.keys() and not beside & by_itself)
+        if there and not known:
             yield path
 
 
@@ -76,12 +79,3 @@ def _read_in(own: Specialised) -> Iterator[_Number]:
 def _fields(kind: Kind | None) -> tuple[str, ...]:
     """Return by what records are told apart: the names of their fields."""
     return kind.fields if isinstance(kind, Tuple) else kind.dtype.names or () if isinstance(kind, Record) else ()
-
-
-def _paths(path: str, kind: Any, *more: tuple[str, Any]) -> Iterator[tuple[str, _Number]]:
-    """Return the numbers of a record and of those in it."""
-    for name, hint in (*records.fields_of(kind), *more):
-        if hasattr(hint, "_fields"):
-            yield from _paths(f"{path}{name}.", hint)
-        else:
-            yield f"{path}{name}", (kind._fields, name)

@@ -1,8 +1,11 @@
-"""What kernels are made of: a recipe names entries, and says what all that will run lacks."""
+"""What kernels are made of: a recipe names entries, and says what all that will run asks of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+
+from servotwin.models.engine.demands import certain, idle, impossible
 
 
 @dataclass(frozen=True)
@@ -20,17 +23,14 @@ class Recipe:
         become polynomials.
     single : bool
         Whether floats have 32 bits.
-    absent : tuple of str
-        Terms ("heat"), or numbers of one ("motor.L", of an input "sweep"), that all that will run lack: they have their
-        neutral values, and what depends on others is left out.
-    never : tuple of str
-        Constants that nothing will be equal to.
-    present : tuple of str
-        Numbers of terms that are positive in all that will run ("firmware.T_c").
     knows : int
-        On what the acceleration may depend in what will run: flags of `terms.dependence`.
-    spares : tuple of str
-        Numbers of terms that it does well without, though other kernels read them: they act in what it leaves to them.
+        What they follow, of all that a servo may ask for (`engine.demands`): flags of `terms.dependence`.
+    leaves : int
+        Where numbers act that they leave to other kernels.
+    always : int
+        What all servos ask for that will run.
+    never : tuple of str
+        Constants of the engine that nothing will be equal to, beside those that come up by nothing that they know.
     by_numbers : bool
         Whether C calls the entries with their whole numbers, instead of with words.
     """
@@ -39,9 +39,23 @@ class Recipe:
     entries: tuple[str, ...]
     vector: bool = False
     single: bool = False
-    absent: tuple[str, ...] = ()
-    never: tuple[str, ...] = ()
-    present: tuple[str, ...] = ()
     knows: int = -1
-    spares: tuple[str, ...] = ()
+    leaves: int = 0
+    always: int = 0
+    never: tuple[str, ...] = ()
     by_numbers: bool = False
+
+    @cached_property
+    def absent(self) -> frozenset[str]:
+        """Numbers of terms ("motor.L"), or of a command ("sweep"), that act in nothing that will run."""
+        return frozenset(idle(self.knows | self.leaves))
+
+    @cached_property
+    def excluded(self) -> frozenset[str]:
+        """Constants that nothing will be equal to: they have their neutral values, and what depends on others goes."""
+        return frozenset((*self.never, *impossible(self.knows, self.always)))
+
+    @cached_property
+    def present(self) -> frozenset[str]:
+        """Numbers of terms that are positive in all that will run ("firmware.T_c")."""
+        return frozenset(certain(self.always))

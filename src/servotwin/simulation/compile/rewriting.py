@@ -11,11 +11,9 @@ from collections.abc import Callable
 from functools import cache, reduce
 from importlib import import_module
 from types import FunctionType, ModuleType
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
-from servotwin.models.terms.chip import NO_CHIP
-from servotwin.models.terms.firmware import NO_FIRMWARE
-from servotwin.models.terms.numbers import NEUTRAL
+from servotwin.models.terms.rooms import NOTHING
 from servotwin.physics.pieces import Piece
 
 if TYPE_CHECKING:
@@ -23,7 +21,6 @@ if TYPE_CHECKING:
 
 ELEMENTARY = "servotwin.models.engine.elementary"
 DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
-_DECIDERS: dict[str, Any] = {"chip": NO_CHIP, "firmware": NO_FIRMWARE}  # rooms beside those of the plant
 _REPLACED = ("exp", "log", "log1p", "sin", "floor")  # in the vector form, by those of `engine.elementary`
 _PACKAGE = "servotwin."
 _MODELS = "servotwin.models."
@@ -117,7 +114,7 @@ class Rewriting(ast.NodeTransformer):
         """Return whether a condition holds for all that a recipe is for; None where it depends."""
         if isinstance(node, ast.Name) and node.id == "PLAIN":  # what plain Python alone does
             return False
-        if not self._work.recipe.absent and not self._work.recipe.never:
+        if not self._work.recipe.absent and not self._work.recipe.excluded:
             return None
         if isinstance(node, ast.BoolOp):
             parts = [self._truth(value) for value in node.values]
@@ -136,7 +133,8 @@ class Rewriting(ast.NodeTransformer):
         if not isinstance(node, ast.Compare) or len(node.ops) != 1:
             return None
         sides, op = (node.left, node.comparators[0]), node.ops[0]
-        if any(isinstance(side, ast.Name | ast.Attribute) and _last(side) in self._work.recipe.never for side in sides):
+        never = self._work.recipe.excluded
+        if any(isinstance(side, ast.Name | ast.Attribute) and _last(side) in never for side in sides):
             return {ast.Eq: False, ast.NotEq: True}.get(type(op))
         if isinstance(op, ast.Gt) and self._number(sides[1]) == 0.0 and self._is_present(sides[0]):
             return True
@@ -270,16 +268,13 @@ _COMPARISONS: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
 
 
 @cache
-def _neutral(absent: tuple[str, ...]) -> dict[str, float]:
-    """Return the values of numbers that are absent, by "term.number", or of an input by "number"."""
+def _neutral(absent: frozenset[str]) -> dict[str, float]:
+    """Return the values of numbers that are absent, by "term.number", or of a command by "number"."""
     found: dict[str, float] = {}
     for name in absent:
-        room, _, field = name.partition(".")
-        record: Any = getattr(NEUTRAL, room, _DECIDERS.get(room))
-        if record is None:
-            found[name] = getattr(Piece(), name)
-        else:
-            found |= {f"{room}.{one}": getattr(record, one) for one in ((field,) if field else record._fields)}
+        room, *fields = name.split(".")
+        found[".".join([room, *fields][-2:])] = reduce(getattr, fields, NOTHING[room]) if fields else getattr(
+            Piece(), name)
     return found
 
 

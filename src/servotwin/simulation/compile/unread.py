@@ -7,24 +7,15 @@ import json
 from dataclasses import replace
 from functools import cache
 
-from servotwin.models.terms.numbers import NEUTRAL, Numbers
 from servotwin.simulation.compile.finding import shipped_folder, source_key
 from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.storage import cache_folder, key_of, write
 
 
 @cache
-def told(recipe: Recipe) -> Recipe:
-    """Return a recipe that knows of its absent terms by their first numbers alone, and follows all others."""
-    absent = tuple(f"{name}.{getattr(NEUTRAL, name)._fields[0]}" if name in Numbers._fields else name
-                   for name in recipe.absent)
-    return replace(recipe, name=f"{recipe.name}_told", absent=absent)
-
-
-@cache
 def in_general(recipe: Recipe) -> Recipe:
-    """Return the recipe for what a form leaves out, in which no way of going on is chosen by terms that it knows."""
-    return replace(told(recipe), name=f"{recipe.name}_in_general", never=(*recipe.never, "LEGS"))
+    """Return a recipe in which no way of going on is chosen by the numbers that it knows."""
+    return replace(recipe, name=f"{recipe.name}_in_general", never=(*recipe.never, "LEGS"))
 
 
 @cache
