@@ -8,7 +8,7 @@ from servotwin.models.engine import contacts, currents, first_order, guards
 from servotwin.models.engine.coefficients import Apart
 from servotwin.models.engine.courses import Course, both, lead_of, leaves
 from servotwin.models.engine.modes import FORWARD, Mode, Vector
-from servotwin.models.terms.friction import creeping_speed
+from servotwin.models.terms.friction import creeping_speed, shared
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.motor import back_emf
 
@@ -78,20 +78,24 @@ def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, star
 
     How they press changes with the speed in straight lines, with a bend where the motor's torque turns.
     """
+    w, w_end = start.w, after.w
+    at_end = _pressing(numbers, mode, u, tau, w_end)
     bend = u / back_emf(1.0, numbers.motor.K_b)
-    w, pressing = start.w, _pressing(numbers, mode, u, tau, start.w)
-    if pressing <= 0.0 and _pressing(numbers, mode, u, tau, after.w) < guards.BELOW:
+    bends = shared(numbers.friction) and min(w, w_end) < bend < max(w, w_end)
+    if at_end >= guards.BELOW and not bends:
+        return math.inf
+    first = _pressing(numbers, mode, u, tau, w)
+    if first <= 0.0 and at_end < guards.BELOW:
         return s0
-    for w_next in (bend, after.w):
-        if w_next == bend and not (min(start.w, after.w) < bend < max(start.w, after.w)):
-            continue
-        following = _pressing(numbers, mode, u, tau, w_next)
-        if following < guards.BELOW:
-            there = w + (w_next - w) * max(pressing, 0.0) / (max(pressing, 0.0) - following)
-            s = first_order.time_to(laws.output_rate, laws.output_pull, start.w, there)
-            return min(max(s, s0), s1)
-        w, pressing = w_next, following
-    return math.inf
+    at_bend = _pressing(numbers, mode, u, tau, bend) if bends else first
+    if at_bend >= guards.BELOW:
+        if at_end >= guards.BELOW:
+            return math.inf
+        w, first = (bend, at_bend) if bends else (w, first)
+        bend, at_bend = w_end, at_end
+    there = w + (bend - w) * max(first, 0.0) / (max(first, 0.0) - at_bend)
+    s = first_order.time_to(laws.output_rate, laws.output_pull, start.w, there)
+    return min(max(s, s0), s1)
 
 
 def _pressing(numbers: Numbers, mode: Mode, u: float, tau: float, w: float) -> float:
