@@ -161,10 +161,11 @@ def _alone(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
     digital, sprung = _any(terms.ask(PWM)), terms.ask(SPRING)
     found, left = [*_at_last(terms, sprung, recipes.ELASTIC_RUNS[digital], lanes)], _not(sprung)
-    if digital and not is_plain() and _any(left):
-        which = _and(left, terms.fit(recipes.PLAIN_DIGITAL))
-        left = _without(left, which)
-        found.append(OneByOne(_indices(which, lanes), recipes.PLAIN_DIGITAL))
+    for recipe in (recipes.BY_TICKS, recipes.BY_LEGS) if digital and not is_plain() else ():
+        if _any(left):
+            which = _and(left, terms.fit(recipe))
+            left = _without(left, which)
+            found.append(OneByOne(_indices(which, lanes), recipe))
     found += _at_last(terms, left, recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS, lanes)
     return [kind for kind in found if len(kind.which)]
 

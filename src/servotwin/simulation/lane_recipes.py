@@ -5,7 +5,10 @@ Nothing here names a term: what kernels leave out, and which numbers they know, 
 
 from __future__ import annotations
 
-from servotwin.models.engine import tiles
+from dataclasses import replace
+from typing import Any
+
+from servotwin.models.engine import loop_tiles, tiles
 from servotwin.models.terms.dependence import (
     AT_COMMANDS,
     AT_STOPS,
@@ -88,20 +91,22 @@ _LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS | DROPS | SILENCE
 CALM = Recipe("calm", ("servotwin.models.engine.calm:go",), knows=PLAIN_RUNS.knows & ~_LEFT_TO_EVENTS,
               leaves=_LEFT_TO_EVENTS)
 ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM)
-PLAIN_DIGITAL = Recipe("plain_digital_runs", _ENTRIES, knows=_PLAIN | _DIGITAL, always=PROGRAM | PWM)
-# Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop
-_LEFT_BY_LOOPS = AT_STOPS | SHOWN | AT_COMMANDS
-_LOOPED = (PLAIN_DIGITAL.knows & ~(_LEFT_BY_LOOPS | ON_Q))
-_LEGS = (Recipe("by_legs", _ENTRIES, knows=_LOOPED | PLAY | TWO_BODIES | BY_SHARE, leaves=_LEFT_BY_LOOPS,
-                always=PROGRAM | PWM), ("servotwin.models.engine.tick_legs:go",))
-_LEFT_BY_TICKS = _LEFT_BY_LOOPS | BEYOND | ONE_WAY
-_TICKS = tuple(f"servotwin.models.engine.{name}" for name in (
-    "loop_tiles:enter", "loop_rounds:watch", "loop_rounds:decide", "loop_rounds:move", "loop_rounds:move_on",
-    "loop_rounds:follow"))
-_TICKING = (Recipe("ticking", ("servotwin.models.engine.loops:go_on",), vector=True, knows=_LOOPED & ~_LEFT_BY_TICKS,
-                   leaves=_LEFT_BY_TICKS, always=PROGRAM | PWM), _TICKS)
-BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, knows=PLAIN_DIGITAL.knows,
+_TICKS = _PLAIN & ~ON_Q | _DIGITAL
+_LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
+BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.leg_runs:go_on",), vector=True, knows=_LEGS, always=PROGRAM | PWM)
+"""Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_DIGITAL`."""
+BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, knows=_TICKS & ~DROPS,
                   always=PROGRAM | PWM)
+"""Digital servos from tick to tick, side by side; what is left of a call is for `BY_LEGS`."""
+# Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop
+_LEFT_BY_LEGS = AT_STOPS | SHOWN | AT_COMMANDS
+_BY_LEGS = (replace(BY_LEGS, name="ticks_by_legs", knows=_LEGS & ~_LEFT_BY_LEGS, leaves=_LEFT_BY_LEGS),
+            ("servotwin.models.engine.tick_legs:go",))
+_LEFT_BY_TICKS = _LEFT_BY_LEGS | BEYOND | ONE_WAY
+_BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_LEFT_BY_TICKS, leaves=_LEFT_BY_TICKS),
+             tuple(f"servotwin.models.engine.{name}" for name in (
+                 "loop_tiles:enter", "loop_rounds:watch", "loop_rounds:decide", "loop_rounds:move",
+                 "loop_rounds:move_on", "loop_rounds:follow")))
 ELASTIC_RUNS = {
     False: Recipe("elastic_runs", _ENTRIES, knows=~(_DIGITAL | _MEAN | PLAY), always=SPRING),
     True: Recipe("elastic_runs_digital", _ENTRIES, knows=~(_NOT_DIGITAL | PLAY), always=SPRING | PROGRAM | PWM)}
@@ -111,8 +116,13 @@ ELASTIC_RUNS = {
 LOOK = Recipe("look", tuple(f"servotwin.models.engine.sights:{name}" for name in ("side_by_side", "one_by_one")))
 """Lanes of all forms: to look leaves out little where terms are absent."""
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, knows=~_DIGITAL)
-_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _LEGS, _TICKING),
-          ALL_DIGITAL: ((ALL_DIGITAL, ()), _LEGS)}
+_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,)}
+_CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DIGITAL)}
+
+
+def chain_of(recipe: Recipe) -> tuple[Recipe, ...]:
+    """Return the kernels by which lanes of a form go on one after the other: the last of them finish every call."""
+    return _CHAINS.get(recipe, (recipe,))
 
 
 def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
@@ -121,6 +131,11 @@ def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
     Those that say by themselves whether they do follow all numbers.
     """
     return _PARTS.get(recipe, ((recipe, ()),))
+
+
+def room_of(recipe: Recipe) -> tuple[Any, ...]:
+    """Return what these need beside the arguments of `runs.go_on`: lanes side by side, room for a tile."""
+    return (loop_tiles.tile_room(),) if recipe == BY_TICKS else ()
 
 
 def side_by_side(form: int, dtype: str, creeps: bool, banded: bool) -> Recipe:

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import loop_tiles, tiles
+from servotwin.models.engine import tiles
 from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.records import columns_of, record_of, room, tiles_with
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation.compile import Recipe, is_plain, kernels
+from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.first_ticks import to_first_ticks
 from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
 from servotwin.simulation.lane_memory import flat, memories_of, nothing_yet, taken
-from servotwin.simulation.lane_recipes import ALL_RUNS, BY_TICKS, ENDING, PLAIN_DIGITAL
+from servotwin.simulation.lane_recipes import ALL_RUNS, ENDING, chain_of, room_of
 from servotwin.simulation.lanes import ALL_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
 
 Indices = NDArray[np.int64]
@@ -76,7 +76,7 @@ def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> No
 def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = ALL_RUNS) -> None:
     """Run some lanes one after the other, in float64."""
     memories = nothing_yet(len(which))
-    kernels(recipe).start(lanes, which, memories)
+    kernels(chain_of(recipe)[-1]).start(lanes, which, memories)
     _finish(work, lanes, which, np.full(len(which), float(work.duration)), np.zeros(len(which), np.int64), memories,
             raw, recipe)
 
@@ -110,10 +110,12 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
 def go_on(recipe: Recipe, *arguments: Any) -> None:
     """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads."""
     *shared, ended = arguments
-    if recipe == PLAIN_DIGITAL and not is_plain():
-        to_first_ticks(kernels(recipe), *shared)
-        kernels(BY_TICKS).go_on(*shared, loop_tiles.tile_room())
-    kernels(recipe).go_on(*shared, ended)
+    *ahead, last = chain_of(recipe)
+    if ahead:
+        to_first_ticks(kernels(last), *shared)
+    for one in ahead:
+        kernels(one).go_on(*shared, *room_of(one))
+    kernels(last).go_on(*shared, ended)
 
 
 def swept(lanes: Lanes) -> Mask:

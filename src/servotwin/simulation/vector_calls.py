@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import loop_tiles, tape
+from servotwin.models.engine import tape
 from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.tape import Tape
 from servotwin.simulation import lane_recipes
-from servotwin.simulation.compile import Recipe, is_plain
+from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.compile.layout import GIVEN, STAGES
 from servotwin.simulation.lane_memory import nothing_yet
@@ -179,8 +179,7 @@ class _Alone:
         lanes, durations = self.some("lanes", "durations")
         how, at = Some(self._how, self.room.number), Some(self._at, self.room.number)
         shared = (store.columns, *store.inputs, lanes, durations, _NONE, self._first, self._outputs, self.memories, how)
-        calls = [call_of(recipe, "go_on", *shared, at),
+        *ahead, last = lane_recipes.chain_of(recipe)
+        calls = [call_of(last, "go_on", *shared, at),
                  call_of(TICKS, "note_failures", lanes, how, at, self.memories.rows, store.status, store.ended)]
-        if recipe == lane_recipes.PLAIN_DIGITAL and not is_plain():
-            calls.insert(0, call_of(lane_recipes.BY_TICKS, "go_on", *shared, loop_tiles.tile_room()))
-        return calls
+        return [*(call_of(one, "go_on", *shared, *lane_recipes.room_of(one)) for one in ahead), *calls]

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import loop_tiles
 from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.tiles import Lanes
 from servotwin.simulation import lane_recipes
-from servotwin.simulation.compile import Recipe, is_plain, kernels
+from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.calls import call_of
 from servotwin.simulation.first_ticks import to_first_ticks
 from servotwin.simulation.lanes import ALL_FIELDS
@@ -38,20 +37,19 @@ class GoingOn:
     def __init__(self, recipe: Recipe, columns: Lanes, inputs: tuple[Any, ...], which: Indices,
                  memories: Memories) -> None:
         count = len(which)
-        self._recipe, self._durations = recipe, np.empty(count)
+        self._durations = np.empty(count)
         self._first, self._status, self._ended = np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(count)
         self._shared = (columns, *inputs, which, self._durations, np.zeros(0), self._first,
                         np.zeros((count, len(ALL_FIELDS), 0)), memories, self._status)
-        self._calls = [call_of(recipe, "go_on", *self._shared, self._ended)]
-        self._ticking = recipe == lane_recipes.PLAIN_DIGITAL and not is_plain()
-        if self._ticking:
-            self._calls.insert(0, call_of(lane_recipes.BY_TICKS, "go_on", *self._shared, loop_tiles.tile_room()))
+        *ahead, self._last = lane_recipes.chain_of(recipe)
+        self._calls = [*(call_of(one, "go_on", *self._shared, *lane_recipes.room_of(one)) for one in ahead),
+                       call_of(self._last, "go_on", *self._shared, self._ended)]
 
     def __call__(self, duration: float) -> tuple[Indices, Array]:
         """Let them go on for a time [s]; return status and end of each, until the next call."""
         self._durations[:], self._first[:], self._status[:], self._ended[:] = duration, 0, 0, 0.0
-        if self._ticking:
-            to_first_ticks(kernels(self._recipe), *self._shared)
+        if len(self._calls) > 1:
+            to_first_ticks(kernels(self._last), *self._shared)
         for call in self._calls:
             call()
         return self._status, self._ended

@@ -39,7 +39,8 @@ if TYPE_CHECKING:
     from servotwin.models.engine.memory import Memories
     from servotwin.models.engine.tiles import Floats, Indices, Lanes
 
-UNDERWAY = -1  # status of a lane that has gone on side by side with others in this call
+# Status of a lane that has gone on in this call already, side by side with others or by legs: for all of it, or not yet
+ARRIVED, UNDERWAY = -2, -1
 
 
 def start(lanes: Lanes, which: Indices, memories: Memories) -> None:
@@ -58,10 +59,14 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
     """Let the lanes named in `which`, whose memories are given, go on for durations of their own [s].
 
     `outputs` has the shape (n, 18, T), as in `run`, and gets what stands at `times` from the one numbered
-    `first_output` on. A lane whose status is `UNDERWAY` may be in the middle of a tick.
+    `first_output` on. A lane whose status is `UNDERWAY` may be in the middle of a tick, one that has `ARRIVED` stays.
     """
     for k in range(which.size):
         lane = which[k]
+        if status[k] == ARRIVED:
+            row = memories.rows[k]
+            status[k], ended[k] = COMPLETED, row.frames * row.beat + row.point.time
+            continue
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
         memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(memories, k),
                           durations[k], status[k] == UNDERWAY, times, first_output[k], outputs[k])

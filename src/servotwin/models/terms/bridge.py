@@ -65,7 +65,7 @@ ACTS = {"D_drive": STRAIGHT, "R_drive": STRAIGHT, "off.R": STRAIGHT, "off.coast"
 
 def needs(bridge: Bridge, source: Source) -> int:
     """Return what there is to be followed of the bridge."""
-    brakes = bridge.off.D == 0.0 and bridge.D_drive < source.V
+    brakes = bridge.off.D == 0.0 and (bridge.D_drive == 0.0 if bridge.pwm > 0.0 else bridge.D_drive < source.V)
     return ((0 if brakes else DROPS) | (SILENCE if heeds_silence(bridge) else 0) | (PWM if bridge.pwm > 0.0 else 0)
             | (ONE_WAY if bridge.one_way > 0.0 else 0))
 

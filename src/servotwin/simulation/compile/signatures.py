@@ -89,7 +89,7 @@ def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let digital servos go from tick to tick together."""
     from servotwin.models.engine import loop_tiles
 
-    return {"loops:go_on": (*_GOING, _records(loop_tiles.TILE_TYPE))}
+    return {"loops:go_on": (*_GOING, _records(loop_tiles.TILE_TYPE)), "leg_runs:go_on": _GOING}
 
 
 @cache
@@ -109,7 +109,8 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
 
 
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
-    "loops:go_on": _of_ticks, "buses:go_on": _of_buses, "buses:look": _of_buses, "lane_ticks:break_up": _of_buses}
+    "loops:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "buses:go_on": _of_buses, "buses:look": _of_buses,
+    "lane_ticks:break_up": _of_buses}
 
 
 def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ...]]:
