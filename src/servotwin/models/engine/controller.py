@@ -107,7 +107,12 @@ def sensed_of(numbers: Numbers, i: float, V_bus: float, y: Vector) -> Sensed:
 def on_supply(numbers: Numbers, now: float, y: Vector) -> tuple[float, float]:
     """Return the voltage of the bus [V], and the current while it flows [A], of numbers at the duty of `now`."""
     u, w = duty.voltage(numbers.source, now), turning(numbers.elastic, y)
-    zone = currents.zone_of(numbers, u, 0.0, y.q, w, y.i)
+    return in_zone(numbers, currents.zone_of(numbers, u, 0.0, y.q, w, y.i), u, now, y)
+
+
+def in_zone(numbers: Numbers, zone: int, u: float, now: float, y: Vector) -> tuple[float, float]:
+    """Return the same where the zone of the current and the voltage [V] behind the bridge are known."""
+    w = turning(numbers.elastic, y)
     i = currents.flowing(numbers, zone, u, y.q, w, y.i)
     V = bridge.bus_voltage(numbers.bridge, numbers.source, numbers.motor, zone, u, w, i)
     return V / duty.share_of(numbers.bridge, now), i / duty.on_share_of(numbers.bridge, now)

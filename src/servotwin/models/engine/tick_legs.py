@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats
 
 LEGS, STEPS = 0, 1  # from tick to tick: in this loop, or from event to event
+_NO_LAWS = Apart(0.0, 0.0, 0.0, 0.0)
 _GIVEN = Piece()  # what a servo follows that a program drives
 
 
@@ -41,6 +42,17 @@ class Fade(NamedTuple):
     time: float
     once: float
     twice: float
+
+
+class Way(NamedTuple):
+    """How a servo goes on at a duty: its numbers at that, the voltage behind the bridge, its mode and its laws."""
+
+    duty: float
+    numbers: Numbers
+    u: float
+    mode: Mode
+    laws: Apart  # of motor and output without a spring between them
+    law: Law  # with one
 
 
 class Gone(NamedTuple):
@@ -78,63 +90,42 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     point, slack, tau = memory.point, SAME * inputs.firmware[0].T_c, inputs.constant_torque
     t, y, T_c = point.time, point.y, inputs.firmware[0].T_c
     last, gone = min(until, FRAMES * memory.beat), False
-    now, u, mode = numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0)
-    laws, met, known = Apart(0.0, 0.0, 0.0, 0.0), math.nan, math.nan  # duties of `now`, of the mode
-    law = spring_legs.NO_LAW
+    way = Way(math.nan, numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0), _NO_LAWS, spring_legs.NO_LAW)
     output = motor = Fade(math.nan, 0.0, 0.0, 0.0)
     while t < last:
         if controller.next_due(firmware, firm, frames) > t + slack:
             break  # in the middle of a motion
         controller.apply(firmware, firm, frames, t + slack)
-        if firm.duty != met:
-            now, met = duty.at_duty(numbers, firm.duty), firm.duty
+        if firm.duty != way.duty:
+            way = at_duty(numbers, firm.duty, tau, y, way)
         if controller.is_due(firmware, firm, frames, t + slack):
-            tick(now, inputs, firm, y, origin + t)
+            tick(way, inputs, firm, y, origin + t)
             controller.apply(firmware, firm, frames, t + slack)
         end = controller.next_due(firmware, firm, frames)
         if end > until + slack:
             break
         end = min(end, until)
-        if firm.duty != met:
-            now, met = duty.at_duty(numbers, firm.duty), firm.duty
-        if met != known:
-            u, known = duty.voltage(now.source, met), met
-            if elastic.present(numbers.elastic):
-                mode = spring_legs.mode_from(now, tau, u, y, mode.mesh)
-                law = spring_legs.law_of(law, now, mode, u, tau)
-            else:
-                mode = legs.mode_from(now, tau, u, y, mode.mesh)
-                laws = legs.laws_of(now, mode, u, tau)
-        time = end - t
-        if abs(time - T_c) <= slack:
-            time = T_c
-        shows = done < times.size and (times[done] - origin < end - slack or end >= until)
-        if shows:
-            done = show(now, law, inputs, u, y, mode, times, done, t, end, until, origin, outputs, firm)
-        if elastic.present(numbers.elastic):
-            sprung = spring_legs.go(now, law, tau, u, y, mode, time, inputs.accuracy)
-            if sprung.done == 0.0:
-                gone = True
-                break
-            if sprung.mode != mode:
-                law = spring_legs.law_of(law, now, sprung.mode, u, tau)
-            y, mode = sprung.y, sprung.mode
-        elif not legs.stands(mode):
-            output = faded(output, laws.output_rate, time)
-            motor = faded(motor, laws.motor_rate, time) if mode.mesh == INSIDE else motor
-            after = over(now, mode, laws, output, motor, y)
-            if lasts(now, mode, u, tau, y, after, time):
-                y = after
-            else:
-                way = legs.go(now, tau, u, y, mode, y.q, time)
-                if way.done == 0.0:
+        if firm.duty != way.duty:
+            way = at_duty(numbers, firm.duty, tau, y, way)
+        time = T_c if abs(end - t - T_c) <= slack else end - t
+        if done < times.size and (times[done] - origin < end - slack or end >= until):
+            done = show(way, inputs, y, times, done, t, end, until, origin, outputs, firm)
+        if elastic.present(numbers.elastic) or not legs.stands(way.mode):
+            certain = False
+            if not elastic.present(numbers.elastic):
+                output = faded(output, way.laws.output_rate, time)
+                motor = faded(motor, way.laws.motor_rate, time) if way.mode.mesh == INSIDE else motor
+                after = over(way, output, motor, y)
+                certain = lasts(way, tau, y, after, time)
+                y = after if certain else y
+            if not certain:
+                leg = gone_on(way, inputs, y, time)
+                if leg.done == 0.0:
                     gone = True
                     break
-                if way.mode != mode:
-                    laws = legs.laws_of(now, way.mode, u, tau)
-                y, mode = way.y, way.mode
+                way, y = in_mode(way, leg.mode, tau), leg.y
         t = end
-    return Gone(t, y, mode.mesh, done, t > point.time or gone)
+    return Gone(t, y, way.mode.mesh, done, t > point.time or gone)
 
 
 def as_gone(memory: Memory, gone: Gone) -> Memory:
@@ -146,9 +137,44 @@ def as_gone(memory: Memory, gone: Gone) -> Memory:
                   memory.firm)
 
 
-def tick(now: Numbers, inputs: Inputs, firm: Any, y: Vector, time: float) -> None:
-    """Do what a tick does of a servo whose numbers are those at its duty, at a time since the start [s]."""
-    firmware, own = inputs.firmware[0], now.sensor
+def at_duty(numbers: Numbers, now: float, tau: float, y: Vector, before: Way) -> Way:
+    """Return how a servo goes on from a state at another duty than before, under an external torque [N m]."""
+    at = duty.at_duty(numbers, now)
+    u, mesh = duty.voltage(at.source, now), before.mode.mesh
+    if elastic.present(numbers.elastic):
+        mode = spring_legs.mode_from(at, tau, u, y, mesh)
+    else:
+        mode = legs.mode_from(at, tau, u, y, mesh)
+    return with_laws(Way(now, at, u, mode, before.laws, before.law), tau)
+
+
+def in_mode(way: Way, mode: Mode, tau: float) -> Way:
+    """Return how a servo goes on at the same duty in a mode that it may have been in."""
+    if mode == way.mode:
+        return way
+    return with_laws(Way(way.duty, way.numbers, way.u, mode, way.laws, way.law), tau)
+
+
+def with_laws(way: Way, tau: float) -> Way:
+    """Return the same with the laws of its mode, in the place of those before."""
+    if elastic.present(way.numbers.elastic):
+        law = spring_legs.law_of(way.law, way.numbers, way.mode, way.u, tau)
+        return Way(way.duty, way.numbers, way.u, way.mode, way.laws, law)
+    laws = legs.laws_of(way.numbers, way.mode, way.u, tau)
+    return Way(way.duty, way.numbers, way.u, way.mode, laws, way.law)
+
+
+def gone_on(way: Way, inputs: Inputs, y: Vector, time: float) -> legs.Gone:
+    """Return where a servo goes from a state within a time [s], from event to event."""
+    tau = inputs.constant_torque
+    if elastic.present(way.numbers.elastic):
+        return spring_legs.go(way.numbers, way.law, tau, way.u, y, way.mode, time, inputs.accuracy)
+    return legs.go(way.numbers, tau, way.u, y, way.mode, y.q, time)
+
+
+def tick(way: Way, inputs: Inputs, firm: Any, y: Vector, time: float) -> None:
+    """Do what a tick does, at a time since the start [s]."""
+    firmware, own = inputs.firmware[0], way.numbers.sensor
     if controller.has_news(firmware, firm, time):
         controller.listen(inputs, firm, time)
     angle = y.q
@@ -158,8 +184,8 @@ def tick(now: Numbers, inputs: Inputs, firm: Any, y: Vector, time: float) -> Non
         angle = controller.angle_of(firmware, firm, v, inputs.seed)
     sensed = NOTHING_SENSED
     if control.senses(firmware):
-        V_bus, i = controller.on_supply(now, firm.duty, y)
-        sensed = controller.sensed_of(now, i, V_bus, y)
+        V_bus, i = controller.in_zone(way.numbers, way.mode.zone, way.u, way.duty, y)
+        sensed = controller.sensed_of(way.numbers, i, V_bus, y)
     controller.decide(firmware, firm, angle, sensed, time)
 
 
@@ -171,19 +197,21 @@ def faded(known: Fade, rate: float, time: float) -> Fade:
     return Fade(rate, time, once, twice)
 
 
-def over(numbers: Numbers, mode: Mode, laws: Apart, output: Fade, motor: Fade, y: Vector) -> Vector:
+def over(way: Way, output: Fade, motor: Fade, y: Vector) -> Vector:
     """Return the state after a time."""
+    laws, mesh = way.laws, way.mode.mesh
     q, w, i, T_w, T_h, q_m, w_m = y
     there = fma(-laws.output_rate, w, laws.output_pull)
     q, w = fma(there, output.twice, fma(w, output.time, q)), fma(there, output.once, w)
-    if mode.mesh != INSIDE:
-        return with_motor(numbers.play, mode.mesh, Vector(q, w, i, T_w, T_h, q, w))
+    if mesh != INSIDE:
+        return with_motor(way.numbers.play, mesh, Vector(q, w, i, T_w, T_h, q, w))
     there = fma(-laws.motor_rate, w_m, laws.motor_pull)
     return Vector(q, w, i, T_w, T_h, fma(there, motor.twice, fma(w_m, motor.time, q_m)), fma(there, motor.once, w_m))
 
 
-def lasts(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, after: Vector, time: float) -> bool:
+def lasts(way: Way, tau: float, y: Vector, after: Vector, time: float) -> bool:
     """Tell whether a mode surely lasts on the way from a state to the one after a time [s]; speeds are monotone."""
+    numbers, mode, u = way.numbers, way.mode, way.u
     q, w, w_m = after.q, after.w, after.w_m
     low, high = currents.zone_limits(numbers, mode.zone, u)
     if not low < u - back_emf(w_m, numbers.motor.K_b) < high:
@@ -211,14 +239,12 @@ def lasts(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, after: 
     return contacts.pressing(numbers, mode, u, tau, after) > 0.0
 
 
-def show(numbers: Numbers, law: Law, inputs: Inputs, u: float, y: Vector, mode: Mode, times: Floats, done: int,
-         t: float, end: float, until: float, origin: float, outputs: Floats, firm: Any) -> int:
-    """Write the outputs within a tick, leg by leg; return how many are done."""
-    slack, tau = SAME * (end - t), inputs.constant_torque
+def show(way: Way, inputs: Inputs, y: Vector, times: Floats, done: int, t: float, end: float, until: float,
+         origin: float, outputs: Floats, firm: Any) -> int:
+    """Write the outputs within a tick; return how many are done."""
+    slack = SAME * (end - t)
     while done < times.size and (times[done] - origin < end - slack or end >= until):
-        s = min(max(times[done] - origin - t, 0.0), end - t)
-        here = (spring_legs.go(numbers, law, tau, u, y, mode, s, inputs.accuracy) if elastic.present(numbers.elastic)
-                else legs.go(numbers, tau, u, y, mode, y.q, s))
+        here = gone_on(way, inputs, y, min(max(times[done] - origin - t, 0.0), end - t))
         show_one(outputs, done, here.y, here.mode, firm)
         done += 1
     return done

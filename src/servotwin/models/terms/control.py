@@ -251,7 +251,7 @@ def _asked_for(firmware: Firmware, firm: Any) -> float:
 def beyond_zone(firmware: Firmware, r: float, y: float) -> float:
     """Return the error z beyond the dead zone [rad]."""
     error = cut(r, _whole(firmware)) - y
-    return error_beyond_zone(error, cut(firmware.h, _whole(firmware)), firmware.gate > 0.0)
+    return error_beyond_zone(error, firmware.h, firmware.gate > 0.0)
 
 
 def limited(firmware: Firmware, terms: float) -> tuple[float, float]:

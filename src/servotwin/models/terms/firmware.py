@@ -10,6 +10,7 @@ import numpy as np
 from servotwin.models.terms import sensor
 from servotwin.models.terms.dependence import AT_COMMANDS, BEYOND, PROGRAM
 from servotwin.models.terms.given import Given
+from servotwin.physics import cut
 
 READS = tuple(f"firmware.{name}" for name in (
     "control_phase", "compute_delay", "angle_quantum", "filter_weight", "deadband_angle", "deadband_law",
@@ -34,7 +35,7 @@ class Firmware(NamedTuple):
     T_d: float
     quantum: float  # Δ; 0: none
     weight: float  # a
-    h: float
+    h: float  # a multiple of Δ where all is whole
     gate: float
     k_p: float
     k_i: float
@@ -136,15 +137,17 @@ def pack(model: Given, period: Any) -> Firmware:
     # an encoder that stands tells its angle as a voltage would, 1 V a radian
     per_volt = 1.0 / p if np.all(p != 0.0) else 1.0 if sensor.stands(model) else 0.0
     half_deadband = 0.5 * model.value_or("electronics.deadband", 0.0) / s_mu if pulses else 0.0
+    quantum, whole = of("angle_quantum"), word("whole_counts", "yes")
     return Firmware(
-        T_c=of("control_period"), t_phi=of("control_phase"), T_d=of("compute_delay"), quantum=of("angle_quantum"),
-        weight=of("filter_weight", 1.0), h=of("deadband_angle", half_deadband), gate=word("deadband_law", "gate"),
+        T_c=of("control_period"), t_phi=of("control_phase"), T_d=of("compute_delay"), quantum=quantum,
+        weight=of("filter_weight", 1.0), h=cut(of("deadband_angle", half_deadband), whole * quantum),
+        gate=word("deadband_law", "gate"),
         k_p=of("proportional_gain"), k_i=of("integral_gain"), k_d=of("derivative_gain"),
         k_v=of("velocity_feedforward"), k_a=of("acceleration_feedforward"),
         of_measurement=word("derivative_of", "measurement"), m=of("derivative_ticks", 1.0),
         threshold=of("derivative_threshold"), I_limit=_infinite_where_0(limit), kappa=of("anti_windup"),
         at_rest=word("integral_at_rest", "yes"), rest_travel=of("rest_travel"), delta=of("duty_quantum"),
-        whole=word("whole_counts", "yes"), minimum=of("minimum_duty"), torque_limit=of("torque_limit", 1.0),
+        whole=whole, minimum=of("minimum_duty"), torque_limit=of("torque_limit", 1.0),
         duty_limit=of("duty_limit", 1.0), slew=of("duty_slew", math.inf), I_m=of("current_limit", math.inf),
         senses_bus=word("current_sense", "bus"), brakes=word("torque_off_state", "brake"),
         resolution=of("pulse_resolution"), goals=word("command_kind", "goal"), latency=of("bus_latency"),
