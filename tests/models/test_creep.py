@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 import servotwin as st
 from servotwin.models.engine import bands, contacts, creep, currents
-from servotwin.models.engine.modes import RIGID, Mode
+from servotwin.models.engine.modes import NOWHERE, RIGID, Mode, Vector
 from servotwin.models.terms.bridge import NO_BRIDGE, Off
 from servotwin.models.terms.friction import NO_FRICTION, creeping_speed
 from servotwin.models.terms.motor import Motor
@@ -45,7 +45,7 @@ def fine(numbers, torque, drive, q, w, end):
         return contacts.acceleration(numbers, Mode(zone, contact, RIGID, 0, 0), u, torque, state(w))
 
     def state(w):
-        return (0.0, w, 0.0, 0.0, 0.0, 0.0, w)
+        return Vector(0.0, w, 0.0, 0.0, 0.0, 0.0, w)
 
     t = 0.0
     while t < end:
@@ -96,17 +96,17 @@ def test_a_creep_in_parts_is_the_creep(law):
 def test_a_creep_is_as_accurate_as_asked():
     numbers = numbers_of("M2")
     mode = Mode(currents.zone_of(numbers, 6.0, 0.0, 0.0, 0.0, 0.0), 1, RIGID, 0, 0)
-    start = (0.0,) * 7
+    start = NOWHERE
 
     def time_to_the_top(tolerance):
         y, time = start, 0.0
-        while y[1] < creeping_speed(numbers.friction) and time < 1.0:
+        while y.w < creeping_speed(numbers.friction) and time < 1.0:
             went = creep.creep(numbers, mode, 6.0, 0.1, y, 1.0, tolerance)
             assert went.done
             time += went.time
             if went.ends_by >= 0 or went.time == 0.0:
                 break
-            y = (went.q, went.w, 0.0, 0.0, 0.0, went.q, went.w)
+            y = Vector(went.q, went.w, 0.0, 0.0, 0.0, went.q, went.w)
         return time
 
     exact = time_to_the_top(1e-14)
@@ -118,9 +118,9 @@ def test_a_creep_is_as_accurate_as_asked():
 def test_a_creep_knows_where_it_stands_in_between():
     numbers = numbers_of("M4")
     mode = Mode(currents.zone_of(numbers, 6.0, 0.0, 0.0, 0.0, 0.0), 1, RIGID, 0, 1)
-    start = (0.2,) + (0.0,) * 6
+    start = NOWHERE._replace(q=0.2)
     went = creep.creep(numbers, mode, 6.0, 0.1, start, 1.0, FINE)
-    end = (went.q, went.w, 0.0, 0.0, 0.0, went.q, went.w)
+    end = Vector(went.q, went.w, 0.0, 0.0, 0.0, went.q, went.w)
     for part in (0.01, 0.4, 0.99):
         q, w = creep.at_time(numbers, mode, 6.0, 0.1, start, end, went.time, part * went.time)
         np.testing.assert_allclose((q, w), fine(numbers, 0.1, 1.0, 0.2, 0.0, part * went.time), rtol=0, atol=1e-9)

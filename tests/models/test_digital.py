@@ -35,8 +35,8 @@ def test_a_rising_count_leaves_the_filtered_angle_one_low():
         state = sim.initial(goal(40), initial={"output_angle": 10 * COUNT})
         state = sim.advance(state, 0.0105, goal(40))
         point = state.memory.point
-        y = (count * COUNT, *point.y[1:])
-        moved = state.memory._replace(point=point._replace(y=y, anchor=y, anchor_time=math.inf, wiper=y[0]))
+        y = point.y._replace(q=count * COUNT)
+        moved = state.memory._replace(point=point._replace(y=y, anchor=y, anchor_time=math.inf, wiper=y.q))
         state = sim.advance(type(state)(state.time, state.places, moved, state.numbers), 0.05, goal(40))
         assert 1000.0 * sim.observe(state, "duty", goal(40)) == pytest.approx(8 * (40 - seen), abs=1e-9)
 

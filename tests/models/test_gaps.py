@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from lane_cases import replaced
 from models.test_arcs import NUMBERS, OPEN
 from servotwin.models.engine import gaps
-from servotwin.models.engine.modes import INSIDE
+from servotwin.models.engine.modes import INSIDE, Vector
 from servotwin.models.terms.shaft import Shaft
 
 HALF = 6e-3
@@ -62,16 +62,17 @@ def test_two_bodies_against_a_fine_solution(name):
         if len(run.t_events[0]):
             met += 1
             after = go(numbers, torque, drive, start, end + 1e-9)
-            assert own.J_out * after.y[1] + (own.J - own.J_out) * after.y[6] == pytest.approx(
+            assert own.J_out * after.y.w + (own.J - own.J_out) * after.y.w_m == pytest.approx(
                 own.J_out * y[1] + (own.J - own.J_out) * y[3], abs=1e-8)
-            assert abs(after.y[1] - after.y[6]) < 1e-6  # one speed
+            assert abs(after.y.w - after.y.w_m) < 1e-6  # one speed
         before = go(numbers, torque, drive, start, end - 1e-9)
         assert before.mode.mesh == INSIDE
         at = [x - 1e-9 * rate for x, rate in zip(y, of(end, y), strict=True)]
-        assert [before.y[k] for k in (0, 1, 5, 6)] == pytest.approx(at, abs=3e-10), (drive, torque, w, w_m)
+        found = [before.y.q, before.y.w, before.y.q_m, before.y.w_m]
+        assert found == pytest.approx(at, abs=3e-10), (drive, torque, w, w_m)
     assert met > 3
 
 
 def go(numbers, torque, drive, start, time):
     q, w, q_m, w_m = start
-    return gaps.go(numbers, torque, drive, (q, w, 0.0, 0.0, 0.0, q_m, w_m), INSIDE, q, time)
+    return gaps.go(numbers, torque, drive, Vector(q, w, 0.0, 0.0, 0.0, q_m, w_m), INSIDE, q, time)

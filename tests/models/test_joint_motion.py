@@ -7,7 +7,16 @@ import pytest
 import servotwin as st
 from servotwin.loads import Constant, Inertia, as_load
 from servotwin.models.engine import joint_motion, shared_source
-from servotwin.models.engine.modes import BACKWARD, CURRENT_BACKWARD, CURRENT_FORWARD, FORWARD, FREE, RIGID, Mode
+from servotwin.models.engine.modes import (
+    BACKWARD,
+    CURRENT_BACKWARD,
+    CURRENT_FORWARD,
+    FORWARD,
+    FREE,
+    RIGID,
+    Mode,
+    Vector,
+)
 from servotwin.models.engine.records import object_of
 from servotwin.models.engine.seats import Mate
 from servotwin.models.terms.source import Source
@@ -26,7 +35,7 @@ def mates(stiffness=0.0):
         mate, w = object_of(Mate), sign * (1.0 + k)
         mate.numbers = numbers._replace(load=numbers.load._replace(stiffness=stiffness))
         mate.mode, mate.sign, mate.tau = Mode(zone, contact, RIGID, FREE, 0), sign, Piece(value=0.1)
-        mate.start = [0.5, w, 0.0, 0.0, 0.0, 0.5, w]
+        mate.start = Vector(0.5, w, 0.0, 0.0, 0.0, 0.5, w)
         found.append(mate)
     return found
 
@@ -52,12 +61,12 @@ def test_a_series_is_what_the_step_finds(state):
     length = joint_motion.joint_step(SOURCE, state, found, 2, 0.0, 1e-3).length
     terms = joint_motion.series(SOURCE, state, found, 2, 0.0, length)
     for mate in found:
-        assert value(mate.speed, terms, length) == pytest.approx(mate.end[1], abs=1e-11)
-        assert value(mate.speed, terms, 0.3 * length) == pytest.approx(joint_motion.between(mate, 0.3)[1], abs=1e-10)
+        assert value(mate.speed, terms, length) == pytest.approx(mate.end.w, abs=1e-11)
+        assert value(mate.speed, terms, 0.3 * length) == pytest.approx(joint_motion.between(mate, 0.3).w, abs=1e-10)
 
 
 def test_a_step_that_cannot_be_made_says_so():
     found = mates()
     for mate in found:
-        mate.start[1] = math.nan
+        mate.start = mate.start._replace(w=math.nan)
     assert joint_motion.joint_step(SOURCE, shared_source.FOLLOWING, found, 2, 0.0, 1e-3).length < 0.0

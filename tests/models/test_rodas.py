@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from servotwin.models.engine import rodas
-from servotwin.models.engine.modes import FREE, LINEAR, RIGID, Mode
+from servotwin.models.engine.modes import FREE, LINEAR, RIGID, Mode, Vector
 from servotwin.models.engine.rates import jacobian, rates_of
 from servotwin.models.terms.load import NO_LOAD
 from servotwin.models.terms.motor import Motor
@@ -24,11 +24,11 @@ TAU = Piece(amplitude=-1.0, frequency=2.0, phase=0.5 * math.pi)
 
 
 def rates(t, q, w, i):
-    return rates_of(NUMBERS, MODE, piece_value(U, t), piece_value(TAU, t), (q, w, i, 0.0, 0.0, q, w))[1:3]
+    return rates_of(NUMBERS, MODE, piece_value(U, t), piece_value(TAU, t), Vector(q, w, i, 0.0, 0.0, q, w))[1:3]
 
 
 def state(q, w, i):
-    return (q, w, i, 0.0, 0.0, q, w)
+    return Vector(q, w, i, 0.0, 0.0, q, w)
 
 
 def one_step(numbers, u, tau, t, y, h):

@@ -47,10 +47,12 @@ def at_temperature(numbers: Numbers, T_w: float, T_h: float) -> Numbers:
     R = winding_resistance(T_w, cold.R)
     more = R - cold.R
     field = magnet_factor(T_h, numbers.heat.magnet)
+    between = Off(off.D, off.R + more, off.coast)
+    same = silence.R == off.R and silence.D == off.D and silence.coast == off.coast
+    silent = between if same else Off(silence.D, silence.R + more, silence.coast)
     return Numbers(
         Motor(cold.K * field, cold.K_b * field, R, cold.L),
-        Bridge(bridge.D_drive, bridge.R_drive + more, Off(off.D, off.R + more, off.coast),
-               Off(silence.D, silence.R + more, silence.coast), bridge.V_br, bridge.pwm, bridge.one_way),
+        Bridge(bridge.D_drive, bridge.R_drive + more, between, silent, bridge.V_br, bridge.pwm, bridge.one_way),
         numbers.source, numbers.follower, numbers.shaft, numbers.friction, numbers.load, numbers.stops, numbers.play,
         numbers.sensor, numbers.heat, numbers.elastic)
 
