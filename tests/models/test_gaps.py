@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from lane_cases import replaced
 from models.test_arcs import NUMBERS, OPEN
-from servotwin.models.engine import gaps
+from servotwin.models.engine import gap_rounds
 from servotwin.models.engine.modes import INSIDE, Vector
 from servotwin.models.terms.shaft import Shaft
 
@@ -16,7 +16,9 @@ HALF = 6e-3
 LOOSE = replaced(NUMBERS, {"play.half": HALF, "shaft": Shaft(6e-3, 1.5e-3, 2e-3, 5e-4)})
 SERVOS = {
     "braked": LOOSE, "open": replaced(LOOSE, OPEN), "drops": replaced(LOOSE, {"bridge.D_drive": 0.4}),
-    "dry load": replaced(LOOSE, {"load.coulomb": 0.05})}
+    "dry load": replaced(LOOSE, {"load.coulomb": 0.05}),
+    "load friction": replaced(LOOSE, {"friction.varies": 1.0, "friction.K_m": 0.4, "friction.K_e": 0.2}),
+    "load friction and drops": replaced(LOOSE, {"friction.varies": 1.0, "friction.K_m": 0.7, "bridge.D_drive": 0.4})}
 
 
 def current(numbers, drive, w_m):
@@ -32,9 +34,9 @@ def rates(numbers, torque, drive):
 
     def of(_, y):
         _, w, _, w_m = y
-        f_m = dry.F_forward if w_m > 0.0 else -dry.F_backward
-        f = math.copysign(numbers.load.coulomb, w)
         drives = numbers.motor.K * current(numbers, drive, w_m)
+        f_m = math.copysign((dry.F_forward if w_m > 0.0 else dry.F_backward) + dry.K_m * abs(drives), w_m)
+        f = math.copysign(numbers.load.coulomb, w)
         return [w, (-own.b_out * w - f - torque) / own.J_out,
                 w_m, (drives - (own.b - own.b_out) * w_m - f_m) / (own.J - own.J_out)]
 
@@ -68,10 +70,11 @@ def test_two_bodies_against_a_fine_solution(name):
         before = go(numbers, torque, drive, start, end - 1e-9)
         assert before.mode.mesh == INSIDE
         at = [x - 1e-9 * rate for x, rate in zip(y, of(end, y), strict=True)]
-        assert [before.y.q, before.y.w, before.y.q_m, before.y.w_m] == pytest.approx(at, abs=3e-10), (drive, torque, w, w_m)
+        found = [before.y.q, before.y.w, before.y.q_m, before.y.w_m]
+        assert found == pytest.approx(at, abs=3e-10), (drive, torque, w, w_m)
     assert met > 3
 
 
 def go(numbers, torque, drive, start, time):
     q, w, q_m, w_m = start
-    return gaps.go(numbers, torque, drive, Vector(q, w, 0.0, 0.0, 0.0, q_m, w_m), INSIDE, q, time)
+    return gap_rounds.gone(numbers, torque, drive, Vector(q, w, 0.0, 0.0, 0.0, q_m, w_m), INSIDE, q, time)

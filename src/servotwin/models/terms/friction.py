@@ -136,9 +136,10 @@ def sliding_friction(friction: Friction, forward: bool, w: float, tau_m: float, 
     F = coulomb(friction, forward)
     if friction.varies == 0.0:
         return F
-    speed = w if friction.w_s > 0.0 else math.inf  # else static friction ends as soon as the shaft moves
+    if friction.w_s == 0.0:  # static friction ends as soon as the shaft moves
+        return sliding_gear_friction(tau_m, tau_e, F, friction.K_m, friction.K_e)
     return gear_friction_budget(
-        speed, tau_m, tau_e, coulomb_torque=F, breakaway_ratio=friction.breakaway, stribeck_speed=friction.w_s,
+        w, tau_m, tau_e, coulomb_torque=F, breakaway_ratio=friction.breakaway, stribeck_speed=friction.w_s,
         stribeck_exponent=friction.alpha, load_friction_motor=friction.K_m, load_friction_external=friction.K_e,
         load_friction_motor_stribeck=friction.K_ms, load_friction_external_stribeck=friction.K_es,
         load_friction_motor_quad=friction.K_mq, load_friction_external_quad=friction.K_eq)
