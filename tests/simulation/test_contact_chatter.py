@@ -126,6 +126,14 @@ def test_a_motor_that_cannot_lift_its_output_off_a_stop_comes_to_rest_against_it
     assert len(result.events) < 300
 
 
+@pytest.mark.xfail(strict=True, reason="the teeth meet without time going on")
+@pytest.mark.parametrize(("name", "torque", "goal"), [("12 V", 2.0, 0.02), ("7.4 V", 2.5, 0.1)])
+def test_a_catalog_servo_comes_to_rest_against_what_it_cannot_lift(name, torque, goal):
+    model = st.DigitalServo(SERVOS[name].replace({"stops.lower_angle": -0.001, "stops.upper_angle": 1.0}))
+    load = st.loads.Inertia(1e-3) + st.loads.Constant(torque)
+    assert run(model, st.signals.constant(goal, unit="rad"), load, 0.4).status.ok
+
+
 if __name__ == "__main__":
     for seed in range(*map(int, sys.argv[1:])):
         if wrong := crowded(seed):
