@@ -1,8 +1,8 @@
 """Independent reference of the digital servo, written from its specification: slow, plain, one servo, one supply.
 
 What the clock does is known beforehand and met exactly: new duty, load, tick, sample, in this order at one instant.
-Between instants `digital_motion` moves the shaft; at ticks `digital_firmware` decides. Play and elasticity of the gear
-are left out.
+Between instants `digital_motion` moves the shaft, or `digital_train` motor and output where the gear has play; at ticks
+`digital_firmware` decides. Elasticity of the gear is left out.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from .digital_command import Commands
 from .digital_firmware import Firmware, Sensed, Tick
 from .digital_motion import ENERGIES, Shaft
 from .digital_plant import make_plant
+from .digital_train import Meeting, Train
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Mapping[str, Any]]
@@ -47,6 +48,7 @@ class Trace:
     events: tuple[tuple[float, str], ...]
     energy: dict[str, float]  # by the end of the run [J]; kinetic: gained
     least_tie: float  # smallest distance of a measured angle from a change of its count [counts]
+    meetings: tuple[Meeting, ...] = ()  # of motor and output, where the gear has play
 
 
 class _Run:
@@ -58,8 +60,12 @@ class _Run:
         self.T_c, self.phase = float(self.f["control_period"]), float(self.f.get("control_phase", 0.0))
         self.delay, self.slack = float(self.f.get("compute_delay", 0.0)), SAME * self.T_c
         self.firmware = Firmware(values, Commands(values, command, self.slack), seed)
-        self.shaft = Shaft(make_plant(values, load), initial_angle, Bridge(self.f.get("off_state", "brake")),
-                           play=self.pot.get("backlash", 0.0))
+        bridge = Bridge(self.f.get("off_state", "brake"))
+        self.shaft: Shaft | Train
+        if values["gear"].get("backlash"):
+            self.shaft = Train(values, load, initial_angle, bridge)
+        else:
+            self.shaft = Shaft(make_plant(values, load), initial_angle, bridge, play=self.pot.get("backlash", 0.0))
         self.torque_off = command.get("torque_off", ())
         self.pieces = deque(self.shaft.P.torque[1:])
         self.duties: deque[tuple[float, Bridge]] = deque()
@@ -90,7 +96,7 @@ class _Run:
         shaft = self.shaft
         current, bus = shaft.now()
         R_a, _, K_b = shaft.electric()
-        sensed = Sensed(self._angle(), shaft.w, current, bus, shaft.T_h, R_a + shaft.P.r_c, K_b)
+        sensed = Sensed(self._angle(), shaft.motor_speed, current, bus, shaft.T_h, R_a + shaft.P.r_c, K_b)
         torque = not any(start <= t + self.slack < end for start, end in self.torque_off)
         row, bridge = self.firmware.tick(t, sensed, torque)
         self.ticks.append(row)
@@ -154,4 +160,5 @@ def _trace(one: _Run, times: Array, rows: list[tuple[float, ...]], start: float)
         trip=trip.astype(np.int64), events=tuple(one.shaft.events),
         energy=energy | {"stops": one.shaft.impacts, "kinetic": one.shaft.kinetic() - start},
         least_tie=one.firmware.least_tie,
+        meetings=tuple(one.shaft.meetings) if isinstance(one.shaft, Train) else (),
     )

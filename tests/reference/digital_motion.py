@@ -74,6 +74,11 @@ class Shaft:
         zone = self.zone(self.w, self.T_w, self.T_h)
         return zone.current(self.w) / zone.on, zone.bus(self.w)
 
+    @property
+    def motor_speed(self) -> float:
+        """At the output: what the motor's voltage follows."""
+        return self.w
+
     def electric(self) -> tuple[float, float, float]:
         """R_a, K and K_b as they are now."""
         return self.P.electric(self.T_w, self.T_h)

@@ -289,3 +289,34 @@ def test_closed_form_and_integration_agree(seed: int) -> None:
     assert np.max(np.abs(closed.output_angle - integrated.output_angle)) < 1e-11
     assert np.array_equal(closed.trip, integrated.trip)
     assert closed.duty == pytest.approx(integrated.duty, abs=1e-8, nan_ok=True)
+
+
+SWINGS = [(0.02 * k, 0.2 * (-1.0) ** k) for k in range(10)]
+
+
+def geared(**gear: float) -> dict[str, dict[str, Any]]:
+    """A servo with load friction and drops, and a gear with what is given."""
+    values = servo(PLAIN | {"proportional_gain": 6.0}, friction=3e-4, gear={"output_inertia": 1e-3, **gear},
+                   supply={"bridge_drop_voltage": 0.3, "internal_resistance": 0.2})
+    values["friction"] |= {"load_friction_motor": 0.2, "load_friction_external": 0.3, "bearing_coulomb_torque": 5e-3}
+    return values
+
+
+@pytest.mark.parametrize("torque", [0.0, 0.03, -0.3])
+def test_energy_and_momentum_are_kept_across_the_play(torque: float) -> None:
+    trace = run(geared(backlash=0.02), goals(*SWINGS), {"inertia": 1e-3, "torque": torque}, 0.2, [0.2])
+    assert _energy_error(trace) < 1e-11
+    assert trace.meetings
+    J_m, J = 250.0**2 * 8e-8, 2e-3
+    for meeting in trace.meetings:
+        assert (J + J_m) * meeting.after == pytest.approx(J * meeting.output + J_m * meeting.motor, rel=1e-12)
+        lost = 0.5 * J * J_m / (J + J_m) * (meeting.motor - meeting.output) ** 2
+        assert meeting.lost == pytest.approx(lost, rel=1e-6, abs=1e-15)
+
+
+def test_hardly_any_play_is_none() -> None:
+    """Two ways of moving: from event to event in closed form, and one body whose load friction is integrated."""
+    times, load = np.linspace(1e-3, 0.2, 100) + 1e-4, {"inertia": 1e-3, "torque": 0.3}
+    one, two = (run(values, goals(*SWINGS), load, 0.21, times) for values in (geared(), geared(backlash=1e-12)))
+    assert np.ptp(one.output_angle) > 0.05
+    assert np.max(np.abs(one.output_angle - two.output_angle)) < 1e-7
