@@ -12,9 +12,7 @@ BLOCK, BLOCKS = 50, 40
 WORK = 30.0  # s of this process; most take 0.01, those of which a step is integrated a few
 MOST_MOTIONS, MOST_EVENTS = 60_000, 5_000  # of a run of at most 40 ticks; stiff ones are integrated in small steps
 KNOWN = {  # what is not as it should be
-    861,  # without end: as the last tests of test_contact_chatter.py
     1293,  # the motor's rate is 1e8 1/s, and `energy` takes a minute
-    1336,  # teeth that part and meet at one instant, at a load friction of 0.9995
     1843}  # the motor's rate is 7e5 1/s, and what is integrated takes half a minute
 SEEN = ("output_angle", "output_speed", "motor_angle", "armature_current", "load_torque")
 LOSSES = ("winding", "bridge", "brush", "friction", "stops")

@@ -134,8 +134,6 @@ def test_cuts_at_ticks_change_no_bit(seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_cuts_within_ticks_change_rounding_alone(seed):
     one = drawn(seed)
-    if one.model.servo.firmware.off_state == "coast":
-        pytest.skip("has a test of its own")
     whole = told(lanes_of(one, ALL, seed), one, ALL, seed, [EVERY])
     cut = told(lanes_of(one, ALL, seed), one, ALL, seed, INSIDE)
     for name in SHAFT:
@@ -174,7 +172,6 @@ def test_changed_numbers_are_those_of_a_new_simulator(seed, rest):
 # --- known ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.xfail(strict=True, reason="a lane goes on with its old duty from a tick that the call before ended at")
 def test_a_slow_bridge_may_be_cut_within_ticks():
     """Its voltage is the same at any duty, so that a motion that a cut has kept seems to go on."""
     model = digital({"proportional_gain": 6.0, "off_state": "coast"})

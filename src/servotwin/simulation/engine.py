@@ -14,6 +14,7 @@ from typing import NamedTuple
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
 from servotwin.models.engine import controller, guards, motion
+from servotwin.models.engine.legs import MOST_SHORT
 from servotwin.models.engine.memory import (
     ACCURACY,
     Inputs,
@@ -35,6 +36,7 @@ from servotwin.models.engine.modes import (
     at_rest,
 )
 from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.runs import calmed, is_short
 from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
 from servotwin.models.terms import control, duty, firmware, frame
 from servotwin.models.terms.bridge import heeds_silence
@@ -221,7 +223,7 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
         controller.resume(inputs, memory)
     end = instant(plan.pulsed, inputs, memory, until - origin_of(memory))
     m = motion.nothing(numbers, memory.u, memory.tau)
-    idle = 0
+    idle = short = 0
     while memory.point.time < end:
         if due(memory):
             memory = counted_anew(memory)
@@ -238,10 +240,19 @@ def run(plan: Plan, state: State, until: float, record: Record | None = None) ->
             raise failure(Status.CHATTER, time_of(before))
         if record is not None:
             _keep(record, plan, before, trip, memory, m, event)
+        short = short + 1 if numbers.play.half > 0.0 and is_short(before, memory, event) else 0
+        if short >= MOST_SHORT:
+            memory, held = calmed(numbers, chip, inputs, memory)
+            if record is not None and held:
+                record.events.append(Event(time_of(memory), HELD, memory.point.y.q))
     if plan.digital:
         controller.pause(inputs, memory)
         memory = memory._replace(firm=(control.frozen(memory.firm[0]),))
     return State(until, state.places, memory, numbers, state.changes)
+
+
+HELD = "gear held"
+"""What an event is called after which motor and output, that parted and met in no time, stay together for a while."""
 
 
 def failure(status: Status, time: float) -> SimulationError:

@@ -16,6 +16,7 @@ from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
 from servotwin.simulation import files
 from servotwin.simulation.energy import Energy, energy_of
+from servotwin.simulation.engine import HELD
 from servotwin.simulation.metrics import StepMetrics, holding_error, mean_current, peak, step_metrics
 from servotwin.simulation.remarks import Remark, remarks_of
 from servotwin.simulation.rest import Rest, rest_of
@@ -38,11 +39,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stats:
-    """How the solution was found: method, number of motions and of events."""
+    """How the solution was found: method, number of motions and of events.
+
+    `held` is how often motor and output, that parted and met in no time, were kept together until the inputs changed.
+    """
 
     method: str
     motions: int
     events: int
+    held: int = 0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -151,7 +156,7 @@ class Result:
         """How the solution was found."""
         closed = [not is_step(segment.motion) for segment in self.trajectory.segments]
         method = "closed form" if all(closed) else "integrated" if not any(closed) else "closed form and integrated"
-        return Stats(method, len(closed), len(self.events))
+        return Stats(method, len(closed), len(self.events), sum(event.kind == HELD for event in self.events))
 
     @cached_property
     def remarks(self) -> tuple[Remark, ...]:

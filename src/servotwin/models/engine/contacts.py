@@ -16,6 +16,7 @@ from servotwin.models.engine.modes import (
     INSIDE,
     ON_BACKWARD,
     ON_FORWARD,
+    STUCK,
     Mode,
     Vector,
     at_rest,
@@ -119,6 +120,12 @@ def as_one(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: i
     return Mode(zone, contact, mesh, FREE, share_sign(numbers, zone, contact, mesh, u, tau, y))
 
 
+def held(numbers: Numbers, zone: int, u: float, tau: float, y: Vector, mesh: int) -> Mode:
+    """Return the mode of motor and output that stay together until the inputs change, whether or not they press."""
+    mode = as_one(numbers, zone, u, tau, y, mesh)
+    return Mode(zone, mode.contact, mesh, STUCK, mode.share)
+
+
 def share_sign(numbers: Numbers, zone: int, contact: int, mesh: int, u: float, tau: float, y: Vector) -> int:
     """Return the sign of what the torques through a gear add to its friction before its magnitude is taken.
 
@@ -200,14 +207,18 @@ def _closing(numbers: Numbers, mode: Mode, motor: int, contact: int, u: float, t
 
 
 def rebound(numbers: Numbers, mode: Mode, upper: bool, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:
-    """Return mode and state after the output has hit a stop; with it the motor, unless it only follows."""
+    """Return mode and state after the output has hit a stop; with it the motor, unless it only follows.
+
+    Where both are about to rest there and touch they rest together: the motor would come back to the output for ever.
+    """
     q = numbers.stops.upper if upper else numbers.stops.lower
     w = rebound_speed(y.w, numbers.stops.restitution)
     pushes = mode.mesh == (ON_FORWARD if upper else ON_BACKWARD)
-    as_one = not play.present(numbers.play) or pushes
-    mesh = mode.mesh if as_one else INSIDE
+    rests = mode.mesh != INSIDE and abs(w) < REST_SPEED and abs(y.w_m) < REST_SPEED
+    together = not play.present(numbers.play) or pushes or rests
+    mesh = mode.mesh if together else INSIDE
     after = moving(y, q, w, y.w_m)
-    if as_one:
+    if together:
         after = with_motor(numbers.play, mesh, after)
     zone = mode.zone
     if source.present(numbers.source):  # the current goes with the speed

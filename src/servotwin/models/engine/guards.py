@@ -104,7 +104,7 @@ def guards(numbers: Numbers, mode: Mode, u: float, smooth: bool) -> int:
             kinds |= _MOTOR_RELEASE
         elif mode.motor != FREE:
             kinds |= 1 << MOTOR_SPEED
-    elif play.present(numbers.play):
+    elif play.present(numbers.play) and mode.motor != STUCK:  # unless they are held together
         kinds |= 1 << PART_MOTOR | 1 << PART_OUTPUT if at_rest(shaft) else 1 << PART
     return kinds
 

@@ -51,7 +51,7 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
                 until = instant(False, inputs, memory, until - (origin_of(memory) - origin))
             gone = tick_legs.go(numbers, inputs, memory, until, times, done, outputs[k])
             memory, done = tick_legs.as_gone(memory, gone), gone.done
-            goes = gone.moved and gone.time < until and due(memory)
+            goes = gone.anew and gone.time < until and due(memory)
         arrives = memory.point.time >= until
         if arrives:
             controller.pause(inputs, memory)

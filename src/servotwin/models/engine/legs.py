@@ -21,8 +21,8 @@ from servotwin.models.terms.play import with_motor
 from servotwin.models.terms.sensor import wiper_at
 
 MOST_LEGS = 400  # under one drive; a servo that needs more is left to the general engine
-_MOST_SHORT = 8  # legs within no time: then motor and output stay together
-_SHORT, _AT_END = 1e-9, 1e-6  # of a time, of the play
+MOST_SHORT = 8  # legs within next to no time: then motor and output stay together
+SHORT, _AT_END = 1e-9, 1e-6  # of a time, of the play
 
 
 class Gone(NamedTuple):
@@ -71,13 +71,10 @@ def moved(numbers: Numbers, mode: Mode, laws: Apart, y: Vector, s: float) -> Vec
     return with_motor(numbers.play, mode.mesh, Vector(q, w, y.i, y.T_w, y.T_h, y.q_m, y.w_m))
 
 
-def ending(numbers: Numbers, mode: Mode, laws: Apart, u: float, torque: float, y: Vector, time: float,
-           held: bool) -> Ending:
-    """Return how a leg from y ends within a time [s]; `held` keeps motor and output together."""
+def ending(numbers: Numbers, mode: Mode, laws: Apart, u: float, torque: float, y: Vector, time: float) -> Ending:
+    """Return how a leg from y ends within a time [s]."""
     after = moved(numbers, mode, laws, y, time)
     kinds = guards.guards(numbers, mode, u, False)
-    if held:
-        kinds &= ~(1 << guards.PART)
     s, kind = first_end(numbers, mode, kinds, u, torque, laws, y, after, 0.0, time)
     return Ending(s, kind, after)
 
@@ -90,15 +87,15 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: 
         if stands(mode) or not time > 0.0:
             return Gone(y, mode, wiper, held, 1.0)
         laws = laws_of(numbers, mode, u, torque)
-        end = ending(numbers, mode, laws, u, torque, y, time, held > 0)
+        end = ending(numbers, mode, laws, u, torque, y, time)
         if end.kind < 0:
             wiper = wiper_at(numbers.sensor, wiper, end.after.q)
             return Gone(end.after, mode, wiper, held, 1.0 if math.isfinite(end.after.q + end.after.q_m) else 0.0)
         y = moved(numbers, mode, laws, y, end.time)
         wiper = wiper_at(numbers.sensor, wiper, y.q)
         mode, y = guards.cross(numbers, mode, end.kind, u, torque, y)
-        short = short + 1 if end.time <= _SHORT * time else 0
-        if short >= _MOST_SHORT and held == 0:
+        short = short + 1 if end.time <= SHORT * time else 0
+        if short >= MOST_SHORT:
             held, mode, y = together(numbers, mode, u, torque, y)
         time -= end.time
     return Gone(y, mode, wiper, held, 0.0)
@@ -113,4 +110,4 @@ def together(numbers: Numbers, mode: Mode, u: float, torque: float, y: Vector) -
     if mesh == INSIDE:
         y = play.met(numbers.play, numbers.shaft, ahead > 0.0, y)
         mesh = ON_FORWARD if ahead > 0.0 else ON_BACKWARD
-    return 1, contacts.as_one(numbers, currents.zone_of(numbers, u, 0.0, y.q, y.w_m, 0.0), u, torque, y, mesh), y
+    return 1, contacts.held(numbers, currents.zone_of(numbers, u, 0.0, y.q, y.w_m, y.i), u, torque, y, mesh), y

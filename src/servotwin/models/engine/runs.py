@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from servotwin.models.engine import controller, motion, tick_legs
+from servotwin.models.engine import controller, legs, motion, tick_legs
+from servotwin.models.engine.legs import MOST_SHORT, SHORT
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
     Memory,
+    Point,
     counted_anew,
     due,
     in_force,
@@ -33,7 +35,7 @@ from servotwin.models.terms.chip import present as pulsed_chip
 from servotwin.models.terms.control import NOWHERE
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import wiper_at
-from servotwin.physics.pieces import Piece
+from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
     from servotwin.models.engine.memory import Memories
@@ -122,6 +124,27 @@ def mode_under(numbers: Numbers, u: Piece, tau: Piece, memory: Memory) -> Mode:
     return anchored(numbers, since(u, origin), since(tau, origin), point.time, point).mode
 
 
+def calmed(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory) -> tuple[Memory, int]:
+    """Return the memory of a servo whose motor and output, that part and meet in no time, stay together; 1, or 0: not.
+
+    They do so until the inputs change.
+    """
+    point, origin, now = memory.point, origin_of(memory), as_now(numbers, inputs, memory)
+    u, tau = told(numbers, pulsed_chip(chip), inputs, memory)
+    held, mode, y = legs.together(now, point.mode, piece_value(since(u, origin), point.time),
+                                  piece_value(since(tau, origin), point.time), point.y)
+    if held == 0:
+        return memory, 0
+    point = Point(point.time, y, mode, point.time, y, point.step, point.wiper)
+    return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
+                  memory.firm), 1
+
+
+def is_short(before: Memory, memory: Memory, event: int) -> bool:
+    """Tell whether an event came next to no time after the one before."""
+    return event >= 0 and memory.point.time - before.point.time <= SHORT * memory.beat
+
+
 def run(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, duration: float, underway: bool,
         times: Floats, done: int, outputs: Floats) -> tuple[Memory, int]:
     """Go on for a duration [s]; return the memory, of before what went wrong, and a status.
@@ -151,7 +174,7 @@ def _run_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until:
     """Go on to a time [s] from event to event, and by legs wherever these lead on; see `run`."""
     pulsed, origin = pulsed_chip(chip), origin_of(memory)
     m = motion.nothing(numbers, memory.u, memory.tau)
-    idle = 0
+    idle = short = 0
     while memory.point.time < until:
         if due(memory):
             memory = counted_anew(memory)
@@ -163,10 +186,13 @@ def _run_on(numbers: Numbers, chip: Chip, inputs: Inputs, memory: Memory, until:
             if memory.point.time >= until or due(memory):
                 continue
         t, wiper = memory.point.time, memory.point.wiper
-        after, m, _, status = step(numbers, chip, inputs, memory, m, until)
+        after, m, event, status = step(numbers, chip, inputs, memory, m, until)
         if status != COMPLETED:
             return memory, status
+        short = short + 1 if play.present(numbers.play) and is_short(memory, after, event) else 0
         memory = after
+        if short >= MOST_SHORT:
+            memory, _ = calmed(numbers, chip, inputs, memory)
         idle = idle + 1 if memory.point.time == t else 0
         if idle > MOST_IDLE:
             return memory, CHATTER

@@ -56,13 +56,16 @@ class Way(NamedTuple):
 
 
 class Gone(NamedTuple):
-    """Until when a servo has gone [s], its state and mesh there, how many outputs are done, and whether it moved."""
+    """Until when a servo has gone [s], its state and mesh there, how many outputs are done.
+
+    And whether what moves it may be another than its memory has: it went on, or its program worked.
+    """
 
     time: float
     y: Vector
     mesh: int
     done: int
-    moved: bool
+    anew: bool
 
 
 def possible(numbers: Numbers, inputs: Inputs) -> bool:
@@ -89,12 +92,13 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
     firmware, firm, frames, origin = inputs.firmware[0], controller.of(memory), memory.frames, origin_of(memory)
     point, slack, tau = memory.point, SAME * inputs.firmware[0].T_c, inputs.constant_torque
     t, y, T_c = point.time, point.y, inputs.firmware[0].T_c
-    last, gone = min(until, FRAMES * memory.beat), False
+    last, anew = min(until, FRAMES * memory.beat), False
     way = Way(math.nan, numbers, 0.0, Mode(0, 0, point.mode.mesh, 0, 0), _NO_LAWS, spring_legs.NO_LAW)
     output = motor = Fade(math.nan, 0.0, 0.0, 0.0)
     while t < last:
         if controller.next_due(firmware, firm, frames) > t + slack:
             break  # in the middle of a motion
+        anew = True
         controller.apply(firmware, firm, frames, t + slack)
         if firm.duty != way.duty:
             way = at_duty(numbers, firm.duty, tau, y, way)
@@ -121,16 +125,15 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
             if not certain:
                 leg = gone_on(way, inputs, y, time)
                 if leg.done == 0.0:
-                    gone = True
                     break
                 way, y = in_mode(way, leg.mode, tau), leg.y
         t = end
-    return Gone(t, y, way.mode.mesh, done, t > point.time or gone)
+    return Gone(t, y, way.mode.mesh, done, anew)
 
 
 def as_gone(memory: Memory, gone: Gone) -> Memory:
     """Return the memory of a servo that has gone on so."""
-    if not gone.moved:
+    if not gone.anew:
         return memory
     point = Point(gone.time, gone.y, Mode(0, 0, gone.mesh, 0, 0), math.inf, gone.y, memory.point.step, gone.y.q)
     return Memory(memory.frames, memory.beat, point, memory.chip, memory.u, memory.u_end, memory.tau, memory.tau_end,
