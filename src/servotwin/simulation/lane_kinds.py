@@ -119,10 +119,11 @@ class SideBySide(NamedTuple):
 
 
 class OneByOne(NamedTuple):
-    """Lanes that run one by one, by a form that leaves out what they lack."""
+    """Lanes that run one by one, by a form that leaves out what they lack; whether some may go on calmly."""
 
     which: Indices
     recipe: Recipe
+    calm: bool = False
 
 
 def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, recorded: Mask,
@@ -146,13 +147,13 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, 
             which = _and(which, terms.fit(recipes.side_by_side(form, own_type, True, True)))
             left = _without(left, which)
             found.append(_together(terms, form, own_type, _indices(which, lanes)))
-    for recipe, wanted in ((recipes.PLAIN_RUNS, True), (recipes.PENDULUM_RUNS, True), (
-            recipes.GAP_RUNS, terms.ask(PLAY))):
+    for recipe, wanted, calm in ((recipes.PLAIN_RUNS, terms.suit(recipes.CALM.knows), True), (
+            recipes.PLAIN_RUNS, True, False), (recipes.GAP_RUNS, terms.ask(PLAY), False)):
         which = _and(left, wanted)
         if _any(which):
             which = _and(which, terms.fit(recipe))
             left = _without(left, which)
-            found.append(OneByOne(_indices(which, lanes), recipe))
+            found.append(OneByOne(_indices(which, lanes), recipe, calm))
     left = True if is_plain() else left
     return [kind for kind in (*found, *_at_last(terms, left, recipes.ALL_RUNS, lanes)) if len(kind.which)]
 

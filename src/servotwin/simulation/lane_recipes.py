@@ -79,13 +79,12 @@ _BY_GAPS = _side("by_gaps", ("GAPS",), _ANY_BRIDGE | REGULATED | PLAY | TWO_BODI
 
 ALL_RUNS = Recipe("runs", _ENTRIES, knows=~(_DIGITAL | SPRING))
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
-PLAIN_RUNS = Recipe("plain_runs", _ENTRIES, knows=_PLAIN | PULSES | FOLLOWS | RECORDED)
-PENDULUM_RUNS = Recipe("pendulum_runs", _ENTRIES, knows=PLAIN_RUNS.knows | CURVED_Q)
+PLAIN_RUNS = Recipe("plain_runs", _ENTRIES, knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED)
 GAP_RUNS = Recipe("gap_runs", _ENTRIES, knows=(
     _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | SLACK | PULSES | REGULATED | PLAY | TWO_BODIES))
-_LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS | DROPS | SILENCE
-CALM = Recipe("calm", ("servotwin.models.engine.calm:go",), knows=PLAIN_RUNS.knows & ~_LEFT_TO_EVENTS,
-              leaves=_LEFT_TO_EVENTS)
+_LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
+CALM = Recipe("calm", ("servotwin.models.engine.calm:go",), leaves=_LEFT_TO_EVENTS,
+              knows=PLAIN_RUNS.knows & ~(_LEFT_TO_EVENTS | CURVED_Q | RECORDED | TABLE))
 ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM)
 PLAIN_DIGITAL = Recipe("plain_digital_runs", _ENTRIES, knows=_PLAIN | _DIGITAL, always=PROGRAM | PWM)
 # Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop

@@ -74,7 +74,7 @@ class Store:
         self._buses = sets_of(numbers, self._threads, self._pool) if numbers.supplies.lanes else []
         self.sets: list[_Tiles | _Records | BusSet] = [
             *(_Tiles(kind, some_of(self.columns, kind.which), self._threads)
-              if isinstance(kind, SideBySide) else _Records(kind, numbers) for kind in self._kinds), *self._buses]
+              if isinstance(kind, SideBySide) else _Records(kind) for kind in self._kinds), *self._buses]
         self._set_of, self._place = np.empty((2, numbers.count), np.int64)
         for k, some in enumerate(self.sets):
             self._set_of[some.which], self._place[some.which] = k, np.arange(len(some.which))
@@ -368,13 +368,12 @@ class _Tiles:
 class _Records:
     """Lanes that run one by one."""
 
-    def __init__(self, kind: OneByOne, numbers: LaneNumbers) -> None:
+    def __init__(self, kind: OneByOne) -> None:
         self.which, self.recipe = kind.which, kind.recipe
         self.memories = nothing_yet(len(self.which))
         self.rows = self.memories.rows
         self.done = np.zeros(len(self.which), np.int64)  # those that are through this call already
-        self.calms = (not numbers.pulsed and kind.recipe == lane_recipes.PLAIN_RUNS
-                      and not numbers.torque.count[kind.which].any())
+        self.calms = kind.calm
         self._calm: Call | None = None
         self._look: Call | None = None
         self._going: GoingOn | None = None
