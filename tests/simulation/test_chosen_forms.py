@@ -56,7 +56,8 @@ OF_ANALOG = {
     "by_bands_and_creep": "creep limit+creep creep+share creep+slack creep+coast",
     "plain_runs": (
         "steps bend silent told steps+bend steps+coast steps+silent steps+held steps+told bend+coast bend+silent "
-        "bend+held bend+told coast+told silent+held silent+told held+told steps+hangs bend+hangs silent+hangs hangs+told"),
+        "bend+held bend+told coast+told silent+held silent+told held+told steps+hangs bend+hangs silent+hangs "
+        "hangs+told"),
     "gap_runs": "play+steps play+bend play+silent",
     "by_strides_in_bands": (
         "heat+limit heat+creep heat+share limit+hangs limit+held creep+hangs creep+held share+hangs share+held"),

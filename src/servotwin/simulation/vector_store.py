@@ -27,7 +27,7 @@ from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
 from servotwin.simulation.lane_memory import copied, flat, memories_of, nothing_yet, put, put_back, put_memories, taken
 from servotwin.simulation.lane_runs import some_of
 from servotwin.simulation.lanes import ALL_FIELDS
-from servotwin.simulation.vector_buses import BusSet, sets_of
+from servotwin.simulation.vector_buses import BusSet
 from servotwin.simulation.vector_calls import TICKS, asked, calls_in_records, calls_in_tiles
 from servotwin.simulation.vector_going import GoingOn
 from servotwin.simulation.vector_memory import Common, Piece, piece_of
@@ -71,7 +71,7 @@ class Store:
         self.total[:] = self.base
         self.columns = columns._replace(torque=self.total)
         self._kinds = self._kinds_now()
-        self._buses = sets_of(numbers, self._threads, self._pool) if numbers.supplies.lanes else []
+        self._buses = [BusSet(numbers, self._threads, self._pool)] if numbers.supplies.lanes else []
         self.sets: list[_Tiles | _Records | BusSet] = [
             *(_Tiles(kind, some_of(self.columns, kind.which), self._threads)
               if isinstance(kind, SideBySide) else _Records(kind) for kind in self._kinds), *self._buses]
