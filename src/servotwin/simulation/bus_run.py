@@ -22,7 +22,7 @@ from servotwin.models.engine.together import at_start
 from servotwin.models.engine.told import Tables
 from servotwin.models.terms import control
 from servotwin.models.terms.chip import NO_CHIP, Chip
-from servotwin.models.terms.dependence import CURVED_Q
+from servotwin.models.terms.dependence import CURVED_Q, SPRING
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.source import Source
@@ -30,14 +30,14 @@ from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.engine import Plan, State
 from servotwin.simulation.lane_memory import nothing_yet
-from servotwin.simulation.lane_recipes import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS
+from servotwin.simulation.lane_recipes import PLAIN_RUNS
 from servotwin.simulation.lane_runs import programs_of
 
 Array = NDArray[np.float64]
 
 _ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("go_on", "look"))
-BUSES = Recipe("buses", _ENTRIES, knows=ALL_RUNS.knows | ALL_DIGITAL.knows)
-"""All servos: those with terms that others lack take hardly longer for them."""
+BUSES = Recipe("buses", _ENTRIES, knows=~SPRING)
+"""All servos but those with a spring between two bodies; they take hardly longer for what others lack."""
 _PLAINLY = PLAIN_RUNS.knows & ~CURVED_Q
 SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 

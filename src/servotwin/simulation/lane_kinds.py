@@ -161,7 +161,7 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, 
 def _alone(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
     digital, sprung = _any(terms.ask(PWM)), terms.ask(SPRING)
-    found, left = [*_at_last(terms, sprung, recipes.ELASTIC_RUNS[digital], lanes)], _not(sprung)
+    found, left = [*_at_last(terms, sprung, recipes.ALL_RUNS, lanes)], _not(sprung)
     if digital and not is_plain() and _any(left):
         which = _and(left, terms.fit(recipes.PLAIN_DIGITAL))
         left = _without(left, which)

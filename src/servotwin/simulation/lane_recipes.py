@@ -77,7 +77,7 @@ _BY_GAPS = _side("by_gaps", ("GAPS",), _ANY_BRIDGE | REGULATED | PLAY | TWO_BODI
 
 # --- Lanes one by one -------------------------------------------------------------------------------------------------
 
-ALL_RUNS = Recipe("runs", _ENTRIES, knows=~(_DIGITAL | SPRING))
+ALL_RUNS = Recipe("runs", _ENTRIES)  # they take hardly longer for what others lack
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
 PLAIN_RUNS = Recipe("plain_runs", _ENTRIES, knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED)
 GAP_RUNS = Recipe("gap_runs", _ENTRIES, knows=(
@@ -100,9 +100,6 @@ _TICKING = (Recipe("ticking", ("servotwin.models.engine.loops:go_on",), vector=T
                    leaves=_LEFT_BY_TICKS, always=PROGRAM | PWM), _TICKS)
 BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, knows=PLAIN_DIGITAL.knows,
                   always=PROGRAM | PWM)
-ELASTIC_RUNS = {
-    False: Recipe("elastic_runs", _ENTRIES, knows=~(_DIGITAL | _MEAN | PLAY), always=SPRING),
-    True: Recipe("elastic_runs_digital", _ENTRIES, knows=~(_NOT_DIGITAL | PLAY), always=SPRING | PROGRAM | PWM)}
 
 # --- What shows of lanes ----------------------------------------------------------------------------------------------
 
