@@ -147,7 +147,7 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, 
             which = _and(which, terms.fit(recipes.side_by_side(form, own_type, True, True)))
             left = _without(left, which)
             found.append(_together(terms, form, own_type, _indices(which, lanes)))
-    for recipe, wanted, calm in ((recipes.PLAIN_RUNS, terms.suit(recipes.CALM.knows), True), (
+    for recipe, wanted, calm in ((recipes.PLAIN_RUNS, terms.suit(recipes.CALM), True), (
             recipes.PLAIN_RUNS, True, False), (recipes.GAP_RUNS, terms.ask(PLAY), False)):
         which = _and(left, wanted)
         if _any(which):

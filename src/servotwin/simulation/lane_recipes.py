@@ -79,15 +79,18 @@ _BY_GAPS = _side("by_gaps", ("GAPS",), _ANY_BRIDGE | REGULATED | PLAY | TWO_BODI
 
 ALL_RUNS = Recipe("runs", _ENTRIES)  # they take hardly longer for what others lack
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
-PLAIN_RUNS = Recipe("plain_runs", _ENTRIES, knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED)
+_CALM = "servotwin.models.engine.calm:go"
+PLAIN_RUNS = Recipe("plain_runs", (*_ENTRIES, _CALM), knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED)
 GAP_RUNS = Recipe("gap_runs", _ENTRIES, knows=(
     _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | SLACK | PULSES | REGULATED | PLAY | TWO_BODIES))
 _LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
-CALM = Recipe("calm", ("servotwin.models.engine.calm:go",), leaves=_LEFT_TO_EVENTS,
-              knows=PLAIN_RUNS.knows & ~(_LEFT_TO_EVENTS | CURVED_Q | RECORDED | TABLE))
+CALM = PLAIN_RUNS.knows & ~(_LEFT_TO_EVENTS | CURVED_Q | RECORDED | TABLE)
+"""What lanes of those kernels may ask for that go on calmly, as far as that leads."""
+# Not compiled for their own sake: what these call says which numbers are known where lanes go on calmly, and where a
+# program goes in one loop
+_CALMLY = (Recipe("calm", (_CALM,), knows=CALM, leaves=_LEFT_TO_EVENTS), ())
 ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM)
 PLAIN_DIGITAL = Recipe("plain_digital_runs", _ENTRIES, knows=_PLAIN | _DIGITAL, always=PROGRAM | PWM)
-# Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop
 _LEFT_BY_LOOPS = AT_STOPS | SHOWN | AT_COMMANDS
 _LOOPED = (PLAIN_DIGITAL.knows & ~(_LEFT_BY_LOOPS | ON_Q))
 _GLIDING = (Recipe("gliding", _ENTRIES, knows=_LOOPED, leaves=_LEFT_BY_LOOPS, always=PROGRAM | PWM),
@@ -106,7 +109,7 @@ BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=T
 LOOK = Recipe("look", tuple(f"servotwin.models.engine.sights:{name}" for name in ("side_by_side", "one_by_one")))
 """Lanes of all forms: to look leaves out little where terms are absent."""
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, knows=~_DIGITAL)
-_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _GLIDING, _TICKING),
+_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), PLAIN_DIGITAL: ((PLAIN_DIGITAL, ()), _GLIDING, _TICKING),
           ALL_DIGITAL: ((ALL_DIGITAL, ()), _GLIDING)}
 
 

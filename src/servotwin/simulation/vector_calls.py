@@ -110,7 +110,7 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
     rows, which, alone = some.rows, some.which, _Alone(len(some.which))
     calm = list[Call]()
     if some.calms:
-        calm = [call_of(lane_recipes.CALM, "go", store.columns, which, store.now, store.status, rows, some.done,
+        calm = [call_of(lane_recipes.PLAIN_RUNS, "go", store.columns, which, store.now, store.status, rows, some.done,
                         returns=True)]
     gather = call_of(TICKS, "gather", which, store.status, store.now, some.done, some.memories, *alone.room,
                      returns=True)

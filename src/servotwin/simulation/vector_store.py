@@ -381,7 +381,7 @@ class _Records:
     def calm(self, store: Store) -> NDArray[np.bool_]:
         """Let those go on that are through a tick without an event; tell which."""
         if self.calms:
-            self._calm = self._calm or call_of(lane_recipes.CALM, "go", store.columns, self.which, store.now,
+            self._calm = self._calm or call_of(lane_recipes.PLAIN_RUNS, "go", store.columns, self.which, store.now,
                                                store.status, self.rows, self.done)
             self._calm()
         return np.asarray(self.done != 0)
