@@ -56,11 +56,11 @@ OF_ANALOG = {
     "by_bands_and_creep": "creep limit+creep creep+share creep+slack creep+coast",
     "plain_runs": (
         "steps bend silent told steps+bend steps+coast steps+silent steps+held steps+told bend+coast bend+silent "
-        "bend+held bend+told coast+told silent+held silent+told held+told"),
+        "bend+held bend+told coast+told silent+held silent+told held+told steps+hangs bend+hangs silent+hangs "
+        "hangs+told"),
     "gap_runs": "play+steps play+bend play+silent",
     "by_strides_in_bands": (
         "heat+limit heat+creep heat+share limit+hangs limit+held creep+hangs creep+held share+hangs share+held"),
-    "pendulum_runs": "steps+hangs bend+hangs silent+hangs hangs+told",
 }
 OF_DIGITAL = {
     "plain_digital_runs": "plain steps bend held steps+bend steps+held bend+held",
@@ -109,7 +109,7 @@ def combined(kind, servo, names, dtype, rng):
 def expected(table, names, digital):
     """Return what is written down for a set of features."""
     if "spring" in names:
-        return "elastic_runs" + "_digital" * digital
+        return "runs"
     told = "+".join(names) or "plain"
     return next((form for form, sets in table.items() if told in sets.split()), "digital_runs" if digital else "runs")
 
@@ -131,8 +131,7 @@ def test_analog_servos_take_the_forms_that_they_took(servo, dtype):
 def test_servos_without_pulses_take_the_forms_that_they_took(servo):
     rng = np.random.default_rng(3)
     for names in pairs(("coil", "silent")):  # only a load's are terms of theirs
-        form = "pendulum_runs" if "hangs" in names else "plain_runs"
-        assert combined(st.BoundedServo, servo.replace(MEAN), names, "float64", rng) == form, names
+        assert combined(st.BoundedServo, servo.replace(MEAN), names, "float64", rng) == "plain_runs", names
 
 
 def test_digital_servos_take_the_forms_that_they_took(servo):
@@ -162,7 +161,7 @@ def test_no_servo_of_today_needs_kernels_that_are_not_made_beforehand(servo):
         names = rng.permutation(own)[:rng.integers(3, 7)].tolist()
         digital = programs[rng.integers(len(programs))]
         assert combined(st.DigitalServo, digital, names, "float64", rng) in (
-            "plain_digital_runs", "digital_runs", "elastic_runs_digital"), names
+            "plain_digital_runs", "digital_runs", "runs"), names
 
 
 def test_many_lanes_are_asked_what_each_of_them_is(servo):

@@ -7,7 +7,7 @@ import pytest
 from servotwin.simulation import bus_run, lane_recipes, vector_calls
 from servotwin.simulation.compile.derive import derive
 
-RECIPES = (bus_run.PLAIN_BUSES, bus_run.ALL_BUSES, bus_run.DIGITAL_BUSES, lane_recipes.ALL_RUNS,
+RECIPES = (bus_run.BUSES, lane_recipes.ALL_RUNS,
            lane_recipes.PLAIN_RUNS, lane_recipes.ALL_DIGITAL, lane_recipes.LOOK, lane_recipes.BY_TICKS,
            vector_calls.TICKS)
 

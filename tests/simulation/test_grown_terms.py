@@ -84,6 +84,8 @@ HEATS = {"thermal.winding_capacity": 0.5, "thermal.housing_capacity": 5.0, "ther
 PLAYS = {"gear.backlash": 0.02, "gear.output_inertia": 1e-3}
 FORMS = {  # of servos that resist between drives: what they have anyway, by the kernels that they take
     "side_by_side_float64": ("pulse", {}), "by_bands": ("pulse", {"friction.load_friction": 0.05}),
+    "by_bands_and_creep": ("pulse", {"friction.breakaway_ratio": 1.4, "friction.stribeck_speed": 5.0}),
+    "by_strides_in_bands": ("pulse", HEATS | {"friction.load_friction": 0.05}),
     "by_coils": ("inductive", {"motor.armature_inductance": 5e-4}), "by_strides": ("pulse", HEATS),
     "by_gaps": ("pulse", PLAYS), "plain_runs": ("pulse", {"potentiometer.quantisation": 1e-3}),
     "gap_runs": ("pulse", PLAYS | {"potentiometer.quantisation": 1e-3}), "runs": ("pulse", PLAYS | HEATS)}

@@ -11,7 +11,6 @@ LOOSE = {"gear.backlash": 0.005, "gear.output_inertia": 1e-3}
 RECORDED = st.loads.Recorded([0.0, 9.0], [0.01, 0.02])
 # Each compiled form, what leads to it and how far it may be off; the order halves the work between two processes
 FORMS = {
-    "pendulum_runs": ({}, st.loads.Pendulum(mass=0.1, length=0.1) + RECORDED, "float64", 1e-9),
     "runs": (LOOSE, st.loads.Spring(0.05, 0.5), "float64", 1e-9),
     "by_coils": ({"motor.armature_inductance": 5e-4}, None, "float64", 1e-12),
     "by_gaps": (LOOSE, None, "float64", 1e-9),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine import bus, controller, crew, tape
 from servotwin.models.engine.buses import Buses
+from servotwin.models.engine.demands import demanded
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
 from servotwin.models.engine.seats import ROOM, Mate, Seat, Shared, put_shared
@@ -21,30 +22,29 @@ from servotwin.models.engine.together import at_start
 from servotwin.models.engine.told import Tables
 from servotwin.models.terms import control
 from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.dependence import CURVED_Q, SPRING
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.source import Source
+from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
-from servotwin.simulation.compile.unread import in_general
 from servotwin.simulation.engine import Plan, State
-from servotwin.simulation.lane_kinds import Terms
 from servotwin.simulation.lane_memory import nothing_yet
-from servotwin.simulation.lane_recipes import ALL_DIGITAL, ALL_RUNS, PLAIN_RUNS
+from servotwin.simulation.lane_recipes import PLAIN_RUNS
 from servotwin.simulation.lane_runs import programs_of
 
 Array = NDArray[np.float64]
 
 _ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("go_on", "look"))
-ALL_BUSES, PLAIN_BUSES, DIGITAL_BUSES = (
-    Recipe(name, _ENTRIES, knows=form.knows, always=form.always)
-    for name, form in (("buses", ALL_RUNS), ("plain_buses", PLAIN_RUNS), ("digital_buses", ALL_DIGITAL)))
-PLAIN, RARE, OTHER = 0, 1, 2  # terms of a servo: what the plain form follows, what others do, and neither
+BUSES = Recipe("buses", _ENTRIES, knows=~SPRING)
+"""All servos but those with a spring between two bodies; they take hardly longer for what others lack."""
+_PLAINLY = PLAIN_RUNS.knows & ~CURVED_Q
 SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
 
 LOADS_FROM, COMPILES_FROM = 1e2, 1.5e4  # frames of servos in one process: what it takes, and more, in plain Python
 _INTEGRATED = 8  # a servo that does not move by plain laws takes so many times as long
 _ROWS, _NUMBERS = 4096, 1 << 17  # of a tape
-_frames_run: dict[str, float] = {}  # in plain Python, of what each recipe would do
+_frames_run: dict[str, float] = {}  # in plain Python, of what a recipe would do
 
 
 class Rows(NamedTuple):
@@ -60,12 +60,10 @@ class Rows(NamedTuple):
 def run(plans: Sequence[Plan], states: Sequence[State], source: Source, duration: float) -> Rows:
     """Run servos on one source from t = 0 to `duration` [s]."""
     digital = {plan.digital for plan in plans}
-    recipe = recipe_of(any(digital), max(way_of(plan.numbers, plan.digital, False) for plan in plans))
-    work = duration * sum(1.0 / (plan.firmware.T_c if plan.digital else plan.chip.frame_period) for plan in plans)
-    compiled = len(digital) == 1 and _worth_it(recipe, work)  # no kernel has servos with a program beside others
-    if compiled:
-        recipe = recipe_of(any(digital), max(way_of(plan.numbers, plan.digital) for plan in plans))
-    way = _Compiled(recipe, plans, states, source) if compiled else Plainly(plans, states, source)
+    frames = duration * sum(
+        _weight(plan) / (plan.firmware.T_c if plan.digital else plan.chip.frame_period) for plan in plans)
+    compiled = len(digital) == 1 and _worth_it(frames)  # servos with a program beside others have no room of one shape
+    way = _Compiled(plans, states, source) if compiled else Plainly(plans, states, source)
     return taped(way, duration, tape_of(len(plans)))
 
 
@@ -93,12 +91,6 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
     return Rows(motions, events, numbers, int(status), float(when))
 
 
-def recipe_of(digital: bool, way: int) -> Recipe:
-    """Return the kernels of servos on a bus: of programs, of servos with rare terms, or of plain ones."""
-    recipe = DIGITAL_BUSES if digital else PLAIN_BUSES if way == PLAIN else ALL_BUSES
-    return recipe if way <= RARE else in_general(recipe)
-
-
 def tape_of(servos: int) -> Tape:
     """Return a tape with room for what so many servos do."""
     rows = max(_ROWS, 64 * servos)
@@ -106,28 +98,20 @@ def tape_of(servos: int) -> Tape:
                 np.empty(max(_NUMBERS, 64 * servos * ROOM)), np.zeros(3, np.int64))
 
 
-def way_of(numbers: Numbers, digital: bool, knowing: bool = True) -> Any:
-    """Return whether a servo, or each of some lanes, has terms that the plain form leaves out or does not know.
-
-    With `knowing` it is asked too which numbers of its terms kernels know: `OTHER` has one that no form knows.
-    """
-    terms = Terms(numbers, NO_CHIP, NO_FIRMWARE)
-    if is_plain():  # a fast form has no worth
-        return OTHER
-    if not knowing:
-        return np.where(terms.suit(PLAIN_RUNS.knows), PLAIN, RARE)
-    every = ALL_DIGITAL if digital else ALL_RUNS
-    return np.where(terms.fit(every), np.where(terms.fit(PLAIN_RUNS), PLAIN, RARE), OTHER)
+def _weight(plan: Plan) -> float:
+    """Return how many times as long as one that moves by plain laws a servo takes in plain Python."""
+    plainly = plan.digital or demanded(plan.numbers, NO_CHIP, NO_FIRMWARE, Piece()) & ~_PLAINLY == 0
+    return 1.0 if plainly else _INTEGRATED
 
 
-def _worth_it(recipe: Recipe, frames: float) -> bool:
+def _worth_it(frames: float) -> bool:
     """Tell whether so many frames of servos, with those before, are worth compiled kernels."""
     if is_plain():
         return False
-    done = _frames_run.get(recipe.name, 0.0) + frames * (_INTEGRATED if recipe is ALL_BUSES else 1)
-    if done >= COMPILES_FROM or (done >= LOADS_FROM and is_compiled(recipe)):
+    done = _frames_run.get(BUSES.name, 0.0) + frames
+    if done >= COMPILES_FROM or (done >= LOADS_FROM and is_compiled(BUSES)):
         done = math.inf
-    _frames_run[recipe.name] = done
+    _frames_run[BUSES.name] = done
     return done == math.inf
 
 
@@ -189,13 +173,13 @@ class Plainly:
 class _Compiled:
     """Servos on one source that run in compiled code."""
 
-    def __init__(self, recipe: Recipe, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
+    def __init__(self, plans: Sequence[Plan], states: Sequence[State], source: Source) -> None:
         count = len(plans)
         self._lanes, self._tables = _lanes_of(plans), _tables_of(plans)
         self._bus = Buses(np.arange(count), np.array([0, count]), _records_of(list(map(begun, plans, states))),
                           np.full(count, -1), shared_of([source]), np.zeros(count, np.int64), np.zeros(count))
         self._room = room_of(count)
-        self._kernels: Any = kernels(recipe)
+        self._kernels: Any = kernels(BUSES)
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
         """Go on to a time [s]; return a status and when."""

@@ -119,10 +119,11 @@ class SideBySide(NamedTuple):
 
 
 class OneByOne(NamedTuple):
-    """Lanes that run one by one, by a form that leaves out what they lack."""
+    """Lanes that run one by one, by a form that leaves out what they lack; whether some may go on calmly."""
 
     which: Indices
     recipe: Recipe
+    calm: bool = False
 
 
 def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, recorded: Mask,
@@ -146,13 +147,13 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, 
             which = _and(which, terms.fit(recipes.side_by_side(form, own_type, True, True)))
             left = _without(left, which)
             found.append(_together(terms, form, own_type, _indices(which, lanes)))
-    for recipe, wanted in ((recipes.PLAIN_RUNS, True), (recipes.PENDULUM_RUNS, True), (
-            recipes.GAP_RUNS, terms.ask(PLAY))):
+    for recipe, wanted, calm in ((recipes.PLAIN_RUNS, terms.suit(recipes.CALM), True), (
+            recipes.PLAIN_RUNS, True, False), (recipes.GAP_RUNS, terms.ask(PLAY), False)):
         which = _and(left, wanted)
         if _any(which):
             which = _and(which, terms.fit(recipe))
             left = _without(left, which)
-            found.append(OneByOne(_indices(which, lanes), recipe))
+            found.append(OneByOne(_indices(which, lanes), recipe, calm))
     left = True if is_plain() else left
     return [kind for kind in (*found, *_at_last(terms, left, recipes.ALL_RUNS, lanes)) if len(kind.which)]
 
@@ -160,7 +161,7 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, 
 def _alone(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
     digital, sprung = _any(terms.ask(PWM)), terms.ask(SPRING)
-    found, left = [*_at_last(terms, sprung, recipes.ELASTIC_RUNS[digital], lanes)], _not(sprung)
+    found, left = [*_at_last(terms, sprung, recipes.ALL_RUNS, lanes)], _not(sprung)
     for recipe in (recipes.BY_TICKS, recipes.BY_LEGS) if digital and not is_plain() else ():
         if _any(left):
             which = _and(left, terms.fit(recipe))

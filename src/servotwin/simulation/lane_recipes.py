@@ -81,15 +81,17 @@ _BY_GAPS = _side("by_gaps", ("GAPS",), _ANY_BRIDGE | _GAPS)
 
 # --- Lanes one by one -------------------------------------------------------------------------------------------------
 
-ALL_RUNS = Recipe("runs", _ENTRIES, knows=~(_DIGITAL | SPRING))
+ALL_RUNS = Recipe("runs", _ENTRIES)  # they take hardly longer for what others lack
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
-PLAIN_RUNS = Recipe("plain_runs", _ENTRIES, knows=_PLAIN | PULSES | FOLLOWS | RECORDED)
-PENDULUM_RUNS = Recipe("pendulum_runs", _ENTRIES, knows=PLAIN_RUNS.knows | CURVED_Q)
+_CALM = "servotwin.models.engine.calm:go"
+PLAIN_RUNS = Recipe("plain_runs", (*_ENTRIES, _CALM), knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED)
 GAP_RUNS = Recipe("gap_runs", _ENTRIES, knows=(
     _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | SLACK | PULSES | _GAPS))
-_LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS | DROPS | SILENCE
-CALM = Recipe("calm", ("servotwin.models.engine.calm:go",), knows=PLAIN_RUNS.knows & ~_LEFT_TO_EVENTS,
-              leaves=_LEFT_TO_EVENTS)
+_LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
+CALM = PLAIN_RUNS.knows & ~(_LEFT_TO_EVENTS | CURVED_Q | RECORDED | TABLE)
+"""What lanes of those kernels may ask for that go on calmly, as far as that leads."""
+# Not compiled for its own sake: it says which numbers are known where lanes go on calmly
+_CALMLY = (Recipe("calm", (_CALM,), knows=CALM, leaves=_LEFT_TO_EVENTS), ())
 ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM)
 _TICKS = _PLAIN & ~ON_Q | _DIGITAL
 _LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
@@ -107,16 +109,13 @@ _BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_L
              tuple(f"servotwin.models.engine.{name}" for name in (
                  "loop_tiles:enter", "loop_rounds:watch", "loop_rounds:decide", "loop_rounds:move",
                  "loop_rounds:move_on", "loop_rounds:follow")))
-ELASTIC_RUNS = {
-    False: Recipe("elastic_runs", _ENTRIES, knows=~(_DIGITAL | _MEAN | PLAY), always=SPRING),
-    True: Recipe("elastic_runs_digital", _ENTRIES, knows=~(_NOT_DIGITAL | PLAY), always=SPRING | PROGRAM | PWM)}
 
 # --- What shows of lanes ----------------------------------------------------------------------------------------------
 
 LOOK = Recipe("look", tuple(f"servotwin.models.engine.sights:{name}" for name in ("side_by_side", "one_by_one")))
 """Lanes of all forms: to look leaves out little where terms are absent."""
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, knows=~_DIGITAL)
-_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), (CALM, ())), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,)}
+_PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,)}
 _CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DIGITAL)}
 
 

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine.buses import Buses
 from servotwin.models.engine.memory import Memories
-from servotwin.models.engine.records import columns_of
 from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import APART
 from servotwin.models.engine.told import Tables
-from servotwin.models.terms.numbers import Numbers
-from servotwin.simulation.bus_run import recipe_of, room_of, shared_of, way_of
+from servotwin.simulation.bus_run import BUSES, room_of, shared_of
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
@@ -34,15 +32,6 @@ _PLACES = 4  # among what is imposed
 _WORTH = 4  # buses for a thread: fewer cost more in waking it
 
 
-def sets_of(numbers: LaneNumbers, threads: int, pool: Any) -> list[BusSet]:
-    """Return the sets of all buses: those of plain servos, and others."""
-    supplies = numbers.supplies
-    own = way_of(columns_of(Numbers, numbers.columns.numbers, slice(numbers.count)), numbers.digital)
-    ways = [recipe_of(numbers.digital, np.broadcast_to(own, numbers.count)[lanes].max()) for lanes in supplies.lanes]
-    parts = ((recipe, [k for k, own in enumerate(ways) if own == recipe]) for recipe in dict.fromkeys(ways))
-    return [BusSet(numbers, recipe, which, threads, pool) for recipe, which in parts]
-
-
 class BusSet:
     """Lanes on buses, in the order of the buses.
 
@@ -53,21 +42,20 @@ class BusSet:
     memories : Memories
         What each remembers.
     buses : Buses
-        What those on a bus remember together; `recipe`, `tables` and `rooms` are what its kernels need besides.
+        What those on a bus remember together; `tables` and `rooms` are what its kernels need besides.
     """
 
-    def __init__(self, numbers: LaneNumbers, recipe: Any, buses: list[int], threads: int, pool: Any) -> None:
+    def __init__(self, numbers: LaneNumbers, threads: int, pool: Any) -> None:
         supplies: Supplies = numbers.supplies
-        lanes = [supplies.lanes[k] for k in buses]
-        self.numbers_of_buses, self.recipe, self._pool = np.array(buses), recipe, pool
-        self.which = np.concatenate(lanes)
-        sizes = np.array([len(some) for some in lanes])
+        self._pool = pool
+        self.which = np.concatenate(supplies.lanes)
+        sizes = np.array([len(some) for some in supplies.lanes])
         count = len(self.which)
         self.memories = nothing_yet(count)
         self.rows = self.memories.rows
-        self._bus_at = np.repeat(np.arange(len(buses)), sizes)
+        self._bus_at = np.repeat(np.arange(len(sizes)), sizes)
         self.buses = Buses(self.which, np.concatenate([[0], np.cumsum(sizes)]), self.memories, np.full(count, -1),
-                            shared_of([source_of(supplies.supplies[k]) for k in buses]), np.zeros(count, np.int64),
+                            shared_of([source_of(supply) for supply in supplies.supplies]), np.zeros(count, np.int64),
                             np.zeros(count))
         none = np.zeros(numbers.count, np.int64)
         curve = numbers.curve
@@ -75,7 +63,7 @@ class BusSet:
                               none + len(curve))
         self._calls: list[Call] = []
         self._look: Call | None = None
-        self.rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(buses) // _WORTH)))]
+        self.rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(sizes) // _WORTH)))]
 
     def advance(self, store: Store) -> None:
         """Let all buses go on by a tick; status and end of all lanes are kept up to date."""
@@ -83,8 +71,8 @@ class BusSet:
         buses.status[:] = status[self.which]
         before = buses.status.copy()
         if not self._calls:
-            count, workers = len(self.numbers_of_buses), len(self.rooms)
-            self._calls = [call_of(self.recipe, "go_on", store.columns, self.tables, buses, count * k // workers,
+            count, workers = len(self.buses.shared), len(self.rooms)
+            self._calls = [call_of(BUSES, "go_on", store.columns, self.tables, buses, count * k // workers,
                                    count * (k + 1) // workers, Now(store.now, 0), math.inf, *room, NO_TAPE)
                            for k, room in enumerate(self.rooms)]
         if len(self._calls) == 1:
@@ -136,18 +124,17 @@ class BusSet:
     def common(self, joined: Indices, shared: dict[int, Any]) -> None:
         """Put into `joined` (lanes,) and `shared` what the lanes of each bus remember together."""
         joined[self.which] = self.buses.joined
-        shared |= {int(k): self.buses.shared[n].copy() for n, k in enumerate(self.numbers_of_buses)}
+        shared |= {k: self.buses.shared[k].copy() for k in range(len(self.buses.shared))}
 
     def set_common(self, joined: Indices, shared: dict[int, Any], anchors: Array) -> None:
         """Let those lanes move together again whose buses are in `shared`, from motions that began at `anchors` [s]."""
-        for n, k in enumerate(self.numbers_of_buses.tolist()):
-            if k in shared:
-                places = np.flatnonzero(self._bus_at == n)
-                source = self.buses.shared[n]["source"].copy()
-                self.buses.shared[n] = shared[k]
-                self.buses.shared["source"][n] = source
-                self.buses.joined[places] = joined[self.which[places]]
-                self.rows["point"]["anchor_time"][places] = anchors[self.which[places]]
+        for k, record in shared.items():
+            places = np.flatnonzero(self._bus_at == k)
+            source = self.buses.shared[k]["source"].copy()
+            self.buses.shared[k] = record
+            self.buses.shared["source"][k] = source
+            self.buses.joined[places] = joined[self.which[places]]
+            self.rows["point"]["anchor_time"][places] = anchors[self.which[places]]
 
     def shaft(self, name: str) -> Array:
         """Return angle [rad] or speed [rad/s] of each shaft."""
@@ -161,6 +148,6 @@ class BusSet:
     def look(self, store: Store, seen: Array) -> None:
         """Put what shows of the lanes into their rows of `seen`."""
         self.buses.status[:] = store.status[self.which]
-        self._look = self._look or call_of(self.recipe, "look", store.columns, self.tables, self.buses, *self.rooms[0],
+        self._look = self._look or call_of(BUSES, "look", store.columns, self.tables, self.buses, *self.rooms[0],
                                            seen)
         self._look()

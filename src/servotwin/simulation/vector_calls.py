@@ -14,6 +14,7 @@ from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.tape import Tape
 from servotwin.simulation import lane_recipes
+from servotwin.simulation.bus_run import BUSES
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.compile.layout import GIVEN, STAGES
@@ -109,7 +110,7 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
     rows, which, alone = some.rows, some.which, _Alone(len(some.which))
     calm = list[Call]()
     if some.calms:
-        calm = [call_of(lane_recipes.CALM, "go", store.columns, which, store.now, store.status, rows, some.done,
+        calm = [call_of(lane_recipes.PLAIN_RUNS, "go", store.columns, which, store.now, store.status, rows, some.done,
                         returns=True)]
     gather = call_of(TICKS, "gather", which, store.status, store.now, some.done, some.memories, *alone.room,
                      returns=True)
@@ -128,18 +129,18 @@ def calls_in_records(some: Any, store: Store, room: Room, command: Array) -> dic
 
 def calls_on_buses(some: Any, store: Store, room: Room) -> dict[str, list[Call]]:
     """Return what is called for lanes on buses at each stage."""
-    recipe, rows, which, buses, own = some.recipe, some.rows, some.which, some.buses, (store.columns, some.tables)
+    rows, which, buses, own = some.rows, some.which, some.buses, (store.columns, some.tables)
     apart = call_of(TICKS, "break_up", buses.joined, buses.shared, rows)
     alive = call_of(TICKS, "take_status", which, store.status, buses.status)
     found = {
         "refit": [apart],
         "impose": [apart, call_of(TICKS, "impose_on_records", room.has, room.given, store.columns.numbers, which,
                                   np.arange(len(which)), store.work, rows)],
-        "advance": [alive, call_of(recipe, "go_on", *own, buses, 0, len(buses.shared), Now(store.now, 0), math.inf,
+        "advance": [alive, call_of(BUSES, "go_on", *own, buses, 0, len(buses.shared), Now(store.now, 0), math.inf,
                                    *some.rooms[0], NO_TAPE),
                     call_of(TICKS, "note_lost_buses", which, buses.status, rows, store.status, store.ended)],
         "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
-        "look": [alive, call_of(recipe, "look", *own, buses, *some.rooms[0], room.seen)]}
+        "look": [alive, call_of(BUSES, "look", *own, buses, *some.rooms[0], room.seen)]}
     return found | _clock(some, store, room)
 
 

@@ -27,7 +27,7 @@ from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
 from servotwin.simulation.lane_memory import copied, flat, memories_of, nothing_yet, put, put_back, put_memories, taken
 from servotwin.simulation.lane_runs import some_of
 from servotwin.simulation.lanes import ALL_FIELDS
-from servotwin.simulation.vector_buses import BusSet, sets_of
+from servotwin.simulation.vector_buses import BusSet
 from servotwin.simulation.vector_calls import TICKS, asked, calls_in_records, calls_in_tiles
 from servotwin.simulation.vector_going import GoingOn
 from servotwin.simulation.vector_memory import Common, Piece, piece_of
@@ -71,10 +71,10 @@ class Store:
         self.total[:] = self.base
         self.columns = columns._replace(torque=self.total)
         self._kinds = self._kinds_now()
-        self._buses = sets_of(numbers, self._threads, self._pool) if numbers.supplies.lanes else []
+        self._buses = [BusSet(numbers, self._threads, self._pool)] if numbers.supplies.lanes else []
         self.sets: list[_Tiles | _Records | BusSet] = [
             *(_Tiles(kind, some_of(self.columns, kind.which), self._threads)
-              if isinstance(kind, SideBySide) else _Records(kind, numbers) for kind in self._kinds), *self._buses]
+              if isinstance(kind, SideBySide) else _Records(kind) for kind in self._kinds), *self._buses]
         self._set_of, self._place = np.empty((2, numbers.count), np.int64)
         for k, some in enumerate(self.sets):
             self._set_of[some.which], self._place[some.which] = k, np.arange(len(some.which))
@@ -369,13 +369,12 @@ class _Tiles:
 class _Records:
     """Lanes that run one by one."""
 
-    def __init__(self, kind: OneByOne, numbers: LaneNumbers) -> None:
+    def __init__(self, kind: OneByOne) -> None:
         self.which, self.recipe = kind.which, kind.recipe
         self.memories = nothing_yet(len(self.which))
         self.rows = self.memories.rows
         self.done = np.zeros(len(self.which), np.int64)  # those that are through this call already
-        self.calms = (not numbers.pulsed and kind.recipe == lane_recipes.PLAIN_RUNS
-                      and not numbers.torque.count[kind.which].any())
+        self.calms = kind.calm
         self._calm: Call | None = None
         self._look: Call | None = None
         self._going: GoingOn | None = None
@@ -383,7 +382,7 @@ class _Records:
     def calm(self, store: Store) -> NDArray[np.bool_]:
         """Let those go on that are through a tick without an event; tell which."""
         if self.calms:
-            self._calm = self._calm or call_of(lane_recipes.CALM, "go", store.columns, self.which, store.now,
+            self._calm = self._calm or call_of(lane_recipes.PLAIN_RUNS, "go", store.columns, self.which, store.now,
                                                store.status, self.rows, self.done)
             self._calm()
         return np.asarray(self.done != 0)
