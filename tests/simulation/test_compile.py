@@ -16,7 +16,7 @@ from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.compilers import compilers
 from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.translate import header
-from servotwin.simulation.lane_recipes import _BY_ARCS, ALL_RUNS, GAP_RUNS, PLAIN_RUNS, parts_of
+from servotwin.simulation.lane_recipes import _BY_ARCS, ALL_RUNS, BY_LEGS, PLAIN_RUNS, parts_of
 
 SLIDE = Recipe("slide", ("servotwin.models.engine.arcs:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
@@ -100,7 +100,7 @@ def test_two_processes_at_once(tmp_path):
 
 def test_what_no_term_asks_for_is_left_out():
     plain, calm, loose, everything = (
-        derive(one).text for one in (PLAIN_RUNS, parts_of(PLAIN_RUNS)[1][0], GAP_RUNS, ALL_RUNS))
+        derive(one).text for one in (PLAIN_RUNS, parts_of(PLAIN_RUNS)[1][0], BY_LEGS, ALL_RUNS))
     assert not any(f"engine_motion__{name}" in calm for name in FLAGGED)
     assert "engine_motion___long_step" in plain
     assert all(f"engine_motion__{name}" in everything for name in FLAGGED)

@@ -6,7 +6,7 @@ import pytest
 
 from servotwin.models.terms.rooms import ACTS
 from servotwin.simulation.compile import reading, unread
-from servotwin.simulation.lane_recipes import GAP_RUNS, side_by_side
+from servotwin.simulation.lane_recipes import ALL_RUNS, side_by_side
 
 SILENT = ("shaft.b_out", "stops.restitution")
 BY_GAPS = side_by_side(5, "float64", False, False)
@@ -23,7 +23,7 @@ def folder(tmp_path, monkeypatch):
 def test_what_a_term_says_is_known_where_it_is_read(folder, monkeypatch):
     """Lanes side by side leave stops to others, and go through the play by a law of their own."""
     assert set(find(BY_GAPS)) == {"shaft.b_out", "stops.restitution"}
-    assert find(GAP_RUNS) == ()
+    assert find(ALL_RUNS) == ()
     monkeypatch.setattr(reading, "ACTS", ACTS)
     assert list(reading.unread_numbers(BY_GAPS, ())) == []
 

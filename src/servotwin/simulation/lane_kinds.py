@@ -112,8 +112,6 @@ class SideBySide(NamedTuple):
     @property
     def general(self) -> Recipe:
         """The kernels of those that cannot go on side by side."""
-        if self.form == tiles.GAPS:
-            return recipes.GAP_RUNS
         plain = self.form in (tiles.ONE_FORMULA, tiles.ARCS) and not self.slack
         return recipes.PLAIN_RUNS if plain else recipes.ALL_RUNS
 
@@ -147,13 +145,12 @@ def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, 
             which = _and(which, terms.fit(recipes.side_by_side(form, own_type, True, True)))
             left = _without(left, which)
             found.append(_together(terms, form, own_type, _indices(which, lanes)))
-    for recipe, wanted, calm in ((recipes.PLAIN_RUNS, terms.suit(recipes.CALM), True), (
-            recipes.PLAIN_RUNS, True, False), (recipes.GAP_RUNS, terms.ask(PLAY), False)):
+    for wanted, calm in ((terms.suit(recipes.CALM), True), (True, False)):
         which = _and(left, wanted)
         if _any(which):
-            which = _and(which, terms.fit(recipe))
+            which = _and(which, terms.fit(recipes.PLAIN_RUNS))
             left = _without(left, which)
-            found.append(OneByOne(_indices(which, lanes), recipe, calm))
+            found.append(OneByOne(_indices(which, lanes), recipes.PLAIN_RUNS, calm))
     left = True if is_plain() else left
     return [kind for kind in (*found, *_at_last(terms, left, recipes.ALL_RUNS, lanes)) if len(kind.which)]
 

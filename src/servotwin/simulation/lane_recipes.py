@@ -85,8 +85,6 @@ ALL_RUNS = Recipe("runs", _ENTRIES)  # they take hardly longer for what others l
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
 _CALM = "servotwin.models.engine.calm:go"
 PLAIN_RUNS = Recipe("plain_runs", (*_ENTRIES, _CALM), knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED)
-GAP_RUNS = Recipe("gap_runs", _ENTRIES, knows=(
-    _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | SLACK | PULSES | _GAPS))
 _LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
 CALM = PLAIN_RUNS.knows & ~(_LEFT_TO_EVENTS | CURVED_Q | RECORDED | TABLE)
 """What lanes of those kernels may ask for that go on calmly, as far as that leads."""
