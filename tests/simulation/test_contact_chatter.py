@@ -16,7 +16,7 @@ from leg_cases import SERVOS, written
 from models.digital_servos import digital
 
 DURATION, EVERY = 0.4, 0.02  # s
-CROWD, AT_ONCE, SHORT = 16, 3, 1e-4  # events within a short time [s], as of a shaft that bounces to rest; at one instant
+CROWD, AT_ONCE, SHORT = 16, 3, 1e-4  # events within a short time [s], as of a shaft that bounces; at one instant
 WORK = 20.0  # s of this process: a run takes 0.1
 
 
