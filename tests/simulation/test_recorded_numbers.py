@@ -1,4 +1,4 @@
-"""The compiled kernels give the numbers that numba's gave, all bits of them.
+"""The compiled kernels give the numbers that they gave when these were recorded, all bits of them.
 
 On a machine that rounds otherwise, for its C library or for the want of fused multiply-adds, numbers are compared to
 1e-9, and to 1e-4 in float32; where a compiler may take a sum in any order, to 1e-12. The name of each test says which.

@@ -8,7 +8,7 @@ import pytest
 
 import servotwin as st
 from servotwin.models.engine import demands, modes, motion
-from servotwin.models.engine.modes import Mode
+from servotwin.models.engine.modes import Mode, Vector
 from servotwin.models.engine.records import mapped
 from servotwin.models.terms import dependence
 from servotwin.models.terms.chip import NO_CHIP
@@ -107,7 +107,7 @@ def test_motions_of_a_kind_come_up_only_where_it_is_said(servo, behind):
             asked = demands.demanded(numbers, NO_CHIP, NO_FIRMWARE, Piece()) | (RECORDED if told else 0)
             never = demands.impossible(asked | dependence.STRAIGHT)
             for mode in modes_of(numbers, behind):
-                y = (0.3, 0.5 * way(mode), 0.1, 300.0, 299.0, 0.301, 0.4 * way(mode))
+                y = Vector(0.3, 0.5 * way(mode), 0.1, 300.0, 299.0, 0.301, 0.4 * way(mode))
                 found = motion.begin(numbers, mode, Piece(value=4.0), Piece(slope=told), 0.0, y, 1e-3, 0.1, 1e-9)
                 word = kinds.get(found.kind)
                 seen.add(word)

@@ -1,4 +1,7 @@
-"""What numba's kernels gave: `numbers.npz` and `numbers.json`, which `test_recorded_numbers.py` reads.
+"""What kernels gave: `numbers.npz` and `numbers.json`, which `test_recorded_numbers.py` reads.
+
+Most are of the kernels that numba compiled; sets with play, with springs between two bodies and with programs are of those
+that go by legs, in which sums have another order.
 
     python tests/simulation/recorded/record.py --write [SET ...]
 

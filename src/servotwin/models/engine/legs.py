@@ -95,7 +95,7 @@ def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: 
         wiper = wiper_at(numbers.sensor, wiper, y.q)
         mode, y = guards.cross(numbers, mode, end.kind, u, torque, y)
         short = short + 1 if end.time <= SHORT * time else 0
-        if short >= MOST_SHORT:
+        if short >= MOST_SHORT and play.present(numbers.play):
             held, mode, y = together(numbers, mode, u, torque, y)
         time -= end.time
     return Gone(y, mode, wiper, held, 0.0)

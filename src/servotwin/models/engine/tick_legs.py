@@ -103,7 +103,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
         if firm.duty != way.duty:
             way = at_duty(numbers, firm.duty, tau, y, way)
         if controller.is_due(firmware, firm, frames, t + slack):
-            tick(way, inputs, firm, y, origin + t)
+            tick(numbers, way, inputs, firm, y, origin + t)
             controller.apply(firmware, firm, frames, t + slack)
         end = controller.next_due(firmware, firm, frames)
         if end > until + slack:
@@ -175,9 +175,9 @@ def gone_on(way: Way, inputs: Inputs, y: Vector, time: float) -> legs.Gone:
     return legs.go(way.numbers, tau, way.u, y, way.mode, y.q, time)
 
 
-def tick(way: Way, inputs: Inputs, firm: Any, y: Vector, time: float) -> None:
+def tick(numbers: Numbers, way: Way, inputs: Inputs, firm: Any, y: Vector, time: float) -> None:
     """Do what a tick does, at a time since the start [s]."""
-    firmware, own = inputs.firmware[0], way.numbers.sensor
+    firmware, own = inputs.firmware[0], numbers.sensor
     if controller.has_news(firmware, firm, time):
         controller.listen(inputs, firm, time)
     angle = y.q
@@ -188,7 +188,7 @@ def tick(way: Way, inputs: Inputs, firm: Any, y: Vector, time: float) -> None:
     sensed = NOTHING_SENSED
     if control.senses(firmware):
         V_bus, i = controller.in_zone(way.numbers, way.mode.zone, way.u, way.duty, y)
-        sensed = controller.sensed_of(way.numbers, i, V_bus, y)
+        sensed = controller.sensed_of(numbers, i, V_bus, y)
     controller.decide(firmware, firm, angle, sensed, time)
 
 
