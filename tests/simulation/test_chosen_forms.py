@@ -47,7 +47,7 @@ OF_PULSES = ("coil", "silent", "coast")
 # Sets of features by the kernels that servos took; what is not here took the general ones, a spring those of its own
 OF_ANALOG = {
     "side_by_side_float64": "plain slack coast coast+silent",
-    "by_gaps": "play play+limit play+slack play+coast",
+    "by_gaps": "play play+limit play+share play+slack play+coast",
     "by_coils": "coil coil+slack coil+coast",
     "by_strides": (
         "heat hangs held heat+slack heat+coast heat+hangs heat+held slack+hangs slack+held coast+hangs coast+held "
@@ -58,12 +58,12 @@ OF_ANALOG = {
         "steps bend silent told steps+bend steps+coast steps+silent steps+held steps+told bend+coast bend+silent "
         "bend+held bend+told coast+told silent+held silent+told held+told steps+hangs bend+hangs silent+hangs "
         "hangs+told"),
-    "gap_runs": "play+steps play+bend play+silent",
     "by_strides_in_bands": (
         "heat+limit heat+creep heat+share limit+hangs limit+held creep+hangs creep+held share+hangs share+held"),
 }
 OF_DIGITAL = {
-    "plain_digital_runs": "plain steps bend held steps+bend steps+held bend+held",
+    "by_legs": (  # the plain one has drops
+        "plain play share steps bend play+share play+steps play+bend share+steps share+bend steps+bend"),
 }
 OF_CATALOG = {
     "by_bands": (
@@ -72,8 +72,12 @@ OF_CATALOG = {
         "hitec-hs-322hd hitec-hs-325hb hitec-hs-422 hitec-hs-425bb hitec-hs-475hb hitec-hs-485hb hitec-hs-55 "
         "hitec-hs-645mg hitec-hs-755mg hitec-hs-805bb hitec-hs-81 hitec-hs-85bb power-hd-hd-1501mg "
         "unbranded-micro-13g"),
-    "plain_digital_runs": (
-        "dsservo-ds3218 dsservo-rds3115 dynamixel-xl330-m077 feetech-ft-7235 towerpro-mg995 towerpro-mg996r"),
+    "by_ticks": "dsservo-ds3218 dsservo-rds3115 dynamixel-xl330-m077 feetech-ft-7235 towerpro-mg995",
+    "by_legs": (
+        "dynamixel-ax-12a dynamixel-mx-106 dynamixel-mx-28 dynamixel-mx-64 dynamixel-xl-320 dynamixel-xl330-m288 "
+        "dynamixel-xl430-w250 emax-es08md feetech-ft-15m0 feetech-ft-2806 feetech-sts3215-12v feetech-sts3215-7v4 "
+        "feetech-sts3250 hitec-hs-5485hb jx-pdi-6221mg miuzei-25kg towerpro-mg996r towerpro-sg92r"),
+    "by_gaps": "geekservo-2kg miuzei-ms18",
     "side_by_side_float64": "futaba-s3003 hitec-hs-311 hitec-hs-755hb towerpro-mg90s towerpro-sg90",
 }
 
@@ -161,7 +165,7 @@ def test_no_servo_of_today_needs_kernels_that_are_not_made_beforehand(servo):
         names = rng.permutation(own)[:rng.integers(3, 7)].tolist()
         digital = programs[rng.integers(len(programs))]
         assert combined(st.DigitalServo, digital, names, "float64", rng) in (
-            "plain_digital_runs", "digital_runs", "runs"), names
+            "by_ticks", "by_legs", "digital_runs", "runs"), names
 
 
 def test_many_lanes_are_asked_what_each_of_them_is(servo):

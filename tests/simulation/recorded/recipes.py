@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
-from servotwin.simulation import bus_run, lane_recipes, vector_calls
+from servotwin.simulation import recipes
 from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.derive import Derivation
 
@@ -15,8 +15,7 @@ _NAMES = ("kernels", "call_of")  # what takes a recipe first, and is imported by
 
 def all_recipes() -> set[str]:
     """Return the names of all recipes."""
-    return {recipe.name for module in (lane_recipes, bus_run, vector_calls) for value in vars(module).values()
-            for recipe in (value.values() if isinstance(value, dict) else (value,)) if isinstance(recipe, Recipe)}
+    return {recipe.name for recipe in recipes.all_recipes()}
 
 
 @cache

@@ -7,7 +7,7 @@ import math
 from servotwin.models.engine import contacts, currents, first_order, guards
 from servotwin.models.engine.coefficients import Apart
 from servotwin.models.engine.courses import Course, both, lead_of, leaves
-from servotwin.models.engine.modes import FORWARD, Mode, Vector
+from servotwin.models.engine.modes import FORWARD, Mode, Vector, moving
 from servotwin.models.terms.friction import creeping_speed, shared
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.motor import back_emf
@@ -79,15 +79,15 @@ def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, star
     How they press changes with the speed in straight lines, with a bend where the motor's torque turns.
     """
     w, w_end = start.w, after.w
-    at_end = _pressing(numbers, mode, u, tau, w_end)
+    at_end = _pressing(numbers, mode, u, tau, start, w_end)
     bend = u / back_emf(1.0, numbers.motor.K_b)
     bends = shared(numbers.friction) and min(w, w_end) < bend < max(w, w_end)
     if at_end >= guards.BELOW and not bends:
         return math.inf
-    first = _pressing(numbers, mode, u, tau, w)
+    first = _pressing(numbers, mode, u, tau, start, w)
     if first <= 0.0 and at_end < guards.BELOW:
         return s0
-    at_bend = _pressing(numbers, mode, u, tau, bend) if bends else first
+    at_bend = _pressing(numbers, mode, u, tau, start, bend) if bends else first
     if at_bend >= guards.BELOW:
         if at_end >= guards.BELOW:
             return math.inf
@@ -98,6 +98,6 @@ def _parts(numbers: Numbers, mode: Mode, u: float, tau: float, laws: Apart, star
     return min(max(s, s0), s1)
 
 
-def _pressing(numbers: Numbers, mode: Mode, u: float, tau: float, w: float) -> float:
+def _pressing(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: float) -> float:
     """Return how motor and output in contact would close in [rad/s²] at a speed."""
-    return contacts.pressing_along(numbers, mode, u, tau, Vector(0.0, w, 0.0, 0.0, 0.0, 0.0, w))
+    return contacts.pressing_along(numbers, mode, u, tau, moving(y, y.q, w, w))
