@@ -1,7 +1,7 @@
 """What kernels gave: `numbers.npz` and `numbers.json`, which `test_recorded_numbers.py` reads.
 
-Most are of the kernels that numba compiled. Sets with play, with springs between two bodies and with programs are of later
-ones, in which lanes go by legs: their sums have another order.
+Most are of the kernels that numba compiled. Sets with play, with springs between two bodies and with programs are of
+later ones, in which lanes go by legs: their sums have another order.
 
     python tests/simulation/recorded/record.py --write [SET ...]
 
