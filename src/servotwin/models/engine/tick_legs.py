@@ -30,6 +30,7 @@ from servotwin.physics.potentiometer import feedback_voltage
 if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats
 
+CALLED = ("gone_on", "show")  # seldom; with copies, or what goes by its address here would go through memory everywhere
 LEGS, STEPS = 0, 1  # from tick to tick: in this loop, or from event to event
 _NO_LAWS = Apart(0.0, 0.0, 0.0, 0.0)
 _GIVEN = Piece()  # what a servo follows that a program drives
@@ -113,7 +114,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
             way = at_duty(numbers, firm.duty, tau, y, way)
         time = T_c if abs(end - t - T_c) <= slack else end - t
         if done < times.size and (times[done] - origin < end - slack or end >= until):
-            done = show(way, inputs, y, times, done, t, end, until, origin, outputs, firm)
+            done = show(copied(way), tau, inputs.accuracy, y, times, done, t, end, until, origin, outputs, firm)
         if elastic.present(numbers.elastic) or not legs.stands(way.mode):
             certain = False
             if not elastic.present(numbers.elastic):
@@ -123,7 +124,7 @@ def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Fl
                 certain = lasts(way, tau, y, after, time)
                 y = after if certain else y
             if not certain:
-                leg = gone_on(way, inputs, y, time)
+                leg = gone_on(copied(way), tau, inputs.accuracy, y, time)
                 if leg.done == 0.0:
                     break
                 way, y = in_mode(way, leg.mode, tau), leg.y
@@ -167,11 +168,18 @@ def with_laws(way: Way, tau: float) -> Way:
     return Way(way.duty, way.numbers, way.u, way.mode, laws, way.law)
 
 
-def gone_on(way: Way, inputs: Inputs, y: Vector, time: float) -> legs.Gone:
+def copied(way: Way) -> Way:
+    """Return the same again, as something of its own."""
+    own = way.numbers
+    numbers = Numbers(own.motor, own.bridge, own.source, own.follower, own.shaft, own.friction, own.load, own.stops,
+                      own.play, own.sensor, own.heat, own.elastic)
+    return Way(way.duty, numbers, way.u, way.mode, way.laws, way.law)
+
+
+def gone_on(way: Way, tau: float, accuracy: float, y: Vector, time: float) -> legs.Gone:
     """Return where a servo goes from a state within a time [s], from event to event."""
-    tau = inputs.constant_torque
     if elastic.present(way.numbers.elastic):
-        return spring_legs.go(way.numbers, way.law, tau, way.u, y, way.mode, time, inputs.accuracy)
+        return spring_legs.go(way.numbers, way.law, tau, way.u, y, way.mode, time, accuracy)
     return legs.go(way.numbers, tau, way.u, y, way.mode, y.q, time)
 
 
@@ -242,12 +250,12 @@ def lasts(way: Way, tau: float, y: Vector, after: Vector, time: float) -> bool:
     return contacts.pressing(numbers, mode, u, tau, after) > 0.0
 
 
-def show(way: Way, inputs: Inputs, y: Vector, times: Floats, done: int, t: float, end: float, until: float,
-         origin: float, outputs: Floats, firm: Any) -> int:
+def show(way: Way, tau: float, accuracy: float, y: Vector, times: Floats, done: int, t: float, end: float,
+         until: float, origin: float, outputs: Floats, firm: Any) -> int:
     """Write the outputs within a tick; return how many are done."""
     slack = SAME * (end - t)
     while done < times.size and (times[done] - origin < end - slack or end >= until):
-        here = gone_on(way, inputs, y, min(max(times[done] - origin - t, 0.0), end - t))
+        here = gone_on(way, tau, accuracy, y, min(max(times[done] - origin - t, 0.0), end - t))
         show_one(outputs, done, here.y, here.mode, firm)
         done += 1
     return done

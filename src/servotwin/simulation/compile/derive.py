@@ -5,7 +5,7 @@ Starting from the entries, every function that is called is collected from its o
 in these ways only: docstrings and annotations are dropped; what a recipe has no use for is left out, and what plain
 Python alone does (`if PLAIN`); in the float32 form every float literal gets that type; in the vector form exponentials,
 logarithms, sines and floors become those of `engine.elementary`, and the sums of functions that a module names
-`IN_ANY_ORDER` are taken so.
+`IN_ANY_ORDER` are taken so; those that it names in `CALLED` are not inlined.
 """
 
 from __future__ import annotations
@@ -48,6 +48,8 @@ class Derived:
         What C has an expression for, by its name in the module.
     in_any_order : frozenset of str
         Functions whose sums may be taken in any order.
+    called : frozenset of str
+        Functions that are called where others are inlined.
     entries : dict of str to str
         Names in the module, by those of the entries.
     """
@@ -57,6 +59,7 @@ class Derived:
     head: str
     primitives: dict[str, str]
     in_any_order: frozenset[str]
+    called: frozenset[str]
     entries: dict[str, str]
 
     @cached_property
@@ -84,7 +87,7 @@ def derive(recipe: Recipe) -> Derived:
     lines += [f"{alias} = {text}" for alias, text in sorted(work.constants.items())]
     entries = dict(zip((entry.split(":")[1] for entry in recipe.entries), names, strict=True))
     return Derived(recipe, {name: work.functions[name] for name in work.order}, "\n".join([*lines, ""]),
-                   work.primitives, frozenset(work.in_any_order), entries)
+                   work.primitives, frozenset(work.in_any_order), frozenset(work.called), entries)
 
 
 @dataclass
@@ -98,6 +101,7 @@ class Derivation:
     imports: dict[str, tuple[str, str]] = field(default_factory=dict)
     primitives: dict[str, str] = field(default_factory=dict)
     in_any_order: set[str] = field(default_factory=set)
+    called: set[str] = field(default_factory=set)
 
     def function(self, module: str, name: str) -> str:
         """Collect a function after those that it calls, and return its name in the derived module."""
@@ -106,6 +110,8 @@ class Derivation:
             self.functions[flat] = node = definition(module, name)  # marks a call of itself
             if name in getattr(import_module(module), "IN_ANY_ORDER", ()):
                 self.in_any_order.add(flat)
+            if name in getattr(import_module(module), "CALLED", ()):
+                self.called.add(flat)
             rewritten = Rewriting(self, module, local_names(node)).visit(node)
             rewritten.name = flat
             self.functions[flat] = ast.fix_missing_locations(rewritten)

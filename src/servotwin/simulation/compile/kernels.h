@@ -12,6 +12,7 @@
 #endif
 #define SMALL static inline __attribute__((unused))
 #define INLINED static inline __attribute__((always_inline, unused))
+#define ASIDE static __attribute__((noinline, unused))
 #define PACKED __attribute__((packed))
 #if defined(__x86_64__) && !defined(__FMA__)
 /* A function that computes it exactly takes nearly twice the time of a lane. */

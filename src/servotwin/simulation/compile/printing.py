@@ -41,8 +41,8 @@ class Printer:
         Their text.
     """
 
-    def __init__(self, vector: bool, in_any_order: frozenset[str]) -> None:
-        self.vector, self.in_any_order = vector, in_any_order
+    def __init__(self, vector: bool, in_any_order: frozenset[str], called: frozenset[str]) -> None:
+        self.vector, self.in_any_order, self.called = vector, in_any_order, called
         self.types = Types()
         self.functions: list[str] = []
         self._names: dict[Specialised, str] = {}
@@ -61,7 +61,7 @@ class _Text(CallExpressions):
 
     def __init__(self, printer: Printer, own: Specialised) -> None:
         super().__init__(printer, own)
-        self._vector, self._in_any_order = printer.vector, printer.in_any_order
+        self._vector, self._in_any_order, self._called = printer.vector, printer.in_any_order, printer.called
         self._variables = Variables(own)
 
     # --- the function -------------------------------------------------------------------------------------------------
@@ -97,7 +97,12 @@ class _Text(CallExpressions):
         return types.declared(kind, name), ""
 
     def _lead(self) -> str:
-        """Return how the function is to be compiled: in the vector form all is inlined but for loops over lanes."""
+        """Return how the function is to be compiled.
+
+        In the vector form all is inlined but for loops over lanes, and what is seldom called.
+        """
+        if self._vector and self._own.node.name in self._called:
+            return "ASIDE"
         loops = any(isinstance(node, (ast.For, ast.While)) for node in ast.walk(self._own.node))
         wide = any(isinstance(kind, Tuple) and leaves(kind) > _MANY for kind in self._own.arguments)
         return "INLINED" if self._vector and (wide or not loops) else "static"
