@@ -37,7 +37,7 @@ def derived(text, recipe=None):
         else:
             head.append(ast.unparse(node))
     entries = {name: name for name in functions}
-    return Derived(recipe or Recipe("by_hand", ()), functions, "\n".join(head), {}, frozenset(), entries)
+    return Derived(recipe or Recipe("by_hand", ()), functions, "\n".join(head), {}, frozenset(), frozenset(), entries)
 
 
 def kinds_of(node):
