@@ -19,7 +19,7 @@ PACKAGE = Path(servotwin.__file__).parent
 PAGE = Path(__file__).parents[2] / "docs/theory/growing.md"
 GROUPS, FRICTION = "parameters/groups.py", "models/terms/friction.py"
 PARAMETER = "    bearing_coulomb_torque: float | None = parameter("
-SLIDES = "    F = coulomb(friction, forward)\n    if friction.varies == 0.0:\n        return F\n    speed"
+SLIDES = "    F = coulomb(friction, forward)\n    if friction.varies == 0.0:\n        return F\n    if friction.w_s"
 HOLDS = "    F = coulomb(friction, forward)\n    if friction.varies == 0.0:\n        return breakaway"
 
 
@@ -62,7 +62,7 @@ def share_balance(""")],
         (SLIDES,
          "    F = coulomb(friction, forward)\n    if friction.K_w > 0.0:\n"
          "        F += quadratic_friction(w, friction.K_w)\n"
-         "    if friction.varies == 0.0:\n        return F\n    speed"),
+         "    if friction.varies == 0.0:\n        return F\n    if friction.w_s"),
         ("    return (STEEP_W if contact == CORE else 0 if",
          "    return (STEEP_W if contact == CORE else CURVED_W if friction.K_w > 0.0 and not at_rest(contact)"
          " else 0 if")]}
@@ -88,7 +88,7 @@ FORMS = {  # of servos that resist between drives: what they have anyway, by the
     "by_strides_in_bands": ("pulse", HEATS | {"friction.load_friction": 0.05}),
     "by_coils": ("inductive", {"motor.armature_inductance": 5e-4}), "by_strides": ("pulse", HEATS),
     "by_gaps": ("pulse", PLAYS), "plain_runs": ("pulse", {"potentiometer.quantisation": 1e-3}),
-    "gap_runs": ("pulse", PLAYS | {"potentiometer.quantisation": 1e-3}), "runs": ("pulse", PLAYS | HEATS)}
+    "runs": ("pulse", PLAYS | HEATS)}
 # A number in each room, and of friction one of which `depends` says nothing
 NUMBERS = {
     FRICTION: [("    K_eq: float\n", "    K_eq: float\n    new: float = 0.0\n"),

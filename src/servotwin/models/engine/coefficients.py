@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from servotwin.models.engine import contacts, currents
@@ -86,8 +85,8 @@ def apart_coefficients(numbers: Numbers, mode: Mode, u: float, tau: float) -> Ap
         drag = motor.back_emf(1.0, numbers.motor.K_b) * currents.torque_per_volt(
             numbers, currents.resistance(numbers, zone, u))
         motor_rate = -shaft.motor_acceleration(own, -left * drag, 1.0, 0.0)
-        motor_pull = shaft.motor_acceleration(own, left * torque, 0.0, contacts.motor_friction(
-            numbers, mode.motor, math.inf, 0.0))
+        dry = contacts.motor_friction(numbers, mode.motor, 0.0, 0.0)
+        motor_pull = shaft.motor_acceleration(own, left * torque, 0.0, dry)
     return Apart(output_rate, output_pull, motor_rate, motor_pull)
 
 

@@ -2,7 +2,7 @@
 
 Between two ticks the duty is constant. A leg that surely lasts until the next one is arithmetic: what its exponentials
 are over a whole tick is kept as long as its laws have the same rates. Any other tick goes from event to event. A servo
-at rest whose duty stays costs a comparison. Arrays of the inputs are looked at only where they are needed.
+at rest whose duty stays costs a comparison.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from servotwin.models.terms.play import with_motor
 from servotwin.models.terms.sensor import sensed_voltage
 from servotwin.physics.motor import back_emf
 from servotwin.physics.pieces import Piece
-from servotwin.physics.potentiometer import feedback_voltage
 
 if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats
@@ -185,13 +184,12 @@ def gone_on(way: Way, tau: float, accuracy: float, y: Vector, time: float) -> le
 
 def tick(numbers: Numbers, way: Way, inputs: Inputs, firm: Any, y: Vector, time: float) -> None:
     """Do what a tick does, at a time since the start [s]."""
-    firmware, own = inputs.firmware[0], numbers.sensor
+    firmware = inputs.firmware[0]
     if controller.has_news(firmware, firm, time):
         controller.listen(inputs, firm, time)
     angle = y.q
     if firmware.per_volt != 0.0:
-        straight = own.step == 0.0 and len(inputs.curve) == 0
-        v = feedback_voltage(y.q, own.p, own.b_o) if straight else sensed_voltage(own, inputs.curve, y.q)
+        v = sensed_voltage(numbers.sensor, inputs.curve, y.q)
         angle = controller.angle_of(firmware, firm, v, inputs.seed)
     sensed = NOTHING_SENSED
     if control.senses(firmware):

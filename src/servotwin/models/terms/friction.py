@@ -149,7 +149,7 @@ def sliding_against(friction: Friction, forward: bool, sign: int, w: float, tau_
     """Return the same while the share keeps its sign: beyond its zero too, where it is known and nothing fades."""
     if sign == 0 or fades(friction):
         return sliding_friction(friction, forward, w, tau_m, tau_e)
-    return sliding_friction(friction, forward, math.inf, 0.0, 0.0) + sign * share(friction, tau_m, tau_e)
+    return sliding_friction(friction, forward, w, 0.0, 0.0) + sign * share(friction, tau_m, tau_e)
 
 
 def holding_friction(friction: Friction, forward: bool, tau_m: float, tau_e: float) -> float:

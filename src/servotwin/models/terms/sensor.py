@@ -36,7 +36,7 @@ class Sensor(NamedTuple):
 
 
 NO_SENSOR = Sensor(0.0, 0.0, 0.0, 0.0)
-ACTS = {"b_o": FOLLOWS | PULSES | PROGRAM, "half_slack": SLACK, "step": STEPS}
+ACTS = {"p": ON_Q | FOLLOWS | PULSES | PROGRAM, "b_o": FOLLOWS | PULSES | PROGRAM, "half_slack": SLACK, "step": STEPS}
 """Where each number acts."""
 
 
