@@ -18,7 +18,7 @@ from servotwin.simulation.bus_run import BUSES, room_of, shared_of
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
-from servotwin.simulation.lane_memory import copied, nothing_yet, put_back
+from servotwin.simulation.lane_memory import nothing_yet, put_back, taken
 from servotwin.simulation.vector_calls import NO_TAPE, TICKS, calls_on_buses
 from servotwin.simulation.vector_memory import Piece, piece_of
 
@@ -113,9 +113,9 @@ class BusSet:
         """Return what compiled code calls at each stage of a tick."""
         return calls_on_buses(self, store, room)
 
-    def copied(self) -> Memories:
-        """Return what the lanes remember."""
-        return copied(self.memories)
+    def copied(self, places: Indices) -> Memories:
+        """Return what lanes remember that stand at some places."""
+        return taken(self.memories, places)
 
     def pieces(self) -> list[Piece]:
         """Return where the lanes stand, and what those on a bus remember together."""

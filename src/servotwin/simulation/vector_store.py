@@ -163,14 +163,14 @@ class Store:
 
     def start(self, which: Indices, memories: Memories) -> None:
         """Put lanes where they start; their noise goes on."""
-        before = taken(self.memories(), which)
+        before = self.memories(which)
         memories.rows["chip"]["draws"], memories.firms["draws"] = before.rows["chip"]["draws"], before.firms["draws"]
         self.status[which], self.ended[which], self.work[which] = 0, 0.0, 0.0
         self._put(which, memories)
 
     def enable(self, which: Indices, torque: Array) -> None:
         """Let torque of some lanes be on (1) or off (0)."""
-        memories = taken(self.memories(), which)
+        memories = self.memories(which)
         memories.firms["torque"] = torque
         self._put(which, memories)
 
@@ -178,11 +178,12 @@ class Store:
         for some, places, of in self._parts(which):
             some.put(places, taken(memories, of), self.numbers)
 
-    def memories(self) -> Memories:
-        """Return the memories of all lanes."""
-        found = nothing_yet(len(self.status))
-        for some in self.sets:
-            put_back(found, some.which, some.copied())
+    def memories(self, which: Indices | None = None) -> Memories:
+        """Return the memories of some lanes, or of all."""
+        which = np.arange(len(self.status)) if which is None else which
+        found = nothing_yet(len(which))
+        for some, places, of in self._parts(which):
+            put_back(found, of, some.copied(places))
         return found
 
     def shaft(self, name: str) -> Array:
@@ -336,8 +337,8 @@ class _Tiles:
         """Let the general way finish the calls of these lanes."""
         put(self.rows, "clock", "owed", places, 0.0)
 
-    def copied(self) -> Memories:
-        return memories_of(self.rows, np.arange(len(self.which)))
+    def copied(self, places: Indices) -> Memories:
+        return memories_of(self.rows, places)
 
     def pieces(self) -> list[Piece]:
         """Return where the lanes of each tile stand: numbers of one kind side by side."""
@@ -403,8 +404,8 @@ class _Records:
         """Set angles and speeds, as `engine.lane_ticks` does; motor and potentiometer go along as far as their play."""
         kernels(TICKS).impose_on_records(*imposed, self.rows)
 
-    def copied(self) -> Memories:
-        return copied(self.memories)
+    def copied(self, places: Indices) -> Memories:
+        return taken(self.memories, places)
 
     def pieces(self) -> list[Piece]:
         """Return where the lanes stand."""
