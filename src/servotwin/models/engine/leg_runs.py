@@ -37,7 +37,7 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
         lane = which[k]
         numbers = numbers_of(lanes, lane)
         inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
-        if tick_legs.way_of(numbers, inputs) != LEGS:
+        if tick_legs.way_of(numbers, inputs, durations[k]) != LEGS:
             continue
         memory = memory_at(memories, k)
         if status[k] != UNDERWAY:

@@ -26,12 +26,11 @@ SHORT, _AT_END = 1e-9, 1e-6  # of a time, of the play
 
 
 class Gone(NamedTuple):
-    """Where a servo has gone: state, mode, potentiometer [rad]; whether play was held together; 1, or 0: it gave up."""
+    """Where a servo has gone: state, mode, potentiometer [rad]; 1, or 0 where it gave up."""
 
     y: Vector
     mode: Mode
     wiper: float
-    held: int
     done: float
 
 
@@ -79,26 +78,25 @@ def ending(numbers: Numbers, mode: Mode, laws: Apart, u: float, torque: float, y
     return Ending(s, kind, after)
 
 
-def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: float,
-       time: float) -> Gone:
+def go(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, wiper: float, time: float) -> Gone:
     """Return where a servo goes within a time [s], under a voltage behind the bridge and an external torque [N m]."""
-    short = held = 0
+    short = 0
     for _ in range(MOST_LEGS):
         if stands(mode) or not time > 0.0:
-            return Gone(y, mode, wiper, held, 1.0)
+            return Gone(y, mode, wiper, 1.0)
         laws = laws_of(numbers, mode, u, torque)
         end = ending(numbers, mode, laws, u, torque, y, time)
         if end.kind < 0:
             wiper = wiper_at(numbers.sensor, wiper, end.after.q)
-            return Gone(end.after, mode, wiper, held, 1.0 if math.isfinite(end.after.q + end.after.q_m) else 0.0)
+            return Gone(end.after, mode, wiper, 1.0 if math.isfinite(end.after.q + end.after.q_m) else 0.0)
         y = moved(numbers, mode, laws, y, end.time)
         wiper = wiper_at(numbers.sensor, wiper, y.q)
         mode, y = guards.cross(numbers, mode, end.kind, u, torque, y)
         short = short + 1 if end.time <= SHORT * time else 0
         if short >= MOST_SHORT and play.present(numbers.play):
-            held, mode, y = together(numbers, mode, u, torque, y)
+            _, mode, y = together(numbers, mode, u, torque, y)
         time -= end.time
-    return Gone(y, mode, wiper, held, 0.0)
+    return Gone(y, mode, wiper, 0.0)
 
 
 def together(numbers: Numbers, mode: Mode, u: float, torque: float, y: Vector) -> tuple[int, Mode, Vector]:

@@ -57,7 +57,7 @@ def go(numbers: Numbers, law: Law, torque: float, u: float, y: Vector, mode: Mod
     if time <= law.longest:
         after = pairs.propagate(law.A, y, time)
         if not _ends(numbers, mode, law.A, torque, u, y, after):
-            return Gone(after, mode, after.q, 0, 1.0)
+            return Gone(after, mode, after.q, 1.0)
     return _by_steps(numbers, torque, u, y, mode, time, accuracy)
 
 
@@ -85,5 +85,5 @@ def _by_steps(numbers: Numbers, torque: float, u: float, y: Vector, mode: Mode, 
         point, m, _, status = step.onward(numbers, point, voltage, against, m, before == 0.0, time, time, accuracy)
         idle = idle + 1 if point.time == before else 0
         if status != COMPLETED or idle > MOST_IDLE:
-            return Gone(y, mode, y.q, 0, 0.0)
-    return Gone(point.y, point.mode, point.y.q, 0, 1.0)
+            return Gone(y, mode, y.q, 0.0)
+    return Gone(point.y, point.mode, point.y.q, 1.0)

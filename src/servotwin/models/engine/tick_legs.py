@@ -1,8 +1,8 @@
 """Digital servos from tick to tick, leg by leg, without a motion being kept.
 
 Between two ticks the duty is constant. A leg that surely lasts until the next one is arithmetic: what its exponentials
-are over a whole tick is kept as long as its laws have the same rates. Any other tick goes from event to event. A servo
-at rest whose duty stays costs a comparison.
+are over a whole tick is kept as long as its laws have the same rates. Any other tick goes from event to event. The
+motion of a servo at rest whose duty stays costs a comparison.
 """
 
 from __future__ import annotations
@@ -78,9 +78,9 @@ def possible(numbers: Numbers, inputs: Inputs) -> bool:
     return on & ~(TWO_BODIES | BY_SHARE) == 0
 
 
-def way_of(numbers: Numbers, inputs: Inputs) -> int:
-    """Return which way a servo goes from tick to tick."""
-    return LEGS if possible(numbers, inputs) else STEPS
+def way_of(numbers: Numbers, inputs: Inputs, left: float) -> int:
+    """Return which way a servo goes for the time that is left [s]: from tick to tick if that is one at least."""
+    return LEGS if left >= inputs.firmware[0].T_c * (1.0 - SAME) and possible(numbers, inputs) else STEPS
 
 
 def go(numbers: Numbers, inputs: Inputs, memory: Memory, until: float, times: Floats, done: int,
