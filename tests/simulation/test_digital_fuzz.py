@@ -17,6 +17,8 @@ KNOWN = {  # what is not as it should be
 SEEN = ("output_angle", "output_speed", "motor_angle", "armature_current", "load_torque")
 LOSSES = ("winding", "bridge", "brush", "friction", "stops")
 
+HELD = 1336
+
 
 class EndlessError(Exception):
     """A run that takes far longer than any should."""
@@ -67,3 +69,11 @@ def test_extreme_servos(block):
     for seed in range(BLOCK * block, BLOCK * (block + 1)):
         if seed not in KNOWN:
             check(seed)
+
+
+def test_motor_and_output_that_meet_in_no_time_are_held_together():
+    """With a load friction of 0.9995 they part and meet at one instant: in `simulate`, in lanes, and it is told."""
+    check(HELD)
+    result = run(extreme(HELD))
+    told = [event.time for event in result.events if event.kind == "gear held"]
+    assert len(told) == result.stats.held > 0
