@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine import bus, controller, crew, tape
 from servotwin.models.engine.buses import Buses
+from servotwin.models.engine.coupled_units import Coupling, Unit
 from servotwin.models.engine.demands import demanded
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
 from servotwin.models.engine.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
@@ -40,6 +41,7 @@ BUSES = Recipe("buses", _ENTRIES, knows=~SPRING)
 """All servos but those with a spring between two bodies; they take hardly longer for what others lack."""
 _PLAINLY = PLAIN_RUNS.knows & ~CURVED_Q
 SHARED, SEAT, MATE = record_of(Shared), record_of(Seat), record_of(Mate)
+UNIT, COUPLING = record_of(Unit), record_of(Coupling)
 
 LOADS_FROM, COMPILES_FROM = 1e2, 1.5e4  # frames of servos in one process: what it takes, and more, in plain Python
 _INTEGRATED = 8  # a servo that does not move by plain laws takes so many times as long
@@ -178,7 +180,7 @@ class _Compiled:
         self._lanes, self._tables = _lanes_of(plans), _tables_of(plans)
         self._bus = Buses(np.arange(count), np.array([0, count]), _records_of(list(map(begun, plans, states))),
                           np.full(count, -1), shared_of([source]), np.zeros(count, np.int64), np.zeros(count))
-        self._room = room_of(count)
+        self._room = (*room_of(count), *units_of(count))
         self._kernels: Any = kernels(BUSES)
 
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
@@ -191,6 +193,11 @@ class _Compiled:
 def room_of(servos: int) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return seats for so many servos on one bus, and room for their common motions."""
     return np.zeros(servos, SEAT), np.zeros(2 * servos, MATE)
+
+
+def units_of(servos: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return room for so many servos on one bus that go from tick to tick."""
+    return np.zeros(servos, UNIT), np.zeros(1, COUPLING)
 
 
 def shared_of(sources: Sequence[Source]) -> NDArray[Any]:

@@ -14,7 +14,7 @@ from servotwin.models.engine.step import COMPLETED
 from servotwin.models.engine.tiles import Lanes
 from servotwin.models.engine.together import APART
 from servotwin.models.engine.told import Tables
-from servotwin.simulation.bus_run import BUSES, room_of, shared_of
+from servotwin.simulation.bus_run import BUSES, room_of, shared_of, units_of
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
@@ -63,7 +63,8 @@ class BusSet:
                               none + len(curve))
         self._calls: list[Call] = []
         self._look: Call | None = None
-        self.rooms = [room_of(int(sizes.max())) for _ in range(max(1, min(threads, len(sizes) // _WORTH)))]
+        most, workers = int(sizes.max()), max(1, min(threads, len(sizes) // _WORTH))
+        self.rooms = [(*room_of(most), *units_of(most)) for _ in range(workers)]
 
     def advance(self, store: Store) -> None:
         """Let all buses go on by a tick; status and end of all lanes are kept up to date."""
@@ -148,6 +149,6 @@ class BusSet:
     def look(self, store: Store, seen: Array) -> None:
         """Put what shows of the lanes into their rows of `seen`."""
         self.buses.status[:] = store.status[self.which]
-        self._look = self._look or call_of(BUSES, "look", store.columns, self.tables, self.buses, *self.rooms[0],
+        self._look = self._look or call_of(BUSES, "look", store.columns, self.tables, self.buses, *self.rooms[0][:2],
                                            seen)
         self._look()

@@ -140,7 +140,7 @@ def calls_on_buses(some: Any, store: Store, room: Room) -> dict[str, list[Call]]
                                    *some.rooms[0], NO_TAPE),
                     call_of(TICKS, "note_lost_buses", which, buses.status, rows, store.status, store.ended)],
         "show": [call_of(TICKS, "show_records", which, rows, room.shaft)],
-        "look": [alive, call_of(BUSES, "look", *own, buses, *some.rooms[0], room.seen)]}
+        "look": [alive, call_of(BUSES, "look", *own, buses, *some.rooms[0][:2], room.seen)]}
     return found | _clock(some, store, room)
 
 

@@ -5,14 +5,33 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import bus, controller, crew, step
-from servotwin.models.engine.memory import Memories, in_force, memory_at, origin_of, put_memory, silent_now, since
+from servotwin.models.engine import bus, controller, coupled_ticks, crew, step
+from servotwin.models.engine.coupled_units import put_unit_numbers, put_unit_state, unit_state
+from servotwin.models.engine.memory import (
+    FRAMES,
+    Memories,
+    Memory,
+    Point,
+    counted_anew,
+    due,
+    in_force,
+    instant,
+    memory_at,
+    origin_of,
+    put_memory,
+    resumed,
+    silent_now,
+    since,
+)
+from servotwin.models.engine.modes import Mode
 from servotwin.models.engine.observe import observed, on_bus, told_by
-from servotwin.models.engine.seats import drive_of
+from servotwin.models.engine.seats import drive_of, numbers_of, put_point, source_of
 from servotwin.models.engine.sights import put
 from servotwin.models.engine.step import COMPLETED
-from servotwin.models.engine.tape import Tape
-from servotwin.models.engine.tiles import chip_of, numbers_of
+from servotwin.models.engine.tape import Tape, runs
+from servotwin.models.engine.tiles import chip_of
+from servotwin.models.engine.tiles import numbers_of as numbers_at
+from servotwin.models.engine.together import APART
 from servotwin.models.engine.told import Tables, Told, inputs_at
 from servotwin.models.terms import duty, firmware
 from servotwin.models.terms.numbers import warm
@@ -39,23 +58,23 @@ class Buses(NamedTuple):
 
 
 def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, duration: float, until: float, seats: Any,
-          mates: Any, written: Tape) -> int:
+          mates: Any, units: Any, common: Any, written: Tape) -> int:
     """Let the buses from `begin` to before `end` go on for a duration, or to a time since their start [s].
 
     `until` is inf where the duration counts. A lane with a status is not on its bus. Seats there have to be for every
-    servo of a bus, and twice as many mates. Return the status of the last bus: where it is `bus.PAUSED` the tape is
+    servo of a bus, as many units, and twice as many mates. Return the status of the last bus: where it is `bus.PAUSED` the tape is
     full.
     """
     told, status = Told(lanes, tables), COMPLETED
     for k in range(begin, end):
         count = _seated(told, buses, k, seats)
         if count > 0:
-            status = _go_on(told, buses, k, count, duration, until, seats, mates, written)
+            status = _go_on(told, buses, k, count, duration, until, seats, mates, units, common[0], written)
     return status
 
 
 def _go_on(told: Told, buses: Buses, k: int, count: int, duration: float, until: float, seats: Any, mates: Any,
-           written: Tape) -> int:
+           units: Any, common: Any, written: Tape) -> int:
     """Let the servos of a bus go on that have their seats; return a status."""
     firms, paused = buses.memories.firms, firmware.present(told.lanes.firmware[0]) and until == math.inf
     for n in range(count):
@@ -63,6 +82,8 @@ def _go_on(told: Told, buses: Buses, k: int, count: int, duration: float, until:
         if paused:
             controller.resume(inputs_at(told, seat), crew.memory_in(seat, firms))
         seat.until = seat.point.time + duration if until == math.inf else until - seat.origin
+    if not runs(written):
+        _from_tick_to_tick(told, firms, count, buses.shared[k], seats, units, common)
     status, when = bus.through(told, firms, count, buses.shared[k], seats, mates, written)
     for n in range(count):
         seat = seats[n]
@@ -76,6 +97,54 @@ def _go_on(told: Told, buses: Buses, k: int, count: int, duration: float, until:
     return status
 
 
+def _from_tick_to_tick(told: Told, firms: Any, count: int, shared: Any, seats: Any, units: Any, common: Any) -> None:
+    """Let servos with programs go on from tick to tick as far as that leads."""
+    for n in range(count):
+        if not coupled_ticks.possible(numbers_of(seats[n].numbers), inputs_at(told, seats[n])):
+            return
+    for n in range(count):
+        seat, unit = seats[n], units[n]
+        memory = resumed(True, inputs_at(told, seat), crew.memory_in(seat, firms), False)
+        seat.until = instant(True, inputs_at(told, seat), memory, seat.until)
+        unit.place, unit.lane = seat.place, seat.lane
+        put_unit_numbers(unit.given, numbers_of(seat.numbers))
+        crew.remember(seat, memory)
+    coupled_ticks.put_source(common, source_of(shared.source))
+    going = True
+    while going:
+        for n in range(count):
+            _sit(inputs_at(told, seats[n]), crew.memory_in(seats[n], firms), seats[n], units[n])
+        coupled_ticks.go(told, firms, count, units, common)
+        going = False
+        for n in range(count):
+            going = _got_up(seats[n], units[n]) or going
+    shared.phase, shared.jumped = APART, 1
+
+
+def _sit(inputs: Any, memory: Memory, seat: Any, unit: Any) -> None:
+    """Put a servo where it goes on from tick to tick."""
+    if due(memory):
+        seat.until -= FRAMES * memory.beat
+        memory = counted_anew(memory)
+        seat.until = instant(True, inputs, memory, seat.until)
+        crew.remember(seat, memory)
+    unit.frames, unit.origin, unit.time = memory.frames, origin_of(memory), memory.point.time
+    put_unit_state(unit.y, memory.point.y)
+    unit.mode.zone, unit.mode.contact, unit.mode.motor, unit.mode.share = 0, 0, 0, 0
+    unit.mode.mesh = memory.point.mode.mesh
+    coupled_ticks.sit(unit, inputs, seat.until, FRAMES * memory.beat)
+
+
+def _got_up(seat: Any, unit: Any) -> bool:
+    """Put a servo's record where it has gone from tick to tick; return whether it only has to count anew to go on."""
+    y, went = unit_state(unit.y), unit.time > seat.point.time
+    if went or unit.short > 0:
+        point = Point(unit.time, y, Mode(0, 0, unit.mode.mesh, 0, 0), math.inf, y, seat.point.step, y.q)
+        put_point(seat.point, point)
+        seat.joined = -1
+    return bool(went and FRAMES * seat.beat <= unit.time < seat.until)
+
+
 def _seated(told: Told, buses: Buses, k: int, seats: Any) -> int:
     """Give the lanes of a bus that have no status yet their seats, where they remember; return how many there are."""
     count = 0
@@ -83,7 +152,7 @@ def _seated(told: Told, buses: Buses, k: int, seats: Any) -> int:
         if buses.status[j] == COMPLETED:
             seat, lane = seats[count], buses.which[j]
             seat.place, seat.lane, seat.joined = j, lane, buses.joined[j]
-            crew.sit(seat, numbers_of(told.lanes, lane), chip_of(told.lanes, lane), inputs_at(told, seat))
+            crew.sit(seat, numbers_at(told.lanes, lane), chip_of(told.lanes, lane), inputs_at(told, seat))
             crew.remember(seat, memory_at(buses.memories, j))
             count += 1
     return count

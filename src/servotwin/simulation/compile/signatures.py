@@ -96,16 +96,18 @@ def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
 def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that move servos on a bus."""
     from servotwin.models.engine.buses import Buses
+    from servotwin.models.engine.coupled_units import Coupling, Unit
     from servotwin.models.engine.seats import Mate, Seat, Shared
     from servotwin.models.engine.tape import Tape
     from servotwin.models.engine.told import Tables
 
     tables = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
     shared, room = _records(record_of(Shared)), (_records(record_of(Seat)), _records(record_of(Mate)))
+    units = (_records(record_of(Unit)), _records(record_of(Coupling)))
     own = (_LANES, tables, _tuple(Buses, _INDICES, memories=_MEMORIES, shared=shared, ended=_FLOATS))
     tape = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
-    return {"buses:go_on": (*own, INT64, INT64, FLOAT64, FLOAT64, *room, tape), "buses:look": (*own, *room, _TABLE),
-            "lane_ticks:break_up": (_INDICES, shared, _ROWS)}
+    return {"buses:go_on": (*own, INT64, INT64, FLOAT64, FLOAT64, *room, *units, tape),
+            "buses:look": (*own, *room, _TABLE), "lane_ticks:break_up": (_INDICES, shared, _ROWS)}
 
 
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have

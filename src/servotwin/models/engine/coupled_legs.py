@@ -1,0 +1,364 @@
+"""Legs of servos on one supply: their modes at its voltage, whether these surely last, and what ends them first.
+
+What bends a series within a leg is bounded by its coefficients: |x(t) − chord| ≤ h² max|ẍ|/8, and ẋ keeps its sign where
+h |ẋ(0)| > h² max|ẍ|. So it is mostly enough to look at the end of a leg; guards that may fall below zero on the way are
+followed as the general engine has them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from servotwin.models.engine import contacts, coupled_series, currents, guards, legs
+from servotwin.models.engine.coupled_series import put_after, put_law_of, state_at, voltage_at
+from servotwin.models.engine.coupled_units import (
+    put_unit_mode,
+    put_unit_numbers,
+    put_unit_state,
+    unit_mode,
+    unit_numbers,
+    unit_state,
+)
+from servotwin.models.engine.legs import MOST_SHORT, SHORT
+from servotwin.models.engine.modes import INSIDE, NO_CURRENT, NOWHERE, STUCK, Mode, Vector, at_rest, sign_of
+from servotwin.models.engine.shared_source import on_stiff_source, part_on_bus
+from servotwin.models.terms import bridge, duty, play
+from servotwin.models.terms.friction import share
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.physics.motor import back_emf
+
+MOST_LEGS = 400  # to one instant; servos that need more are left to the general engine
+_LEAST = 0.05  # of the open-circuit voltage: below, buses are left to the general engine
+_SAME = 1e-14  # of that
+_LOOKS = (0.25, 0.5, 0.75, 1.0)  # parts of a leg at which guards are looked at
+_HALVINGS = 200
+_CLOSE = 1e-13  # A
+
+DONE, LEFT = 1, 0
+
+
+def put_duty(unit: Any, now: float) -> None:
+    """Let a servo's bridge have a duty, or be open or braked."""
+    given = unit_numbers(unit.given)
+    numbers = duty.at_duty(given, now)
+    drive = math.copysign(1.0, now) if duty.drives(now) else 0.0
+    put_unit_numbers(unit.numbers, on_stiff_source(numbers, False))
+    unit.duty, unit.anew = now, 1
+    unit.sign = part_on_bus(drive, numbers.bridge, now, NOWHERE) if drive != 0.0 else 0.0
+    unit.open = 1 if drive == 0.0 and bridge.coasts(numbers.bridge) else 0
+
+
+def settle(units: Any, count: int, common: Any) -> int:
+    """Find the modes of servos whose duties are others, and of all that these may have changed; return `LEFT` or not."""
+    changed = common.jumped != 0
+    for k in range(count):
+        changed = changed or units[k].anew != 0
+    if not changed:
+        return DONE
+    before, common.jumped = common.now, 0
+    if put_zones(units, count, common) == LEFT:
+        return LEFT
+    for k in range(count):
+        unit = units[k]
+        if unit.anew != 0 or (unit.sign != 0.0 and common.now != before):
+            _settle(unit, common.now)
+    return DONE
+
+
+def _settle(unit: Any, V: float) -> None:
+    y, mode, u = unit_state(unit.y), unit_mode(unit.mode), unit.sign * V
+    numbers = warm(unit_numbers(unit.numbers), y)
+    if mode.mesh != INSIDE and mode.motor == STUCK and unit.anew == 0:
+        mode = contacts.held(numbers, mode.zone, u, unit.torque, y, mode.mesh)
+    else:
+        mode = contacts.settled(numbers, mode.zone, u, unit.torque, y, mode.mesh, False)
+    put_unit_mode(unit.mode, mode)
+    put_law_of(unit)
+    unit.anew = 0
+
+
+def put_zones(units: Any, count: int, common: Any) -> int:
+    """Put servos into the zones of their currents, at a voltage of the bus that these leave; return `LEFT` or not.
+
+    The bus sags the more of them conduct, and the fewer conduct the more it sags: a few rounds settle it.
+    """
+    V = common.now
+    for _ in range(20 + 4 * count):
+        below, back = 1.0, 0.0
+        for k in range(count):
+            unit = units[k]
+            if unit.sign == 0.0 and unit.anew == 0:
+                continue
+            y = unit_state(unit.y)
+            numbers = warm(unit_numbers(unit.numbers), y)
+            zone = currents.zone_of(numbers, unit.sign * V, 0.0, y.q, y.w_m, 0.0)
+            unit.mode.zone = zone
+            if unit.sign != 0.0 and zone != NO_CURRENT:
+                per_volt = unit.sign / numbers.bridge.R_drive
+                below += common.R_b * unit.sign * per_volt
+                back += per_volt * (back_emf(y.w_m, numbers.motor.K_b) + sign_of(zone) * numbers.bridge.D_drive)
+        before, V = V, (common.V + common.R_b * back) / below
+        if abs(V - before) <= _SAME * common.V:
+            break
+    common.now = V
+    return DONE if V >= _LEAST * common.V else LEFT
+
+
+def current_of(unit: Any, V: float, y: Vector) -> float:
+    """Return the current of a servo [A] in a state, under a voltage of the bus [V]."""
+    numbers = warm(unit_numbers(unit.numbers), y)
+    return currents.current(numbers, unit.mode.zone, unit.sign * V, y.q, y.w_m)
+
+
+def is_plain(units: Any, count: int, common: Any, V: float, at_end: bool) -> bool:
+    """Tell whether the source follows its resistance, and diodes block, where servos are or at the end of a leg."""
+    total = 0.0
+    for k in range(count):
+        unit = units[k]
+        y = unit_state(unit.after) if at_end and unit.active != 0 else unit_state(unit.y)
+        if unit.open != 0 and abs(back_emf(y.w_m, unit.numbers.motor.K_b)) >= V:
+            return False
+        if common.I_max < math.inf and unit.sign != 0.0:
+            total += unit.sign * current_of(unit, V, y)
+    if common.I_max == math.inf:
+        return True
+    return bool(-_CLOSE <= total <= common.I_max)
+
+
+def go(units: Any, count: int, common: Any, time: float) -> float:
+    """Let all servos go on for a time [s], leg by leg; return how long they have: less where they are left."""
+    left, longest = time, 0.0
+    for _ in range(MOST_LEGS):
+        if settle(units, count, common) == LEFT or not is_plain(units, count, common, common.now, False):
+            return time - left
+        moving = False
+        for k in range(count):
+            if units[k].law.R_slope != 0.0:
+                put_law_of(units[k])  # at the temperatures that there are now
+            moving = moving or units[k].active != 0
+        if not moving or not left > 0.0:
+            return time
+        longest = coupled_series.longest(units, count)
+        length = min(left, longest)
+        coupled_series.work_out(units, count, common, length)
+        whose, kind, end = -1, -1, length
+        for k in range(count):
+            if not surely_lasts(units[k], common, length):
+                found, s = first_end(units[k], common, end, whose < 0)
+                if found >= 0:
+                    whose, kind, end = k, found, s
+        if whose < 0:
+            if not is_plain(units, count, common, common.then, True):
+                return time - left
+            for k in range(count):
+                if units[k].active != 0:
+                    units[k].short = 0
+                    put_unit_state(units[k].y, unit_state(units[k].after))
+            common.now = common.then
+            if length == left:
+                return time
+            left -= length
+            continue
+        for k in range(count):
+            if units[k].active != 0:
+                put_after(units[k], state_at(units[k], common.terms, end))
+        common.then = voltage_at(common, end)
+        if not is_plain(units, count, common, common.then, True):
+            return time - left
+        for k in range(count):
+            if units[k].active != 0:
+                put_unit_state(units[k].y, unit_state(units[k].after))
+        common.now = common.then
+        _cross(units[whose], kind, common.now, end, time)
+        common.jumped = 1 if jumps(kind) and units[whose].sign != 0.0 else 0
+        left -= end
+    return time - left
+
+
+def _cross(unit: Any, kind: int, V: float, end: float, time: float) -> None:
+    """Let an event of a servo have happened, at the end of a leg."""
+    numbers, mode, u = unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * V
+    mode, y = guards.cross(numbers, mode, kind, u, unit.torque, unit_state(unit.y))
+    unit.short = unit.short + 1 if end <= SHORT * time else 0
+    if unit.short >= MOST_SHORT and play.present(numbers.play):
+        _, mode, y = legs.together(warm(numbers, y), mode, u, unit.torque, y)
+    put_unit_mode(unit.mode, mode)
+    put_unit_state(unit.y, y)
+    put_law_of(unit)
+
+
+def jumps(kind: int) -> bool:
+    """Tell whether an event makes a speed jump, and with it the currents of all."""
+    return kind == guards.UPPER or kind == guards.LOWER or kind == guards.MEET_FORWARD or kind == guards.MEET_BACKWARD
+
+
+# --- whether a mode lasts ---------------------------------------------------------------------------------------------
+
+
+def surely_lasts(unit: Any, common: Any, length: float) -> bool:
+    """Tell whether a servo surely stays in its mode along a leg."""
+    constant = unit.sign == 0.0 or (
+        common.now == common.then and common.bend == 0.0 and unit.law.R_slope == 0.0)
+    if unit.active == 0 and constant:
+        return True
+    mode, y = unit_mode(unit.mode), unit_state(unit.y)
+    after = unit_state(unit.after) if unit.active != 0 else y
+    numbers, law = warm(unit_numbers(unit.numbers), after), unit.law
+    u0, u, moves, apart = unit.sign * common.now, unit.sign * common.then, law.moves > 0.0, law.apart > 0.0
+    bend, bend_u = unit.bend, abs(unit.sign) * common.bend
+    bend_x = bend_u + law.K_b * bend
+    if not _in_zone(unit, numbers, mode.zone, u0, u, y, after, bend_x, length):
+        return False
+    if mode.mesh == INSIDE:
+        if apart and not (y.w * after.w >= 0.0 and after.w != 0.0):
+            return False
+        if apart and not numbers.stops.lower < after.q < numbers.stops.upper:
+            return False
+        if moves and not _keeps_sign(unit.speed, y.w_m, after.w_m, bend, length):
+            return False
+        if not _within_play(numbers, y, after, bend, length):
+            return False
+    elif moves:
+        if not _keeps_sign(unit.speed, y.w, after.w, bend, length):
+            return False
+        if not numbers.stops.lower < after.q < numbers.stops.upper:
+            return False
+    if not moves and not constant and not _holds(unit, numbers, mode, u, y, after, bend_x):
+        return False
+    if not moves or (mode.share == 0 and not play.present(numbers.play)):
+        return True
+    return _presses(unit, numbers, mode, u0, u, y, after, bend_x)
+
+
+def _keeps_sign(speed: Any, w: float, after: float, bend: float, length: float) -> bool:
+    """Tell whether a speed surely keeps its sign: it is monotone, or far from zero."""
+    if w * after < 0.0 or after == 0.0:
+        return False
+    if abs(speed[1]) * length > bend:
+        return w != 0.0 or speed[1] * after > 0.0
+    return min(abs(w), abs(after)) > 0.25 * bend
+
+
+def _in_zone(unit: Any, numbers: Numbers, zone: int, u0: float, u: float, y: Vector, after: Vector, bend: float,
+             length: float) -> bool:
+    """Tell whether the current surely stays in its zone."""
+    low, high = currents.zone_limits(numbers, zone, u)
+    if low == -math.inf and high == math.inf:
+        return True
+    x0, x = u0 - back_emf(y.w_m, numbers.motor.K_b), u - back_emf(after.w_m, numbers.motor.K_b)
+    if not low < x < high:
+        return False
+    first = low + 0.25 * bend < x0 < high - 0.25 * bend and low + 0.25 * bend < x < high - 0.25 * bend
+    return first or abs(x - x0) > 2.0 * bend
+
+
+def _within_play(numbers: Numbers, y: Vector, after: Vector, bend: float, length: float) -> bool:
+    """Tell whether motor and output surely stay apart."""
+    ahead, half = y.q_m - y.q, numbers.play.half
+    most = length * max(max(y.w_m, after.w_m) + 0.125 * bend - min(y.w, after.w), 0.0)
+    least = length * min(min(y.w_m, after.w_m) - 0.125 * bend - max(y.w, after.w), 0.0)
+    return ahead + most < half and ahead + least > -half
+
+
+def _holds(unit: Any, numbers: Numbers, mode: Mode, u: float, y: Vector, after: Vector, bend: float) -> bool:
+    """Tell whether what the motor turns surely stays at rest."""
+    kinds = guards.guards(numbers, mode, u, False) & ~(1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN | 1 << guards.SPEED
+                                                       | guards.MEETINGS | guards.STOPS)
+    margin = 2.0 * unit.law.K * unit.law.conducts * bend
+    for kind in range(guards.KINDS):
+        if kinds >> kind & 1:
+            value = guards.guard(numbers, mode, kind, u, 0.0, unit.torque, 0.0, after, NOWHERE)[0]
+            if not value > margin:
+                return False
+    return True
+
+
+def _presses(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, y: Vector, after: Vector,
+             bend: float) -> bool:
+    """Tell whether the share surely keeps its sign, and motor and output surely press together."""
+    body, tau = numbers.shaft, unit.torque
+    torque, before = currents.drive_torque(numbers, mode.zone, u, after), currents.drive_torque(
+        numbers, mode.zone, u0, y)
+    off = 0.25 * unit.law.K * unit.law.conducts * bend
+    if mode.share != 0:
+        least = abs(share(numbers.friction, off, 0.0)) + abs(
+            share(numbers.friction, 0.0, 0.25 * body.b_out * unit.bend))
+        if not _above(mode.share * contacts.through_gear(numbers, mode.mesh, before, tau, y),
+                      mode.share * contacts.through_gear(numbers, mode.mesh, torque, tau, after), least):
+            return False
+    if mode.mesh == INSIDE or not play.present(numbers.play) or mode.motor == STUCK:
+        return True
+    if torque * before <= 0.0 or min(abs(torque), abs(before)) <= off:
+        return False  # there is a bend in how they press
+    inertia = body.J - body.J_out
+    least = 2.0 * off / inertia + unit.bend * (abs(body.b - body.b_out) / inertia + body.b_out / body.J_out)
+    return _above(contacts.pressing_along(numbers, mode, u0, tau, y),
+                  contacts.pressing_along(numbers, mode, u, tau, after), least)
+
+
+def _above(first: float, end: float, least: float) -> bool:
+    """Tell whether what bends so little stays above zero: it ends there, and is monotone or far from it."""
+    return end > 0.0 and (min(first, end) > least or abs(end - first) > 4.0 * least)
+
+
+# --- what ends a mode -------------------------------------------------------------------------------------------------
+
+
+def first_end(unit: Any, common: Any, length: float, last: bool) -> tuple[int, float]:
+    """Return which guard of a servo falls below zero first along a leg (−1: none), and when [s].
+
+    Where it is the `last` instant it counts as well.
+    """
+    kinds = guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
+    found, first = -1, length
+    for kind in range(guards.KINDS):
+        if kinds >> kind & 1:
+            s = _crossing(unit, common, kind, first)
+            if s < first or (s == first and found < 0 and last):
+                found, first = kind, s
+    return found, first
+
+
+def _guard(unit: Any, common: Any, kind: int, s: float) -> float:
+    """Return a guard of a servo at s [s] after the beginning of a leg."""
+    y, u = state_at(unit, common.terms, s), unit.sign * voltage_at(common, s)
+    return guards.guard(unit_numbers(unit.numbers), unit_mode(unit.mode), kind, u, 0.0, unit.torque, 0.0, y, y)[0]
+
+
+def _crossing(unit: Any, common: Any, kind: int, length: float) -> float:
+    """Return when a guard falls below zero, at most `length` [s]; inf where it does not."""
+    a, f_a = 0.0, _guard(unit, common, kind, 0.0)
+    if f_a < guards.BELOW:  # what another one did has ended this mode too
+        return 0.0
+    b, f_b, falls = 0.0, 0.0, False
+    for part in _LOOKS:
+        b = part * length
+        f_b = _guard(unit, common, kind, b)
+        falls = f_b < guards.BELOW
+        if falls:
+            break
+        a, f_a = b, f_b
+    if not falls:
+        return math.inf
+    if f_a <= 0.0:  # it starts at zero, to rounding: look whether it rises before it falls
+        end, half = b, 0.5
+        for _ in range(50):
+            f_a = _guard(unit, common, kind, a + (end - a) * half)
+            if f_a > 0.0:
+                a += (end - a) * half
+                break
+            half *= 0.5
+        if f_a <= 0.0:
+            return a
+    for _ in range(_HALVINGS):
+        if b - a <= 4e-16 * b or f_b == 0.0:
+            break
+        for s in (b - f_b * (b - a) / (f_b - f_a), 0.5 * (a + b)):
+            if a < s < b:
+                f = _guard(unit, common, kind, s)
+                if f > 0.0:
+                    a, f_a = s, f
+                else:
+                    b, f_b = s, f
+    return b
