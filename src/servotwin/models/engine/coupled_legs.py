@@ -8,7 +8,7 @@ followed as the general engine has them.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from servotwin.models.engine import contacts, coupled_series, currents, guards, legs
 from servotwin.models.engine.coupled_series import put_after, put_law_of, state_at, voltage_at
@@ -31,8 +31,8 @@ from servotwin.physics.motor import back_emf
 MOST_LEGS = 400  # to one instant; servos that need more are left to the general engine
 _LEAST = 0.05  # of the open-circuit voltage: below, buses are left to the general engine
 _SAME = 1e-14  # of that
-_LOOKS = (0.25, 0.5, 0.75, 1.0)  # parts of a leg at which guards are looked at
 _HALVINGS = 200
+_INSTANT = 1e-17  # s, within which a time is the same
 _CLOSE = 1e-13  # A
 
 DONE, LEFT = 1, 0
@@ -311,54 +311,79 @@ def first_end(unit: Any, common: Any, length: float, last: bool) -> tuple[int, f
     Where it is the `last` instant it counts as well.
     """
     kinds = guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
+    at_start = _place(unit, common, 0.0)
+    quarter, half = _place(unit, common, 0.25 * length), _place(unit, common, 0.5 * length)
+    late, at_end = _place(unit, common, 0.75 * length), _place(unit, common, length)
     found, first = -1, length
     for kind in range(guards.KINDS):
-        if kinds >> kind & 1:
-            s = _crossing(unit, common, kind, first)
-            if s < first or (s == first and found < 0 and last):
-                found, first = kind, s
+        if not kinds >> kind & 1:
+            continue
+        s, a, f_a = math.inf, at_start.s, _guard(unit, kind, at_start)
+        if f_a < guards.BELOW:  # what another one did has ended this mode too
+            s = 0.0
+        else:
+            for place in (quarter, half, late, at_end):
+                f = _guard(unit, kind, place)
+                if f < guards.BELOW:
+                    s = _crossing(unit, common, kind, a, f_a, place.s, f)
+                    break
+                a, f_a = place.s, f
+        if s < first or (s == first and found < 0 and last):
+            found, first = kind, s
     return found, first
 
 
-def _guard(unit: Any, common: Any, kind: int, s: float) -> float:
-    """Return a guard of a servo at s [s] after the beginning of a leg."""
-    y, u = state_at(unit, common.terms, s), unit.sign * voltage_at(common, s)
-    return guards.guard(unit_numbers(unit.numbers), unit_mode(unit.mode), kind, u, 0.0, unit.torque, 0.0, y, y)[0]
+class Place(NamedTuple):
+    """Where a servo is along a leg: how long after its beginning [s], the voltage in its circuit [V], its state."""
+
+    s: float
+    u: float
+    y: Vector
 
 
-def _crossing(unit: Any, common: Any, kind: int, length: float) -> float:
-    """Return when a guard falls below zero, at most `length` [s]; inf where it does not."""
-    a, f_a = 0.0, _guard(unit, common, kind, 0.0)
-    if f_a < guards.BELOW:  # what another one did has ended this mode too
-        return 0.0
-    b, f_b, falls = 0.0, 0.0, False
-    for part in _LOOKS:
-        b = part * length
-        f_b = _guard(unit, common, kind, b)
-        falls = f_b < guards.BELOW
-        if falls:
-            break
-        a, f_a = b, f_b
-    if not falls:
-        return math.inf
-    if f_a <= 0.0:  # it starts at zero, to rounding: look whether it rises before it falls
-        end, half = b, 0.5
+def _place(unit: Any, common: Any, s: float) -> Place:
+    return Place(s, unit.sign * voltage_at(common, s), state_at(unit, common.terms, s))
+
+
+def _guard(unit: Any, kind: int, place: Place) -> float:
+    """Return a guard of a servo somewhere along a leg."""
+    return guards.guard(unit_numbers(unit.numbers), unit_mode(unit.mode), kind, place.u, 0.0, unit.torque, 0.0,
+                        place.y, place.y)[0]
+
+
+def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float, f_b: float) -> float:
+    """Return when a guard falls below zero, between two times [s] at which it is at least zero, to rounding, and below.
+
+    By inverse parabolas where they are sure to lead on, else by halves (Chandrupatla 1997).
+    """
+    if f_a <= 0.0:  # it starts at zero: look whether it rises before it falls
+        start, part = a, 0.5
         for _ in range(50):
-            f_a = _guard(unit, common, kind, a + (end - a) * half)
+            a = start + (b - start) * part
+            f_a = _guard(unit, kind, _place(unit, common, a))
             if f_a > 0.0:
-                a += (end - a) * half
                 break
-            half *= 0.5
+            b, f_b, part = a, f_a, 0.5 * part
         if f_a <= 0.0:
-            return a
+            return start
+    new, f_new, old, f_old, part = b, f_b, a, f_a, f_a / (f_a - f_b)
+    part = 1.0 - part
     for _ in range(_HALVINGS):
-        if b - a <= 4e-16 * b or f_b == 0.0:
+        s = new + part * (old - new)
+        f = _guard(unit, kind, _place(unit, common, s))
+        if (f > 0.0) == (f_new > 0.0):
+            third, f_third = new, f_new
+        else:
+            third, f_third = old, f_old
+            old, f_old = new, f_new
+        new, f_new = s, f
+        least = _INSTANT / abs(old - new)
+        if f == 0.0 or least > 0.5:
             break
-        for s in (b - f_b * (b - a) / (f_b - f_a), 0.5 * (a + b)):
-            if a < s < b:
-                f = _guard(unit, common, kind, s)
-                if f > 0.0:
-                    a, f_a = s, f
-                else:
-                    b, f_b = s, f
-    return b
+        xi, phi = (new - old) / (third - old), (f_new - f_old) / (f_third - f_old)
+        part = 0.5
+        if phi * phi < xi and (1.0 - phi) * (1.0 - phi) < 1.0 - xi:
+            part = (f_new / (f_old - f_new) * f_third / (f_old - f_third)
+                    + (third - new) / (old - new) * f_new / (f_third - f_new) * f_old / (f_third - f_old))
+        part = min(max(part, least), 1.0 - least)
+    return new if f_new <= 0.0 else old

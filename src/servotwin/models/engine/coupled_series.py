@@ -24,6 +24,7 @@ from servotwin.physics.thermal import magnet_factor, winding_resistance
 
 _LONGEST = 0.5  # of a series, in times of its fastest rate
 _ROUNDING = 1e-18  # of a term
+_INVERSES = (0.0, *(1.0 / n for n in range(1, TERMS + 1)))
 _PER_KELVIN = 1e-2  # what a kelvin counts beside a radian per second
 
 
@@ -143,7 +144,7 @@ def _back(unit: Any, n: int) -> float:
 
 def _next(unit: Any, n: int) -> float:
     """Work out what follows on the n-th current of a servo; return how large it is."""
-    law, over = unit.law, 1.0 / (n + 1)
+    law, over = unit.law, _INVERSES[n + 1]
     first = 1.0 if n == 0 else 0.0
     torque, more = law.K * unit.current[n], 0.0
     if law.R_slope != 0.0:
@@ -168,8 +169,8 @@ def _warm_up(unit: Any, n: int) -> float:
         loss += law.R_slope * unit.winding[m] * unit.square[n - m]
     flow = heat.heat_flow(unit.winding[n], unit.housing[n], own.G_wh)
     lost = heat.heat_flow(unit.housing[n], own.T_amb if n == 0 else 0.0, own.G_ha)
-    dT_w = heat.warming_rate(loss, flow, own.C_w) / (n + 1)
-    dT_h = heat.warming_rate(flow, lost, own.C_h) / (n + 1)
+    dT_w = heat.warming_rate(loss, flow, own.C_w) * _INVERSES[n + 1]
+    dT_h = heat.warming_rate(flow, lost, own.C_h) * _INVERSES[n + 1]
     unit.winding[n + 1], unit.housing[n + 1] = dT_w, dT_h
     return _PER_KELVIN * max(abs(dT_w), abs(dT_h))
 
@@ -183,7 +184,7 @@ def state_at(unit: Any, terms: int, s: float) -> Vector:
     if law.moves > 0.0:
         for n in range(terms, -1, -1):
             w = w * s + unit.speed[n]
-            angle = angle * s + unit.speed[n] / (n + 1)
+            angle = angle * s + unit.speed[n] * _INVERSES[n + 1]
         angle *= s
     T_w, T_h = y.T_w, y.T_h
     if law.R_slope != 0.0:
@@ -198,7 +199,7 @@ def state_at(unit: Any, terms: int, s: float) -> Vector:
     if law.apart > 0.0:
         for n in range(terms, -1, -1):
             v = v * s + unit.output[n]
-            way = way * s + unit.output[n] / (n + 1)
+            way = way * s + unit.output[n] * _INVERSES[n + 1]
         way *= s
     return Vector(y.q + way, v, y.i, T_w, T_h, y.q_m + angle, w)
 
