@@ -159,7 +159,7 @@ def _alone(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
     """Return how lanes run of which some have a spring between two bodies, or a program."""
     digital, sprung = _any(terms.ask(PWM)), terms.ask(SPRING)
     found, left = [*_at_last(terms, sprung, recipes.ALL_RUNS, lanes)], _not(sprung)
-    for recipe in (recipes.BY_TICKS, recipes.BY_LEGS) if digital and not is_plain() else ():
+    for recipe in (recipes.BY_TICKS, recipes.BY_LEGS, recipes.BY_SERIES) if digital and not is_plain() else ():
         if _any(left):
             which = _and(left, terms.fit(recipe))
             left = _without(left, which)

@@ -8,7 +8,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from servotwin.models.engine import loop_tiles, tiles
+from servotwin.models.engine.coupled_units import Coupling, Unit
+from servotwin.models.engine.records import record_of
 from servotwin.models.terms.dependence import (
     AT_COMMANDS,
     AT_STOPS,
@@ -95,6 +99,9 @@ _TICKS = _PLAIN & ~ON_Q | _DIGITAL
 _LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
 BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.leg_runs:go_on",), vector=True, knows=_LEGS, always=PROGRAM | PWM)
 """Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_DIGITAL`."""
+BY_SERIES = Recipe("by_series", ("servotwin.models.engine.coupled_runs:go_on",),
+                   knows=_LEGS & ~TABLE | ON_HEAT | REGULATED, always=PROGRAM | PWM)
+"""The same whose windings get warm, or whose supply has a limit; what is left of a call is for `ALL_DIGITAL`."""
 BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, knows=_TICKS & ~DROPS,
                   always=PROGRAM | PWM)
 """Digital servos from tick to tick, side by side; what is left of a call is for `BY_LEGS`."""
@@ -102,6 +109,9 @@ BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=T
 _LEFT_BY_LEGS = AT_STOPS | SHOWN | AT_COMMANDS
 _BY_LEGS = (replace(BY_LEGS, name="ticks_by_legs", knows=_LEGS & ~_LEFT_BY_LEGS, leaves=_LEFT_BY_LEGS),
             ("servotwin.models.engine.tick_legs:go",))
+_BY_SERIES = (replace(BY_SERIES, name="ticks_by_series", knows=BY_SERIES.knows & ~_LEFT_BY_LEGS,
+                      leaves=_LEFT_BY_LEGS),
+              ("servotwin.models.engine.coupled_ticks:serve", "servotwin.models.engine.coupled_ticks:move"))
 _LEFT_BY_TICKS = _LEFT_BY_LEGS | BEYOND | ONE_WAY
 _BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_LEFT_BY_TICKS, leaves=_LEFT_BY_TICKS),
              tuple(f"servotwin.models.engine.{name}" for name in (
@@ -114,8 +124,9 @@ LOOK = Recipe("look", tuple(f"servotwin.models.engine.sights:{name}" for name in
 """Lanes of all forms: to look leaves out little where terms are absent."""
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, knows=~_DIGITAL)
 _PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
-          ALL_DIGITAL: ((ALL_DIGITAL, ()), _BY_LEGS)}
-_CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DIGITAL)}
+          BY_SERIES: (_BY_SERIES,), ALL_DIGITAL: ((ALL_DIGITAL, ()), _BY_LEGS)}
+_CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DIGITAL),
+           BY_SERIES: (BY_SERIES, ALL_DIGITAL)}
 
 
 def chain_of(recipe: Recipe) -> tuple[Recipe, ...]:
@@ -133,6 +144,8 @@ def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
 
 def room_of(recipe: Recipe) -> tuple[Any, ...]:
     """Return what these need beside the arguments of `runs.go_on`: lanes side by side, room for a tile."""
+    if recipe == BY_SERIES:
+        return np.zeros(2, record_of(Unit)), np.zeros(2, record_of(Coupling))
     return (loop_tiles.tile_room(),) if recipe == BY_TICKS else ()
 
 

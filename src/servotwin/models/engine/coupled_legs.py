@@ -22,7 +22,7 @@ from servotwin.models.engine.coupled_units import (
 )
 from servotwin.models.engine.legs import MOST_SHORT, SHORT
 from servotwin.models.engine.modes import INSIDE, NO_CURRENT, NOWHERE, STUCK, Mode, Vector, at_rest, sign_of
-from servotwin.models.engine.shared_source import on_stiff_source, part_on_bus
+from servotwin.models.engine.shared_source import driven, part_on_bus
 from servotwin.models.terms import bridge, duty, play
 from servotwin.models.terms.friction import share
 from servotwin.models.terms.numbers import Numbers, warm
@@ -32,7 +32,7 @@ MOST_LEGS = 400  # to one instant; servos that need more are left to the general
 _LEAST = 0.05  # of the open-circuit voltage: below, buses are left to the general engine
 _SAME = 1e-14  # of that
 _HALVINGS = 200
-_INSTANT = 1e-17  # s, within which a time is the same
+_INSTANT, _ROUNDING = 1e-16, 1e-16  # s and units of a guard, within which a root is found
 _CLOSE = 1e-13  # A
 
 DONE, LEFT = 1, 0
@@ -43,7 +43,8 @@ def put_duty(unit: Any, now: float) -> None:
     given = unit_numbers(unit.given)
     numbers = duty.at_duty(given, now)
     drive = math.copysign(1.0, now) if duty.drives(now) else 0.0
-    put_unit_numbers(unit.numbers, on_stiff_source(numbers, False))
+    path = numbers.bridge
+    put_unit_numbers(unit.numbers, driven(numbers, path.D_drive, path.R_drive - numbers.source.R_b))
     unit.duty, unit.anew = now, 1
     unit.sign = part_on_bus(drive, numbers.bridge, now, NOWHERE) if drive != 0.0 else 0.0
     unit.open = 1 if drive == 0.0 and bridge.coasts(numbers.bridge) else 0
@@ -378,7 +379,9 @@ def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float,
             old, f_old = new, f_new
         new, f_new = s, f
         least = _INSTANT / abs(old - new)
-        if f == 0.0 or least > 0.5:
+        if abs(f) <= _ROUNDING:
+            return s
+        if least > 0.5:
             break
         xi, phi = (new - old) / (third - old), (f_new - f_old) / (f_third - f_old)
         part = 0.5

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine import legs
+from servotwin.models.engine import currents, legs
 from servotwin.models.engine.coupled_units import TERMS, Law, put_unit_law, unit_mode, unit_numbers, unit_state
 from servotwin.models.engine.modes import FORWARD, INSIDE, NO_CURRENT, Mode, Vector, at_rest, sign_of
 from servotwin.models.terms import bridge, heat, shaft
@@ -35,7 +35,7 @@ def put_law_of(unit: Any) -> None:
     R = winding = drop = conducts = R_slope = K_slope = K_b_slope = 0.0
     winding = numbers.motor.R
     if mode.zone != NO_CURRENT:
-        R = numbers.bridge.R_drive if driven != 0.0 else numbers.bridge.off.R
+        R = currents.resistance(numbers, mode.zone, driven)
         drop = sign_of(mode.zone) * bridge.drop(numbers.bridge, driven)
         conducts = 1.0 / R
     if heat.present(cold.heat):

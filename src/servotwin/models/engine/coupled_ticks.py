@@ -53,24 +53,33 @@ def sit(unit: Any, inputs: Inputs, until: float, last: float) -> None:
 
 def go(told: Any, firms: Any, count: int, units: Any, common: Any) -> None:
     """Let servos go on as far as this way leads; where they are, and when, is in their records."""
+    begin(told, firms, count, units)
+    while is_underway(units, count):
+        if serve(told, firms, count, units, common) == LEFT:
+            return
+        if move(units, count, common, to_next(units, count)) == LEFT:
+            return
+
+
+def begin(told: Any, firms: Any, count: int, units: Any) -> None:
+    """Let servos have the duties of their programs, and know when these do something next."""
     for k in range(count):
         unit = units[k]
         unit.due = controller.next_due(inputs_at(told, unit).firmware[0], firms[unit.place], unit.frames)
         put_duty(unit, firms[unit.place].duty)
-    while _is_underway(units, count):
-        if _serve(told, firms, count, units, common) == LEFT:
-            return
-        time = _to_next(units, count)
-        gone = coupled_legs.go(units, count, common, time)
-        for k in range(count):
-            unit = units[k]
-            end = min(unit.due, unit.last)
-            unit.time = end if gone == time and end <= unit.time + time + unit.slack else unit.time + gone
-        if gone < time:
-            return
 
 
-def _is_underway(units: Any, count: int) -> bool:
+def move(units: Any, count: int, common: Any, time: float) -> int:
+    """Let servos move for a time [s] as far as legs lead; return `LEFT` where that is less."""
+    gone = coupled_legs.go(units, count, common, time)
+    for k in range(count):
+        unit = units[k]
+        end = min(unit.due, unit.last)
+        unit.time = end if gone == time and end <= unit.time + time + unit.slack else unit.time + gone
+    return DONE if gone == time else LEFT
+
+
+def is_underway(units: Any, count: int) -> bool:
     """Tell whether all have to go on."""
     for k in range(count):
         if units[k].time >= units[k].last:
@@ -78,7 +87,7 @@ def _is_underway(units: Any, count: int) -> bool:
     return True
 
 
-def _to_next(units: Any, count: int) -> float:
+def to_next(units: Any, count: int) -> float:
     """Return how long it takes to the next instant of any servo [s]."""
     time = math.inf
     for k in range(count):
@@ -88,7 +97,7 @@ def _to_next(units: Any, count: int) -> float:
     return max(time, 0.0)
 
 
-def _serve(told: Any, firms: Any, count: int, units: Any, common: Any) -> int:
+def serve(told: Any, firms: Any, count: int, units: Any, common: Any) -> int:
     """Do what programs do now: put duties on bridges, measure, decide; return `LEFT` or not."""
     due = False
     for k in range(count):

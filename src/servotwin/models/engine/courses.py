@@ -13,6 +13,7 @@ from servotwin.models.engine.modes import Vector
 
 _BEYOND = 1e-13  # rad: so little is rounding
 _STEPS = 200
+_ROUNDING = 2.5e-16  # of an angle
 _CLOSE = 1e-7  # of a time: from so near a step along a parabola ends at rounding
 
 
@@ -110,11 +111,14 @@ def _reaches(one: Course, other: Course, way: float, toward: float, a: float, at
     """Return when in [a, b] the lead crosses `way`, upwards (`toward` is 1) or downwards (−1); it is beyond at b."""
     if toward * (at_a.way - way) >= 0.0:
         return a
+    least = _ROUNDING * (abs(one.q) + abs(other.q))  # of a lead: less does not say on which side it is
     x = a + _step(toward * (way - at_a.way), toward * at_a.speed, toward * at_a.bend)
     for _ in range(_STEPS):
         x = x if a < x < b else 0.5 * (a + b)
         at = lead_at(one, other, x)
         left = toward * (way - at.way)
+        if abs(left) <= least:
+            return x
         if left > 0.0:
             a = x
         else:

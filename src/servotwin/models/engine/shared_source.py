@@ -31,13 +31,18 @@ FOLLOWING, LIMITED, BROKEN_DOWN, KEEPING = range(4)
 def on_stiff_source(numbers: Numbers, returning: bool) -> Numbers:
     """Return a servo whose bus voltage is given: driven, or returning current through its diodes."""
     path, source = numbers.bridge, numbers.source
-    R = path.R_drive - source.R_b
-    if returning:
-        R = path.off.R if source_term.regulated(source) else path.off.R - source.R_b
-    D = max(path.D_drive, 1e-300) if returning else path.D_drive  # a diode without drop still has a direction
+    if not returning:
+        return driven(numbers, path.D_drive, path.R_drive - source.R_b)
+    R = path.off.R if source_term.regulated(source) else path.off.R - source.R_b
+    return driven(numbers, max(path.D_drive, 1e-300), R)  # a diode without drop still has a direction
+
+
+def driven(numbers: Numbers, D: float, R: float) -> Numbers:
+    """Return a servo whose bus voltage is given and drives it with so much drop [V] and resistance [Ω]."""
+    path = numbers.bridge
     return Numbers(
         numbers.motor, Bridge(D, R, path.off, path.silence, path.V_br, path.pwm, path.one_way),
-        Source(source.V, 0.0, math.inf), numbers.follower, numbers.shaft, numbers.friction, numbers.load,
+        Source(numbers.source.V, 0.0, math.inf), numbers.follower, numbers.shaft, numbers.friction, numbers.load,
         numbers.stops, numbers.play, numbers.sensor, numbers.heat, numbers.elastic)
 
 

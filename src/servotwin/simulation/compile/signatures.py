@@ -88,8 +88,10 @@ _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
 def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let digital servos go from tick to tick together."""
     from servotwin.models.engine import loop_tiles
+    from servotwin.models.engine.coupled_units import Coupling, Unit
 
-    return {"loops:go_on": (*_GOING, _records(loop_tiles.TILE_TYPE)), "leg_runs:go_on": _GOING}
+    return {"loops:go_on": (*_GOING, _records(loop_tiles.TILE_TYPE)), "leg_runs:go_on": _GOING,
+            "coupled_runs:go_on": (*_GOING, _records(record_of(Unit)), _records(record_of(Coupling)))}
 
 
 @cache
@@ -111,7 +113,7 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
 
 
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
-    "loops:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "buses:go_on": _of_buses, "buses:look": _of_buses,
+    "loops:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "coupled_runs:go_on": _of_ticks, "buses:go_on": _of_buses, "buses:look": _of_buses,
     "lane_ticks:break_up": _of_buses}
 
 
