@@ -357,15 +357,15 @@ def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float,
 
     By inverse parabolas where they are sure to lead on, else by halves (Chandrupatla 1997).
     """
-    if f_a <= 0.0:  # it starts at zero: look whether it rises before it falls
-        start, part = a, 0.5
+    if f_a <= -guards.BELOW:  # it starts at zero, to rounding: look whether it rises before it falls
+        start = a
         for _ in range(50):
-            a = start + (b - start) * part
+            a = start + 0.5 * (b - start)
             f_a = _guard(unit, kind, _place(unit, common, a))
-            if f_a > 0.0:
+            if f_a > -guards.BELOW:
                 break
-            b, f_b, part = a, f_a, 0.5 * part
-        if f_a <= 0.0:
+            b, f_b = a, f_a
+        if f_a <= -guards.BELOW or f_b > 0.0:
             return start
     new, f_new, old, f_old, part = b, f_b, a, f_a, f_a / (f_a - f_b)
     part = 1.0 - part
