@@ -35,6 +35,9 @@ _HALVINGS = 200
 _INSTANT, _ROUNDING = 1e-16, 1e-16  # s and units of a guard, within which a root is found
 _CLOSE = 1e-13  # A
 
+_ZONES = 1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN
+_AT_REST = ~(_ZONES | 1 << guards.SPEED | guards.MEETINGS | guards.STOPS)  # what ends rest of what the motor turns
+
 DONE, LEFT = 1, 0
 
 
@@ -145,8 +148,9 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
         coupled_series.work_out(units, count, common, length)
         whose, kind, end = -1, -1, length
         for k in range(count):
-            if not surely_lasts(units[k], common, length):
-                found, s = first_end(units[k], common, end, whose < 0)
+            kinds = doubtful(units[k], common, length)
+            if kinds != 0:
+                found, s = first_end(units[k], common, kinds, end, whose < 0)
                 if found >= 0:
                     whose, kind, end = k, found, s
         if whose < 0:
@@ -197,39 +201,36 @@ def jumps(kind: int) -> bool:
 # --- whether a mode lasts ---------------------------------------------------------------------------------------------
 
 
-def surely_lasts(unit: Any, common: Any, length: float) -> bool:
-    """Tell whether a servo surely stays in its mode along a leg."""
+def doubtful(unit: Any, common: Any, length: float) -> int:
+    """Return which guards of a servo do not surely stay above zero along a leg, as a sum of 1 << kind."""
     constant = unit.sign == 0.0 or (
         common.now == common.then and common.bend == 0.0 and unit.law.R_slope == 0.0)
     if unit.active == 0 and constant:
-        return True
+        return 0
     mode, y = unit_mode(unit.mode), unit_state(unit.y)
     after = unit_state(unit.after) if unit.active != 0 else y
     numbers, law = warm(unit_numbers(unit.numbers), after), unit.law
     u0, u, moves, apart = unit.sign * common.now, unit.sign * common.then, law.moves > 0.0, law.apart > 0.0
-    bend, bend_u = unit.bend, abs(unit.sign) * common.bend
-    bend_x = bend_u + law.K_b * bend
-    if not _in_zone(unit, numbers, mode.zone, u0, u, y, after, bend_x, length):
-        return False
-    if mode.mesh == INSIDE:
+    bend = unit.bend
+    bend_x = abs(unit.sign) * common.bend + law.K_b * bend
+    kinds = 0 if _in_zone(numbers, mode.zone, u0, u, y, after, bend_x) else _ZONES
+    inside = mode.mesh == INSIDE
+    if (apart or (moves and not inside)) and not numbers.stops.lower < after.q < numbers.stops.upper:
+        kinds |= guards.STOPS
+    if inside:
         if apart and not (y.w * after.w >= 0.0 and after.w != 0.0):
-            return False
-        if apart and not numbers.stops.lower < after.q < numbers.stops.upper:
-            return False
+            kinds |= 1 << guards.SPEED | guards.STOPS
         if moves and not _keeps_sign(unit.speed, y.w_m, after.w_m, bend, length):
-            return False
+            kinds |= 1 << guards.MOTOR_SPEED
         if not _within_play(numbers, y, after, bend, length):
-            return False
-    elif moves:
-        if not _keeps_sign(unit.speed, y.w, after.w, bend, length):
-            return False
-        if not numbers.stops.lower < after.q < numbers.stops.upper:
-            return False
-    if not moves and not constant and not _holds(unit, numbers, mode, u, y, after, bend_x):
-        return False
+            kinds |= guards.MEETINGS
+    elif moves and not _keeps_sign(unit.speed, y.w, after.w, bend, length):
+        kinds |= 1 << guards.SPEED | guards.STOPS
+    if not moves and not constant:
+        kinds |= _released(unit, numbers, mode, u, after, bend_x)
     if not moves or (mode.share == 0 and not play.present(numbers.play)):
-        return True
-    return _presses(unit, numbers, mode, u0, u, y, after, bend_x)
+        return kinds
+    return kinds | _parted(unit, numbers, mode, u0, u, y, after, bend_x)
 
 
 def _keeps_sign(speed: Any, w: float, after: float, bend: float, length: float) -> bool:
@@ -241,8 +242,7 @@ def _keeps_sign(speed: Any, w: float, after: float, bend: float, length: float) 
     return min(abs(w), abs(after)) > 0.25 * bend
 
 
-def _in_zone(unit: Any, numbers: Numbers, zone: int, u0: float, u: float, y: Vector, after: Vector, bend: float,
-             length: float) -> bool:
+def _in_zone(numbers: Numbers, zone: int, u0: float, u: float, y: Vector, after: Vector, bend: float) -> bool:
     """Tell whether the current surely stays in its zone."""
     low, high = currents.zone_limits(numbers, zone, u)
     if low == -math.inf and high == math.inf:
@@ -262,23 +262,20 @@ def _within_play(numbers: Numbers, y: Vector, after: Vector, bend: float, length
     return ahead + most < half and ahead + least > -half
 
 
-def _holds(unit: Any, numbers: Numbers, mode: Mode, u: float, y: Vector, after: Vector, bend: float) -> bool:
-    """Tell whether what the motor turns surely stays at rest."""
-    kinds = guards.guards(numbers, mode, u, False) & ~(1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN | 1 << guards.SPEED
-                                                       | guards.MEETINGS | guards.STOPS)
-    margin = 2.0 * unit.law.K * unit.law.conducts * bend
+def _released(unit: Any, numbers: Numbers, mode: Mode, u: float, after: Vector, bend: float) -> int:
+    """Return which guards may fall that keep what the motor turns at rest."""
+    kinds, margin = guards.guards(numbers, mode, u, False) & _AT_REST, 2.0 * unit.law.K * unit.law.conducts * bend
     for kind in range(guards.KINDS):
-        if kinds >> kind & 1:
-            value = guards.guard(numbers, mode, kind, u, 0.0, unit.torque, 0.0, after, NOWHERE)[0]
-            if not value > margin:
-                return False
-    return True
+        if kinds >> kind & 1 and guards.guard(
+                numbers, mode, kind, u, 0.0, unit.torque, 0.0, after, NOWHERE)[0] > margin:
+            kinds ^= 1 << kind
+    return kinds
 
 
-def _presses(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, y: Vector, after: Vector,
-             bend: float) -> bool:
-    """Tell whether the share surely keeps its sign, and motor and output surely press together."""
-    body, tau = numbers.shaft, unit.torque
+def _parted(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, y: Vector, after: Vector,
+            bend: float) -> int:
+    """Return which may fall of the guards of a share, and of motor and output that press together."""
+    body, tau, kinds = numbers.shaft, unit.torque, 0
     torque, before = currents.drive_torque(numbers, mode.zone, u, after), currents.drive_torque(
         numbers, mode.zone, u0, y)
     off = 0.25 * unit.law.K * unit.law.conducts * bend
@@ -287,15 +284,16 @@ def _presses(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, y: Ve
             share(numbers.friction, 0.0, 0.25 * body.b_out * unit.bend))
         if not _above(mode.share * contacts.through_gear(numbers, mode.mesh, before, tau, y),
                       mode.share * contacts.through_gear(numbers, mode.mesh, torque, tau, after), least):
-            return False
+            kinds = 1 << guards.SHARE
     if mode.mesh == INSIDE or not play.present(numbers.play) or mode.motor == STUCK:
-        return True
+        return kinds
     if torque * before <= 0.0 or min(abs(torque), abs(before)) <= off:
-        return False  # there is a bend in how they press
+        return kinds | 1 << guards.PART  # there is a bend in how they press
     inertia = body.J - body.J_out
     least = 2.0 * off / inertia + unit.bend * (abs(body.b - body.b_out) / inertia + body.b_out / body.J_out)
-    return _above(contacts.pressing_along(numbers, mode, u0, tau, y),
-                  contacts.pressing_along(numbers, mode, u, tau, after), least)
+    pressed = _above(contacts.pressing_along(numbers, mode, u0, tau, y),
+                     contacts.pressing_along(numbers, mode, u, tau, after), least)
+    return kinds if pressed else kinds | 1 << guards.PART
 
 
 def _above(first: float, end: float, least: float) -> bool:
@@ -306,12 +304,12 @@ def _above(first: float, end: float, least: float) -> bool:
 # --- what ends a mode -------------------------------------------------------------------------------------------------
 
 
-def first_end(unit: Any, common: Any, length: float, last: bool) -> tuple[int, float]:
-    """Return which guard of a servo falls below zero first along a leg (−1: none), and when [s].
+def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) -> tuple[int, float]:
+    """Return which doubtful guard of a servo falls below zero first along a leg (−1: none), and when [s].
 
     Where it is the `last` instant it counts as well.
     """
-    kinds = guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
+    kinds = doubtful & guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
     at_start = _place(unit, common, 0.0)
     quarter, half = _place(unit, common, 0.25 * length), _place(unit, common, 0.5 * length)
     late, at_end = _place(unit, common, 0.75 * length), _place(unit, common, length)

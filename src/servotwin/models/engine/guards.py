@@ -170,6 +170,8 @@ def guard(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau: flo
         return numbers.stops.upper - q, -w
     if kind == LOWER:
         return q - numbers.stops.lower, w
+    if play.present(numbers.play) and (kind == MEET_FORWARD or kind == MEET_BACKWARD or kind == MOTOR_SPEED):
+        return _play_guard(numbers, mode, kind, u, tau, dtau, y, dy)
     if heat.present(numbers.heat):
         return _by_torque(warm(numbers, y), mode, kind, u, du, tau, dtau, y, dy)
     return _by_torque(numbers, mode, kind, u, du, tau, dtau, y, dy)
