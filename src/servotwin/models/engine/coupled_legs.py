@@ -39,6 +39,7 @@ _ZONES = 1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN
 _AT_REST = ~(_ZONES | 1 << guards.SPEED | guards.MEETINGS | guards.STOPS)  # what ends rest of what the motor turns
 
 DONE, LEFT = 1, 0
+ZONE, DUTY = 1, 2  # why a mode has to be found anew
 
 
 def put_duty(unit: Any, now: float) -> None:
@@ -48,13 +49,16 @@ def put_duty(unit: Any, now: float) -> None:
     drive = math.copysign(1.0, now) if duty.drives(now) else 0.0
     path = numbers.bridge
     put_unit_numbers(unit.numbers, driven(numbers, path.D_drive, path.R_drive - numbers.source.R_b))
-    unit.duty, unit.anew = now, 1
+    unit.duty, unit.anew = now, DUTY
     unit.sign = part_on_bus(drive, numbers.bridge, now, NOWHERE) if drive != 0.0 else 0.0
     unit.open = 1 if drive == 0.0 and bridge.coasts(numbers.bridge) else 0
 
 
 def settle(units: Any, count: int, common: Any) -> int:
-    """Find the modes of servos whose duties are others, and of all that these may have changed; return `LEFT` or not."""
+    """Find the modes of servos whose duties are others, and of all that these change; return `LEFT` or not.
+
+    What another voltage of the bus has ended of a mode in which something moves, its guards tell.
+    """
     changed = common.jumped != 0
     for k in range(count):
         changed = changed or units[k].anew != 0
@@ -65,7 +69,7 @@ def settle(units: Any, count: int, common: Any) -> int:
         return LEFT
     for k in range(count):
         unit = units[k]
-        if unit.anew != 0 or (unit.sign != 0.0 and common.now != before):
+        if unit.anew != 0 or (common.now != before and unit.sign != 0.0 and unit.law.moves == 0.0):
             _settle(unit, common.now)
     return DONE
 
@@ -73,7 +77,7 @@ def settle(units: Any, count: int, common: Any) -> int:
 def _settle(unit: Any, V: float) -> None:
     y, mode, u = unit_state(unit.y), unit_mode(unit.mode), unit.sign * V
     numbers = warm(unit_numbers(unit.numbers), y)
-    if mode.mesh != INSIDE and mode.motor == STUCK and unit.anew == 0:
+    if mode.mesh != INSIDE and mode.motor == STUCK and unit.anew != DUTY:
         mode = contacts.held(numbers, mode.zone, u, unit.torque, y, mode.mesh)
     else:
         mode = contacts.settled(numbers, mode.zone, u, unit.torque, y, mode.mesh, False)
@@ -97,7 +101,8 @@ def put_zones(units: Any, count: int, common: Any) -> int:
             y = unit_state(unit.y)
             numbers = warm(unit_numbers(unit.numbers), y)
             zone = currents.zone_of(numbers, unit.sign * V, 0.0, y.q, y.w_m, 0.0)
-            unit.mode.zone = zone
+            if zone != unit.mode.zone:
+                unit.mode.zone, unit.anew = zone, max(unit.anew, ZONE)
             if unit.sign != 0.0 and zone != NO_CURRENT:
                 per_volt = unit.sign / numbers.bridge.R_drive
                 below += common.R_b * unit.sign * per_volt
@@ -227,7 +232,7 @@ def doubtful(unit: Any, common: Any, length: float) -> int:
     elif moves and not _keeps_sign(unit.speed, y.w, after.w, bend, length):
         kinds |= 1 << guards.SPEED | guards.STOPS
     if not moves and not constant:
-        kinds |= _released(unit, numbers, mode, u, after, bend_x)
+        kinds |= _released(unit, numbers, mode, u0, u, after, bend_x)
     if not moves or (mode.share == 0 and not play.present(numbers.play)):
         return kinds
     return kinds | _parted(unit, numbers, mode, u0, u, y, after, bend_x)
@@ -251,7 +256,7 @@ def _in_zone(numbers: Numbers, zone: int, u0: float, u: float, y: Vector, after:
     if not low < x < high:
         return False
     first = low + 0.25 * bend < x0 < high - 0.25 * bend and low + 0.25 * bend < x < high - 0.25 * bend
-    return first or abs(x - x0) > 2.0 * bend
+    return first or (low + guards.BELOW <= x0 <= high - guards.BELOW and abs(x - x0) > 2.0 * bend)
 
 
 def _within_play(numbers: Numbers, y: Vector, after: Vector, bend: float, length: float) -> bool:
@@ -262,13 +267,15 @@ def _within_play(numbers: Numbers, y: Vector, after: Vector, bend: float, length
     return ahead + most < half and ahead + least > -half
 
 
-def _released(unit: Any, numbers: Numbers, mode: Mode, u: float, after: Vector, bend: float) -> int:
+def _released(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, after: Vector, bend: float) -> int:
     """Return which guards may fall that keep what the motor turns at rest."""
     kinds, margin = guards.guards(numbers, mode, u, False) & _AT_REST, 2.0 * unit.law.K * unit.law.conducts * bend
     for kind in range(guards.KINDS):
-        if kinds >> kind & 1 and guards.guard(
-                numbers, mode, kind, u, 0.0, unit.torque, 0.0, after, NOWHERE)[0] > margin:
-            kinds ^= 1 << kind
+        if kinds >> kind & 1:
+            first = guards.guard(numbers, mode, kind, u0, 0.0, unit.torque, 0.0, after, NOWHERE)[0]
+            end = guards.guard(numbers, mode, kind, u, 0.0, unit.torque, 0.0, after, NOWHERE)[0]
+            if _above(first, end, margin):
+                kinds ^= 1 << kind
     return kinds
 
 
@@ -297,8 +304,8 @@ def _parted(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, y: Vec
 
 
 def _above(first: float, end: float, least: float) -> bool:
-    """Tell whether what bends so little stays above zero: it ends there, and is monotone or far from it."""
-    return end > 0.0 and (min(first, end) > least or abs(end - first) > 4.0 * least)
+    """Tell whether what bends so little stays above zero: at both ends it is, and it is monotone or far from zero."""
+    return first >= 0.0 and end > 0.0 and (min(first, end) > least or abs(end - first) > 4.0 * least)
 
 
 # --- what ends a mode -------------------------------------------------------------------------------------------------
@@ -307,26 +314,33 @@ def _above(first: float, end: float, least: float) -> bool:
 def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) -> tuple[int, float]:
     """Return which doubtful guard of a servo falls below zero first along a leg (−1: none), and when [s].
 
-    Where it is the `last` instant it counts as well.
+    Where it is the `last` instant it counts as well. A guard turns once at most, about where a parabola does.
     """
     kinds = doubtful & guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
-    at_start = _place(unit, common, 0.0)
-    quarter, half = _place(unit, common, 0.25 * length), _place(unit, common, 0.5 * length)
-    late, at_end = _place(unit, common, 0.75 * length), _place(unit, common, length)
+    if kinds == 0:
+        return -1, length
+    at_start, at_end = _place(unit, common, 0.0), _place(unit, common, length)
+    middle = at_start
     found, first = -1, length
     for kind in range(guards.KINDS):
         if not kinds >> kind & 1:
             continue
-        s, a, f_a = math.inf, at_start.s, _guard(unit, kind, at_start)
-        if f_a < guards.BELOW:  # what another one did has ended this mode too
+        s, f, f_end = math.inf, _guard(unit, kind, at_start), _guard(unit, kind, at_end)
+        if f < guards.BELOW:  # what another one did has ended this mode too
             s = 0.0
+        elif f_end < guards.BELOW:
+            s = _crossing(unit, common, kind, 0.0, f, length, f_end)
         else:
-            for place in (quarter, half, late, at_end):
-                f = _guard(unit, kind, place)
-                if f < guards.BELOW:
-                    s = _crossing(unit, common, kind, a, f_a, place.s, f)
-                    break
-                a, f_a = place.s, f
+            middle = middle if middle.s > 0.0 else _place(unit, common, 0.5 * length)
+            f_middle = _guard(unit, kind, middle)
+            bend = f - 2.0 * f_middle + f_end
+            turn = 0.25 * (3.0 * f - 4.0 * f_middle + f_end) / bend * length if bend > 0.0 else -1.0
+            lowest = middle
+            if f_middle >= guards.BELOW and 0.0 < turn < length:
+                lowest = _place(unit, common, turn)
+                f_middle = _guard(unit, kind, lowest)
+            if f_middle < guards.BELOW:
+                s = _crossing(unit, common, kind, 0.0, f, lowest.s, f_middle)
         if s < first or (s == first and found < 0 and last):
             found, first = kind, s
     return found, first
