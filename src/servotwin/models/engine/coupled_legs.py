@@ -11,7 +11,7 @@ import math
 from typing import Any, NamedTuple
 
 from servotwin.models.engine import contacts, coupled_series, currents, guards, legs
-from servotwin.models.engine.coupled_series import put_after, put_law_of, state_at, voltage_at
+from servotwin.models.engine.coupled_series import place_at, put_after, put_law_of, state_at, voltage_at
 from servotwin.models.engine.coupled_units import (
     put_unit_mode,
     put_unit_numbers,
@@ -36,6 +36,7 @@ _INSTANT, _ROUNDING = 1e-16, 1e-16  # s and units of a guard, within which a roo
 _CLOSE = 1e-13  # A
 
 _ZONES = 1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN
+_BY_PLACE = 1 << guards.SPEED | 1 << guards.MOTOR_SPEED | guards.MEETINGS | guards.STOPS  # without torques
 _AT_REST = ~(_ZONES | 1 << guards.SPEED | guards.MEETINGS | guards.STOPS)  # what ends rest of what the motor turns
 
 DONE, LEFT = 1, 0
@@ -319,7 +320,7 @@ def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) 
     kinds = doubtful & guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
     if kinds == 0:
         return -1, length
-    at_start, at_end = _place(unit, common, 0.0), _place(unit, common, length)
+    at_start, at_end = _place(unit, common, kinds, 0.0), _place(unit, common, kinds, length)
     middle = at_start
     found, first = -1, length
     for kind in range(guards.KINDS):
@@ -331,13 +332,13 @@ def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) 
         elif f_end < guards.BELOW:
             s = _crossing(unit, common, kind, 0.0, f, length, f_end)
         else:
-            middle = middle if middle.s > 0.0 else _place(unit, common, 0.5 * length)
+            middle = middle if middle.s > 0.0 else _place(unit, common, kinds, 0.5 * length)
             f_middle = _guard(unit, kind, middle)
             bend = f - 2.0 * f_middle + f_end
             turn = 0.25 * (3.0 * f - 4.0 * f_middle + f_end) / bend * length if bend > 0.0 else -1.0
             lowest = middle
             if f_middle >= guards.BELOW and 0.0 < turn < length:
-                lowest = _place(unit, common, turn)
+                lowest = _place(unit, common, kinds, turn)
                 f_middle = _guard(unit, kind, lowest)
             if f_middle < guards.BELOW:
                 s = _crossing(unit, common, kind, 0.0, f, lowest.s, f_middle)
@@ -354,7 +355,10 @@ class Place(NamedTuple):
     y: Vector
 
 
-def _place(unit: Any, common: Any, s: float) -> Place:
+def _place(unit: Any, common: Any, kinds: int, s: float) -> Place:
+    """Return where a servo is at s [s] after the beginning of a leg, as far as guards of these kinds look at it."""
+    if kinds & ~_BY_PLACE == 0:
+        return Place(s, 1.0, place_at(unit, common.terms, s))
     return Place(s, unit.sign * voltage_at(common, s), state_at(unit, common.terms, s))
 
 
@@ -373,7 +377,7 @@ def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float,
         start = a
         for _ in range(50):
             a = start + 0.5 * (b - start)
-            f_a = _guard(unit, kind, _place(unit, common, a))
+            f_a = _guard(unit, kind, _place(unit, common, 1 << kind, a))
             if f_a > -guards.BELOW:
                 break
             b, f_b = a, f_a
@@ -383,7 +387,7 @@ def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float,
     part = 1.0 - part
     for _ in range(_HALVINGS):
         s = new + part * (old - new)
-        f = _guard(unit, kind, _place(unit, common, s))
+        f = _guard(unit, kind, _place(unit, common, 1 << kind, s))
         if (f > 0.0) == (f_new > 0.0):
             third, f_third = new, f_new
         else:

@@ -19,11 +19,11 @@ from servotwin.models.engine.modes import FORWARD, INSIDE, NO_CURRENT, Mode, Vec
 from servotwin.models.terms import bridge, heat, shaft
 from servotwin.models.terms.friction import share_slopes
 from servotwin.models.terms.numbers import Numbers, warm
-from servotwin.models.terms.play import with_motor
+from servotwin.models.terms.play import ahead
 from servotwin.physics.thermal import magnet_factor, winding_resistance
 
 _LONGEST = 0.5  # of a series, in times of its fastest rate
-_ROUNDING = 1e-18  # of a term
+_ROUNDING = 1e-17  # of a term
 _INVERSES = (0.0, *(1.0 / n for n in range(1, TERMS + 1)))
 _PER_KELVIN = 1e-2  # what a kelvin counts beside a radian per second
 
@@ -160,9 +160,12 @@ def _next(unit: Any, n: int) -> float:
 def _warm_up(unit: Any, n: int) -> float:
     """Work out the next coefficients of a servo's temperatures; return how large they are."""
     law, own = unit.law, unit.numbers.heat
-    square = loss = 0.0
-    for m in range(n + 1):
+    square, half = 0.0, (n + 1) // 2
+    for m in range(half):
         square += unit.current[m] * unit.current[n - m]
+    square += square
+    if n == 2 * half:
+        square += unit.current[half] * unit.current[half]
     unit.square[n] = square
     loss = law.winding * square
     for m in range(1, n + 1):
@@ -177,6 +180,17 @@ def _warm_up(unit: Any, n: int) -> float:
 
 def state_at(unit: Any, terms: int, s: float) -> Vector:
     """Return the state of a servo at s [s] after the beginning of a leg."""
+    at = place_at(unit, terms, s)
+    if unit.law.R_slope == 0.0:
+        return at
+    T_w = T_h = 0.0
+    for n in range(terms, 0, -1):
+        T_w, T_h = (T_w + unit.winding[n]) * s, (T_h + unit.housing[n]) * s
+    return Vector(at.q, at.w, at.i, at.T_w + T_w, at.T_h + T_h, at.q_m, at.w_m)
+
+
+def place_at(unit: Any, terms: int, s: float) -> Vector:
+    """Return the same with the temperatures of the beginning."""
     y, law = unit.y, unit.law
     if unit.active == 0:
         return unit_state(y)
@@ -186,22 +200,16 @@ def state_at(unit: Any, terms: int, s: float) -> Vector:
             w = w * s + unit.speed[n]
             angle = angle * s + unit.speed[n] * _INVERSES[n + 1]
         angle *= s
-    T_w, T_h = y.T_w, y.T_h
-    if law.R_slope != 0.0:
-        T_w = T_h = 0.0
-        for n in range(terms, 0, -1):
-            T_w, T_h = (T_w + unit.winding[n]) * s, (T_h + unit.housing[n]) * s
-        T_w, T_h = y.T_w + T_w, y.T_h + T_h
     if unit.mode.mesh != INSIDE:
-        after = Vector(y.q + angle, w, y.i, T_w, T_h, y.q + angle, w)
-        return with_motor(unit_numbers(unit.numbers).play, unit.mode.mesh, after)
+        return Vector(y.q + angle, w, y.i, y.T_w, y.T_h,
+                      y.q + angle + ahead(unit_numbers(unit.numbers).play, unit.mode.mesh), w)
     way = v = 0.0
     if law.apart > 0.0:
         for n in range(terms, -1, -1):
             v = v * s + unit.output[n]
             way = way * s + unit.output[n] * _INVERSES[n + 1]
         way *= s
-    return Vector(y.q + way, v, y.i, T_w, T_h, y.q_m + angle, w)
+    return Vector(y.q + way, v, y.i, y.T_w, y.T_h, y.q_m + angle, w)
 
 
 def voltage_at(common: Any, s: float) -> float:
