@@ -64,6 +64,7 @@ OF_ANALOG = {
 OF_DIGITAL = {
     "by_legs": (  # the plain one has drops
         "plain play share steps bend play+share play+steps play+bend share+steps share+bend steps+bend"),
+    "by_series": "heat limit play+heat play+limit heat+limit heat+share heat+steps limit+share limit+steps",
 }
 OF_CATALOG = {
     "by_bands": (

@@ -62,8 +62,8 @@ def go_on(lanes: Lanes, tables: Tables, buses: Buses, begin: int, end: int, dura
     """Let the buses from `begin` to before `end` go on for a duration, or to a time since their start [s].
 
     `until` is inf where the duration counts. A lane with a status is not on its bus. Seats there have to be for every
-    servo of a bus, as many units, and twice as many mates. Return the status of the last bus: where it is `bus.PAUSED` the tape is
-    full.
+    servo of a bus, as many units, and twice as many mates. Return the status of the last bus: where it is `bus.PAUSED`
+    the tape is full.
     """
     told, status = Told(lanes, tables), COMPLETED
     for k in range(begin, end):

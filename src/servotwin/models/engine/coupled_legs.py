@@ -1,8 +1,8 @@
 """Legs of servos on one supply: their modes at its voltage, whether these surely last, and what ends them first.
 
-What bends a series within a leg is bounded by its coefficients: |x(t) − chord| ≤ h² max|ẍ|/8, and ẋ keeps its sign where
-h |ẋ(0)| > h² max|ẍ|. So it is mostly enough to look at the end of a leg; guards that may fall below zero on the way are
-followed as the general engine has them.
+How much a series bends within a leg is bounded by its coefficients: |x(t) − chord| ≤ h² max|ẍ|/8, and ẋ keeps its sign
+where h |ẋ(0)| > h² max|ẍ|. So it is mostly enough to look at both ends of a leg; guards that may fall below zero on the
+way are followed, as the general engine has them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from servotwin.models.engine.coupled_units import (
     unit_state,
 )
 from servotwin.models.engine.legs import MOST_SHORT, SHORT
-from servotwin.models.engine.modes import INSIDE, NO_CURRENT, NOWHERE, STUCK, Mode, Vector, at_rest, sign_of
+from servotwin.models.engine.modes import INSIDE, NO_CURRENT, NOWHERE, STUCK, Mode, Vector, sign_of
 from servotwin.models.engine.shared_source import driven, part_on_bus
 from servotwin.models.terms import bridge, duty, play
 from servotwin.models.terms.friction import share

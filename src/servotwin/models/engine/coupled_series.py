@@ -20,7 +20,7 @@ from servotwin.models.terms import bridge, heat, shaft
 from servotwin.models.terms.friction import share_slopes
 from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.models.terms.play import ahead
-from servotwin.physics.thermal import magnet_factor, winding_resistance
+from servotwin.physics.thermal import heat_flow, magnet_factor, warming_rate, winding_resistance
 
 _LONGEST = 0.5  # of a series, in times of its fastest rate
 _ROUNDING = 1e-17  # of a term
@@ -51,9 +51,9 @@ def put_law_of(unit: Any) -> None:
                              unit.torque)
         pull, rate, per_torque = still.motor_pull, still.motor_rate, per_torque_of(numbers, mode)
         output_pull, output_rate = still.output_pull, still.output_rate
-    put_unit_law(unit.law, Law(R, winding, R_slope, numbers.motor.K, numbers.motor.K_b, K_slope, K_b_slope, drop, conducts,
-                          1.0 if moves else 0.0, pull, per_torque, rate, 1.0 if apart else 0.0, output_pull,
-                          output_rate))
+    put_unit_law(unit.law, Law(
+        R, winding, R_slope, numbers.motor.K, numbers.motor.K_b, K_slope, K_b_slope, drop, conducts,
+        1.0 if moves else 0.0, pull, per_torque, rate, 1.0 if apart else 0.0, output_pull, output_rate))
     unit.active = 1 if moves or apart or heat.present(cold.heat) else 0
 
 
@@ -130,9 +130,10 @@ def put_after(unit: Any, y: Vector) -> None:
 def _back(unit: Any, n: int) -> float:
     """Return the n-th coefficient of K_b w + drop + (R − R(0)) i of a servo, whose current has one less."""
     law = unit.law
-    back = law.K_b * unit.speed[n] if law.moves > 0.0 else 0.0
+    back: float = law.K_b * unit.speed[n] if law.moves > 0.0 else 0.0
     if n == 0:
-        return back + law.drop
+        back += law.drop
+        return back
     if law.R_slope != 0.0:
         warming = 0.0
         for m in range(1, n + 1):
@@ -146,7 +147,8 @@ def _next(unit: Any, n: int) -> float:
     """Work out what follows on the n-th current of a servo; return how large it is."""
     law, over = unit.law, _INVERSES[n + 1]
     first = 1.0 if n == 0 else 0.0
-    torque, more = law.K * unit.current[n], 0.0
+    torque: float = law.K * unit.current[n]
+    more = 0.0
     if law.R_slope != 0.0:
         for m in range(1, n + 1):
             torque += law.K_slope * unit.housing[m] * unit.current[n - m]
@@ -154,7 +156,8 @@ def _next(unit: Any, n: int) -> float:
     dw = law.moves * (first * law.pull + law.per_torque * torque - law.rate * unit.speed[n]) * over
     dv = law.apart * (first * law.output_pull - law.output_rate * unit.output[n]) * over
     unit.speed[n + 1], unit.output[n + 1] = dw, dv
-    return max(abs(dw), abs(dv), more)
+    size: float = max(abs(dw), abs(dv), more)
+    return size
 
 
 def _warm_up(unit: Any, n: int) -> float:
@@ -170,10 +173,10 @@ def _warm_up(unit: Any, n: int) -> float:
     loss = law.winding * square
     for m in range(1, n + 1):
         loss += law.R_slope * unit.winding[m] * unit.square[n - m]
-    flow = heat.heat_flow(unit.winding[n], unit.housing[n], own.G_wh)
-    lost = heat.heat_flow(unit.housing[n], own.T_amb if n == 0 else 0.0, own.G_ha)
-    dT_w = heat.warming_rate(loss, flow, own.C_w) * _INVERSES[n + 1]
-    dT_h = heat.warming_rate(flow, lost, own.C_h) * _INVERSES[n + 1]
+    flow = heat_flow(unit.winding[n], unit.housing[n], own.G_wh)
+    lost = heat_flow(unit.housing[n], own.T_amb if n == 0 else 0.0, own.G_ha)
+    dT_w = warming_rate(loss, flow, own.C_w) * _INVERSES[n + 1]
+    dT_h = warming_rate(flow, lost, own.C_h) * _INVERSES[n + 1]
     unit.winding[n + 1], unit.housing[n + 1] = dT_w, dT_h
     return _PER_KELVIN * max(abs(dT_w), abs(dT_h))
 

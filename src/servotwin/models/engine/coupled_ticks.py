@@ -14,7 +14,7 @@ from servotwin.models.engine.coupled_units import unit_numbers, unit_state
 from servotwin.models.engine.memory import SAME, Inputs
 from servotwin.models.engine.motion import may_depend
 from servotwin.models.engine.told import inputs_at
-from servotwin.models.terms import control, duty, elastic, firmware, heat, sensor
+from servotwin.models.terms import control, duty, elastic, firmware, sensor
 from servotwin.models.terms.control import NOTHING_SENSED, Sensed
 from servotwin.models.terms.dependence import BY_SHARE, ON_HEAT, TWO_BODIES
 from servotwin.models.terms.numbers import Numbers, warm

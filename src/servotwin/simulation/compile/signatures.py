@@ -113,8 +113,8 @@ def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
 
 
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
-    "loops:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "coupled_runs:go_on": _of_ticks, "buses:go_on": _of_buses, "buses:look": _of_buses,
-    "lane_ticks:break_up": _of_buses}
+    "loops:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "coupled_runs:go_on": _of_ticks,
+    "buses:go_on": _of_buses, "buses:look": _of_buses, "lane_ticks:break_up": _of_buses}
 
 
 def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ...]]:
