@@ -10,7 +10,7 @@ from importlib import import_module
 
 import picture
 
-PARTS = ("batch", "single", "bus", "off", "digital")
+PARTS = ("batch", "single", "bus", "off", "digital", "shared")
 
 
 def main() -> None:

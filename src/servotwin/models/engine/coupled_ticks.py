@@ -9,7 +9,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import controller, coupled_legs
-from servotwin.models.engine.coupled_legs import DONE, LEFT, current_of, put_duty, settle
+from servotwin.models.engine.coupled_legs import DONE, LEFT, current_of, is_plain, put_duty, settle
 from servotwin.models.engine.coupled_units import unit_numbers, unit_state
 from servotwin.models.engine.memory import SAME, Inputs
 from servotwin.models.engine.motion import may_depend
@@ -105,8 +105,8 @@ def serve(told: Any, firms: Any, count: int, units: Any, common: Any) -> int:
         if unit.due <= unit.time + unit.slack:
             due = True
             _apply(inputs_at(told, unit), firms[unit.place], unit)
-    if settle(units, count, common) == LEFT:
-        return LEFT
+    if settle(units, count, common) == LEFT or not is_plain(units, count, common, common.now, False):
+        return LEFT  # before anything is measured
     if not due:
         return DONE
     for k in range(count):

@@ -31,6 +31,7 @@ from servotwin.physics.pieces import piece_rate, piece_value
 _BELOW = -1e-13  # rounding is not an event
 _BELOW_OF_SUM = -1e-10  # A: nor what the currents of all have gathered
 _HALVINGS = 200
+_NEAR, _TURNINGS = 1e-6, 24  # of the time between two looks: to tell whether a guard rises; halvings to where it turns
 _MOST_SERIES = 1e6  # one after the other
 _LOOKS = (0.25, 0.5, 0.75, 1.0)  # parts of a motion at which its guards are looked at
 _SOURCE_GUARDS = 2
@@ -211,13 +212,20 @@ def _crossing(source: Source, shared: Any, mates: Any, j: int, kind: int, length
     below = _BELOW if j >= 0 else _BELOW_OF_SUM
     if f_a < below:  # what another one did has ended this mode too
         return 0.0
-    b, f_b, falls = 0.0, 0.0, False
+    b, f_b, falls, before = 0.0, 0.0, False, f_a
     for fraction in _LOOKS:
-        b = fraction * length
+        first, b = b, fraction * length
         f_b = _guard(source, shared, mates, j, kind, b)
         falls = f_b < below
+        if not falls:
+            low = _lowest(source, shared, mates, j, kind, first, before, b, f_b)
+            f_low = _guard(source, shared, mates, j, kind, low) if low > first else f_b
+            falls = f_low < below
+            if falls:
+                b, f_b = low, f_low
         if falls:
             break
+        before = f_b
     if not falls:
         return math.inf
     if f_a <= 0.0:  # it starts at zero, to rounding: look whether it rises before it falls
@@ -241,6 +249,28 @@ def _crossing(source: Source, shared: Any, mates: Any, j: int, kind: int, length
                 else:
                     b, f_b = s, f
     return b
+
+
+def _lowest(source: Source, shared: Any, mates: Any, j: int, kind: int, a: float, f_a: float, b: float,
+            f_b: float) -> float:
+    """Return where in [a, b] a guard is lowest that falls at a and rises at b; a where it does not turn so."""
+    step = _NEAR * (b - a)
+    after = _guard(source, shared, mates, j, kind, a + step)
+    if after >= f_a:
+        return a
+    before = _guard(source, shared, mates, j, kind, b - step)
+    if before >= f_b:
+        return a
+    low, high = a, b
+    for _ in range(_TURNINGS):
+        middle = 0.5 * (low + high)
+        here = _guard(source, shared, mates, j, kind, middle)
+        after = _guard(source, shared, mates, j, kind, middle + step)
+        if after < here:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 def _guard(source: Source, shared: Any, mates: Any, j: int, kind: int, s: float) -> float:
