@@ -21,7 +21,17 @@ from servotwin.models.engine.coupled_units import (
     unit_state,
 )
 from servotwin.models.engine.legs import MOST_SHORT, SHORT
-from servotwin.models.engine.modes import INSIDE, NO_CURRENT, NOWHERE, STUCK, Mode, Vector, sign_of
+from servotwin.models.engine.modes import (
+    BACKWARD,
+    FORWARD,
+    INSIDE,
+    NO_CURRENT,
+    NOWHERE,
+    STUCK,
+    Mode,
+    Vector,
+    sign_of,
+)
 from servotwin.models.engine.shared_source import driven, part_on_bus
 from servotwin.models.terms import bridge, duty, play
 from servotwin.models.terms.friction import share
@@ -224,13 +234,13 @@ def doubtful(unit: Any, common: Any, length: float) -> int:
     if (apart or (moves and not inside)) and not numbers.stops.lower < after.q < numbers.stops.upper:
         kinds |= guards.STOPS
     if inside:
-        if apart and not (y.w * after.w >= 0.0 and after.w != 0.0):
+        if apart and not _keeps_way(mode.contact, unit.output, y.w, after.w, 0.0, length):
             kinds |= 1 << guards.SPEED | guards.STOPS
-        if moves and not _keeps_sign(unit.speed, y.w_m, after.w_m, bend, length):
+        if moves and not _keeps_way(mode.motor, unit.speed, y.w_m, after.w_m, bend, length):
             kinds |= 1 << guards.MOTOR_SPEED
         if not _within_play(numbers, y, after, bend, length):
             kinds |= guards.MEETINGS
-    elif moves and not _keeps_sign(unit.speed, y.w, after.w, bend, length):
+    elif moves and not _keeps_way(mode.contact, unit.speed, y.w, after.w, bend, length):
         kinds |= 1 << guards.SPEED | guards.STOPS
     if not moves and not constant:
         kinds |= _released(unit, numbers, mode, u0, u, after, bend_x)
@@ -239,12 +249,13 @@ def doubtful(unit: Any, common: Any, length: float) -> int:
     return kinds | _parted(unit, numbers, mode, u0, u, y, after, bend_x)
 
 
-def _keeps_sign(speed: Any, w: float, after: float, bend: float, length: float) -> bool:
-    """Tell whether a speed surely keeps its sign: it is monotone, or far from zero."""
-    if w * after < 0.0 or after == 0.0:
+def _keeps_way(contact: int, speed: Any, w: float, after: float, bend: float, length: float) -> bool:
+    """Tell whether a body surely goes on the way on which it slides: its speed is monotone, or far from zero."""
+    way = 1.0 if contact == FORWARD else -1.0 if contact == BACKWARD else math.copysign(1.0, after)
+    if not (way * after > 0.0 and way * w >= 0.0):
         return False
     if abs(speed[1]) * length > bend:
-        return w != 0.0 or speed[1] * after > 0.0
+        return w != 0.0 or way * speed[1] > 0.0
     return min(abs(w), abs(after)) > 0.25 * bend
 
 
