@@ -128,12 +128,12 @@ def on_a_bus(st, model, command, load, how):
 
 def without_compiler():
     """Let batches run the derived text as it is, in the forms that compiled ones take."""
-    from servotwin.simulation import lane_runs, vector_going, vector_store
+    from servotwin.simulation import lane_runs, lane_sets
     from servotwin.simulation.compile import calls
     from servotwin.simulation.compile.plain import plain_module
 
     kernels = cache(plain_module)
-    for module in (lane_runs, vector_going, vector_store, calls):
+    for module in (lane_runs, lane_sets, calls):
         module.kernels = kernels
     calls.is_plain = lambda: True
 

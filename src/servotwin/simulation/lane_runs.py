@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,9 @@ from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.simulation.compile import Recipe, kernels
-from servotwin.simulation.first_ticks import to_first_ticks
 from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
 from servotwin.simulation.lane_memory import flat, memories_of, nothing_yet, taken
-from servotwin.simulation.lane_recipes import ALL_RUNS, ENDING, chain_of, room_of
+from servotwin.simulation.lane_recipes import ALL_RUNS, ENDING, last_of, steps_of
 from servotwin.simulation.lanes import ALL_FIELDS, SMALL_FIELDS, Floats, Raw, Work, empty_raw
 
 Indices = NDArray[np.int64]
@@ -27,6 +26,7 @@ Mask = NDArray[np.bool_]
 _SHARED = ("pieces", "edges", "accuracy", "firmware")  # by all lanes, or by all that run side by side
 _TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
 _ROOM = 2_000_000  # numbers that lanes one after the other leave behind at once
+_NEVER = np.zeros(0)
 
 
 def run(work: Work) -> Raw:
@@ -49,17 +49,41 @@ def run(work: Work) -> Raw:
     return raw
 
 
+class Going(NamedTuple):
+    """Lanes that go on one by one: what the kernels are called with of `runs.go_on` after lanes, tables and torques."""
+
+    which: Indices
+    durations: Floats  # [s]
+    times: Floats  # of outputs [s]
+    first_output: Indices
+    outputs: Floats
+    memories: Memories
+    status: Indices
+
+    @classmethod
+    def of(cls, which: Indices, memories: Memories, times: Floats = _NEVER) -> Going:
+        """Return lanes that are not told yet how far they go."""
+        count = len(which)
+        return cls(which, np.zeros(count), times, np.zeros(count, np.int64),
+                   np.zeros((count, len(ALL_FIELDS), len(times))), memories, np.zeros(count, np.int64))
+
+
+def tiles_of(kind: SideBySide, lanes: Lanes, first_output: float) -> NDArray[Any]:
+    """Return lanes in tiles as they start; `first_output` is when their first output is due [s]."""
+    rows = room(-(-len(kind.which) // tiles.TILE), tiles.tile_type(kind.dtype, kind.form))
+    kernels(kind.recipe).start(some_of(lanes, kind.which), kind.form, first_output, rows)
+    return rows
+
+
 def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> None:
     """Run some lanes side by side; finish those that are given up one by one."""
     which = kind.which
-    rows = room(-(-len(which) // tiles.TILE), tiles.tile_type(kind.dtype, kind.form))
-    plans = tiles.plan_room(kind.dtype, kind.form)
     times = _own(work.times, np.float64)
-    module = kernels(kind.recipe)
-    module.start(some_of(lanes, which), kind.form, times[0] if len(times) else np.inf, rows)
+    rows = tiles_of(kind, lanes, times[0] if len(times) else np.inf)
     outputs = outputs_of(work, raw, kind.dtype)
-    lost = module.go_on(lanes.pieces, lanes.edges, kind.form, kind.slack, which, float(work.duration), times,
-                        outputs, rows, plans)
+    lost = kernels(kind.recipe).go_on(
+        lanes.pieces, lanes.edges, kind.form, kind.slack, which, float(work.duration), times, outputs, rows,
+        tiles.plan_room(kind.dtype, kind.form))
     for name, values in outputs._asdict().items():
         if name in raw.fields and values is not raw.fields[name]:
             with np.errstate(over="ignore"):
@@ -76,7 +100,7 @@ def run_side_by_side(work: Work, lanes: Lanes, kind: SideBySide, raw: Raw) -> No
 def run_one_by_one(work: Work, lanes: Lanes, which: Indices, raw: Raw, recipe: Recipe = ALL_RUNS) -> None:
     """Run some lanes one after the other, in float64."""
     memories = nothing_yet(len(which))
-    kernels(chain_of(recipe)[-1]).start(lanes, which, memories)
+    kernels(last_of(recipe)).start(lanes, which, memories)
     _finish(work, lanes, which, np.full(len(which), float(work.duration)), np.zeros(len(which), np.int64), memories,
             raw, recipe)
 
@@ -88,14 +112,15 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
     at_once = max(1, _ROOM // (len(ALL_FIELDS) * max(len(times), 1)))
     for start in range(0, len(which), at_once):
         some = slice(start, start + at_once)
-        part, own = which[some], _indices(first[some])
-        found = np.zeros((len(part), len(ALL_FIELDS), len(times)))
-        status, ended = np.zeros(len(part), np.int64), np.zeros(len(part))
-        go_on(recipe, lanes, np.array(work.curve, np.float64).reshape(-1, 2), _rows(work.torque.rows),
-              _indices(work.torque.first), _indices(work.torque.count), part, durations[some].copy(), times, own.copy(),
-              found, taken(memories, some), status, ended)
-        bad = status != 0
-        raw.status[part], raw.ended[part] = status, np.where(bad, ended, work.duration)
+        part, own, ended = which[some], first[some], np.zeros(len(which[some]))
+        going = Going.of(part, taken(memories, some), times)
+        going.durations[:], going.first_output[:] = durations[some], own
+        for one, entry, more in steps_of(recipe, ended):
+            getattr(kernels(one), entry)(
+                lanes, np.array(work.curve, np.float64).reshape(-1, 2), _rows(work.torque.rows),
+                _indices(work.torque.first), _indices(work.torque.count), *going, *more)
+        bad, found = going.status != 0, going.outputs
+        raw.status[part], raw.ended[part] = going.status, np.where(bad, ended, work.duration)
         y = memories.rows[some]["point"]["y"]
         raw.final[part] = np.column_stack([y["q"], y["w"], y["T_w"], y["T_h"]])
         failed = bad[:, None] & (times >= ended[:, None])
@@ -105,17 +130,6 @@ def _finish(work: Work, lanes: Lanes, which: Indices, durations: Floats, first: 
                 with np.errstate(over="ignore"):
                     own_part = np.where(failed, 0 if name in SMALL_FIELDS else np.nan, found[:, k])
                     raw.fields[name][part] = np.where(ahead, own_part, raw.fields[name][part])
-
-
-def go_on(recipe: Recipe, *arguments: Any) -> None:
-    """Let lanes go on as `runs.go_on` does, digital servos from tick to tick together as far as that leads."""
-    *shared, ended = arguments
-    *ahead, last = chain_of(recipe)
-    if ahead:
-        to_first_ticks(kernels(last), *shared)
-    for one in ahead:
-        kernels(one).go_on(*shared, *room_of(one))
-    kernels(last).go_on(*shared, ended)
 
 
 def swept(lanes: Lanes) -> Mask:

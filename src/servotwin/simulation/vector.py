@@ -21,21 +21,20 @@ from servotwin.signals import Signal, constant
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.bus_supply import supplies_of
 from servotwin.simulation.lane_inputs import TICK_LAWS, lanes_of, pick
+from servotwin.simulation.lane_sets import SHAFT
 from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
-from servotwin.simulation.vector_calls import Room
-from servotwin.simulation.vector_commands import Translator
 from servotwin.simulation.vector_memory import VectorMemory
 from servotwin.simulation.vector_numbers import LaneNumbers
-from servotwin.simulation.vector_store import SHAFT, Store
+from servotwin.simulation.vector_store import Store
 from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
 
     from servotwin import loads
-    from servotwin.simulation.c_entry import CEntry, Parts
+    from servotwin.simulation.c_entry import CEntry
 
 Array = NDArray[np.float64]
 _BYTES = 4000  # of a lane, and of what is made of it now and then
@@ -106,14 +105,9 @@ class VectorSimulator:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
         self._numbers = LaneNumbers(inputs, accuracy_of(accuracy), supplies)
-        self._threads = _whole("threads", threads, 1) if threads is not None else workers_of(None)
-        self._pool = own_threads(os.getpid())
-        self._store = Store(self._numbers, real_type(dtype), self._threads, self._pool)
-        self._translate = Translator(self._numbers)
-        self._command = self._numbers.neutral.copy()  # as the engine follows it: pulse width [s], control voltage [V]
-        self._torque = np.zeros(count)
-        self._room = Room.of(count)
-        self._fresh = np.zeros(1, np.int64)  # 1 while what was seen still shows; compiled code ends that too
+        self._store = Store(self._numbers, real_type(dtype),
+                            _whole("threads", threads, 1) if threads is not None else workers_of(None),
+                            own_threads(os.getpid()))
         self._entry: CEntry | None = None
         self.reset()
 
@@ -165,14 +159,13 @@ class VectorSimulator:
             raise InputError("advance(duration)", got=duration,
                              allowed=f"a number of seconds, from 0 to {LONGEST:.0e} in one call")
         self._numbers.check_recorded(lambda: self.time, float(duration))
-        self._fresh[0] = 0
+        self._store.fresh[0] = 0
         torque = self._torque_of(external_torque) if external_torque is not None else None
         self._take_command(pulse_width, command_angle, command_voltage)
-        if torque is not None and not np.array_equal(torque, self._torque):
-            self._torque[:] = torque
-            self._store.hang(self._torque)
+        if torque is not None and not np.array_equal(torque, self._store.torque):
+            self._store.hang(torque)
         if duration > 0.0:
-            self._store.advance(float(duration), self._command)
+            self._store.advance(float(duration))
 
     def reset(self, *, pulse_width: ArrayLike | None = None, command_angle: ArrayLike | None = None,
               command_voltage: ArrayLike | None = None, output_angle: ArrayLike | None = None,
@@ -189,14 +182,14 @@ class VectorSimulator:
             Which; all unless given.
         """
         which = pick(lanes, len(self))
-        self._fresh[0] = 0
+        self._store.fresh[0] = 0
         angle = None if output_angle is None else numbers_of("output_angle", output_angle, which)
-        command = self._command.copy()
-        found = self._translate.command(pulse_width, command_angle, command_voltage, which)
+        command = self._store.command.copy()
+        found = self._numbers.translate.command(pulse_width, command_angle, command_voltage, which)
         if found is not None:
             command[which] = found
         self._store.start(which, self._numbers.start(which, command, angle))
-        self._command[:] = command
+        self._store.command[:] = command
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -215,11 +208,8 @@ class VectorSimulator:
         if name not in numbers.available:
             raise UnknownNameError(f"signal of {type(numbers.model).__name__}", name, ("time", *numbers.available))
         if name in KINDS:
-            return np.where(self._store.status != 0, math.nan, numbers.commanded(name, self._command))
-        if not self._fresh[0]:
-            self._store.look(self._command, self._room.seen)
-            self._fresh[0] = 1
-        values = self._room.seen[:, _COLUMNS[name]]
+            return np.where(self._store.status != 0, math.nan, numbers.commanded(name, self._store.command))
+        values = self._store.look()[:, _COLUMNS[name]]
         return np.asarray(AT_MOTOR[name](values, numbers.reduction)) if name in AT_MOTOR else values.copy()
 
     @property
@@ -255,7 +245,7 @@ class VectorSimulator:
             On bad input, before anything changes; names lane and argument.
         """
         which = pick(lanes, len(self))
-        self._fresh[0] = 0
+        self._store.fresh[0] = 0
         torque = None if torque_enable is None else self._torque_switch(torque_enable, which)
         angle, speed, inertia, bus = (
             None if value is None else numbers_of(name, value, which) for name, value in (
@@ -271,12 +261,11 @@ class VectorSimulator:
             self._numbers.check_angles(angle, which)
         if parameters:
             self._numbers = self._numbers.changed(which, parameters)
-            self._store.renew(self._numbers, which, self._torque)
-            self._translate = Translator(self._numbers)
+            self._store.renew(self._numbers, which)
         otherwise = False
         if inertia is not None or bus is not None:
             otherwise = self._numbers.impose(which, inertia, bus)
-            self._store.refit(which, otherwise, self._torque)
+            self._store.refit(which, otherwise)
         if self._entry is not None and (parameters or otherwise):
             self._entry.refresh()
         if angle is not None or speed is not None:
@@ -288,10 +277,7 @@ class VectorSimulator:
 
     def save(self) -> VectorMemory:
         """Return all that the lanes remember, as it is now; picklable."""
-        store = self._store
-        return VectorMemory(type(self._numbers.model).__name__, *store.memories(), self._command.copy(),
-                            self._torque.copy(), store.status.copy(), store.ended.copy(), store.work.copy(),
-                            self._numbers.columns.numbers.copy(), store.common())
+        return self._store.save()
 
     def restore(self, memory: VectorMemory) -> None:
         """Go back to what was saved, here or in another simulator of this model with as many lanes.
@@ -309,9 +295,8 @@ class VectorSimulator:
         if memory.model != kind or len(memory.records) != len(self):
             raise InputError("restore(memory)", got=f"{len(memory.records)} lanes of {memory.model}",
                              allowed=f"{len(self)} lanes of {kind}")
-        self._fresh[0] = 0
-        self._command[:], self._torque[:] = memory.command, memory.torque
-        self._store.restore(memory, self._torque)
+        self._store.fresh[0] = 0
+        self._store.restore(memory)
 
     # --- from C -------------------------------------------------------------------------------------------------------
 
@@ -328,20 +313,15 @@ class VectorSimulator:
         if self._entry is None:
             from servotwin.simulation.c_entry import CEntry
 
-            self._entry = CEntry(self._parts)
+            self._entry = CEntry(self._store)
         return self._entry
-
-    def _parts(self) -> Parts:
-        from servotwin.simulation.c_entry import Parts
-
-        return Parts(self._numbers, self._store, self._translate, self._command, self._torque, self._room, self._fresh)
 
     # --- arguments ----------------------------------------------------------------------------------------------------
 
     def _take_command(self, pulse_width: Any, command_angle: Any, command_voltage: Any) -> None:
-        found = self._translate.command(pulse_width, command_angle, command_voltage, None)
+        found = self._numbers.translate.command(pulse_width, command_angle, command_voltage, None)
         if found is not None:
-            self._command[:] = found
+            self._store.command[:] = found
 
     def _torque_switch(self, torque_enable: Any, which: NDArray[np.int64]) -> Array:
         if not self._numbers.digital:

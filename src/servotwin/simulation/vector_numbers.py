@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -31,6 +32,7 @@ from servotwin.simulation.lanes import Tables
 from servotwin.simulation.packing import Asked, Chunk, Commands, flat, groups
 from servotwin.simulation.start import start_vector
 from servotwin.simulation.vector_calls import TICKS, asked
+from servotwin.simulation.vector_commands import Translator
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -121,6 +123,11 @@ class LaneNumbers:
         columns = Columns(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), pieces, index, none + 1,
                           np.zeros(0), none, none - 1, self.accuracy, programs)
         return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
+
+    @cached_property
+    def translate(self) -> Translator:
+        """What translates commands of these lanes."""
+        return Translator(self)
 
     def now(self, kind: Any, which: Indices | None = None) -> Any:
         """Return a term's record of numbers of some lanes, or of all, as they are now, each an array."""
