@@ -85,7 +85,7 @@ OF_CATALOG = {
 def form_of(model, load=NO_LOAD, dtype="float64", told=False, bent=False):
     """Return the name of the kernels that a servo takes as a lane."""
     pulsed = isinstance(model, PULSED)
-    (kind,) = lane_kinds.kinds_of(
+    (kind,) = lane_kinds.kinds_with(
         model.pack(load), model.chip() if pulsed else NO_CHIP, 1, dtype, NOBODY, NOBODY | told, bent,
         model.firmware() or NO_FIRMWARE)
     return kind.recipe.name

@@ -409,7 +409,7 @@ def test_arrays_without_dimensions_are_what_they_hold():
 def test_long_runs_go_in_small_chunks(monkeypatch):
     lanes = []
     monkeypatch.setattr(many, "_CHUNK_FRAMES", 20.0)  # an interrupt waits for what runs
-    monkeypatch.setattr(many, "run_lanes", lambda work: (lanes.append(work.lanes), run_lanes(work))[1])
+    monkeypatch.setattr(many, "run_lanes", lambda work: (lanes.append(work.packed.size), run_lanes(work))[1])
     st.simulate_many(st.PulseServo(SERVO), STEP, duration=0.2, parameters={"load.inertia": np.zeros(5)},
                      output_times=[0.2])
     assert sorted(lanes) == [1, 2, 2]

@@ -29,7 +29,7 @@ OTHERS = {
     ("simulation/lane_inputs.py", "load"): "an argument of simulate_many",
     ("simulation/vector_numbers.py", "load"): "the same",
     ("simulation/lanes.py", "motor"): "what is recorded of the motor's contact",
-    ("simulation/lane_runs.py", "firmware"): "a field of what all lanes share",
+    ("simulation/lanes.py", "firmware"): "a field of what all lanes share",
     ("simulation/remarks.py", "heat"): "what a servo trips by, as people read it",
     ("simulation/vector_buses.py", "source"): "a field of what servos on a bus share",
     ("simulation/vector_store.py", "chip"): "a field of a memory",

@@ -31,7 +31,7 @@ from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.engine import Plan, State
 from servotwin.simulation.lane_memory import nothing_yet
 from servotwin.simulation.lane_recipes import PLAIN_RUNS
-from servotwin.simulation.lane_runs import programs_of
+from servotwin.simulation.lanes import programs_of
 
 Array = NDArray[np.float64]
 

@@ -23,6 +23,7 @@ from servotwin.simulation import lane_recipes as recipes
 from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.unread import in_general, unread
 from servotwin.simulation.lane_groups import by_groups
+from servotwin.simulation.lanes import Packed, swept
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -124,15 +125,22 @@ class OneByOne(NamedTuple):
     calm: bool = False
 
 
-def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, recorded: Mask,
-             curved: bool, firmware: Firmware = NO_FIRMWARE) -> list[SideBySide | OneByOne]:
+def kinds_of(packed: Packed, dtype: str) -> list[SideBySide | OneByOne]:
+    """Return how lanes run; `dtype` is that of those that may be of either."""
+    own, recorded = packed.lanes, packed.torque.count > 0
+    return kinds_with(own.numbers, own.chips, packed.size, dtype, swept(own), recorded, packed.curve.size > 0,
+                      own.firmware or NO_FIRMWARE)
+
+
+def kinds_with(numbers: Numbers, chip: Chip, lanes: int, dtype: str, sweeps: Mask, recorded: Mask,
+               curved: bool, firmware: Firmware = NO_FIRMWARE) -> list[SideBySide | OneByOne]:
     """Return how lanes run, whose numbers are numbers or arrays (lanes,).
 
-    `swept` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
+    `sweeps` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
     potentiometers have a table.
     """
     inputs = recorded * RECORDED if recorded.any() else 0
-    terms = Terms(numbers, chip, firmware, swept.any() and swept, inputs | TABLE * curved)
+    terms = Terms(numbers, chip, firmware, sweeps.any() and sweeps, inputs | TABLE * curved)
     if _any(terms.ask(SPRING | PWM)):
         return _alone(terms, lanes)
     found: list[SideBySide | OneByOne] = []

@@ -1,23 +1,21 @@
-"""Many servos at once: what a chunk of lanes needs, what comes back, and the way through the compiled kernels."""
+"""Many servos at once: what a chunk of lanes is, what is asked of it, and what comes back."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.memory import ACCURACY
-from servotwin.models.engine.records import mapped
-
-if TYPE_CHECKING:
-    from servotwin.models.terms.chip import Chip
-    from servotwin.models.terms.firmware import Firmware
-    from servotwin.models.terms.numbers import Numbers
+from servotwin.models.engine.records import columns_of, mapped, record_of, tiles_with
+from servotwin.models.engine.tiles import Lanes
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
+from servotwin.models.terms.numbers import Numbers
 
 Floats = NDArray[np.float64]
-Record = TypeVar("Record", bound=tuple[object, ...])
+Indices = NDArray[np.int64]
 
 FIELDS = ("angle", "speed", "contact", "drive", "error", "wiper", "current", "winding", "housing", "motor_angle",
           "motor_speed", "mesh")
@@ -25,49 +23,127 @@ MORE_FIELDS = ("motor", "silent", "duty", "goal", "reference", "trip")  # of ser
 ALL_FIELDS = (*FIELDS, *MORE_FIELDS)  # rows of what a run leaves behind
 SMALL_FIELDS = ("contact", "drive", "mesh", "motor", "silent", "trip")  # fields that are kept as int8
 
+_SHARED = ("pieces", "edges", "accuracy")  # by all lanes
+_TILED: dict[str, Any] = {"numbers": Numbers, "chips": Chip}
+
 
 @dataclass(frozen=True)
-class Tables:
-    """One table per lane, all in one array; lanes may share rows.
+class Torques:
+    """Recorded external torques [N m], a table of pieces for each lane: rows[first : first + count]; count 0: none."""
+
+    rows: Floats
+    first: Indices
+    count: Indices
+
+
+class Packed(NamedTuple):
+    """What lanes are; picklable.
 
     Parameters
     ----------
-    first, count : ndarray of int64, shape (B,)
-        The table of a lane is rows[first : first + count].
-    rows : ndarray of float64, shape (n, 7) or (m,)
-        Pieces as in `physics.pieces.Piece`, or frame edges [s].
+    law : str
+        "pulse", "bounded" or "digital".
+    lanes : models.engine.tiles.Lanes
+        Numbers, chips, torque and firmware as named tuples, each number one for all lanes or an array (B,); firmware
+        is None where there is no program. Pieces are widths of pulses [s] for "pulse", v_c [V] for "bounded", either
+        widths or goals [rad] for "digital".
+    curve : ndarray, shape (n, 2)
+        Rows of angle [rad] and error [V] of the potentiometers, the same for all lanes.
+    torque : Torques
     """
 
-    first: NDArray[np.int64]
-    count: NDArray[np.int64]
-    rows: Floats
+    law: str
+    lanes: Lanes
+    curve: Floats
+    torque: Torques
 
-    def part(self, start: int, stop: int) -> Tables:
-        """Return the tables of some lanes."""
-        return Tables(self.first[start:stop], self.count[start:stop], self.rows)
+    @property
+    def size(self) -> int:
+        """Number of lanes B."""
+        return len(self.lanes.seeds)
+
+    def part(self, start: int, stop: int) -> Packed:
+        """Return some of the lanes."""
+        some = slice(start, stop)
+        torque = Torques(self.torque.rows, self.torque.first[some], self.torque.count[some])
+        return self._replace(torque=torque, lanes=Lanes(*(
+            x if name in _SHARED else x[:, some] if name == "start" else mapped(lambda x: _sliced(x, some), x)
+            for name, x in zip(Lanes._fields, self.lanes, strict=True))))
+
+    def columns(self) -> Lanes:
+        """Return the lanes as the kernels read them."""
+        own = {name: as_kernels_take(x) for name, x in self.lanes._asdict().items()}
+        tiled = {name: tiles_with(kind, own[name], self.size) for name, kind in _TILED.items()}
+        torque = np.empty(self.size)
+        torque[:] = self.lanes.torque
+        return Lanes(**own | tiled)._replace(torque=torque, firmware=programs_of(self.lanes.firmware, self.size))
+
+    @property
+    def inputs(self) -> tuple[Floats, Floats, Indices, Indices]:
+        """What the kernels read beside the lanes: table of the potentiometers, and torques."""
+        own = self.torque
+        return as_kernels_take(self.curve), *map(as_kernels_take, (own.rows, own.first, own.count))
 
 
-def no_tables(lanes: int, width: int = 7) -> Tables:
-    """Return tables without rows.
+def _sliced(x: Any, some: slice) -> Any:
+    return x[some] if isinstance(x, np.ndarray) and x.ndim else x
 
-    Examples
-    --------
-    >>> no_tables(2).count.tolist()
-    [0, 0]
+
+def as_kernels_take(x: Any) -> Any:
+    """Return an array with its numbers in a row and to write into, anything else as it is."""
+    return np.require(x, None, ("C_CONTIGUOUS", "WRITEABLE")) if isinstance(x, np.ndarray) else x
+
+
+def some_of(lanes: Lanes, which: Indices) -> Lanes:
+    """Return some lanes of columns."""
+    if len(which) == len(lanes.torque):
+        return lanes
+    records = {name: tiles_with(kind, columns_of(kind, getattr(lanes, name), which), len(which))
+               for name, kind in _TILED.items()}
+    columns: Any = (records[name] if name in records else x if name in (*_SHARED, "firmware") else
+                    np.ascontiguousarray(x[..., which]) for name, x in zip(Lanes._fields, lanes, strict=True))
+    return Lanes(*columns)
+
+
+def swept(lanes: Lanes) -> NDArray[np.bool_]:
+    """Tell whose command has a chirp."""
+    if not lanes.pieces[:, 6].any():
+        return np.zeros(len(lanes.piece_first), np.bool_)
+    before = np.concatenate([[0], np.cumsum(lanes.pieces[:, 6] != 0.0)])
+    return np.asarray(before[lanes.piece_first + lanes.piece_count] > before[lanes.piece_first])
+
+
+def programs_of(firmware: Firmware | None, lanes: int) -> NDArray[Any]:
+    """Return a record of the program of each lane, whose numbers are numbers or columns; one where there is none."""
+    records = np.zeros(1 if firmware is None else lanes, record_of(Firmware))
+    for name, values in zip(Firmware._fields, firmware or NO_FIRMWARE, strict=True):
+        records[name] = values
+    return records
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What every chunk is asked for.
+
+    Parameters
+    ----------
+    duration : float
+        [s]
+    times : ndarray, shape (T,)
+        Output times [s], not decreasing, within [0, duration].
+    outputs : tuple of str
+        Names of signals.
+    dtype : str
+        "float64" or "float32".
+    accuracy : float
+        Of what is integrated [rad].
     """
-    none = np.zeros(lanes, dtype=np.int64)
-    return Tables(none, none, np.zeros((0, width) if width else (0,)))
 
-
-def regular_edges(lanes: int) -> Tables:
-    """Return the edges of lanes whose frames follow at `Chip.frame_period`.
-
-    Examples
-    --------
-    >>> regular_edges(2).count.tolist()
-    [-1, -1]
-    """
-    return Tables(np.zeros(lanes, dtype=np.int64), np.full(lanes, -1, dtype=np.int64), np.zeros(0))
+    duration: float
+    times: Floats
+    outputs: tuple[str, ...]
+    dtype: str
+    accuracy: float
 
 
 @dataclass(frozen=True)
@@ -76,82 +152,21 @@ class Work:
 
     Parameters
     ----------
-    law : str
-        "pulse", "bounded" or "digital".
-    numbers : Numbers
-        Each field a number, or an array (B,).
-    chip : Chip or None
-        The same; its frame_period is that of the command where that gives one. None for "bounded".
-    command : Tables
-        Pulse width [s] for "pulse", v_c [V] for "bounded"; either a pulse width or a goal [rad] for "digital".
-    torque : Tables
-        Recorded external torque [N m] over time; count 0: none.
-    constant_torque : float or ndarray, shape (B,)
-        Added to it [N m]; positive pushes towards −q.
-    edges : Tables
-        Frame edges [s]; count −1: regular frames of `chip.frame_period`.
-    start : ndarray, shape (7, B)
-        The state at t = 0, as in `engine.modes.Vector`.
-    seeds : ndarray of int64, shape (B,)
-        Of the noise.
-    duration : float
-        [s]
-    times : ndarray, shape (T,)
-        Output times [s], not decreasing, within [0, duration].
+    packed : Packed
+    asked : Asked
     fields : tuple of str
         Of "angle" [rad], "speed" [rad/s], "contact" (`engine.modes.FREE` … `ON_UPPER`), "drive" (−1, 0, +1),
         "error" (of the latest decision [s]), "wiper" (of the potentiometer [rad]) and "current" (of an armature with
-        inductance [A], else 0), or of `MORE_FIELDS`; only these
-        are computed and kept.
-    dtype : str
-        "float64" or "float32".
-    curve : tuple
-        Rows of angle [rad] and error [V] of the potentiometer's linearity table, the same for all lanes.
-    accuracy : float
-        Of what is integrated [rad].
-    firmware : Firmware, optional
-        Of digital servos, each field a number or an array (B,).
+        inductance [A], else 0), or of `MORE_FIELDS`; only these are computed and kept.
     """
 
-    law: str
-    numbers: Numbers
-    chip: Chip | None
-    command: Tables
-    torque: Tables
-    constant_torque: float | Floats
-    edges: Tables
-    start: Floats
-    seeds: NDArray[np.int64]
-    duration: float
-    times: Floats
+    packed: Packed
+    asked: Asked
     fields: tuple[str, ...]
-    dtype: str
-    curve: tuple[tuple[float, float], ...] = ()
-    accuracy: float = ACCURACY
-    firmware: Firmware | None = None
-
-    @property
-    def lanes(self) -> int:
-        """Number of lanes."""
-        return int(self.start.shape[1])
 
     def part(self, start: int, stop: int) -> Work:
         """Return the work of some lanes."""
-        lanes = slice(start, stop)
-        torque = self.constant_torque
-        return replace(
-            self, numbers=_sliced(self.numbers, lanes), chip=None if self.chip is None else _sliced(self.chip, lanes),
-            firmware=None if self.firmware is None else _sliced(self.firmware, lanes),
-            command=self.command.part(start, stop), torque=self.torque.part(start, stop),
-            constant_torque=torque[lanes] if isinstance(torque, np.ndarray) and torque.ndim else torque,
-            edges=self.edges.part(start, stop), start=self.start[:, lanes],
-            seeds=self.seeds[lanes])
-
-
-def _sliced(numbers: Record, lanes: slice) -> Record:
-    """Return a named tuple of numbers and columns with some rows of the columns."""
-    sliced: Record = mapped(lambda x: x[lanes] if isinstance(x, np.ndarray) and x.ndim else x, numbers)
-    return sliced
+        return replace(self, packed=self.packed.part(start, stop))
 
 
 @dataclass(frozen=True)
@@ -184,8 +199,9 @@ class Raw:
 
 def empty_raw(work: Work) -> Raw:
     """Return the arrays that the kernels fill."""
-    shape = (work.lanes, len(work.times))
-    kinds = {name: np.dtype(np.int8) if name in SMALL_FIELDS else np.dtype(work.dtype) for name in work.fields}
-    return Raw({name: np.zeros(shape, kind) for name, kind in kinds.items()}, np.zeros(work.lanes, np.int8),
-               np.full(work.lanes, work.duration), np.ascontiguousarray(work.start[[0, 1, 3, 4]].T),
-               np.full(work.lanes, np.nan), np.zeros(work.lanes, np.int8))
+    lanes, asked = work.packed.size, work.asked
+    kinds = {name: np.dtype(np.int8) if name in SMALL_FIELDS else np.dtype(asked.dtype) for name in work.fields}
+    return Raw({name: np.zeros((lanes, len(asked.times)), kind) for name, kind in kinds.items()},
+               np.zeros(lanes, np.int8), np.full(lanes, asked.duration),
+               np.ascontiguousarray(work.packed.lanes.start[[0, 1, 3, 4]].T), np.full(lanes, np.nan),
+               np.zeros(lanes, np.int8))

@@ -21,9 +21,9 @@ from servotwin.simulation.batch import Batch, Failure
 from servotwin.simulation.lane_inputs import Lanes, framed, lanes_of
 from servotwin.simulation.lane_kinds import goes_together
 from servotwin.simulation.lane_runs import run as run_lanes
-from servotwin.simulation.lanes import Raw, Work
+from servotwin.simulation.lanes import Asked, Raw, Work
 from servotwin.simulation.oddities import warn_of
-from servotwin.simulation.packing import Asked, Chunk, Commands, groups
+from servotwin.simulation.packing import Chunk, Commands, groups
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import lane_remarks
 from servotwin.simulation.start import accuracy_of
@@ -337,8 +337,8 @@ def _run(packs: list[_Pack], asked: Asked,
 def _chunks(packs: list[_Pack], asked: Asked) -> Iterator[tuple[Chunk, Work]]:
     """Return all chunks with their work, one after the other."""
     for pack in packs:
-        work = pack.lanes.work(asked, pack.fields)
-        for start in range(0, work.lanes, pack.size):
+        work = Work(pack.lanes.packed(asked.accuracy), asked, pack.fields)
+        for start in range(0, work.packed.size, pack.size):
             yield pack.lanes.part(start, start + pack.size), work.part(start, start + pack.size)
 
 

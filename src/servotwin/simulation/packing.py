@@ -1,4 +1,4 @@
-"""From checked lanes to the work of a chunk, and from its raw fields to output signals."""
+"""From checked lanes to what the kernels read, and from raw fields to output signals."""
 
 from __future__ import annotations
 
@@ -17,14 +17,16 @@ from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.models.engine.modes import Vector
 from servotwin.models.engine.records import mapped
+from servotwin.models.engine.tiles import Lanes as EngineLanes
 from servotwin.models.outputs import FIELDS as FIELDS_OF
+from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
 from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes
 from servotwin.simulation.lane_loads import LOAD_NAMES, column_load, recorded_torque, structure
-from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Raw, Tables, Work, no_tables, regular_edges
+from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Asked, Packed, Raw, Torques
 from servotwin.simulation.start import check_start, start_vector
 
 if TYPE_CHECKING:
@@ -36,17 +38,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 _MOST_FRAMES = 1e8  # of a lane: they take half a minute, in which nothing stops a kernel
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What every chunk is asked for: see `Work`, and the names of the outputs."""
-
-    duration: float
-    times: Array
-    outputs: tuple[str, ...]
-    dtype: str
-    accuracy: float
 
 
 class Commands:
@@ -94,13 +85,6 @@ class Commands:
         period = None if math.isnan(self.periods[of[0]]) else self._shared(self.periods, of)
         edges = None if self.edge_count[of[0]] < 0 else ()
         return LaneSignal(KIND_NAMES[self.kinds[of[0]]], pieces, period, edges, lanes)
-
-    def frame_edges(self, lanes: Indices) -> Tables:
-        """Return the edges of each lane's frames."""
-        of = self.of[lanes]
-        if (self.edge_count < 0).all():
-            return regular_edges(len(of))
-        return Tables(self.edge_first[of], self.edge_count[of], self.edges)
 
 
 def groups(lanes: Lanes, commands: Commands) -> Iterator[Indices]:
@@ -244,23 +228,23 @@ class Chunk:
         with np.errstate(over="ignore"):
             return np.where(own < 0, duration / np.asarray(flat(self.chip.frame_period), dtype=np.float64), own)
 
-    def work(self, asked: Asked, fields: tuple[str, ...]) -> Work:
-        """Return what the kernels need."""
+    def packed(self, accuracy: float) -> Packed:
+        """Return what the lanes are to the kernels, which integrate to so many radians."""
+        commands, of, none = self.commands, self.commands.of[self.which], np.zeros(len(self.which), np.int64)
         with np.errstate(all="ignore"):
             numbers, chip = self.numbers, self.chip
-            command = Tables(*self.drive.tables())
-        torque = no_tables(len(self.which))
+            first, count, rows = self.drive.tables()
+        torque = Torques(np.zeros((0, 7)), none, none)
         if any(load.recorded for load in self._of_loads[0]):
-            first, count, rows = recorded_torque(*self._of_loads).tables()
-            recorded = np.array([bool(load.recorded) for load in self._of_loads[0]])[self._of_loads[1]]
-            torque = Tables(first, np.where(recorded, count, 0), rows)
-        return Work(law=TICK_LAWS[type(self.model)], numbers=mapped(flat, numbers),
-                    chip=None if chip is None else mapped(flat, chip), command=command, torque=torque,
-                    constant_torque=flat(self.load.torque), edges=self.commands.frame_edges(self.which),
-                    start=self.start, seeds=self.lanes.seeds[self.which], duration=asked.duration,
-                    times=asked.times, fields=fields, dtype=asked.dtype, curve=table_of(self.model.curve()),
-                    accuracy=asked.accuracy,
-                    firmware=None if self.firmware is None else mapped(flat, self.firmware))
+            at, size, recorded = recorded_torque(*self._of_loads).tables()
+            has = np.array([bool(load.recorded) for load in self._of_loads[0]])[self._of_loads[1]]
+            torque = Torques(recorded, at, np.where(has, size, 0))
+        lanes = EngineLanes(
+            mapped(flat, numbers), mapped(flat, chip or NO_CHIP), self.start, flat(self.load.torque),
+            self.lanes.seeds[self.which], rows, first, count, commands.edges, commands.edge_first[of],
+            commands.edge_count[of], accuracy, self.firmware and mapped(flat, self.firmware))
+        curve = np.array(table_of(self.model.curve()), np.float64).reshape(-1, 2)
+        return Packed(TICK_LAWS[type(self.model)], lanes, curve, torque)
 
     def fields(self, asked: Asked) -> tuple[str, ...]:
         """Return the raw fields that the outputs read: those that they look at when they are computed for one lane."""

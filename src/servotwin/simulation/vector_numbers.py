@@ -13,23 +13,21 @@ from numpy.typing import NDArray
 from servotwin.errors import InputError, LoadError
 from servotwin.models.engine.memory import Memories, put_started
 from servotwin.models.engine.modes import INSIDE, NOWHERE, RIGID
-from servotwin.models.engine.records import columns_of, fields_of, put_columns, tiles_with
+from servotwin.models.engine.records import columns_of, fields_of
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.tiles import Lanes as Columns
-from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.elastic import Elastic
-from servotwin.models.terms.firmware import NO_FIRMWARE
-from servotwin.models.terms.numbers import NEUTRAL, Numbers
+from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import Play
-from servotwin.models.terms.sensor import table_of
 from servotwin.models.terms.stops import Stops
-from servotwin.simulation import lane_runs
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes, lanes_of
 from servotwin.simulation.lane_memory import nothing_yet, taken
-from servotwin.simulation.lanes import Tables
-from servotwin.simulation.packing import Asked, Chunk, Commands, flat, groups
+from servotwin.simulation.lanes import Packed, Torques
+from servotwin.simulation.packing import Chunk, Commands, flat, groups
 from servotwin.simulation.start import start_vector
 from servotwin.simulation.vector_calls import TICKS, asked
 from servotwin.simulation.vector_commands import Translator
@@ -55,8 +53,7 @@ class LaneNumbers:
         Names of the signals, `time` apart.
     reduction : ndarray, shape (lanes,)
         N of each gear.
-    torque : Tables
-        Recorded torque over time; a lane without one has no row.
+    torque : Torques
     curve : ndarray, shape (n, 2)
         Rows of angle [rad] and error [V] of the potentiometers.
     given : ndarray
@@ -78,11 +75,11 @@ class LaneNumbers:
         commands = Commands(inputs)
         self.chunks = [Chunk(own, commands, part) for which in groups(inputs, commands)
                        for own, part in supplies.parts(inputs, which)]
-        law = TICK_LAWS[type(inputs.model)]
-        self.pulsed, self.digital = law != "bounded", law == "digital"  # whether there is a bridge, and a program
-        self.curve = np.array(table_of(inputs.model.curve()), np.float64).reshape(-1, 2)
         self.neutral = np.empty(self.count)
-        self.columns, self.torque = self._packed()
+        self._given = self._joined()
+        law, _, self.curve, self.torque = self._given
+        self.pulsed, self.digital = law != "bounded", law == "digital"  # whether there is a bridge, and a program
+        self.columns = self._given.columns()
         self.frame_period = self.columns.chips["frame_period"].ravel()[:self.count]
         self.load_total, self.reduction, self.V_oc = np.empty((3, self.count))
         for chunk in self.chunks:
@@ -99,30 +96,40 @@ class LaneNumbers:
             if len(fed):
                 self.impose(fed, None, imposed.bus_voltage[fed])
 
-    def _packed(self) -> tuple[Columns, Tables]:
-        B = self.count
-        numbers, chips, start = tiles_with(Numbers, NEUTRAL, B), tiles_with(Chip, NO_CHIP, B), np.empty((7, B))
-        torque, first, count = np.empty(B), np.zeros(B, np.int64), np.zeros(B, np.int64)
-        rows: list[Array] = []
-        programs = lane_runs.programs_of(NO_FIRMWARE if self.digital else None, B)
-        for chunk in self.chunks:
-            asked = Asked(1.0, np.zeros(1), (), "float64", self.accuracy)
-            work = chunk.work(asked, ())
-            packed, which = lane_runs.lanes_of(work), chunk.which
-            put_columns(numbers, which, columns_of(Numbers, packed.numbers, slice(len(which))))
-            put_columns(chips, which, columns_of(Chip, packed.chips, slice(len(which))))
-            start[:, which] = packed.start
-            if self.digital:
-                programs[which] = packed.firmware
-            torque[which] = packed.torque
-            first[which], count[which] = work.torque.first + sum(map(len, rows)), work.torque.count
-            rows.append(work.torque.rows)
-            self.neutral[which] = work.command.rows[work.command.first, 1]
-        pieces = np.zeros((B, 7))
+    def _joined(self) -> Packed:
+        """Return all lanes, which are told one thing for ever."""
+        parts = [(chunk.which, chunk.packed(self.accuracy)) for chunk in self.chunks]
+        lanes, B = [part.lanes for _, part in parts], self.count
+
+        def joined(*values: Any) -> Any:
+            if hasattr(values[0], "_fields"):
+                return type(values[0])(*map(joined, *values))
+            column = np.empty((*np.shape(values[0])[:-1], B))
+            for (which, _), x in zip(parts, values, strict=True):
+                column[..., which] = x
+            return column
+
+        at = np.cumsum([0, *(len(part.torque.rows) for _, part in parts)])
+        first, count = np.zeros((2, B), np.int64)
+        for (which, part), rows in zip(parts, at, strict=False):
+            first[which], count[which] = part.torque.first + rows, part.torque.count
+            self.neutral[which] = part.lanes.pieces[part.lanes.piece_first, 1]
         index, none = np.arange(B), np.zeros(B, np.int64)
-        columns = Columns(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), pieces, index, none + 1,
-                          np.zeros(0), none, none - 1, self.accuracy, programs)
-        return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
+        numbers, chips, start, torque = (joined(*(getattr(own, name) for own in lanes))
+                                         for name in ("numbers", "chips", "start", "torque"))
+        own = Columns(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), np.zeros((B, 7)), index,
+                      none + 1, np.zeros(0), none, none - 1, self.accuracy,
+                      joined(*(own.firmware for own in lanes)) if parts[0][1].law == "digital" else None)
+        rows = np.concatenate([part.torque.rows for _, part in parts])
+        return Packed(parts[0][1].law, own, parts[0][1].curve, Torques(rows, first, count))
+
+    def packed(self) -> Packed:
+        """Return the lanes as they are now, as `lane_kinds.kinds_of` asks them."""
+        own, every = self.columns, slice(self.count)
+        firmware = Firmware(*(own.firmware[name] for name in Firmware._fields)) if self.digital else None
+        return self._given._replace(lanes=own._replace(
+            numbers=columns_of(Numbers, own.numbers, every), chips=columns_of(Chip, own.chips, every),
+            firmware=firmware))
 
     @cached_property
     def translate(self) -> Translator:

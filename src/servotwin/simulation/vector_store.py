@@ -11,12 +11,9 @@ from numpy.typing import NDArray
 
 from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID
-from servotwin.models.engine.records import TILE, columns_of
+from servotwin.models.engine.records import TILE
 from servotwin.models.engine.ticks import ANGLE, SPEED
-from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.elastic import Elastic
-from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
-from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import Play
 from servotwin.simulation.compile.calls import Call, call_of
 from servotwin.simulation.compile.layout import STAGES
@@ -77,12 +74,8 @@ class Store:
         self.now[1] = 1.0
 
     def _kinds_now(self) -> list[SideBySide | OneByOne]:
-        numbers, lanes = self.numbers, slice(self.numbers.count)
-        own = columns_of(Numbers, numbers.columns.numbers, lanes), columns_of(Chip, numbers.columns.chips, lanes)
-        programs = numbers.columns.firmware
-        kinds = kinds_of(*own, numbers.count, self._dtype, np.zeros(numbers.count, np.bool_),
-                         numbers.torque.count > 0, bool(numbers.curve.size),
-                         Firmware(*(programs[name] for name in Firmware._fields)) if numbers.digital else NO_FIRMWARE)
+        numbers = self.numbers
+        kinds = kinds_of(numbers.packed(), self._dtype)
         if numbers.supplies.lanes:
             bus_of = numbers.supplies.bus_of
             kinds = [kind._replace(which=kind.which[bus_of[kind.which] < 0]) for kind in kinds]
