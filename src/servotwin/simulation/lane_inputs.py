@@ -12,7 +12,17 @@ from numpy.typing import NDArray
 
 from servotwin.errors import CommandError, InputError, LoadError, ParameterError, UnknownNameError
 from servotwin.loads import Load, as_load
-from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
+from servotwin.models import (
+    AveragedServo,
+    AveragedServoInductive,
+    BoundedServo,
+    DCMotor,
+    DigitalServo,
+    GearedMotor,
+    Model,
+    PulseServo,
+    PulseServoInductive,
+)
 from servotwin.parameters import GROUPS, Servo
 from servotwin.parameters.groups import check_columns
 from servotwin.signals import Signal
@@ -23,10 +33,10 @@ from servotwin.units import is_finite, is_masked
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-LAWS: dict[type[Model], str] = {PulseServo: "pulse", PulseServoInductive: "pulse", BoundedServo: "bounded",
-                             DigitalServo: "digital"}
-TICK_LAWS: dict[type[Model], str] = {**LAWS, AveragedServo: "bounded"}
-"""Those that go on tick by tick; the paper's servo is a bounded one without bounds, under a smoothed friction."""
+LAWS: dict[type[Model], str] = {
+    DCMotor: "motor", GearedMotor: "motor", AveragedServo: "bounded", AveragedServoInductive: "bounded",
+    BoundedServo: "bounded", PulseServo: "pulse", PulseServoInductive: "pulse", DigitalServo: "digital"}
+"""How each model is told what to do; the averaged servos are bounded ones without bounds, under a smoothed friction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,16 +92,16 @@ class Lanes:
 
 
 def lanes_of(model: Model, command: object, load: object, parameters: object, initial: object,
-             seeds: object, laws: Mapping[type[Model], str] = LAWS) -> Lanes:
-    """Check the arguments of `simulate_many` that differ from lane to lane, and zip them; `laws` has what may run.
+             seeds: object) -> Lanes:
+    """Check the arguments of `simulate_many` that differ from lane to lane, and zip them.
 
     Raises
     ------
     InputError
         Or one of its kinds; names what is wrong, and the lane.
     """
-    if type(model) not in laws:
-        raise InputError("model of simulate_many", got=model, allowed=" or ".join(kind.__name__ for kind in laws))
+    if type(model) not in LAWS:
+        raise InputError("model of many lanes", got=model, allowed=" or ".join(kind.__name__ for kind in LAWS))
     given = _named("parameters", parameters)
     for name in given:
         check_name(model, name)

@@ -64,7 +64,7 @@ def simulate_many(
 
     Parameters
     ----------
-    model : PulseServo or BoundedServo
+    model : Model
     command : Signal or sequence of Signal
     duration : float
         Positive [s].

@@ -24,7 +24,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
-from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes
+from servotwin.simulation.lane_inputs import LAWS, Lanes
 from servotwin.simulation.lane_loads import LOAD_NAMES, column_load, recorded_torque, structure
 from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Asked, Packed, Raw, Torques
 from servotwin.simulation.start import check_start, start_vector
@@ -244,7 +244,7 @@ class Chunk:
             self.lanes.seeds[self.which], rows, first, count, commands.edges, commands.edge_first[of],
             commands.edge_count[of], accuracy, self.firmware and mapped(flat, self.firmware))
         curve = np.array(table_of(self.model.curve()), np.float64).reshape(-1, 2)
-        return Packed(TICK_LAWS[type(self.model)], lanes, curve, torque)
+        return Packed(LAWS[type(self.model)], lanes, curve, torque)
 
     def fields(self, asked: Asked) -> tuple[str, ...]:
         """Return the raw fields that the outputs read: those that they look at when they are computed for one lane."""

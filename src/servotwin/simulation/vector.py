@@ -20,7 +20,7 @@ from servotwin.models.engine.ticks import LONGEST
 from servotwin.signals import Signal, constant
 from servotwin.simulation.batch import Failure
 from servotwin.simulation.bus_supply import supplies_of
-from servotwin.simulation.lane_inputs import TICK_LAWS, lanes_of, pick
+from servotwin.simulation.lane_inputs import LAWS, lanes_of, pick
 from servotwin.simulation.lane_sets import SHAFT
 from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
 from servotwin.simulation.start import accuracy_of
@@ -54,7 +54,8 @@ class VectorSimulator:
 
     Parameters
     ----------
-    model : PulseServo, PulseServoInductive, DigitalServo, BoundedServo or AveragedServo
+    model : Model
+        Any servo.
     lanes : int
         Number of servos.
     load : Load or sequence of Load, optional
@@ -94,13 +95,16 @@ class VectorSimulator:
         parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
         threads: int | None = None, seed: int = 0, accuracy: float = ACCURACY,
     ) -> None:
+        if LAWS.get(type(model), "motor") == "motor":
+            raise InputError("model of a VectorSimulator", got=model,
+                             allowed=" or ".join(kind.__name__ for kind, law in LAWS.items() if law != "motor"))
         count = _whole("lanes", lanes, 1)
         if count * _BYTES > 0.8 * memory_limit():
             raise InputError("lanes", got=count, allowed="what fits into memory: take fewer")
         supplies = supplies_of(bus, model, count)
         base = _whole("seed", seed, None)
         start = _first_command(model)
-        inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count), TICK_LAWS)
+        inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count))
         if inputs.count != count:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
@@ -338,15 +342,13 @@ class VectorSimulator:
         return numbers_of("external_torque", torque, np.arange(len(self)))
 
 
-def _first_command(model: object) -> Signal:
+def _first_command(model: Model) -> Signal:
     """Return what a servo is told until the first command: a pulse in the middle of those that it takes, or a goal."""
     if isinstance(model, DigitalServo) and model.takes_goals:
         low, high = (model.value_or(f"firmware.{end}_goal", model.value_or(f"stops.{end}_angle", math.nan))
                      for end in ("lower", "upper"))
         middle = 0.5 * (low + high)
         return constant(0.0 if math.isnan(middle) else middle, unit="rad")
-    if not isinstance(model, Model):
-        return constant(1500.0, unit="us")  # what is no model is refused in a moment
     return constant(1e6 * _middle(model), unit="us")
 
 

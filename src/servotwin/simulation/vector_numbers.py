@@ -24,7 +24,7 @@ from servotwin.models.terms.play import Play
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
-from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes, lanes_of
+from servotwin.simulation.lane_inputs import Lanes, lanes_of
 from servotwin.simulation.lane_memory import nothing_yet, taken
 from servotwin.simulation.lanes import Packed, Torques
 from servotwin.simulation.packing import Chunk, Commands, flat, groups
@@ -166,7 +166,7 @@ class LaneNumbers:
         merged = {name: self._merged(name, value, which) for name, value in parameters.items()}
         known = {**inputs.numbers, **inputs.words}
         loads = [inputs.loads[k] for k in inputs.load_of.tolist()]
-        inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds, TICK_LAWS)
+        inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
         return LaneNumbers(inputs, self.accuracy, self.supplies, self.imposed)
 
     def _merged(self, name: str, value: Any, which: Indices) -> Any:
