@@ -22,12 +22,13 @@ from servotwin.simulation.batch import Failure
 from servotwin.simulation.bus_supply import supplies_of
 from servotwin.simulation.lane_inputs import LAWS, lanes_of, pick
 from servotwin.simulation.lane_sets import SHAFT
-from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
+from servotwin.simulation.many import real_type
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.vector_memory import VectorMemory
 from servotwin.simulation.vector_numbers import LaneNumbers
 from servotwin.simulation.vector_store import Store
+from servotwin.simulation.workers import memory_limit, own_threads, workers_of
 from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:
