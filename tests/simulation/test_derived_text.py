@@ -4,12 +4,12 @@ import ast
 
 import pytest
 
-from servotwin.simulation import bus_run, lane_recipes, vector_calls
+from servotwin.simulation import bus_run, lane_recipes
 from servotwin.simulation.compile.derive import derive
 
 RECIPES = (bus_run.BUSES, lane_recipes.ALL_RUNS,
            lane_recipes.PLAIN_RUNS, lane_recipes.ALL_DIGITAL, lane_recipes.LOOK, lane_recipes.BY_TICKS,
-           vector_calls.TICKS)
+           lane_recipes.TICKS)
 
 
 @pytest.fixture(scope="module", params=RECIPES, ids=lambda recipe: recipe.name)

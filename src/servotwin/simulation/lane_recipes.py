@@ -110,10 +110,16 @@ _BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_L
                  "loop_tiles:enter", "loop_rounds:watch", "loop_rounds:decide", "loop_rounds:move",
                  "loop_rounds:move_on", "loop_rounds:follow")))
 
-# --- What shows of lanes ----------------------------------------------------------------------------------------------
+# --- Lanes between calls ----------------------------------------------------------------------------------------------
 
 LOOK = Recipe("look", tuple(f"servotwin.models.engine.sights:{name}" for name in ("side_by_side", "one_by_one")))
 """Lanes of all forms: to look leaves out little where terms are absent."""
+TICKS = Recipe("ticks", (
+    *(f"servotwin.models.engine.ticks:{name}" for name in ("accept", "change", "follow")),
+    *(f"servotwin.models.engine.lane_ticks:{name}" for name in (
+        "gather_lost", "to_records", "to_tiles", "forget_motions", "impose_on_tiles", "impose_on_records", "show_tiles",
+        "show_records", "read_clocks", "take_status", "note_lost_buses", "break_up"))))
+"""Lanes of all forms between two calls: what is imposed on them, and the way from tiles to records and back."""
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, knows=~_DIGITAL)
 _PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
           ALL_DIGITAL: ((ALL_DIGITAL, ()), _BY_LEGS)}

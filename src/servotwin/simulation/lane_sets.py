@@ -22,9 +22,10 @@ from servotwin.simulation import lane_recipes
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.lane_kinds import OneByOne, SideBySide
-from servotwin.simulation.lane_memory import flat, memories_of, nothing_yet, put_back, put_memories, taken
+from servotwin.simulation.lane_memory import flat, memories_of, nothing_yet, put_back, taken
+from servotwin.simulation.lane_recipes import TICKS
 from servotwin.simulation.lane_runs import Going, tiles_of
-from servotwin.simulation.vector_calls import TICKS, clock_of
+from servotwin.simulation.vector_calls import clock_of
 from servotwin.simulation.vector_memory import Piece, piece_of
 
 if TYPE_CHECKING:
@@ -95,7 +96,7 @@ class Tiles:
             first: dict[str, Any] = {name: Some(getattr(room, name), number)
                                      for name in ("which", "durations", "status")}
             lost = room._replace(memories=Memories(*(Some(array, number) for array in room.memories)), **first)
-            put = call_of(TICKS, "put_lost", Some(places, number), lost.which, lost.memories,
+            put = call_of(TICKS, "to_tiles", Some(places, number), lost.which, lost.memories,
                           store.numbers.frame_period, rows)
             return [gather, *_one_by_one(kind.general, store, lost, number), put]
 
@@ -103,7 +104,7 @@ class Tiles:
 
     def put(self, places: Indices, memories: Memories, numbers: LaneNumbers) -> None:
         """Put what lanes remember into their places."""
-        put_memories(self.rows, places, memories, numbers.frame_period[self.which[places]])
+        kernels(TICKS).to_tiles(places, self.which[places], memories, numbers.frame_period, self.rows)
 
     def refit(self, columns: tiles.Lanes, lanes: Indices, places: Indices) -> None:
         """Take the numbers of lanes anew."""

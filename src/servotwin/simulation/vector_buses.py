@@ -19,7 +19,8 @@ from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
 from servotwin.simulation.lane_memory import nothing_yet, put_back, taken
-from servotwin.simulation.vector_calls import NO_TAPE, TICKS, calls_on_buses
+from servotwin.simulation.lane_recipes import TICKS
+from servotwin.simulation.vector_calls import NO_TAPE, calls_on_buses
 from servotwin.simulation.vector_memory import Piece, piece_of
 
 if TYPE_CHECKING:

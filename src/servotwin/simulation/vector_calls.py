@@ -13,9 +13,9 @@ from servotwin.models.engine import tape
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.tape import Tape
 from servotwin.simulation.bus_run import BUSES
-from servotwin.simulation.compile import Recipe
 from servotwin.simulation.compile.calls import Call, Now, call_of
 from servotwin.simulation.compile.layout import GIVEN
+from servotwin.simulation.lane_recipes import TICKS
 
 if TYPE_CHECKING:
     from servotwin.simulation.vector_store import Store
@@ -23,11 +23,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-TICKS = Recipe("ticks", (
-    *(f"servotwin.models.engine.ticks:{name}" for name in ("accept", "change", "follow")),
-    *(f"servotwin.models.engine.lane_ticks:{name}" for name in (
-        "gather_lost", "put_lost", "forget_motions", "impose_on_tiles", "impose_on_records", "show_tiles",
-        "show_records", "read_clocks", "take_status", "note_lost_buses", "break_up"))))
 NO_TAPE = Tape(np.zeros((0, tape.ROW)), np.zeros((0, tape.EVENT)), np.zeros(0), np.zeros(0, np.int64))
 """Of buses whose motions nobody keeps."""
 

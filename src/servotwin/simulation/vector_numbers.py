@@ -26,10 +26,11 @@ from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_inputs import Lanes, lanes_of
 from servotwin.simulation.lane_memory import nothing_yet, taken
+from servotwin.simulation.lane_recipes import TICKS
 from servotwin.simulation.lanes import Packed, Torques
 from servotwin.simulation.packing import Chunk, Commands, flat, groups
 from servotwin.simulation.start import start_vector
-from servotwin.simulation.vector_calls import TICKS, asked
+from servotwin.simulation.vector_calls import asked
 from servotwin.simulation.vector_commands import Translator
 
 Array = NDArray[np.float64]

@@ -19,9 +19,10 @@ from servotwin.simulation.compile.calls import Call, call_of
 from servotwin.simulation.compile.layout import STAGES
 from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
 from servotwin.simulation.lane_memory import copied, nothing_yet, put_back, taken
+from servotwin.simulation.lane_recipes import TICKS
 from servotwin.simulation.lane_sets import Records, Tiles
 from servotwin.simulation.vector_buses import BusSet
-from servotwin.simulation.vector_calls import TICKS, Room, asked
+from servotwin.simulation.vector_calls import Room, asked
 from servotwin.simulation.vector_memory import Common, VectorMemory
 
 if TYPE_CHECKING:

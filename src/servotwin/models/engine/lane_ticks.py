@@ -44,9 +44,7 @@ def gather_lost(which: Indices, status: Any, command: Floats, pieces: Floats, ti
         tile, j, lane = tile_rows[k // TILE], k % TILE, which[k]
         if tile.clock.owed[j] > 0.0:
             if status[lane] == COMPLETED:
-                side = Side(held_at(tile.servo, j), hour_at(tile.clock, j), counted_at(tile.count, j))
-                put_memory(memories.rows[n], remembered(side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j],
-                                                        memories.firms[n:n + 1]))
+                _remember(tile, j, memories, n)
                 places[n], lanes[n], durations[n], pieces[lane, 1] = k, lane, tile.clock.owed[j], command[lane]
                 n += 1
             tile.clock.owed[j] = 0.0
@@ -54,8 +52,21 @@ def gather_lost(which: Indices, status: Any, command: Floats, pieces: Floats, ti
     return n
 
 
-def put_lost(places: Indices, lanes: Indices, memories: Memories, periods: Floats, tile_rows: Any) -> None:
-    """Put lanes that have gone on one by one back into their tiles."""
+def _remember(tile: Any, j: int, memories: Memories, n: int) -> None:
+    """Put what a lane remembers in a tile into a record."""
+    side = Side(held_at(tile.servo, j), hour_at(tile.clock, j), counted_at(tile.count, j))
+    put_memory(memories.rows[n], remembered(side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j],
+                                            memories.firms[n:n + 1]))
+
+
+def to_records(places: Indices, tile_rows: Any, memories: Memories) -> None:
+    """Put what lanes at these places of tiles remember into records."""
+    for k in range(places.size):
+        _remember(tile_rows[places[k] // TILE], places[k] % TILE, memories, k)
+
+
+def to_tiles(places: Indices, lanes: Indices, memories: Memories, periods: Floats, tile_rows: Any) -> None:
+    """Put what lanes remember in records into tiles; their frames are regular, of these periods from now on [s]."""
     for k in range(places.size):
         tile, j = tile_rows[places[k] // TILE], places[k] % TILE
         side = side_of(memory_at(memories, k), periods[lanes[k]])

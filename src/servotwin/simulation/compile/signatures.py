@@ -120,7 +120,8 @@ def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ..
         "side_by_side:refit": (_LANES, INT64, _INDICES, _INDICES, rows),
         "sights:side_by_side": (_LANES, _TABLE, _INDICES, rows, _TABLE),
         "lane_ticks:gather_lost": (_INDICES, _SMALLS, _FLOATS, _TABLE, rows, *(_INDICES,) * 3, _FLOATS, _MEMORIES),
-        "lane_ticks:put_lost": (_INDICES, _INDICES, _MEMORIES, _FLOATS, rows),
+        "lane_ticks:to_records": (_INDICES, rows, _MEMORIES),
+        "lane_ticks:to_tiles": (_INDICES, _INDICES, _MEMORIES, _FLOATS, rows),
         "lane_ticks:impose_on_tiles": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, rows),
         "lane_ticks:show_tiles": (_INDICES, rows, _TABLE),
     }
