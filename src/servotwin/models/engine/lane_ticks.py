@@ -8,17 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine.crossing import (
-    Side,
-    counted_at,
-    held_at,
-    hour_at,
-    put_counted,
-    put_held,
-    put_hour,
-    remembered,
-    side_of,
-)
+from servotwin.models.engine.crossing import put_beside, remembered
 from servotwin.models.engine.imposing import carried, impulse_work, placed
 from servotwin.models.engine.memory import memory_at, point_of, put_memory, put_point, time_of
 from servotwin.models.engine.modes import INSIDE, LOST
@@ -44,7 +34,7 @@ def gather_lost(which: Indices, status: Any, command: Floats, pieces: Floats, ti
         tile, j, lane = tile_rows[k // TILE], k % TILE, which[k]
         if tile.clock.owed[j] > 0.0:
             if status[lane] == COMPLETED:
-                _remember(tile, j, memories, n)
+                put_memory(memories.rows[n], remembered(tile, j, memories.firms[n:n + 1]))
                 places[n], lanes[n], durations[n], pieces[lane, 1] = k, lane, tile.clock.owed[j], command[lane]
                 n += 1
             tile.clock.owed[j] = 0.0
@@ -52,27 +42,17 @@ def gather_lost(which: Indices, status: Any, command: Floats, pieces: Floats, ti
     return n
 
 
-def _remember(tile: Any, j: int, memories: Memories, n: int) -> None:
-    """Put what a lane remembers in a tile into a record."""
-    side = Side(held_at(tile.servo, j), hour_at(tile.clock, j), counted_at(tile.count, j))
-    put_memory(memories.rows[n], remembered(side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j],
-                                            memories.firms[n:n + 1]))
-
-
 def to_records(places: Indices, tile_rows: Any, memories: Memories) -> None:
     """Put what lanes at these places of tiles remember into records."""
     for k in range(places.size):
-        _remember(tile_rows[places[k] // TILE], places[k] % TILE, memories, k)
+        tile = tile_rows[places[k] // TILE]
+        put_memory(memories.rows[k], remembered(tile, places[k] % TILE, memories.firms[k:k + 1]))
 
 
 def to_tiles(places: Indices, lanes: Indices, memories: Memories, periods: Floats, tile_rows: Any) -> None:
     """Put what lanes remember in records into tiles; their frames are regular, of these periods from now on [s]."""
     for k in range(places.size):
-        tile, j = tile_rows[places[k] // TILE], places[k] % TILE
-        side = side_of(memory_at(memories, k), periods[lanes[k]])
-        put_held(tile.servo, j, side.held)
-        put_hour(tile.clock, j, side.hour)
-        put_counted(tile.count, j, side.counted)
+        put_beside(memory_at(memories, k), periods[lanes[k]], tile_rows[places[k] // TILE], places[k] % TILE)
 
 
 def forget_motions(rows: Any) -> None:
