@@ -160,11 +160,14 @@ class Chunk:
     def start(self) -> Array:
         """The states at t = 0, shape (7, n)."""
         before = cast("LanePieces", self.model.command(cast("Any", self.commands.before(self.which))))
-        initial = {name: column[self.which if len(column) > 1 else [0], None]
-                   for name, column in self.lanes.initial.items()}
+        return self.started(before.initial, {name: column[self.which if len(column) > 1 else [0], None]
+                                             for name, column in self.lanes.initial.items()})
+
+    def started(self, drive: Any, initial: Mapping[str, Any]) -> Array:
+        """Return the states at rest under what the models follow, but for initial values by name; shape (7, n)."""
         angle: Any = initial.get("output_angle")
         if angle is None:
-            angle = self.model.start_angle(cast("Any", before.initial))
+            angle = self.model.start_angle(drive)
         y = np.empty((7, len(self.which), 1))
         for k, values in enumerate(start_vector(self.model.states, self.numbers, angle, initial)):
             y[k] = values

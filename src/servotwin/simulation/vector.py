@@ -109,12 +109,15 @@ class VectorSimulator:
         if inputs.count != count:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
-        self._numbers = LaneNumbers(inputs, accuracy_of(accuracy), supplies)
-        self._store = Store(self._numbers, real_type(dtype),
+        self._store = Store(LaneNumbers(inputs, accuracy_of(accuracy), supplies), real_type(dtype),
                             _whole("threads", threads, 1) if threads is not None else workers_of(None),
                             own_threads(os.getpid()))
         self._entry: CEntry | None = None
         self.reset()
+
+    @property
+    def _numbers(self) -> LaneNumbers:
+        return self._store.numbers
 
     def __repr__(self) -> str:
         return f"VectorSimulator({self._numbers.model!r}, lanes={len(self)})"
@@ -265,8 +268,7 @@ class VectorSimulator:
         if angle is not None:
             self._numbers.check_angles(angle, which)
         if parameters:
-            self._numbers = self._numbers.changed(which, parameters)
-            self._store.renew(self._numbers, which)
+            self._store.renew(self._numbers.changed(which, parameters), which)
         otherwise = False
         if inertia is not None or bus is not None:
             otherwise = self._numbers.impose(which, inertia, bus)

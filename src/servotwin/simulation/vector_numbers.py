@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
-from servotwin.models.engine.memory import Memories, put_started
-from servotwin.models.engine.modes import INSIDE, NOWHERE, RIGID
+from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.records import columns_of, fields_of
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.tiles import Lanes as Columns
@@ -20,16 +19,14 @@ from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import Numbers
-from servotwin.models.terms.play import Play
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lane_inputs import Lanes, lanes_of
-from servotwin.simulation.lane_memory import nothing_yet, taken
+from servotwin.simulation.lane_memory import nothing_yet
 from servotwin.simulation.lane_recipes import TICKS
 from servotwin.simulation.lanes import Packed, Torques
 from servotwin.simulation.packing import Chunk, Commands, flat, groups
-from servotwin.simulation.start import start_vector
 from servotwin.simulation.vector_calls import asked
 from servotwin.simulation.vector_commands import Translator
 
@@ -211,26 +208,17 @@ class LaneNumbers:
         InputError
             If an angle is beyond a stop; names the lane.
         """
-        rest = nothing_yet(1)
-        put_started(rest, 0, NOWHERE, RIGID)
-        memories = taken(rest, np.zeros(len(which), np.int64))
-        place = np.full(self.count, -1)
+        place, y = np.full(self.count, -1), np.empty((7, self.count))
         place[which] = np.arange(len(which))
+        if angle is not None:
+            self.check_angles(angle, which)
         for chunk in self.chunks:
             own = chunk.which[place[chunk.which] >= 0]
-            if not len(own):
-                continue
-            part = Chunk(chunk.lanes, chunk.commands, own)
-            q = part.model.start_angle(cast("Any", command[own, None])) if angle is None else angle[place[own], None]
-            y = start_vector(part.model.states, part.numbers, q, {})
-            if angle is not None:
-                self.check_angles(angle[place[own]], own)
-            play = self.now(Play, own).half > 0.0
-            point = memories.rows["point"]
-            for name, values in y._asdict().items():
-                point["y"][name][place[own]] = point["anchor"][name][place[own]] = np.ravel(values)
-            point["wiper"][place[own]] = np.ravel(y.q)
-            point["mode"]["mesh"][place[own]] = np.where(play, INSIDE, RIGID)
+            if len(own):
+                initial = {} if angle is None else {"output_angle": angle[place[own], None]}
+                y[:, own] = Chunk(chunk.lanes, chunk.commands, own).started(command[own, None], initial)
+        memories = nothing_yet(len(which))
+        kernels(TICKS).start(self.columns._replace(start=y), which, memories)
         return memories
 
     def check_angles(self, angle: Array, which: Indices) -> None:
