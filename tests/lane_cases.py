@@ -16,7 +16,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import Sensor
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
-from servotwin.simulation.lanes import Asked, Packed, Torques, Work
+from servotwin.simulation.lanes.packed import Asked, Packed, Torques, Work
 
 STEPS = 4  # of each command
 

@@ -17,9 +17,9 @@ from servotwin.models.terms.motor import Motor
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
-from servotwin.simulation import lane_runs
-from servotwin.simulation.lane_runs import run as run_lanes
-from servotwin.simulation.lanes import FIELDS, empty_raw
+from servotwin.simulation.lanes import whole_runs
+from servotwin.simulation.lanes.packed import FIELDS, empty_raw
+from servotwin.simulation.lanes.whole_runs import run as run_lanes
 
 NUMBERS = Numbers(
     motor=Motor(1.03, 1.0, 3.0, 0.0), shaft=Shaft(6e-3, 1e-3, 0.0, 0.0), source=Source(6.0, 0.0, math.inf),
@@ -129,7 +129,7 @@ GIVING_UP = ("stops", "everything", "all bands", "backlash, two decisions wait")
 
 def one_by_one(work):
     raw = empty_raw(work)
-    lane_runs.run_one_by_one(work, work.packed.columns(), np.arange(work.packed.size), raw)
+    whole_runs.run_one_by_one(work, work.packed.columns(), np.arange(work.packed.size), raw)
     return raw
 
 
@@ -153,13 +153,13 @@ def assert_same(raw, other, tolerance):
 def plain(work):
     raw = empty_raw(work)
     lanes, times = work.packed.columns(), work.asked.times
-    (kind,) = lane_runs.kinds_of(work.packed, "float64")
+    (kind,) = whole_runs.kinds_of(work.packed, "float64")
     with np.errstate(all="ignore"):
         rows = room(1, tiles.tile_type("float64", kind.form))
         side_by_side.start(lanes, kind.form, times[0], rows)
         lost = side_by_side.go_on(
             lanes.pieces, lanes.edges, kind.form, kind.slack, kind.which, work.asked.duration,
-            times, lane_runs.outputs_of(work, raw, "float64"), rows, tiles.plan_room("float64", kind.form))
+            times, whole_runs.outputs_of(work, raw, "float64"), rows, tiles.plan_room("float64", kind.form))
     assert lost == 0
     return raw
 

@@ -12,11 +12,12 @@ import pytest
 import servotwin as st
 from absent_values import ABSENT, HEAT, TABLES
 from servotwin import loads, signals
-from servotwin.simulation import files, many
-from servotwin.simulation.lane_inputs import lanes_of
-from servotwin.simulation.lane_loads import LOAD_NAMES, with_numbers
-from servotwin.simulation.lane_runs import run as run_lanes
-from servotwin.simulation.packing import Commands
+from servotwin.simulation import files
+from servotwin.simulation.lanes import many
+from servotwin.simulation.lanes.inputs import lanes_of
+from servotwin.simulation.lanes.load_columns import LOAD_NAMES, with_numbers
+from servotwin.simulation.lanes.packing import Commands
+from servotwin.simulation.lanes.whole_runs import run as run_lanes
 from servotwin.tables import read_columns
 
 SERVO = st.load_servo("hitec-hs-755hb")

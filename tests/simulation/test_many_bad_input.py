@@ -16,7 +16,7 @@ from servotwin.errors import (
     ParameterError,
     UnknownNameError,
 )
-from servotwin.simulation import many
+from servotwin.simulation.lanes import many
 
 SERVO = st.load_servo("hitec-hs-755hb")
 STEP = signals.step(10.0, 50.0, at=0.05, unit="deg")

@@ -16,10 +16,10 @@ from servotwin.models import DigitalServo, Model, PulseServo, PulseServoInductiv
 from servotwin.models.terms.elastic import Elastic, behind, present
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
-from servotwin.simulation.lane_inputs import pick
+from servotwin.simulation.lanes.inputs import pick
 
 if TYPE_CHECKING:
-    from servotwin.simulation.lane_inputs import Lanes
+    from servotwin.simulation.lanes.inputs import Lanes
 
 Indices = NDArray[np.int64]
 OF_BUS = ("supply.open_circuit_voltage", "supply.internal_resistance", "supply.current_limit")

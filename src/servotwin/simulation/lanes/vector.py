@@ -18,16 +18,16 @@ from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.ticks import LONGEST
 from servotwin.signals import Signal, constant
-from servotwin.simulation.batch import Failure
 from servotwin.simulation.bus_supply import supplies_of
-from servotwin.simulation.lane_inputs import LAWS, lanes_of, pick
-from servotwin.simulation.lane_sets import SHAFT
-from servotwin.simulation.many import real_type
+from servotwin.simulation.lanes.batch import Failure
+from servotwin.simulation.lanes.inputs import LAWS, lanes_of, pick
+from servotwin.simulation.lanes.lane_numbers import LaneNumbers
+from servotwin.simulation.lanes.lane_sets import SHAFT
+from servotwin.simulation.lanes.many import real_type
+from servotwin.simulation.lanes.saved import VectorMemory
+from servotwin.simulation.lanes.store import Store
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
-from servotwin.simulation.vector_memory import VectorMemory
-from servotwin.simulation.vector_numbers import LaneNumbers
-from servotwin.simulation.vector_store import Store
 from servotwin.simulation.workers import memory_limit, own_threads, workers_of
 from servotwin.units import is_finite, is_masked
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
 
     from servotwin import loads
-    from servotwin.simulation.c_entry import CEntry
+    from servotwin.simulation.lanes.c_entry import CEntry
 
 Array = NDArray[np.float64]
 _BYTES = 4000  # of a lane, and of what is made of it now and then
@@ -318,7 +318,7 @@ class VectorSimulator:
         All that its lanes may need is compiled now, once on a machine.
         """
         if self._entry is None:
-            from servotwin.simulation.c_entry import CEntry
+            from servotwin.simulation.lanes.c_entry import CEntry
 
             self._entry = CEntry(self._store)
         return self._entry

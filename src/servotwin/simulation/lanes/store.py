@@ -17,16 +17,16 @@ from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.play import Play
 from servotwin.simulation.compile.calls import Call, call_of
 from servotwin.simulation.compile.layout import STAGES
-from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
-from servotwin.simulation.lane_memory import copied, nothing_yet, put_back, taken
-from servotwin.simulation.lane_recipes import TICKS
-from servotwin.simulation.lane_sets import Records, Tiles
+from servotwin.simulation.lanes.form_recipes import TICKS
+from servotwin.simulation.lanes.forms import OneByOne, SideBySide, kinds_of
+from servotwin.simulation.lanes.lane_sets import Records, Tiles
+from servotwin.simulation.lanes.memories import copied, nothing_yet, put_back, taken
+from servotwin.simulation.lanes.saved import Common, VectorMemory
+from servotwin.simulation.lanes.tick_room import Room, asked
 from servotwin.simulation.vector_buses import BusSet
-from servotwin.simulation.vector_calls import Room, asked
-from servotwin.simulation.vector_memory import Common, VectorMemory
 
 if TYPE_CHECKING:
-    from servotwin.simulation.vector_numbers import LaneNumbers
+    from servotwin.simulation.lanes.lane_numbers import LaneNumbers
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from servotwin.simulation.lane_inputs import Lanes
+    from servotwin.simulation.lanes.inputs import Lanes
     from servotwin.simulation.result import Result
 
 

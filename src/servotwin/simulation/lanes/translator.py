@@ -13,12 +13,12 @@ from servotwin.errors import CommandError, InputError
 from servotwin.models import AveragedServo, AveragedServoInductive, BoundedServo, DigitalServo
 from servotwin.models.base import PULSE_RANGE, TRAVEL_SLACK
 from servotwin.models.columns import LanePieces, LaneSignal
-from servotwin.simulation.packing import Chunk, flat
+from servotwin.simulation.lanes.packing import Chunk, flat
 from servotwin.units import is_masked
 
 if TYPE_CHECKING:
     from servotwin.models import Model
-    from servotwin.simulation.vector_numbers import LaneNumbers
+    from servotwin.simulation.lanes.lane_numbers import LaneNumbers
 
 Array = NDArray[np.float64]
 _KINDS = {"pulse_width": "pulse_width", "command_angle": "angle", "command_voltage": "voltage"}

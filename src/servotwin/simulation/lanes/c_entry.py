@@ -17,12 +17,12 @@ from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile.calls import program, tick_address
 from servotwin.simulation.compile.layout import GIVEN, HANDLE, MESSAGES, STAGES, TICK, VERSION
-from servotwin.simulation.vector_memory import Piece, piece_of
+from servotwin.simulation.lanes.saved import Piece, piece_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from servotwin.simulation.vector_store import Store
+    from servotwin.simulation.lanes.store import Store
 
 Array = NDArray[np.float64]
 _INSIDE = 1e-9  # of a range whose ends are not possible themselves

@@ -22,13 +22,13 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
-from servotwin.simulation.lane_inputs import Lanes, lanes_of
-from servotwin.simulation.lane_memory import nothing_yet
-from servotwin.simulation.lane_recipes import TICKS
-from servotwin.simulation.lanes import Packed, Torques
-from servotwin.simulation.packing import Chunk, Commands, flat, groups
-from servotwin.simulation.vector_calls import asked
-from servotwin.simulation.vector_commands import Translator
+from servotwin.simulation.lanes.form_recipes import TICKS
+from servotwin.simulation.lanes.inputs import Lanes, lanes_of
+from servotwin.simulation.lanes.memories import nothing_yet
+from servotwin.simulation.lanes.packed import Packed, Torques
+from servotwin.simulation.lanes.packing import Chunk, Commands, flat, groups
+from servotwin.simulation.lanes.tick_room import asked
+from servotwin.simulation.lanes.translator import Translator
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -122,7 +122,7 @@ class LaneNumbers:
         return Packed(parts[0][1].law, own, parts[0][1].curve, Torques(rows, first, count))
 
     def packed(self) -> Packed:
-        """Return the lanes as they are now, as `lane_kinds.kinds_of` asks them."""
+        """Return the lanes as they are now, as `forms.kinds_of` asks them."""
         own, every = self.columns, slice(self.count)
         firmware = Firmware(*(own.firmware[name] for name in Firmware._fields)) if self.digital else None
         return self._given._replace(lanes=own._replace(

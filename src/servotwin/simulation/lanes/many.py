@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.engine.memory import ACCURACY
-from servotwin.simulation.batch import Batch, Failure
-from servotwin.simulation.lane_inputs import Lanes, framed, lanes_of
-from servotwin.simulation.lane_kinds import goes_together
-from servotwin.simulation.lane_runs import run as run_lanes
-from servotwin.simulation.lanes import Asked, Raw, Work
+from servotwin.simulation.lanes.batch import Batch, Failure
+from servotwin.simulation.lanes.forms import goes_together
+from servotwin.simulation.lanes.inputs import Lanes, framed, lanes_of
+from servotwin.simulation.lanes.packed import Asked, Raw, Work
+from servotwin.simulation.lanes.packing import Chunk, Commands, groups
+from servotwin.simulation.lanes.whole_runs import run as run_lanes
 from servotwin.simulation.oddities import warn_of
-from servotwin.simulation.packing import Chunk, Commands, groups
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import lane_remarks
 from servotwin.simulation.start import accuracy_of

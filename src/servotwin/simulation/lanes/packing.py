@@ -24,9 +24,9 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
-from servotwin.simulation.lane_inputs import LAWS, Lanes
-from servotwin.simulation.lane_loads import LOAD_NAMES, column_load, recorded_torque, structure
-from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Asked, Packed, Raw, Torques
+from servotwin.simulation.lanes.inputs import LAWS, Lanes
+from servotwin.simulation.lanes.load_columns import LOAD_NAMES, column_load, recorded_torque, structure
+from servotwin.simulation.lanes.packed import FIELDS, MORE_FIELDS, SMALL_FIELDS, Asked, Packed, Raw, Torques
 from servotwin.simulation.start import check_start, start_vector
 
 if TYPE_CHECKING:

@@ -18,19 +18,19 @@ from numpy.typing import NDArray
 from servotwin.models.engine import tiles
 from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.records import TILE
-from servotwin.simulation import lane_recipes
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
-from servotwin.simulation.lane_kinds import OneByOne, SideBySide
-from servotwin.simulation.lane_memory import flat, memories_of, nothing_yet, put_back, taken
-from servotwin.simulation.lane_recipes import TICKS
-from servotwin.simulation.lane_runs import Going, tiles_of
-from servotwin.simulation.vector_calls import clock_of
-from servotwin.simulation.vector_memory import Piece, piece_of
+from servotwin.simulation.lanes import form_recipes
+from servotwin.simulation.lanes.form_recipes import TICKS
+from servotwin.simulation.lanes.forms import OneByOne, SideBySide
+from servotwin.simulation.lanes.memories import flat, memories_of, nothing_yet, put_back, taken
+from servotwin.simulation.lanes.saved import Piece, piece_of
+from servotwin.simulation.lanes.tick_room import clock_of
+from servotwin.simulation.lanes.whole_runs import Going, tiles_of
 
 if TYPE_CHECKING:
-    from servotwin.simulation.vector_numbers import LaneNumbers
-    from servotwin.simulation.vector_store import Store
+    from servotwin.simulation.lanes.lane_numbers import LaneNumbers
+    from servotwin.simulation.lanes.store import Store
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -139,7 +139,7 @@ class Tiles:
 
     def look(self, store: Store) -> Call:
         """Return the call that puts what shows of the lanes into their rows of what is seen."""
-        self._look = self._look or call_of(lane_recipes.LOOK, "side_by_side", store.columns, store.inputs[0],
+        self._look = self._look or call_of(form_recipes.LOOK, "side_by_side", store.columns, store.inputs[0],
                                            self.which, self.rows, store.room.seen)
         return self._look
 
@@ -175,9 +175,9 @@ class Records:
         """Return what lets some lanes go on: those without an event at once, if some may go on calmly."""
         going = Going.of(self.which[part], taken(self.memories, part))
         done = np.zeros(len(going.which), np.int64)
-        calm = [call_of(lane_recipes.PLAIN_RUNS, "go", store.columns, going.which, store.now, store.status,
+        calm = [call_of(form_recipes.PLAIN_RUNS, "go", store.columns, going.which, store.now, store.status,
                         going.memories.rows, done, returns=True)] if self._calms else []
-        ready = call_of(lane_recipes.last_of(self._recipe), "ready", going.which, store.status, store.now, done,
+        ready = call_of(form_recipes.last_of(self._recipe), "ready", going.which, store.status, store.now, done,
                         going.durations, going.status, returns=True)
         return Chain([*calm, ready, *_one_by_one(self._recipe, store, going)])
 
@@ -212,7 +212,7 @@ class Records:
 
     def look(self, store: Store) -> Call:
         """Return the call that puts what shows of the lanes into their rows of what is seen."""
-        self._look = self._look or call_of(lane_recipes.LOOK, "one_by_one", store.columns, *store.inputs, self.which,
+        self._look = self._look or call_of(form_recipes.LOOK, "one_by_one", store.columns, *store.inputs, self.which,
                                            self.memories, store.room.seen)
         return self._look
 
@@ -232,8 +232,8 @@ def _one_by_one(recipe: Recipe, store: Store, going: Going, number: Indices | No
     if number is not None:
         ended = Some(ended, number)
     steps = [call_of(one, entry, store.columns, *store.inputs, *going, *more)
-             for one, entry, more in lane_recipes.steps_of(recipe, ended)]
-    return [*steps, call_of(lane_recipes.last_of(recipe), "note_failures", going.which, going.status, ended,
+             for one, entry, more in form_recipes.steps_of(recipe, ended)]
+    return [*steps, call_of(form_recipes.last_of(recipe), "note_failures", going.which, going.status, ended,
                             going.memories.rows, store.status, store.ended)]
 
 

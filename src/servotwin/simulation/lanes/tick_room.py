@@ -15,10 +15,10 @@ from servotwin.models.engine.tape import Tape
 from servotwin.simulation.bus_run import BUSES
 from servotwin.simulation.compile.calls import Call, Now, call_of
 from servotwin.simulation.compile.layout import GIVEN
-from servotwin.simulation.lane_recipes import TICKS
+from servotwin.simulation.lanes.form_recipes import TICKS
 
 if TYPE_CHECKING:
-    from servotwin.simulation.vector_store import Store
+    from servotwin.simulation.lanes.store import Store
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

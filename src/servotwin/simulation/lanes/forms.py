@@ -19,11 +19,11 @@ from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.rooms import NOTHING, ROOMS
 from servotwin.physics.pieces import Piece
-from servotwin.simulation import lane_recipes as recipes
 from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.unread import in_general, unread
-from servotwin.simulation.lane_groups import by_groups
-from servotwin.simulation.lanes import Packed, swept
+from servotwin.simulation.lanes import form_recipes as recipes
+from servotwin.simulation.lanes.divided import by_groups
+from servotwin.simulation.lanes.packed import Packed, swept
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]

@@ -27,7 +27,7 @@ from servotwin.parameters import GROUPS, Servo
 from servotwin.parameters.groups import check_columns
 from servotwin.signals import Signal
 from servotwin.signals.signal import headers
-from servotwin.simulation.lane_loads import LOAD_NAMES, check_number, with_numbers
+from servotwin.simulation.lanes.load_columns import LOAD_NAMES, check_number, with_numbers
 from servotwin.units import is_finite, is_masked
 
 Array = NDArray[np.float64]

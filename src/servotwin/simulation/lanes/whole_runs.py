@@ -12,10 +12,19 @@ from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.records import room
 from servotwin.models.engine.tiles import Lanes, Outputs
 from servotwin.simulation.compile import Recipe, kernels
-from servotwin.simulation.lane_kinds import OneByOne, SideBySide, kinds_of
-from servotwin.simulation.lane_memory import flat, memories_of, nothing_yet, taken
-from servotwin.simulation.lane_recipes import ALL_RUNS, ENDING, last_of, steps_of
-from servotwin.simulation.lanes import ALL_FIELDS, SMALL_FIELDS, Floats, Raw, Work, as_kernels_take, empty_raw, some_of
+from servotwin.simulation.lanes.form_recipes import ALL_RUNS, ENDING, last_of, steps_of
+from servotwin.simulation.lanes.forms import OneByOne, SideBySide, kinds_of
+from servotwin.simulation.lanes.memories import flat, memories_of, nothing_yet, taken
+from servotwin.simulation.lanes.packed import (
+    ALL_FIELDS,
+    SMALL_FIELDS,
+    Floats,
+    Raw,
+    Work,
+    as_kernels_take,
+    empty_raw,
+    some_of,
+)
 
 Indices = NDArray[np.int64]
 

@@ -11,7 +11,7 @@ from servotwin.models.engine.memory import Memories, Memory
 from servotwin.models.engine.records import record_of
 from servotwin.models.terms.control import Firm
 from servotwin.simulation.compile import kernels
-from servotwin.simulation.lane_recipes import TICKS
+from servotwin.simulation.lanes.form_recipes import TICKS
 
 Indices = NDArray[np.int64]
 
