@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 LAWS: dict[type[Model], str] = {
-    DCMotor: "motor", GearedMotor: "motor", AveragedServo: "bounded", AveragedServoInductive: "bounded",
+    DCMotor: "voltage", GearedMotor: "voltage", AveragedServo: "bounded", AveragedServoInductive: "bounded",
     BoundedServo: "bounded", PulseServo: "pulse", PulseServoInductive: "pulse", DigitalServo: "digital"}
 """How each model is told what to do; the averaged servos are bounded ones without bounds, under a smoothed friction."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -77,6 +77,7 @@ class LaneNumbers:
         self._given = self._joined()
         law, _, self.curve, self.torque = self._given
         self.pulsed, self.digital = law != "bounded", law == "digital"  # whether there is a bridge, and a program
+        self.recorded = bool(self.torque.count.any())  # whether a record of torque may end
         self.columns = self._given.columns()
         self.frame_period = self.columns.chips["frame_period"].ravel()[:self.count]
         self.load_total, self.reduction, self.V_oc = np.empty((3, self.count))
@@ -230,11 +231,8 @@ class LaneNumbers:
             raise InputError(f"output_angle of lane {which[k]}", got=float(angle[k]),
                              allowed=f"{lower[k]:.6g} to {upper[k]:.6g} rad, between the stops")
 
-    def check_recorded(self, time: Callable[[], Array], duration: float) -> None:
+    def check_recorded(self, now: Array, duration: float) -> None:
         """Raise LoadError if a recorded torque ends before lanes that go on for a duration [s] do; names the lane."""
-        if not self.torque.count.any():
-            return
-        now = time()
         for lane in np.flatnonzero(self.torque.count).tolist():
             load = self.inputs.loads[self.inputs.load_of[lane]]
             try:

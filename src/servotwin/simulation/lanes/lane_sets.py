@@ -37,7 +37,8 @@ Indices = NDArray[np.int64]
 SHAFT = {"output_angle": "q", "output_speed": "w"}  # where tiles and records have them
 _WORD = 8  # bytes
 _WORTH = 64  # tiles for a thread: fewer cost more in waking it
-_WORTH_ALONE = 4  # lanes that go on one by one
+_QUICK = (form_recipes.PLAIN_RUNS, form_recipes.BY_TICKS, form_recipes.BY_LEGS)
+_WORTH_QUICK, _WORTH_SLOW = 64, 4  # lanes for a thread that go on one by one, by kernels that take so long
 
 
 class Chain:
@@ -161,7 +162,7 @@ class Records:
         self.which, self._recipe, self._calms = kind.which, kind.recipe, kind.calm
         self.memories = nothing_yet(len(self.which))
         self.rows = self.memories.rows
-        self._workers = min(threads, len(self.which) // _WORTH_ALONE)
+        self._workers = min(threads, len(self.which) // (_WORTH_QUICK if kind.recipe in _QUICK else _WORTH_SLOW))
         self._chains: list[Chain] = []
         self._look: Call | None = None
 

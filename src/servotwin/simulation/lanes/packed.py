@@ -42,11 +42,11 @@ class Packed(NamedTuple):
     Parameters
     ----------
     law : str
-        "pulse", "bounded" or "digital".
+        "voltage", "bounded", "pulse" or "digital".
     lanes : models.engine.tiles.Lanes
         Numbers, chips, torque and firmware as named tuples, each number one for all lanes or an array (B,); firmware
-        is None where there is no program. Pieces are widths of pulses [s] for "pulse", v_c [V] for "bounded", either
-        widths or goals [rad] for "digital".
+        is None where there is no program. Pieces are armature voltages or v_c [V] for "voltage" and "bounded", widths
+        of pulses [s] for "pulse", either these or goals [rad] for "digital".
     curve : ndarray, shape (n, 2)
         Rows of angle [rad] and error [V] of the potentiometers, the same for all lanes.
     torque : Torques
@@ -64,6 +64,8 @@ class Packed(NamedTuple):
 
     def part(self, start: int, stop: int) -> Packed:
         """Return some of the lanes."""
+        if start == 0 and stop >= self.size:
+            return self
         some = slice(start, stop)
         torque = Torques(self.torque.rows, self.torque.first[some], self.torque.count[some])
         return self._replace(torque=torque, lanes=Lanes(*(

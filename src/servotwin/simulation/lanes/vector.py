@@ -96,9 +96,9 @@ class VectorSimulator:
         parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
         threads: int | None = None, seed: int = 0, accuracy: float = ACCURACY,
     ) -> None:
-        if LAWS.get(type(model), "motor") == "motor":
+        if LAWS.get(type(model), "voltage") == "voltage":
             raise InputError("model of a VectorSimulator", got=model,
-                             allowed=" or ".join(kind.__name__ for kind, law in LAWS.items() if law != "motor"))
+                             allowed=" or ".join(kind.__name__ for kind, law in LAWS.items() if law != "voltage"))
         count = _whole("lanes", lanes, 1)
         if count * _BYTES > 0.8 * memory_limit():
             raise InputError("lanes", got=count, allowed="what fits into memory: take fewer")
@@ -166,14 +166,18 @@ class VectorSimulator:
         if not (type(duration) is float or is_finite(duration)) or not 0.0 <= duration <= LONGEST:
             raise InputError("advance(duration)", got=duration,
                              allowed=f"a number of seconds, from 0 to {LONGEST:.0e} in one call")
-        self._numbers.check_recorded(lambda: self.time, float(duration))
-        self._store.fresh[0] = 0
+        store = self._store
+        if store.numbers.recorded:
+            store.numbers.check_recorded(self.time, float(duration))
+        store.fresh[0] = 0
         torque = self._torque_of(external_torque) if external_torque is not None else None
-        self._take_command(pulse_width, command_angle, command_voltage)
-        if torque is not None and not np.array_equal(torque, self._store.torque):
-            self._store.hang(torque)
+        command = store.numbers.translate.command(pulse_width, command_angle, command_voltage, None)
+        if command is not None:
+            store.command[:] = command
+        if torque is not None and not np.array_equal(torque, store.torque):
+            store.hang(torque)
         if duration > 0.0:
-            self._store.advance(float(duration))
+            store.advance(float(duration))
 
     def reset(self, *, pulse_width: ArrayLike | None = None, command_angle: ArrayLike | None = None,
               command_voltage: ArrayLike | None = None, output_angle: ArrayLike | None = None,
@@ -324,11 +328,6 @@ class VectorSimulator:
         return self._entry
 
     # --- arguments ----------------------------------------------------------------------------------------------------
-
-    def _take_command(self, pulse_width: Any, command_angle: Any, command_voltage: Any) -> None:
-        found = self._numbers.translate.command(pulse_width, command_angle, command_voltage, None)
-        if found is not None:
-            self._store.command[:] = found
 
     def _torque_switch(self, torque_enable: Any, which: NDArray[np.int64]) -> Array:
         if not self._numbers.digital:

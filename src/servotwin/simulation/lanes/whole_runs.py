@@ -41,7 +41,7 @@ def run(work: Work) -> Raw:
             run_one_by_one(work, lanes, kind.which, raw, kind.recipe)
         else:
             run_side_by_side(work, lanes, kind, raw)
-    if packed.law in ("digital", "motor"):
+    if packed.law in ("digital", "voltage"):
         return raw
     kernels(ENDING).look_at_lanes(packed.law == "pulse", lanes, *packed.inputs[1:], float(asked.duration), raw.final,
                                   raw.refused, raw.marks)
