@@ -40,7 +40,7 @@ LAWS: dict[type[Model], str] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Lanes:
+class LaneInputs:
     """What is simulated: what all lanes share once, what differs as arrays (B,).
 
     Parameters
@@ -92,7 +92,7 @@ class Lanes:
 
 
 def lanes_of(model: Model, command: object, load: object, parameters: object, initial: object,
-             seeds: object) -> Lanes:
+             seeds: object) -> LaneInputs:
     """Check the arguments of `simulate_many` that differ from lane to lane, and zip them.
 
     Raises
@@ -122,7 +122,7 @@ def lanes_of(model: Model, command: object, load: object, parameters: object, in
     servo = _servo_of_first(model.servo, {name: v for name, v in values.items() if name not in LOAD_NAMES})
     of_load = {name: value for name, value in values.items() if name in LOAD_NAMES}
     loads = _with_numbers(loads, load_of, of_load)
-    return Lanes(
+    return LaneInputs(
         model=model if servo is model.servo else type(model)(servo), count=count,
         numbers={name: column for name, column in columns.items() if column.dtype.kind == "f"},
         words={name: column for name, column in columns.items() if column.dtype.kind == "U"},
@@ -131,7 +131,7 @@ def lanes_of(model: Model, command: object, load: object, parameters: object, in
         seeds=np.arange(count) if seed is None else _spread(np.atleast_1d(seed), count))
 
 
-def framed(lanes: Lanes, until: float) -> Lanes:
+def framed(lanes: LaneInputs, until: float) -> LaneInputs:
     """Return lanes whose commands have their pulses one by one where they have silences, as far as `until` [s]."""
     if not any(signal.silences for signal in lanes.commands):
         return lanes

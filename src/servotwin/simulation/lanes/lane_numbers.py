@@ -14,7 +14,7 @@ from servotwin.errors import InputError, LoadError
 from servotwin.models.engine.memory import Memories
 from servotwin.models.engine.records import columns_of, fields_of
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
-from servotwin.models.engine.tiles import Lanes as Columns
+from servotwin.models.engine.tiles import Lanes
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import Firmware
@@ -23,7 +23,7 @@ from servotwin.models.terms.stops import Stops
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lanes.form_recipes import TICKS
-from servotwin.simulation.lanes.inputs import Lanes, lanes_of
+from servotwin.simulation.lanes.inputs import LaneInputs, lanes_of
 from servotwin.simulation.lanes.memories import nothing_yet
 from servotwin.simulation.lanes.packed import Packed, Torques
 from servotwin.simulation.lanes.packing import Chunk, Commands, flat, groups
@@ -64,7 +64,7 @@ class LaneNumbers:
         Those that lanes share.
     """
 
-    def __init__(self, inputs: Lanes, accuracy: float, supplies: Supplies, imposed: Imposed | None = None) -> None:
+    def __init__(self, inputs: LaneInputs, accuracy: float, supplies: Supplies, imposed: Imposed | None = None) -> None:
         self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
         self.accuracy, self.supplies = accuracy, supplies
         self.available = inputs.model.signals_with(*inputs.loads)
@@ -116,7 +116,7 @@ class LaneNumbers:
         index, none = np.arange(B), np.zeros(B, np.int64)
         numbers, chips, start, torque = (joined(*(getattr(own, name) for own in lanes))
                                          for name in ("numbers", "chips", "start", "torque"))
-        own = Columns(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), np.zeros((B, 7)), index,
+        own = Lanes(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), np.zeros((B, 7)), index,
                       none + 1, np.zeros(0), none, none - 1, self.accuracy,
                       joined(*(own.firmware for own in lanes)) if parts[0][1].law == "digital" else None)
         rows = np.concatenate([part.torque.rows for _, part in parts])

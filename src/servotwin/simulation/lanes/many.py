@@ -15,7 +15,7 @@ from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.engine.memory import ACCURACY
 from servotwin.simulation.lanes.batch import Batch, Failure
 from servotwin.simulation.lanes.forms import goes_together
-from servotwin.simulation.lanes.inputs import Lanes, framed, lanes_of
+from servotwin.simulation.lanes.inputs import LaneInputs, framed, lanes_of
 from servotwin.simulation.lanes.packed import Asked, Raw, Work
 from servotwin.simulation.lanes.packing import Chunk, Commands, groups
 from servotwin.simulation.lanes.whole_runs import run as run_lanes
@@ -125,7 +125,7 @@ def simulate_many(
 
 
 def simulate_lanes(
-    lanes: Lanes, *, duration: float, output_step: float | None = None, output_times: ArrayLike | None = None,
+    lanes: LaneInputs, *, duration: float, output_step: float | None = None, output_times: ArrayLike | None = None,
     outputs: Sequence[str] = ("output_angle",), dtype: DTypeLike = "float64", executor: Any = None,
     chunk: int | None = None, progress: Progress = False, accuracy: float = ACCURACY,
 ) -> Batch:
@@ -234,7 +234,7 @@ def real_type(dtype: DTypeLike) -> str:
     return name
 
 
-def _space(lanes: Lanes, asked: Asked) -> dict[str, NDArray[Any]]:
+def _space(lanes: LaneInputs, asked: Asked) -> dict[str, NDArray[Any]]:
     """Return the arrays of the outputs, if the machine has the memory."""
     shape = (lanes.count, len(asked.times))
     size = len(asked.outputs) * math.prod(shape) * np.dtype(asked.dtype).itemsize
@@ -258,7 +258,7 @@ class _Pack(NamedTuple):
     size: int
 
 
-def _packs(lanes: Lanes, commands: Commands, asked: Asked, chunk: int | None, workers: int) -> list[_Pack]:
+def _packs(lanes: LaneInputs, commands: Commands, asked: Asked, chunk: int | None, workers: int) -> list[_Pack]:
     """Check every lane, and return them in packs."""
     if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, int | np.integer) or chunk < 1):
         raise InputError("chunk", got=chunk, allowed="a whole number of lanes, at least 1")

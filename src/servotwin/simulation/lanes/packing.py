@@ -17,14 +17,14 @@ from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.models.engine.modes import Vector
 from servotwin.models.engine.records import mapped
-from servotwin.models.engine.tiles import Lanes as EngineLanes
+from servotwin.models.engine.tiles import Lanes
 from servotwin.models.outputs import FIELDS as FIELDS_OF
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
-from servotwin.simulation.lanes.inputs import LAWS, Lanes
+from servotwin.simulation.lanes.inputs import LAWS, LaneInputs
 from servotwin.simulation.lanes.load_columns import LOAD_NAMES, column_load, recorded_torque, structure
 from servotwin.simulation.lanes.packed import FIELDS, MORE_FIELDS, SMALL_FIELDS, Asked, Packed, Raw, Torques
 from servotwin.simulation.start import check_start, start_vector
@@ -43,7 +43,7 @@ _MOST_FRAMES = 1e8  # of a lane: they take half a minute, in which nothing stops
 class Commands:
     """The commands of all lanes as one array of pieces."""
 
-    def __init__(self, lanes: Lanes) -> None:
+    def __init__(self, lanes: LaneInputs) -> None:
         signals, self.of = lanes.commands, lanes.command_of
         heads = lanes.headers
         self.kinds, self.initial, self.periods = heads["kind"], heads["initial"], heads["frame_period"]
@@ -87,7 +87,7 @@ class Commands:
         return LaneSignal(KIND_NAMES[self.kinds[of[0]]], pieces, period, edges, lanes)
 
 
-def groups(lanes: Lanes, commands: Commands) -> Iterator[Indices]:
+def groups(lanes: LaneInputs, commands: Commands) -> Iterator[Indices]:
     """Return the lanes in groups of one structure: one kind of command and frame, same words, loads of same parts."""
     of_command = commands.shape.tolist() if np.ptp(commands.shape) else [0]
     of_load = [structure(load) for load in lanes.loads]
@@ -110,7 +110,7 @@ def groups(lanes: Lanes, commands: Commands) -> Iterator[Indices]:
 class Chunk:
     """Some lanes of one structure, with columns (n, 1) where they differ."""
 
-    lanes: Lanes
+    lanes: LaneInputs
     commands: Commands
     which: Indices
 
@@ -242,7 +242,7 @@ class Chunk:
             at, size, recorded = recorded_torque(*self._of_loads).tables()
             has = np.array([bool(load.recorded) for load in self._of_loads[0]])[self._of_loads[1]]
             torque = Torques(recorded, at, np.where(has, size, 0))
-        lanes = EngineLanes(
+        lanes = Lanes(
             mapped(flat, numbers), mapped(flat, chip or NO_CHIP), self.start, flat(self.load.torque),
             self.lanes.seeds[self.which], rows, first, count, commands.edges, commands.edge_first[of],
             commands.edge_count[of], accuracy, self.firmware and mapped(flat, self.firmware))
