@@ -1,9 +1,12 @@
 """Random pulse servos as work for the lanes: every lane another servo, load and command."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
+from servotwin.models.engine.memory import ACCURACY
+from servotwin.models.engine.tiles import Lanes
 from servotwin.models.terms.bridge import Bridge, Off
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.friction import NO_FRICTION
@@ -13,7 +16,7 @@ from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import Sensor
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
-from servotwin.simulation.lanes import Tables, Work, no_tables, regular_edges
+from servotwin.simulation.lanes.packed import Asked, Packed, Torques, Work
 
 STEPS = 4  # of each command
 
@@ -45,9 +48,17 @@ def case(lanes, *, duration, times, fields=("angle",), dtype="float64", seed=0, 
     rows[:, 1:, 0] = np.sort(rng.uniform(0.0, duration, (lanes, STEPS - 1)), axis=1)
     rows[:, :, 1] = rng.uniform(0.7e-3, 2.3e-3, (lanes, STEPS))
     first = np.arange(lanes) * STEPS
-    return Work("pulse", numbers, chip, Tables(first, np.full(lanes, STEPS), rows.reshape(-1, 7)),
-                no_tables(lanes), between(-0.3, 0.4), regular_edges(lanes), start_at(between(0.3, 1.5)),
-                np.arange(lanes) - 3, duration, np.asarray(times, float), tuple(fields), dtype)
+    torque, start = between(-0.3, 0.4), start_at(between(0.3, 1.5))
+    none = np.zeros(lanes, np.int64)
+    own = Lanes(numbers, chip, start, torque, np.arange(lanes) - 3, rows.reshape(-1, 7), first,
+                np.full(lanes, STEPS), np.zeros(0), none, none - 1, ACCURACY, None)
+    packed = Packed("pulse", own, np.zeros((0, 2)), Torques(np.zeros((0, 7)), none, none))
+    return Work(packed, Asked(duration, np.asarray(times, float), (), dtype, ACCURACY), tuple(fields))
+
+
+def with_lanes(work, **changes):
+    """Return work whose lanes have others in some of their arrays."""
+    return replace(work, packed=work.packed._replace(lanes=work.packed.lanes._replace(**changes)))
 
 
 def replaced(numbers, changes):

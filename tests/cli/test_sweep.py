@@ -123,7 +123,6 @@ def test_truncation(sweep):
     ([*VARY, "--metric", "overshot"], "did you mean 'overshoot'?"),
     ([*VARY, "--output-step", "nan"], "output_step: got nan"),
     ([*VARY, "--duration", "-1"], "--duration: got -1"),
-    ([*VARY, "--model", "averaged"], "model of simulate_many: got AveragedServo"),
     ([*VARY, "--resume"], "--resume needs --out FOLDER"),
     ([*VARY, "--plot"], "--plot needs --out FOLDER"),
     ([*VARY, "--out", "file"], "file is no folder"),

@@ -25,7 +25,6 @@ import numpy as np
 import servotwin as st
 from servotwin.models import MODELS
 from servotwin.models.outputs import SIGNALS as ALL_SIGNALS
-from servotwin.simulation.lane_inputs import LAWS
 
 FILE = Path(__file__).with_name("frozen_results.npz")
 LATER = ("duty", "goal_angle", "reference_angle", "trip", "load_angle")  # than the results were frozen
@@ -37,6 +36,7 @@ TRAVEL = (0.2, 1.9)  # rad, of commands
 SMALL = 1.0 / 280.0  # what a load is scaled by to hang on a motor without a gear
 
 _ONE_LAW = ("K_l", "K_ls")
+BATCHED = (st.PulseServo, st.PulseServoInductive, st.BoundedServo, st.DigitalServo)
 _TWO_LAWS = ("K_m", "K_e", "K_ms", "K_es", "K_mq", "K_eq")
 _HEAT = {"thermal.winding_capacity": 0.6, "thermal.housing_capacity": 6.0, "thermal.winding_to_housing": 10.0,
          "thermal.housing_to_ambient": 20.0}
@@ -381,8 +381,8 @@ def run_bus(bus, times):
 
 
 def is_batched(number):
-    """Tell whether `simulate_many` takes the model of a case."""
-    return MODELS[plan()[number][0]] in LAWS
+    """Tell whether the lanes of a case are frozen too."""
+    return MODELS[plan()[number][0]] in BATCHED
 
 
 def run_lanes(one, times, dtype="float64", parameters=None):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from lane_cases import case, replaced
+from lane_cases import case, replaced, with_lanes
 from servotwin.models.engine import arcs, contacts, side_by_side, tiles
 from servotwin.models.engine.records import room
 from servotwin.models.terms.bridge import NO_BRIDGE, Off
@@ -17,9 +17,9 @@ from servotwin.models.terms.motor import Motor
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
-from servotwin.simulation import lane_runs
-from servotwin.simulation.lane_runs import run as run_lanes
-from servotwin.simulation.lanes import FIELDS, Tables, empty_raw
+from servotwin.simulation.lanes import whole_runs
+from servotwin.simulation.lanes.packed import FIELDS, empty_raw
+from servotwin.simulation.lanes.whole_runs import run as run_lanes
 
 NUMBERS = Numbers(
     motor=Motor(1.03, 1.0, 3.0, 0.0), shaft=Shaft(6e-3, 1e-3, 0.0, 0.0), source=Source(6.0, 0.0, math.inf),
@@ -129,7 +129,7 @@ GIVING_UP = ("stops", "everything", "all bands", "backlash, two decisions wait")
 
 def one_by_one(work):
     raw = empty_raw(work)
-    lane_runs.run_one_by_one(work, lane_runs.lanes_of(work), np.arange(work.lanes), raw)
+    whole_runs.run_one_by_one(work, work.packed.columns(), np.arange(work.packed.size), raw)
     return raw
 
 
@@ -152,15 +152,14 @@ def assert_same(raw, other, tolerance):
 
 def plain(work):
     raw = empty_raw(work)
-    lanes = lane_runs.lanes_of(work)
-    (kind,) = lane_runs.kinds_of(work.numbers, work.chip, work.lanes, "float64", lane_runs.swept(lanes),
-                                   work.torque.count > 0, False)
+    lanes, times = work.packed.columns(), work.asked.times
+    (kind,) = whole_runs.kinds_of(work.packed, "float64")
     with np.errstate(all="ignore"):
         rows = room(1, tiles.tile_type("float64", kind.form))
-        side_by_side.start(lanes, kind.form, work.times[0], rows)
+        side_by_side.start(lanes, kind.form, times[0], rows)
         lost = side_by_side.go_on(
-            lanes.pieces, lanes.edges, kind.form, kind.slack, kind.which, work.duration,
-            work.times, lane_runs.outputs_of(work, raw, "float64"), rows, tiles.plan_room("float64", kind.form))
+            lanes.pieces, lanes.edges, kind.form, kind.slack, kind.which, work.asked.duration,
+            times, whole_runs.outputs_of(work, raw, "float64"), rows, tiles.plan_room("float64", kind.form))
     assert lost == 0
     return raw
 
@@ -176,8 +175,9 @@ def test_edges_of_the_command():
     """Late, jittered, missing, and none at all."""
     edges = [[0.0, 0.021, 0.0385, 0.1, 0.12], [0.03, 0.05], [], [0.0]]
     first = np.cumsum([0, *map(len, edges[:-1])])
-    own = Tables(first, np.array([len(e) for e in edges]), np.concatenate([np.asarray(e, float) for e in edges]))
-    work = replace(case(4, duration=0.3, times=np.linspace(0.0, 0.3, 61), fields=FIELDS), edges=own)
+    work = with_lanes(case(4, duration=0.3, times=np.linspace(0.0, 0.3, 61), fields=FIELDS), edge_first=first,
+                      edge_count=np.array([len(e) for e in edges]),
+                      edges=np.concatenate([np.asarray(e, float) for e in edges]))
     assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
@@ -185,7 +185,7 @@ def test_commands_that_are_not_constant():
     work = case(3, duration=0.5, times=np.linspace(0.0, 0.5, 11), fields=FIELDS)
     rows = np.array([[0.0, 1.2e-3, 1e-3, 0, 0, 0, 0], [0.2, 1.4e-3, 0, 3e-4, 9.0, 0.5, 0],
                      [0.0, 1.5e-3, 0, 2e-4, 5.0, 0, 40.0]])
-    work = replace(work, command=Tables(np.array([0, 1, 2]), np.array([2, 1, 1]), rows))
+    work = with_lanes(work, piece_first=np.array([0, 1, 2]), piece_count=np.array([2, 1, 1]), pieces=rows)
     assert_same(run_lanes(work), one_by_one(work), 1e-11)
 
 
@@ -201,7 +201,7 @@ def test_lanes_know_nothing_of_each_other(name):
 
 def test_float32_follows_float64():
     work = case(100, duration=0.5, times=np.array([0.5]), fields=FIELDS)
-    exact, single = run_lanes(work), run_lanes(replace(work, dtype="float32"))
+    exact, single = run_lanes(work), run_lanes(replace(work, asked=replace(work.asked, dtype="float32")))
     assert single.fields["angle"].dtype == np.float32
     assert np.median(np.abs(single.fields["angle"] - exact.fields["angle"])) < 2e-6
 
@@ -216,9 +216,9 @@ def test_lanes_that_need_the_general_way_are_mixed_with_others():
 
 def test_numbers_beyond_all_bounds_end_with_a_status():
     work = case(3, duration=0.2, times=np.array([0.0, 0.2]), fields=FIELDS)
-    start = work.start.copy()
+    start = work.packed.lanes.start.copy()
     start[1, 1] = math.nan
-    broken = replace(work, start=start)
+    broken = with_lanes(work, start=start)
     raw = run_lanes(broken)
     assert raw.status.tolist()[::2] == [0, 0]
     assert raw.status[1] != 0
@@ -228,9 +228,9 @@ def test_numbers_beyond_all_bounds_end_with_a_status():
 
 def test_a_current_at_the_start_flows_on():
     work = case(20, duration=0.05, times=np.array([0.0, 2e-4, 0.05]), fields=FIELDS, changes=COIL)
-    start = work.start.copy()
+    start = work.packed.lanes.start.copy()
     start[1], start[2] = np.linspace(-2.0, 2.0, 20), np.linspace(1.5, -1.5, 20)
-    raw = run_lanes(replace(work, start=start))
-    assert_same(raw, one_by_one(replace(work, start=start)), 1e-11)
+    raw = run_lanes(with_lanes(work, start=start))
+    assert_same(raw, one_by_one(with_lanes(work, start=start)), 1e-11)
     np.testing.assert_array_equal(raw.fields["current"][:, 0], start[2])
     assert np.abs(raw.fields["angle"] - run_lanes(work).fields["angle"])[:, -1].min() > 1e-6

@@ -102,6 +102,16 @@ def in_a_lane(frozen, n):
             yield f"{name}: output_angle of float32 moved by {off:.1e} rad, allowed {SINGLE:.1e}"
 
 
+def in_a_lane_as_alone(frozen, n):
+    """Return a line for all that differs of a case whose model's lanes are not frozen: in a lane from one by one."""
+    draw, time = frozen["draw"][n], frozen["time"][n]
+    now, status = run_lanes(case_of(n, draw), time)
+    name = f"lane of {described(n, draw)}"
+    if status[0] != frozen["status"][n]:
+        yield f"{name}: status {status[0]}, was {frozen['status'][n]}"
+    yield from compared(name, time, frozen["signals"][n], now[0], frozen["allowed"][n])
+
+
 def on_a_bus(frozen, n):
     """Return a line for all that differs of a bus."""
     draw, time = frozen["bus_draw"][n], frozen["bus_time"][n]
@@ -127,6 +137,11 @@ def test_one_by_one(frozen, k):
 @pytest.mark.parametrize("k", range(GROUPS))
 def test_in_lanes(frozen, k):
     fail_of(in_a_lane(frozen, n) for n in group(k) if is_batched(n))
+
+
+@pytest.mark.parametrize("k", range(GROUPS))
+def test_motors_and_averaged_servos_in_lanes(frozen, k):
+    fail_of(in_a_lane_as_alone(frozen, n) for n in group(k) if not is_batched(n))
 
 
 @pytest.mark.parametrize("k", range(4))

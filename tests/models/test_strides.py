@@ -24,7 +24,7 @@ from servotwin.models.terms.motor import Motor
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.source import Source
-from servotwin.simulation import lane_runs
+from servotwin.simulation.lanes import forms
 
 REFERENCE = 298.15  # K, at which resistance and magnets are given
 PLAIN = Numbers(
@@ -292,7 +292,7 @@ def alone(name):
 def test_fleets_go_by_strides(name):
     model, _, loads, _, _ = fleet(name)
     numbers, nobody = model.pack(loads[0]), np.zeros(3, np.bool_)
-    (kind,) = lane_runs.kinds_of(numbers, model.chip(), 3, "float32", nobody, nobody, False)
+    (kind,) = forms.kinds_with(numbers, model.chip(), 3, "float32", nobody, nobody, False)
     assert (kind.form, kind.dtype, kind.banded) == (tiles.STRIDES, "float64", FLEETS[name][2])
 
 

@@ -128,12 +128,12 @@ def on_a_bus(st, model, command, load, how):
 
 def without_compiler():
     """Let batches run the derived text as it is, in the forms that compiled ones take."""
-    from servotwin.simulation import lane_runs, vector_going, vector_store
     from servotwin.simulation.compile import calls
     from servotwin.simulation.compile.plain import plain_module
+    from servotwin.simulation.lanes import lane_sets, memories, whole_runs
 
     kernels = cache(plain_module)
-    for module in (lane_runs, vector_going, vector_store, calls):
+    for module in (whole_runs, lane_sets, memories, calls):
         module.kernels = kernels
     calls.is_plain = lambda: True
 
@@ -187,10 +187,10 @@ if __name__ == "__main__":
 
     out, how, *wanted = sys.argv[1:]
     if how == "derived":
-        from servotwin.simulation import lane_kinds
+        from servotwin.simulation.lanes import forms
 
         without_compiler()
-        lane_kinds.unread = lambda recipe, of=(): ()  # laws change here, no numbers
+        forms.unread = lambda recipe, of=(): ()  # laws change here, no numbers
     found, laws = {}, {}
     if how == "laws":
         found = laws_compiled(wanted)

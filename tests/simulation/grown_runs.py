@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import servotwin as st
-from servotwin.simulation import lane_runs
+from servotwin.simulation.lanes import whole_runs
 
 HELPERS = str(Path(__file__).parents[1] / "physics")  # in the path of the script alone, not of who collects tests
 
@@ -39,8 +39,8 @@ def main(cases):
     import one_law_runs
 
     one_law_runs.without_compiler()
-    used, kernels = [], lane_runs.kernels
-    lane_runs.kernels = lambda recipe: (used.append(recipe.name), kernels(recipe))[1]
+    used, kernels = [], whole_runs.kernels
+    whole_runs.kernels = lambda recipe: (used.append(recipe.name), kernels(recipe))[1]
     sys.stdout.write(json.dumps({"package": st.__file__, "cases": [compared(*case, used) for case in cases]}))
 
 

@@ -14,8 +14,8 @@ from servotwin.models.engine.records import mapped
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.firmware import NO_FIRMWARE
 from servotwin.physics.pieces import Piece
-from servotwin.simulation import lane_kinds
-from servotwin.simulation.lane_groups import by_groups
+from servotwin.simulation.lanes import forms
+from servotwin.simulation.lanes.divided import by_groups
 
 NOBODY = np.zeros(1, np.bool_)
 PULSED = (st.PulseServo, st.PulseServoInductive)
@@ -86,7 +86,7 @@ OF_CATALOG = {
 def form_of(model, load=NO_LOAD, dtype="float64", told=False, bent=False):
     """Return the name of the kernels that a servo takes as a lane."""
     pulsed = isinstance(model, PULSED)
-    (kind,) = lane_kinds.kinds_of(
+    (kind,) = forms.kinds_with(
         model.pack(load), model.chip() if pulsed else NO_CHIP, 1, dtype, NOBODY, NOBODY | told, bent,
         model.firmware() or NO_FIRMWARE)
     return kind.recipe.name

@@ -16,7 +16,7 @@ from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.compilers import compilers
 from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.translate import header
-from servotwin.simulation.lane_recipes import _BY_ARCS, ALL_RUNS, BY_LEGS, PLAIN_RUNS, parts_of
+from servotwin.simulation.lanes.form_recipes import _BY_ARCS, ALL_RUNS, BY_LEGS, PLAIN_RUNS, parts_of
 
 SLIDE = Recipe("slide", ("servotwin.models.engine.arcs:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,

@@ -7,8 +7,8 @@ from scipy.linalg import expm
 import servotwin as st
 from leg_draws import drawn, goals, spread
 from servotwin.models.terms.chip import NO_CHIP
-from servotwin.simulation import lane_kinds
-from servotwin.simulation.lane_recipes import BY_SERIES
+from servotwin.simulation.lanes import forms
+from servotwin.simulation.lanes.form_recipes import BY_SERIES
 
 SERVOS, STEPS, EVERY = 3, 12, 0.02  # on a bus; new goals every so many seconds
 ELSEWHERE = ("elastic gear", "spring", "silence")  # by the general engine; a goal that is written over and over
@@ -109,7 +109,7 @@ def test_warm_lanes_and_lanes_with_a_limit_go_by_series():
     for more in (WARM, {"supply.current_limit": 2.0}):
         model = st.DigitalServo(st.load_servo("feetech-sts3215-12v").replace(more))
         load, nobody = st.loads.Inertia(1e-3) + st.loads.Constant(0.1), np.zeros(1, np.bool_)
-        (kind,) = lane_kinds.kinds_of(model.pack(load), NO_CHIP, 1, "float64", nobody, nobody, False, model.firmware())
+        (kind,) = forms.kinds_with(model.pack(load), NO_CHIP, 1, "float64", nobody, nobody, False, model.firmware())
         assert kind.recipe == BY_SERIES
 
 

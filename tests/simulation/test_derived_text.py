@@ -4,12 +4,13 @@ import ast
 
 import pytest
 
-from servotwin.simulation import bus_run, lane_recipes, vector_calls
+from servotwin.simulation import bus_run
 from servotwin.simulation.compile.derive import derive
+from servotwin.simulation.lanes import form_recipes
 
-RECIPES = (bus_run.BUSES, lane_recipes.ALL_RUNS,
-           lane_recipes.PLAIN_RUNS, lane_recipes.ALL_DIGITAL, lane_recipes.LOOK, lane_recipes.BY_TICKS,
-           vector_calls.TICKS)
+RECIPES = (bus_run.BUSES, form_recipes.ALL_RUNS,
+           form_recipes.PLAIN_RUNS, form_recipes.ALL_DIGITAL, form_recipes.LOOK, form_recipes.BY_TICKS,
+           form_recipes.TICKS)
 
 
 @pytest.fixture(scope="module", params=RECIPES, ids=lambda recipe: recipe.name)

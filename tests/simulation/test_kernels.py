@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.simulation import lane_runs
+from servotwin.simulation.lanes import whole_runs
 
 STEP = st.signals.step(10.0, 50.0, at=0.02, unit="deg")
 LOOSE = {"gear.backlash": 0.005, "gear.output_inertia": 1e-3}
@@ -27,8 +27,8 @@ FORMS = {
 @pytest.mark.parametrize("name", FORMS)
 def test_each_compiled_form_moves_a_servo_as_it_should(servo, monkeypatch, name):
     changes, load, dtype, tolerance = FORMS[name]
-    used, kernels = [], lane_runs.kernels
-    monkeypatch.setattr(lane_runs, "kernels", lambda recipe: (used.append(recipe.name), kernels(recipe))[1])
+    used, kernels = [], whole_runs.kernels
+    monkeypatch.setattr(whole_runs, "kernels", lambda recipe: (used.append(recipe.name), kernels(recipe))[1])
     kind = st.PulseServoInductive if "motor.armature_inductance" in changes else st.PulseServo
     model = kind(servo.replace(changes))
     column = {"motor.armature_resistance": [2.8, 3.2, 3.6]}

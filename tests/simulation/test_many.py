@@ -12,11 +12,12 @@ import pytest
 import servotwin as st
 from absent_values import ABSENT, HEAT, TABLES
 from servotwin import loads, signals
-from servotwin.simulation import files, many
-from servotwin.simulation.lane_inputs import lanes_of
-from servotwin.simulation.lane_loads import LOAD_NAMES, with_numbers
-from servotwin.simulation.lane_runs import run as run_lanes
-from servotwin.simulation.packing import Commands
+from servotwin.simulation import files
+from servotwin.simulation.lanes import many
+from servotwin.simulation.lanes.inputs import lanes_of
+from servotwin.simulation.lanes.load_columns import LOAD_NAMES, with_numbers
+from servotwin.simulation.lanes.packing import Commands
+from servotwin.simulation.lanes.whole_runs import run as run_lanes
 from servotwin.tables import read_columns
 
 SERVO = st.load_servo("hitec-hs-755hb")
@@ -409,7 +410,7 @@ def test_arrays_without_dimensions_are_what_they_hold():
 def test_long_runs_go_in_small_chunks(monkeypatch):
     lanes = []
     monkeypatch.setattr(many, "_CHUNK_FRAMES", 20.0)  # an interrupt waits for what runs
-    monkeypatch.setattr(many, "run_lanes", lambda work: (lanes.append(work.lanes), run_lanes(work))[1])
+    monkeypatch.setattr(many, "run_lanes", lambda work: (lanes.append(work.packed.size), run_lanes(work))[1])
     st.simulate_many(st.PulseServo(SERVO), STEP, duration=0.2, parameters={"load.inertia": np.zeros(5)},
                      output_times=[0.2])
     assert sorted(lanes) == [1, 2, 2]

@@ -16,7 +16,7 @@ from servotwin.errors import (
     ParameterError,
     UnknownNameError,
 )
-from servotwin.simulation import many
+from servotwin.simulation.lanes import many
 
 SERVO = st.load_servo("hitec-hs-755hb")
 STEP = signals.step(10.0, 50.0, at=0.05, unit="deg")
@@ -173,10 +173,9 @@ def test_a_grid_has_each_name_once():
         st.grid({"a": [1.0]}, a=[2.0])
 
 
-def test_models_without_a_way_to_run_many():
-    for model in (st.AveragedServo(SERVO), 3):
-        with pytest.raises(InputError, match="PulseServo or PulseServoInductive or BoundedServo"):
-            st.simulate_many(model, STEP, duration=0.1)
+def test_what_is_no_model_is_refused():
+    with pytest.raises(InputError, match="BoundedServo or PulseServo or PulseServoInductive"):
+        st.simulate_many(3, STEP, duration=0.1)
 
 
 def test_a_run_of_too_many_ticks_is_said_in_ticks():

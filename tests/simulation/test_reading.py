@@ -6,7 +6,7 @@ import pytest
 
 from servotwin.models.terms.rooms import ACTS
 from servotwin.simulation.compile import reading, unread
-from servotwin.simulation.lane_recipes import ALL_RUNS, side_by_side
+from servotwin.simulation.lanes.form_recipes import ALL_RUNS, side_by_side
 
 SILENT = ("shaft.b_out", "stops.restitution")
 BY_GAPS = side_by_side(5, "float64", False, False)

@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 
-from servotwin.simulation.lane_recipes import parts_of
+from servotwin.simulation.lanes.form_recipes import parts_of
 from servotwin.simulation.recipes import all_recipes
 
 # Imports every module of the package; what cannot be imported here has no recipe that anybody could reach

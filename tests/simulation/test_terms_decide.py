@@ -22,17 +22,17 @@ PACKAGE = Path(st.__file__).parent
 FLAGS = {name: flag for name, flag in vars(dependence).items() if name.isupper()}
 # Words that mean something else where they stand
 OTHERS = {
-    ("simulation/c_entry.py", "shaft"): "a word of the C struct: where the shaft is",
+    ("simulation/lanes/c_entry.py", "shaft"): "a word of the C struct: where the shaft is",
     ("simulation/compile/layout.py", "shaft"): "the same",
     ("simulation/compile/tick.py", "shaft"): "the same",
     ("simulation/compile/joints_layout.py", "load"): "a number of a joint",
-    ("simulation/lane_inputs.py", "load"): "an argument of simulate_many",
-    ("simulation/vector_numbers.py", "load"): "the same",
-    ("simulation/lanes.py", "motor"): "what is recorded of the motor's contact",
-    ("simulation/lane_runs.py", "firmware"): "a field of what all lanes share",
+    ("simulation/lanes/inputs.py", "load"): "an argument of simulate_many",
+    ("simulation/lanes/lane_numbers.py", "load"): "the same",
+    ("simulation/lanes/packed.py", "motor"): "what is recorded of the motor's contact",
+    ("simulation/lanes/packed.py", "firmware"): "a field of what all lanes share",
     ("simulation/remarks.py", "heat"): "what a servo trips by, as people read it",
     ("simulation/vector_buses.py", "source"): "a field of what servos on a bus share",
-    ("simulation/vector_store.py", "chip"): "a field of a memory",
+    ("simulation/lanes/store.py", "chip"): "a field of a memory",
     ("models/engine/loop_tiles.py", "sensor"): "a field of a tile",
     ("models/engine/tiles.py", "chip"): "a field of a tile",
 }

@@ -486,9 +486,24 @@ def test_a_recorded_load_that_ends_is_said_before_it_does(servo):
     assert sims.time.tolist() == pytest.approx([0.05, 0.05])
 
 
-def test_models_without_lanes_are_refused(servo):
-    with pytest.raises(InputError, match="PulseServo"):
-        st.VectorSimulator(st.AveragedServoInductive(servo), 2)
+def test_motors_and_what_is_no_model_are_refused(servo):
+    for model in (st.DCMotor(servo.replace({"motor.armature_inductance": 5e-4})), 3):
+        with pytest.raises(InputError, match="AveragedServo or AveragedServoInductive or BoundedServo or PulseServo"):
+            st.VectorSimulator(model, 2)
+
+
+@pytest.mark.parametrize("kind", [st.AveragedServo, st.AveragedServoInductive])
+def test_averaged_servos_are_many_simulators_too(servo, kind):
+    model = kind(servo.replace({"motor.armature_inductance": 5e-4}))
+    sims, sim, command = st.VectorSimulator(model, 2), st.Simulator(model), st.signals.constant(1.2, unit="rad")
+    sims.reset(command_angle=0.4)
+    state = sim.initial(st.signals.constant(0.4, unit="rad"))
+    for k in range(1, 101):
+        sims.advance(1e-3, command_angle=1.2)
+        state = sim.advance(state, k * 1e-3, command)
+    for name in ("output_angle", "output_speed", "armature_current"):
+        np.testing.assert_allclose(sims[name], sim.observe(state, name, command), rtol=1e-9, atol=1e-9)
+    assert sims["output_angle"][0] > 0.6
 
 
 def test_bounded_servos_refuse_pulses_that_the_chip_does(servo):

@@ -16,8 +16,7 @@ from servotwin.linear.response import FrequencyResponse
 from servotwin.linear.transfer_function import check_model
 from servotwin.loads import as_load
 from servotwin.models import PulseServo, PulseServoInductive, mid_travel
-from servotwin.simulation import simulate, simulate_many
-from servotwin.simulation.lane_inputs import LAWS
+from servotwin.simulation import simulate_many
 from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:
@@ -184,12 +183,9 @@ def _run(task: _Task, omega: float, sizes: Array, first: int, window: _Window) -
     commands = [signals.sine(mean=task.mean, amplitude=size, frequency=omega / (2.0 * math.pi),
                              unit=INPUT_UNITS[task.input]) for size in sizes.tolist()]
     times, end, seeds = window.times, window.start + window.length, task.seed + first + np.arange(len(sizes))
-    if type(task.model) in LAWS:
-        batch = simulate_many(task.model, commands, duration=end, load=task.load, output_times=times,
-                              outputs=(task.output,), seeds=seeds, chunk=math.ceil(len(sizes) / _CHUNKS))
-        return batch[task.output].astype(np.float64)
-    return np.array([simulate(task.model, command, duration=end, load=task.load, output_times=times,
-                              seed=seed)[task.output] for command, seed in zip(commands, seeds.tolist(), strict=True)])
+    batch = simulate_many(task.model, commands, duration=end, load=task.load, output_times=times,
+                          outputs=(task.output,), seeds=seeds, chunk=math.ceil(len(sizes) / _CHUNKS))
+    return batch[task.output].astype(np.float64)
 
 
 def _fundamental(values: Array, turning: Complex, periods: int) -> Complex:

@@ -17,8 +17,8 @@ from servotwin.parameters.groups import Supply
 from servotwin.robots.mount import Joint
 from servotwin.robots.told import told
 from servotwin.simulation import VectorSimulator
-from servotwin.simulation.c_entry import CEntry
 from servotwin.simulation.compile.joints_layout import BOOKS, GROUP, INSTANCE, RECORD, ROOM
+from servotwin.simulation.lanes.c_entry import CEntry
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

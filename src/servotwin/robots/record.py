@@ -19,9 +19,9 @@ from servotwin.robots.solver import SolverNote
 from servotwin.robots.told import Told, told
 from servotwin.simulation import files
 from servotwin.simulation.compile.joints_layout import KEPT, ROW
+from servotwin.simulation.lanes.vector import AT_MOTOR
 from servotwin.simulation.remarks import NOT_AT_REST, TRIPS, Remark
 from servotwin.simulation.rest import LEAST_REST, look_period, looks_at, swing_of
-from servotwin.simulation.vector import AT_MOTOR
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -12,15 +12,16 @@ from servotwin.simulation.simulator import Simulator, simulate
 from servotwin.simulation.status import Status
 
 if TYPE_CHECKING:
-    from servotwin.simulation.batch import Batch, Failure
     from servotwin.simulation.bus import Fleet, simulate_bus
-    from servotwin.simulation.c_entry import CEntry, CTick
-    from servotwin.simulation.many import grid, simulate_many
-    from servotwin.simulation.vector import VectorSimulator
-    from servotwin.simulation.vector_memory import VectorMemory
+    from servotwin.simulation.lanes.batch import Batch, Failure
+    from servotwin.simulation.lanes.c_entry import CEntry, CTick
+    from servotwin.simulation.lanes.many import grid, simulate_many
+    from servotwin.simulation.lanes.saved import VectorMemory
+    from servotwin.simulation.lanes.vector import VectorSimulator
 
-_LAZY = {"Batch": "batch", "CEntry": "c_entry", "CTick": "c_entry", "Failure": "batch", "Fleet": "bus", "grid": "many",
-         "simulate_bus": "bus", "simulate_many": "many", "VectorMemory": "vector_memory", "VectorSimulator": "vector"}
+_LAZY = {"Batch": "lanes.batch", "CEntry": "lanes.c_entry", "CTick": "lanes.c_entry", "Failure": "lanes.batch",
+         "Fleet": "bus", "grid": "lanes.many", "simulate_bus": "bus", "simulate_many": "lanes.many",
+         "VectorMemory": "lanes.saved", "VectorSimulator": "lanes.vector"}
 
 __all__ = ["Batch", "CEntry", "CTick", "Energy", "Event", "Failure", "Fleet", "Rest", "Result", "Simulator", "State",
            "Stats", "Status", "StepMetrics", "VectorMemory", "VectorSimulator", "grid", "simulate", "simulate_bus",

@@ -30,9 +30,9 @@ from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece
 from servotwin.simulation.compile import Recipe, is_compiled, is_plain, kernels
 from servotwin.simulation.engine import Plan, State
-from servotwin.simulation.lane_memory import nothing_yet
-from servotwin.simulation.lane_recipes import PLAIN_RUNS
-from servotwin.simulation.lane_runs import programs_of
+from servotwin.simulation.lanes.form_recipes import PLAIN_RUNS
+from servotwin.simulation.lanes.memories import nothing_yet
+from servotwin.simulation.lanes.packed import programs_of
 
 Array = NDArray[np.float64]
 

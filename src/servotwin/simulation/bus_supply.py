@@ -16,10 +16,10 @@ from servotwin.models import DigitalServo, Model, PulseServo, PulseServoInductiv
 from servotwin.models.terms.elastic import Elastic, behind, present
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
-from servotwin.simulation.lane_inputs import pick
+from servotwin.simulation.lanes.inputs import pick
 
 if TYPE_CHECKING:
-    from servotwin.simulation.lane_inputs import Lanes
+    from servotwin.simulation.lanes.inputs import LaneInputs
 
 Indices = NDArray[np.int64]
 OF_BUS = ("supply.open_circuit_voltage", "supply.internal_resistance", "supply.current_limit")
@@ -83,13 +83,13 @@ class Supplies:
             found[lanes] = k
         return found
 
-    def parts(self, inputs: Lanes, which: Indices) -> Iterator[tuple[Lanes, Indices]]:
+    def parts(self, inputs: LaneInputs, which: Indices) -> Iterator[tuple[LaneInputs, Indices]]:
         """Return lanes by the supply that they have, with their inputs."""
         bus_of = self.bus_of[which]
         for k in np.unique(bus_of).tolist():
             yield (inputs if k < 0 else self._fed(inputs, k)), which[bus_of == k]
 
-    def _fed(self, inputs: Lanes, k: int) -> Lanes:
+    def _fed(self, inputs: LaneInputs, k: int) -> LaneInputs:
         own = {name: column for name, column in inputs.numbers.items() if name not in OF_BUS}
         return replace(inputs, model=on_supply(inputs.model, self.supplies[k]), numbers=own)
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from functools import cache
 
-from servotwin.simulation import bus_run, lane_recipes, vector_calls
+from servotwin.simulation import bus_run
 from servotwin.simulation.compile import Recipe, calls
+from servotwin.simulation.lanes import form_recipes
 
 
 @cache
 def all_recipes() -> tuple[Recipe, ...]:
     """Return every recipe that anything in the package asks kernels of, sorted by name."""
     found: dict[str, Recipe] = {}
-    for module in (lane_recipes, bus_run, vector_calls, calls):
+    for module in (form_recipes, bus_run, calls):
         for value in vars(module).values():
             for each in value.values() if isinstance(value, dict) else (value,):
                 if isinstance(each, Recipe):

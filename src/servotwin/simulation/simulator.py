@@ -25,8 +25,8 @@ from servotwin.physics.pieces import Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import engine
 from servotwin.simulation.engine import Plan, Record, State, sign_of, told_by
-from servotwin.simulation.lane_inputs import check_name
-from servotwin.simulation.lane_loads import LOAD_NAMES, check_number, with_numbers
+from servotwin.simulation.lanes.inputs import check_name
+from servotwin.simulation.lanes.load_columns import LOAD_NAMES, check_number, with_numbers
 from servotwin.simulation.oddities import warn_of
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.result import Result

@@ -18,13 +18,14 @@ from servotwin.simulation.bus_run import BUSES, room_of, shared_of, units_of
 from servotwin.simulation.bus_supply import Supplies, source_of
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.compile.calls import Call, Now, call_of
-from servotwin.simulation.lane_memory import nothing_yet, put_back, taken
-from servotwin.simulation.vector_calls import NO_TAPE, TICKS, calls_on_buses
-from servotwin.simulation.vector_memory import Piece, piece_of
+from servotwin.simulation.lanes.form_recipes import TICKS
+from servotwin.simulation.lanes.memories import nothing_yet, put_back, taken
+from servotwin.simulation.lanes.saved import Piece, piece_of
+from servotwin.simulation.lanes.tick_room import NO_TAPE, calls_on_buses
 
 if TYPE_CHECKING:
-    from servotwin.simulation.vector_numbers import LaneNumbers
-    from servotwin.simulation.vector_store import Store
+    from servotwin.simulation.lanes.lane_numbers import LaneNumbers
+    from servotwin.simulation.lanes.store import Store
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

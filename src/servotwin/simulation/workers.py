@@ -2,19 +2,54 @@
 
 from __future__ import annotations
 
+import math
 import os
+import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
+from functools import cache
 from typing import Any
 
 from servotwin.errors import InputError, ServotwinError
-from servotwin.simulation.many import own_threads, workers_of
 
 _MANY = 32  # workers of an executor that does not say
 _TRIES = 4  # of a piece whose worker is lost: more, and it is the piece that ends the worker
+
+
+def memory_limit() -> float:
+    """Return how much memory this process may use [bytes]; inf where that is not known."""
+    sizes = [math.inf]
+    try:
+        sizes.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, ValueError, OSError):  # not on Windows
+        pass
+    try:
+        with open("/sys/fs/cgroup/memory.max", encoding="ascii") as file:  # the limit of a container
+            sizes.append(float(file.read()))
+    except (OSError, ValueError):
+        pass
+    return min(sizes)
+
+
+def workers_of(executor: Any) -> int:
+    """Return how many jobs run at once: what the executor says, else the cores of this process."""
+    own = getattr(executor, "_max_workers", None)
+    if isinstance(own, int) and own > 0:
+        return own
+    if sys.version_info >= (3, 13):
+        return os.process_cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@cache
+def own_threads(process: int) -> ThreadPoolExecutor:
+    """Return the threads of this process, kept from call to call; a forked child has none of its parent's."""
+    return ThreadPoolExecutor(workers_of(None), thread_name_prefix="servotwin")
 
 
 class Here:

@@ -14,8 +14,8 @@ from servotwin.models import Model
 from servotwin.models.columns import LaneServo
 from servotwin.signals import Signal
 from servotwin.simulation.arrival import resolution
-from servotwin.simulation.lane_inputs import lanes_of
-from servotwin.simulation.many import simulate_lanes
+from servotwin.simulation.lanes.inputs import lanes_of
+from servotwin.simulation.lanes.many import simulate_lanes
 from servotwin.simulation.remarks import columns
 from servotwin.simulation.rest import look_period, still_since
 from servotwin.simulation.workers import HERE

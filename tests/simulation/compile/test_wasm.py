@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.simulation import lane_recipes, lane_runs
 from servotwin.simulation.compile import compilers
 from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.kinds import Array, Tuple, words_of
 from servotwin.simulation.compile.library import Function
+from servotwin.simulation.lanes import form_recipes, whole_runs
 
 HARNESS = Path(__file__).with_name("harness")
 TARGETS = ("wasm32-wasi", "x86_64-linux-musl")
@@ -52,7 +52,7 @@ def calls():
     """Return calls of `plain_runs` in a run of a few servos: name, what goes in, what comes out of this process."""
     found, call = [], Function.__call__
     names = {}
-    kernels = lane_runs.kernels(lane_recipes.PLAIN_RUNS)
+    kernels = whole_runs.kernels(form_recipes.PLAIN_RUNS)
     for name in ("start", "go_on"):
         for function in getattr(kernels, name).functions:
             names[function] = name
@@ -80,7 +80,7 @@ def calls():
 def programs(tmp_path_factory):
     """Return a program for each target and entry."""
     folder = tmp_path_factory.mktemp("programs")
-    (folder / "kernels.c").write_text(printed(lane_recipes.PLAIN_RUNS).text)
+    (folder / "kernels.c").write_text(printed(form_recipes.PLAIN_RUNS).text)
     found = {}
     for target in TARGETS:
         for name in ("start", "go_on"):

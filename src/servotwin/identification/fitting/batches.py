@@ -19,8 +19,8 @@ from servotwin.errors import InputError
 from servotwin.loads import Load
 from servotwin.models import Model
 from servotwin.signals import Signal
-from servotwin.simulation.lane_inputs import lanes_of
-from servotwin.simulation.many import simulate_lanes
+from servotwin.simulation.lanes.inputs import lanes_of
+from servotwin.simulation.lanes.many import simulate_lanes
 from servotwin.simulation.workers import HERE, Crew
 
 Array = NDArray[np.float64]

@@ -3,111 +3,54 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any
 
 from servotwin.models.engine.memory import BEAT, NOTHING, SAME, Memory, Point
 from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, RIGID, Mode, Vector
-from servotwin.models.engine.records import reader, writer
 from servotwin.models.terms.control import Programs
 from servotwin.models.terms.frame import Decision, Frame
 
 
-class Held(NamedTuple):
-    """What a servo remembers in a tile, by the names that it has there; times count from now [s]."""
+def remembered(tile: Any, j: int, firm: Programs) -> Memory:
+    """Return the memory of a servo that runs side by side, where times count from now [s].
 
-    q: float
-    w: float
-    drive: float
-    left: float
-    silence: float
-    error: float
-    due: float
-    sign: float
-    duration: float
-    decided: float
-    later_due: float
-    later_sign: float
-    later_duration: float
-    later_decided: float
-    wiper: float
-    i: float
-    T_w: float
-    T_h: float
-    q_m: float
-    w_m: float
-    mesh: float
-    step: float
-
-
-class Hour(NamedTuple):
-    """Where it is in time [s]."""
-
-    period: float
-    edge: float
-    since: float
-    length: float
-
-
-class Counted(NamedTuple):
-    """Which frame is next, and which draw of noise belonged to frame 0."""
-
-    number: int
-    first_draw: int
-
-
-class Side(NamedTuple):
-    """All of it."""
-
-    held: Held
-    hour: Hour
-    counted: Counted
-
-
-held_at = reader("held_at", Held)
-hour_at = reader("hour_at", Hour)
-counted_at = reader("counted_at", Counted)
-put_held = writer("put_held", Held)
-put_hour = writer("put_hour", Hour)
-put_counted = writer("put_counted", Counted)
-
-
-def remembered(side: Side, regular: bool, half_slack: float, firm: Programs) -> Memory:
-    """Return the memory of a servo that ran side by side.
-
-    `regular` is whether its frames come regularly; without slack the potentiometer goes with the shaft. `firm` is what
-    stands in the place of a program's memory.
+    Without slack the potentiometer goes with the shaft. `firm` is what stands in the place of a program's memory.
     """
-    held, hour, number = side.held, side.hour, side.counted.number
-    now = hour.since - hour.length if regular else hour.edge + hour.since
-    q, w = 1.0 * held.q, 1.0 * held.w  # float64, whatever tiles hold
-    pushed = ON_FORWARD if held.mesh == ON_FORWARD else ON_BACKWARD if held.mesh == ON_BACKWARD else RIGID
-    mesh = INSIDE if held.mesh == INSIDE else pushed
-    y = Vector(q, w, 1.0 * held.i, 1.0 * held.T_w, 1.0 * held.T_h, q if held.mesh == RIGID else 1.0 * held.q_m,
-         w if held.mesh == RIGID else 1.0 * held.w_m)
+    servo, clock, regular, number = tile.servo, tile.clock, tile.count.edges[j] < 0, tile.count.number[j]
+    now = clock.since[j] - clock.length[j] if regular else clock.edge[j] + clock.since[j]
+    q, w, drive, gear = 1.0 * servo.q[j], 1.0 * servo.w[j], 1.0 * servo.drive[j], servo.mesh[j]  # float64 as records
+    pushed = ON_FORWARD if gear == ON_FORWARD else ON_BACKWARD if gear == ON_BACKWARD else RIGID
+    mesh = INSIDE if gear == INSIDE else pushed
+    y = Vector(q, w, 1.0 * servo.i[j], 1.0 * servo.T_w[j], 1.0 * servo.T_h[j],
+               q if gear == RIGID else 1.0 * servo.q_m[j], w if gear == RIGID else 1.0 * servo.w_m[j])
     chip = Frame(
-        number, side.counted.first_draw + number, 1.0 * held.drive,
-        now + held.left if held.drive != 0.0 else math.inf, now + held.silence, 0, 1.0 * held.error,
-        Decision(now + held.due, 1.0 * held.sign, 1.0 * held.duration, 1.0 * held.decided),
-        Decision(now + held.later_due, 1.0 * held.later_sign, 1.0 * held.later_duration, 1.0 * held.later_decided))
-    wiper = 1.0 * held.wiper if half_slack > 0.0 else q
-    point = Point(now, y, Mode(0, 0, mesh, 0, 0), math.inf, y, 1.0 * held.step, wiper)
-    return Memory(number if regular else 0, hour.period if regular else BEAT, point, chip, NOTHING, math.inf, NOTHING,
-                  math.inf, firm)
+        number, tile.count.first_draw[j] + number, drive, now + servo.left[j] if drive != 0.0 else math.inf,
+        now + servo.silence[j], 0, 1.0 * servo.error[j],
+        Decision(now + servo.due[j], 1.0 * servo.sign[j], 1.0 * servo.duration[j], 1.0 * servo.decided[j]),
+        Decision(now + servo.later_due[j], 1.0 * servo.later_sign[j], 1.0 * servo.later_duration[j],
+                 1.0 * servo.later_decided[j]))
+    wiper = 1.0 * servo.wiper[j] if tile.hung.half_slack[j] > 0.0 else q
+    point = Point(now, y, Mode(0, 0, mesh, 0, 0), math.inf, y, 1.0 * servo.step[j], wiper)
+    return Memory(number if regular else 0, clock.period[j] if regular else BEAT, point, chip, NOTHING, math.inf,
+                  NOTHING, math.inf, firm)
 
 
-def side_of(memory: Memory, period: float) -> Side:
-    """Return what a servo remembers side by side, whose frames are regular, of a period [s], from now on."""
+def put_beside(memory: Memory, period: float, tile: Any, j: int) -> None:
+    """Put what a servo remembers beside others, whose frames are regular, of a period [s], from now on."""
     now, beat, chip, y = memory.point.time, memory.beat, memory.chip, memory.point.y
-    time = memory.frames * beat + now
-    same = beat == period
+    servo, clock, pending, later = tile.servo, tile.clock, chip.pending, chip.later
+    servo.q[j], servo.w[j], servo.i[j], servo.T_w[j], servo.T_h[j] = y.q, y.w, y.i, y.T_w, y.T_h
+    servo.q_m[j], servo.w_m[j], servo.mesh[j] = y.q_m, y.w_m, 1.0 * memory.point.mode.mesh
+    servo.wiper[j], servo.step[j] = memory.point.wiper, memory.point.step
+    servo.drive[j], servo.left[j] = chip.drive, chip.drive_end - now if chip.drive != 0.0 else 0.0
+    servo.silence[j], servo.error[j] = chip.clock - now, chip.error
+    servo.due[j], servo.sign[j] = pending.time - now, pending.sign
+    servo.duration[j], servo.decided[j] = pending.duration, pending.error
+    servo.later_due[j], servo.later_sign[j] = later.time - now, later.sign
+    servo.later_duration[j], servo.later_decided[j] = later.duration, later.error
+    time, same = memory.frames * beat + now, beat == period
     number = chip.number if same else math.ceil(time / period - SAME)
-    to_next = (chip.number - memory.frames) * beat - now if same else number * period - time
-    to_next = max(to_next, 0.0)
-    pending, later = chip.pending, chip.later
-    held = Held(
-        y.q, y.w, chip.drive, chip.drive_end - now if chip.drive != 0.0 else 0.0,
-        chip.clock - now, chip.error, pending.time - now, pending.sign, pending.duration, pending.error,
-        later.time - now, later.sign, later.duration, later.error, memory.point.wiper, y.i, y.T_w, y.T_h, y.q_m, y.w_m,
-        1.0 * memory.point.mode.mesh, memory.point.step)
-    return Side(held, Hour(period, (number - 1) * period, period - to_next, period),
-                Counted(number, chip.draws - number))
+    to_next = max((chip.number - memory.frames) * beat - now if same else number * period - time, 0.0)
+    clock.period[j], clock.edge[j], clock.since[j], clock.length[j] = (
+        period, (number - 1) * period, period - to_next, period)
+    tile.count.number[j], tile.count.first_draw[j] = number, chip.draws - number

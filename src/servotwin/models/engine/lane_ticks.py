@@ -1,6 +1,6 @@
 """The sets of lanes of which a tick consists, in tiles or in records: what is asked of each between its kernels.
 
-Lanes that have to go on one by one are put together in the first `count[0]` of some places, with their memories.
+Lanes of tiles that were given up are put together in the first `count[0]` of some places, with their memories.
 """
 
 from __future__ import annotations
@@ -8,17 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine.crossing import (
-    Side,
-    counted_at,
-    held_at,
-    hour_at,
-    put_counted,
-    put_held,
-    put_hour,
-    remembered,
-    side_of,
-)
+from servotwin.models.engine.crossing import put_beside, remembered
 from servotwin.models.engine.imposing import carried, impulse_work, placed
 from servotwin.models.engine.memory import memory_at, point_of, put_memory, put_point, time_of
 from servotwin.models.engine.modes import INSIDE, LOST
@@ -33,59 +23,36 @@ if TYPE_CHECKING:
     from servotwin.models.engine.tiles import Floats, Indices
 
 
-def gather_lost(which: Indices, status: Any, tile_rows: Any, count: Indices, places: Indices,
-                lanes: Indices, durations: Floats, memories: Memories) -> int:
-    """Put together the lanes of tiles that were given up; return how many there are. They owe nothing any more."""
+def gather_lost(which: Indices, status: Any, command: Floats, pieces: Floats, tile_rows: Any, count: Indices,
+                places: Indices, lanes: Indices, durations: Floats, memories: Memories) -> int:
+    """Put together the lanes of tiles that were given up; return how many there are. They owe nothing any more.
+
+    What they are told is put into their `pieces`.
+    """
     n = 0
     for k in range(which.size):
         tile, j, lane = tile_rows[k // TILE], k % TILE, which[k]
         if tile.clock.owed[j] > 0.0:
             if status[lane] == COMPLETED:
-                side = Side(held_at(tile.servo, j), hour_at(tile.clock, j), counted_at(tile.count, j))
-                put_memory(memories.rows[n], remembered(side, tile.count.edges[j] < 0, 1.0 * tile.hung.half_slack[j],
-                                                        memories.firms[n:n + 1]))
-                places[n], lanes[n], durations[n] = k, lane, tile.clock.owed[j]
+                put_memory(memories.rows[n], remembered(tile, j, memories.firms[n:n + 1]))
+                places[n], lanes[n], durations[n], pieces[lane, 1] = k, lane, tile.clock.owed[j], command[lane]
                 n += 1
             tile.clock.owed[j] = 0.0
     count[0] = n
     return n
 
 
-def put_lost(places: Indices, lanes: Indices, memories: Memories, periods: Floats, tile_rows: Any) -> None:
-    """Put lanes that have gone on one by one back into their tiles."""
+def to_records(places: Indices, tile_rows: Any, memories: Memories) -> None:
+    """Put what lanes at these places of tiles remember into records."""
     for k in range(places.size):
-        tile, j = tile_rows[places[k] // TILE], places[k] % TILE
-        side = side_of(memory_at(memories, k), periods[lanes[k]])
-        put_held(tile.servo, j, side.held)
-        put_hour(tile.clock, j, side.hour)
-        put_counted(tile.count, j, side.counted)
+        tile = tile_rows[places[k] // TILE]
+        put_memory(memories.rows[k], remembered(tile, places[k] % TILE, memories.firms[k:k + 1]))
 
 
-def gather(which: Indices, status: Any, now: Floats, done: Indices, kept: Memories, count: Indices,
-           places: Indices, lanes: Indices, durations: Floats, memories: Memories) -> int:
-    """Put together the lanes of records that have neither failed nor are `done` (1); return how many there are."""
-    n = 0
-    for k in range(which.size):
-        if status[which[k]] == COMPLETED and done[k] == 0:
-            places[n], lanes[n], durations[n] = k, which[k], now[0]
-            memories.rows[n], memories.firms[n] = kept.rows[k], kept.firms[k]
-            n += 1
-    count[0] = n
-    return n
-
-
-def put(places: Indices, memories: Memories, kept: Memories) -> None:
-    """Put lanes back to where they are kept."""
+def to_tiles(places: Indices, lanes: Indices, memories: Memories, periods: Floats, tile_rows: Any) -> None:
+    """Put what lanes remember in records into tiles; their frames are regular, of these periods from now on [s]."""
     for k in range(places.size):
-        kept.rows[places[k]], kept.firms[places[k]] = memories.rows[k], memories.firms[k]
-
-
-def note_failures(lanes: Indices, how: Indices, at: Floats, records: Any, status: Any, ended: Floats) -> None:
-    """Note which lanes have failed, and when; they are nan from there on."""
-    for k in range(lanes.size):
-        if how[k] != COMPLETED:
-            status[lanes[k]], ended[lanes[k]] = how[k], at[k]
-            put_vector(records[k].point.y, LOST)
+        put_beside(memory_at(memories, k), periods[lanes[k]], tile_rows[places[k] // TILE], places[k] % TILE)
 
 
 def forget_motions(rows: Any) -> None:

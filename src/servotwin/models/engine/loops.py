@@ -14,7 +14,7 @@ from servotwin.models.engine import loop_rounds as rounds
 from servotwin.models.engine import loop_tiles as tiles
 from servotwin.models.engine.memory import SAME, in_force
 from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, RIGID, STUCK, Mode, one_body
-from servotwin.models.engine.runs import inputs_of
+from servotwin.models.engine.runs import ARRIVED, inputs_of
 from servotwin.models.engine.tiles import numbers_of
 from servotwin.models.terms import control, profile
 from servotwin.models.terms.control import NOTHING_SENSED
@@ -37,7 +37,8 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
     for k in range(which.size):
         lane = which[k]
         torque = torques[torque_first[lane]:torque_first[lane] + torque_count[lane]]
-        if tiles.enter(lanes, curve, torque, k, lane, durations[k], times, first_output[k], memories, tile, size):
+        if status[k] != ARRIVED and tiles.enter(lanes, curve, torque, k, lane, durations[k], times, first_output[k],
+                                                memories, tile, size):
             size += 1
         if size == tiles.TOGETHER or (size > 0 and k == which.size - 1):
             _through(lanes, curve, times, outputs, memories, tile, size)

@@ -142,6 +142,12 @@ def put_columns(tiles: NDArray[Any], places: Any, values: Any) -> None:
 
 def record_of(kind: type[Any]) -> np.dtype[Any]:
     """Return the type of a record that holds a named tuple, with those in it; sequences stand elsewhere."""
+    key: Any = kind
+    return _record_of(key)
+
+
+@cache
+def _record_of(kind: Hashable) -> np.dtype[Any]:
     return np.dtype((np.record, [(name, *_field(hint)) for name, hint in fields_of(kind)
                                  if get_origin(hint) is not Sequence]))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from servotwin.models.engine import controller, legs, motion, tick_legs
 from servotwin.models.engine.legs import MOST_SHORT, SHORT
@@ -25,7 +25,8 @@ from servotwin.models.engine.memory import (
     since,
     time_of,
 )
-from servotwin.models.engine.modes import INSIDE, RIGID, Mode, Vector
+from servotwin.models.engine.modes import INSIDE, LOST, RIGID, Mode, Vector
+from servotwin.models.engine.seats import put_vector
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
 from servotwin.models.engine.tick_legs import LEGS
 from servotwin.models.engine.tiles import chip_of, numbers_of
@@ -76,6 +77,52 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
         ended[k] = time_of(memory)
         if how == COMPLETED:
             put_memory(memories.rows[k], memory)
+
+
+def ready(lanes: Indices, lane_status: Any, now: Floats, done: Indices, durations: Floats, status: Indices) -> int:
+    """Let all lanes be about to go on for the time in `now` [s], but for those that have failed or are `done` (1).
+
+    Return how many go on.
+    """
+    left = 0
+    for k in range(lanes.size):
+        goes = lane_status[lanes[k]] == COMPLETED and done[k] == 0
+        durations[k], status[k] = now[0], COMPLETED if goes else ARRIVED
+        left += 1 if goes else 0
+    return left
+
+
+def to_first_ticks(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
+                   which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats,
+                   memories: Memories, status: Indices) -> None:
+    """Let digital servos that begin before their first tick go on to it: from there on they go side by side.
+
+    The arguments are those of `go_on`. Durations and outputs that are left are noted; a lane that fails stays.
+    """
+    for k in range(which.size):
+        lane, row = which[k], memories.rows[k]
+        phase = lanes.firmware[lane].t_phi
+        if status[k] == ARRIVED or not 0.0 < phase < durations[k] or first_output[k] != 0:
+            continue
+        if row.point.time != 0.0 or row.frames != 0:
+            continue
+        seen = 0
+        while seen < times.size and times[seen] < phase:
+            seen += 1
+        inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
+        memory, how = run(numbers_of(lanes, lane), chip_of(lanes, lane), inputs, memory_at(memories, k), phase, False,
+                          times[:seen], 0, outputs[k])
+        if how == COMPLETED:
+            put_memory(memories.rows[k], memory)
+            durations[k], first_output[k] = durations[k] - phase, seen
+
+
+def note_failures(lanes: Indices, how: Indices, at: Floats, records: Any, status: Any, ended: Floats) -> None:
+    """Note which lanes have failed, and when; they are nan from there on."""
+    for k in range(lanes.size):
+        if how[k] != COMPLETED:
+            status[lanes[k]], ended[lanes[k]] = how[k], at[k]
+            put_vector(records[k].point.y, LOST)
 
 
 def inputs_of(lanes: Lanes, curve: Floats, torque: Floats, lane: int) -> Inputs:

@@ -64,17 +64,15 @@ def _outputs(real: Kind) -> Tuple:
 
 _GOING = (_LANES, _TABLE, *_RECORDED, _INDICES, _FLOATS, _FLOATS, _INDICES, _CUBE, _MEMORIES, _INDICES)
 _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
-    "runs:start": (_LANES, _INDICES, _MEMORIES), "runs:go_on": (*_GOING, _FLOATS),
+    "runs:start": (_LANES, _INDICES, _MEMORIES), "runs:go_on": (*_GOING, _FLOATS), "runs:to_first_ticks": _GOING,
+    "runs:ready": (_INDICES, _SMALLS, _FLOATS, _INDICES, _FLOATS, _INDICES),
+    "runs:note_failures": (_INDICES, _INDICES, _FLOATS, _ROWS, _SMALLS, _FLOATS),
     "calm:go": (_LANES, _INDICES, _FLOATS, _SMALLS, _ROWS, _INDICES),
     "ending:look_at_lanes": (BOOL, _LANES, *_RECORDED, FLOAT64, _TABLE, _FLOATS, _SMALLS),
     "sights:one_by_one": (_LANES, _TABLE, *_RECORDED, _INDICES, _MEMORIES, _TABLE),
     "ticks:accept": (_FLOATS, _INDICES, _TABLE, _CUBE, _NUMBERS, _FLOATS, _FLOATS, _INDICES, _FLOATS),
     "ticks:change": (_INDICES, _TABLE, _INDICES, _NUMBERS, _FLOATS, _FLOATS, BOOL, _FLOATS, _FLOATS, _NUMBERS),
     "ticks:follow": (_INDICES, _TABLE, *(_FLOATS,) * 5, _TABLE, _FLOATS),
-    "lane_ticks:gather": (_INDICES, _SMALLS, _FLOATS, _INDICES, _MEMORIES, _INDICES, _INDICES, _INDICES, _FLOATS,
-                          _MEMORIES),
-    "lane_ticks:put": (_INDICES, _MEMORIES, _MEMORIES),
-    "lane_ticks:note_failures": (_INDICES, _INDICES, _FLOATS, _ROWS, _SMALLS, _FLOATS),
     "lane_ticks:forget_motions": (_ROWS,),
     "lane_ticks:impose_on_records": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, _ROWS),
     "lane_ticks:show_records": (_INDICES, _ROWS, _TABLE),
@@ -125,8 +123,9 @@ def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ..
         "side_by_side:advance": (_INDICES, INT64, BOOL, INT64, INT64, FLOAT64, _FLOATS, _FLOATS, BOOL, rows, plans),
         "side_by_side:refit": (_LANES, INT64, _INDICES, _INDICES, rows),
         "sights:side_by_side": (_LANES, _TABLE, _INDICES, rows, _TABLE),
-        "lane_ticks:gather_lost": (_INDICES, _SMALLS, rows, _INDICES, _INDICES, _INDICES, _FLOATS, _MEMORIES),
-        "lane_ticks:put_lost": (_INDICES, _INDICES, _MEMORIES, _FLOATS, rows),
+        "lane_ticks:gather_lost": (_INDICES, _SMALLS, _FLOATS, _TABLE, rows, *(_INDICES,) * 3, _FLOATS, _MEMORIES),
+        "lane_ticks:to_records": (_INDICES, rows, _MEMORIES),
+        "lane_ticks:to_tiles": (_INDICES, _INDICES, _MEMORIES, _FLOATS, rows),
         "lane_ticks:impose_on_tiles": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, rows),
         "lane_ticks:show_tiles": (_INDICES, rows, _TABLE),
     }

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import math
-import os
-import sys
 from collections import deque
 from collections.abc import Generator, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -17,18 +13,19 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, UnknownNameError
 from servotwin.models.engine.memory import ACCURACY
-from servotwin.simulation.batch import Batch, Failure
-from servotwin.simulation.lane_inputs import Lanes, framed, lanes_of
-from servotwin.simulation.lane_kinds import goes_together
-from servotwin.simulation.lane_runs import run as run_lanes
-from servotwin.simulation.lanes import Raw, Work
+from servotwin.simulation.lanes.batch import Batch, Failure
+from servotwin.simulation.lanes.forms import goes_together
+from servotwin.simulation.lanes.inputs import LaneInputs, framed, lanes_of
+from servotwin.simulation.lanes.packed import Asked, Raw, Work
+from servotwin.simulation.lanes.packing import Chunk, Commands, groups
+from servotwin.simulation.lanes.whole_runs import run as run_lanes
 from servotwin.simulation.oddities import warn_of
-from servotwin.simulation.packing import Asked, Chunk, Commands, groups
 from servotwin.simulation.progress import Progress, shown
 from servotwin.simulation.remarks import lane_remarks
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
 from servotwin.simulation.times import times_asked
+from servotwin.simulation.workers import Crew, memory_limit
 from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:
@@ -64,7 +61,7 @@ def simulate_many(
 
     Parameters
     ----------
-    model : PulseServo or BoundedServo
+    model : Model
     command : Signal or sequence of Signal
     duration : float
         Positive [s].
@@ -85,7 +82,7 @@ def simulate_many(
         Of each lane's noise; the number of the lane unless given.
     executor : optional
         Anything with the `submit` of `concurrent.futures.Executor`; threads on all cores unless given. It is not shut
-        down. Results do not depend on it.
+        down; a pool of which a process was killed is replaced. Results do not depend on it.
     chunk : int, optional
         Lanes that go to a worker at once; chosen so that memory stays bounded unless given. Results do not depend on
         it.
@@ -101,8 +98,8 @@ def simulate_many(
     Raises
     ------
     InputError
-        On bad input, before anything runs; names lane and parameter. A lane that ends early says so in
-        `Batch.status`, is nan from there on, and harms no other.
+        On bad input, before anything runs; names lane and parameter. Or if the executor fails. A lane that ends early
+        says so in `Batch.status`, is nan from there on, and harms no other.
 
     Warns
     -----
@@ -128,15 +125,14 @@ def simulate_many(
 
 
 def simulate_lanes(
-    lanes: Lanes, *, duration: float, output_step: float | None = None, output_times: ArrayLike | None = None,
+    lanes: LaneInputs, *, duration: float, output_step: float | None = None, output_times: ArrayLike | None = None,
     outputs: Sequence[str] = ("output_angle",), dtype: DTypeLike = "float64", executor: Any = None,
     chunk: int | None = None, progress: Progress = False, accuracy: float = ACCURACY,
 ) -> Batch:
     """Return what `simulate_many` does of lanes that were zipped before, without warnings."""
     if not (is_finite(duration) and duration > 0.0):
         raise InputError("duration", got=duration, allowed="a positive number of seconds")
-    if executor is not None and (isinstance(executor, type) or not callable(getattr(executor, "submit", None))):
-        raise InputError("executor", got=executor, allowed="one with a submit method, as in concurrent.futures")
+    crew = Crew(executor)
     if not (isinstance(progress, bool) or callable(progress)):
         raise InputError("progress", got=progress, allowed="True, False or a function of the lanes done and of all")
     times = np.array(times_asked(duration, output_step, output_times))  # a copy: it becomes read-only
@@ -144,13 +140,12 @@ def simulate_lanes(
     asked = Asked(float(duration), times, names, real_type(dtype), accuracy_of(accuracy))
     lanes = framed(lanes, asked.duration)
     commands = Commands(lanes)
-    packs = _packs(lanes, commands, asked, chunk, workers_of(executor))
+    packs = _packs(lanes, commands, asked, chunk, crew.workers)
     signals = _space(lanes, asked)
     done = 0
     status, ended = np.zeros(lanes.count, dtype=np.int8), np.full(lanes.count, asked.duration)
     refused, marks = np.empty(lanes.count), np.empty(lanes.count, dtype=np.int8)
-    own = own_threads(os.getpid()) if executor is None else executor
-    with shown(progress, lanes.count, "simulate_many") as show, closing(_run(packs, asked, own)) as running:
+    with crew, shown(progress, lanes.count, "simulate_many") as show, closing(_run(packs, asked, crew)) as running:
         for which, raw, values in running:
             place: Any = which
             if which[-1] - which[0] == len(which) - 1:
@@ -239,7 +234,7 @@ def real_type(dtype: DTypeLike) -> str:
     return name
 
 
-def _space(lanes: Lanes, asked: Asked) -> dict[str, NDArray[Any]]:
+def _space(lanes: LaneInputs, asked: Asked) -> dict[str, NDArray[Any]]:
     """Return the arrays of the outputs, if the machine has the memory."""
     shape = (lanes.count, len(asked.times))
     size = len(asked.outputs) * math.prod(shape) * np.dtype(asked.dtype).itemsize
@@ -255,33 +250,6 @@ def _space(lanes: Lanes, asked: Asked) -> dict[str, NDArray[Any]]:
             allowed=f"what fits into memory{room}: take fewer of them, or float32") from None
 
 
-def memory_limit() -> float:
-    """Return how much memory this process may use [bytes]; inf where that is not known."""
-    sizes = [math.inf]
-    try:
-        sizes.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, ValueError, OSError):  # not on Windows
-        pass
-    try:
-        with open("/sys/fs/cgroup/memory.max", encoding="ascii") as file:  # the limit of a container
-            sizes.append(float(file.read()))
-    except (OSError, ValueError):
-        pass
-    return min(sizes)
-
-
-def workers_of(executor: Any) -> int:
-    """Return how many jobs run at once: what the executor says, else the cores of this process."""
-    own = getattr(executor, "_max_workers", None)
-    if isinstance(own, int) and own > 0:
-        return own
-    if sys.version_info >= (3, 13):
-        return os.process_cpu_count() or 1
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 class _Pack(NamedTuple):
     """Lanes of one structure that are packed together, the raw fields that they need, and how many run at once."""
 
@@ -290,7 +258,7 @@ class _Pack(NamedTuple):
     size: int
 
 
-def _packs(lanes: Lanes, commands: Commands, asked: Asked, chunk: int | None, workers: int) -> list[_Pack]:
+def _packs(lanes: LaneInputs, commands: Commands, asked: Asked, chunk: int | None, workers: int) -> list[_Pack]:
     """Check every lane, and return them in packs."""
     if chunk is not None and (isinstance(chunk, bool) or not isinstance(chunk, int | np.integer) or chunk < 1):
         raise InputError("chunk", got=chunk, allowed="a whole number of lanes, at least 1")
@@ -316,33 +284,24 @@ def _chunk_size(lanes: int, numbers_per_lane: int, frames_per_lane: float, parts
 
 
 def _run(packs: list[_Pack], asked: Asked,
-         executor: Any) -> Generator[tuple[Indices, Raw, dict[str, NDArray[np.float64]]]]:
+         crew: Crew) -> Generator[tuple[Indices, Raw, dict[str, NDArray[np.float64]]]]:
     """Run all lanes, a few chunks at a time; return lanes, raw fields and outputs of each chunk."""
-    flying: deque[tuple[Chunk, Any]] = deque()
-    waiting = _chunks(packs, asked)
-    try:
-        while True:
-            while len(flying) < 2 * workers_of(executor) and (following := next(waiting, None)) is not None:
-                flying.append((following[0], executor.submit(run_lanes, following[1])))
-            if not flying:
-                return
-            piece, future = flying.popleft()
-            raw = future.result()
+    flying = deque[Chunk]()
+
+    def pieces() -> Iterator[tuple[Work]]:
+        for piece, work in _chunks(packs, asked):
+            flying.append(piece)
+            yield (work,)
+
+    with closing(crew.done(run_lanes, pieces(), finishing="chunk of lanes")) as running:
+        for raw in running:
+            piece = flying.popleft()
             yield piece.which, raw, piece.outputs(asked, raw)
-    finally:
-        for _, future in flying:  # only after an error or an interrupt are there any
-            future.cancel()
 
 
 def _chunks(packs: list[_Pack], asked: Asked) -> Iterator[tuple[Chunk, Work]]:
     """Return all chunks with their work, one after the other."""
     for pack in packs:
-        work = pack.lanes.work(asked, pack.fields)
-        for start in range(0, work.lanes, pack.size):
+        work = Work(pack.lanes.packed(asked.accuracy), asked, pack.fields)
+        for start in range(0, work.packed.size, pack.size):
             yield pack.lanes.part(start, start + pack.size), work.part(start, start + pack.size)
-
-
-@cache
-def own_threads(process: int) -> ThreadPoolExecutor:
-    """Return the threads of this process, kept from call to call; a forked child has none of its parent's."""
-    return ThreadPoolExecutor(workers_of(None), thread_name_prefix="servotwin")

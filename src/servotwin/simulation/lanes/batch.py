@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from servotwin.simulation.lane_inputs import Lanes
+    from servotwin.simulation.lanes.inputs import LaneInputs
     from servotwin.simulation.result import Result
 
 
@@ -70,7 +70,7 @@ class Batch:
     remarks: tuple[LaneRemark, ...]
     duration: float
     signals: Mapping[str, NDArray[np.floating]]
-    lanes: Lanes
+    lanes: LaneInputs
 
     def __repr__(self) -> str:
         return (f"Batch({self.lanes.model!r}, lanes={len(self)}, times={len(self.time)}, "

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import CommandError, InputError
-from servotwin.models import AveragedServo, BoundedServo, DigitalServo
+from servotwin.models import AveragedServo, AveragedServoInductive, BoundedServo, DigitalServo
 from servotwin.models.base import PULSE_RANGE, TRAVEL_SLACK
 from servotwin.models.columns import LanePieces, LaneSignal
-from servotwin.simulation.packing import Chunk, flat
+from servotwin.simulation.lanes.packing import Chunk, flat
 from servotwin.units import is_masked
 
 if TYPE_CHECKING:
     from servotwin.models import Model
-    from servotwin.simulation.vector_numbers import LaneNumbers
+    from servotwin.simulation.lanes.lane_numbers import LaneNumbers
 
 Array = NDArray[np.float64]
 _KINDS = {"pulse_width": "pulse_width", "command_angle": "angle", "command_voltage": "voltage"}
@@ -145,7 +145,7 @@ def _bounds(name: str, model: Model) -> _Bounds:
     if name == "command_angle":
         low, high = (model.value_or(f"stops.{end}_angle", limit) + slack for end, limit, slack in (
             ("lower", -math.inf, -TRAVEL_SLACK), ("upper", math.inf, TRAVEL_SLACK)))
-    if isinstance(model, AveragedServo | BoundedServo):
+    if isinstance(model, AveragedServo | AveragedServoInductive | BoundedServo):
         if name == "pulse_width":
             low, high = (model.value_or(f"electronics.pulse_width_{end}", usual)
                          for end, usual in zip(("min", "max"), PULSE_RANGE, strict=True))

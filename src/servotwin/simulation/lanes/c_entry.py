@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +17,12 @@ from servotwin.models.terms.shaft import Shaft
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.compile.calls import program, tick_address
 from servotwin.simulation.compile.layout import GIVEN, HANDLE, MESSAGES, STAGES, TICK, VERSION
-from servotwin.simulation.vector_calls import Room, programs_of
-from servotwin.simulation.vector_memory import Piece, piece_of
+from servotwin.simulation.lanes.saved import Piece, piece_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from servotwin.simulation.vector_commands import Translator
-    from servotwin.simulation.vector_numbers import LaneNumbers
-    from servotwin.simulation.vector_store import Store
+    from servotwin.simulation.lanes.store import Store
 
 Array = NDArray[np.float64]
 _INSIDE = 1e-9  # of a range whose ends are not possible themselves
@@ -39,18 +35,6 @@ class CTick(ctypes.Structure):
 
     _fields_: ClassVar[Any] = [(name, _WORDS.get(name, ctypes.c_void_p)) for name in TICK]
     arrays: Mapping[str, NDArray[Any]]
-
-
-class Parts(NamedTuple):
-    """What of a simulator its entry works on, as it is now."""
-
-    numbers: LaneNumbers
-    store: Store
-    translate: Translator
-    command: Array
-    torque: Array
-    room: Room
-    fresh: NDArray[np.int64]
 
 
 class CEntry:
@@ -74,9 +58,9 @@ class CEntry:
     True
     """
 
-    def __init__(self, parts: Callable[[], Parts]) -> None:
-        self._parts = parts
-        self.lanes = parts().numbers.count
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self.lanes = store.numbers.count
         self._handle = np.zeros(len(HANDLE), np.int64)
         self._renew = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(self._renewed)
         self._kept: tuple[Any, ...] = ()
@@ -160,16 +144,16 @@ class CEntry:
     @property
     def seen(self) -> Array:
         """What shows of the lanes where a signal is asked for, shape (lanes, signals of `models.engine.observe`)."""
-        return self._parts().room.seen
+        return self._store.room.seen
 
     def memory(self) -> tuple[Piece, ...]:
         """Return where all that the lanes remember stands, for who keeps and restores it between ticks.
 
         It stays there for as long as nothing but ticks, `set` of angles and speeds, `reset` and `restore` happens.
         """
-        parts = self._parts()
-        arrays = (parts.store.status, parts.store.ended, parts.store.total, parts.torque)
-        sets = (piece for some in parts.store.sets for piece in some.pieces())
+        store = self._store
+        arrays = (store.status, store.ended, store.total, store.torque)
+        sets = (piece for some in store.sets for piece in some.pieces())
         return (*(piece_of(array) for array in arrays), *sets)
 
     def commands(self, name: str) -> tuple[Array, Array]:
@@ -181,7 +165,7 @@ class CEntry:
             If a servo takes none of this kind.
         """
         kind = GIVEN.index(name)
-        gain, offset, low, high, least, most = self._parts().translate.table()[kind].T
+        gain, offset, low, high, least, most = self._store.numbers.translate.table()[kind].T
         if np.isnan(gain).any():
             raise InputError(f"{name} of lane {np.isnan(gain).argmax()}", allowed="no command of this kind")
         ends = np.sort([(least - offset) / gain, (most - offset) / gain], axis=0)
@@ -191,12 +175,12 @@ class CEntry:
 
     def travel(self) -> tuple[Array, Array]:
         """Return the stops of each lane [rad]; infinite where there are none."""
-        stops = self._parts().numbers.now(Stops)
+        stops = self._store.numbers.now(Stops)
         return np.array(stops.lower), np.array(stops.upper)
 
     def own_inertia(self) -> Array:
         """Return of each lane what turns with the output without its load, the motor included unless it has play."""
-        numbers = self._parts().numbers
+        numbers = self._store.numbers
         shaft, apart = numbers.now(Shaft), (numbers.now(Play).half > 0.0) | (numbers.now(Elastic).k > 0.0)
         known = numbers.imposed.load_inertia
         load = np.where(np.isnan(known), numbers.load_total, known)
@@ -206,22 +190,20 @@ class CEntry:
 
     def refresh(self) -> None:
         """Bring what C works on up to date, after lanes have been laid out anew."""
-        parts = self._parts()
-        room, store = parts.room, parts.store
-        chains = programs_of(parts.numbers, store, room, parts.translate.table(), parts.command, parts.torque)
+        store, room = self._store, self._store.room
+        chains = store.programs()
         programs = {stage: program(chains[stage]) for stage in STAGES}
-        self._kept = (chains, programs, parts)
+        self._kept = (chains, programs)
         arrays: Mapping[str, NDArray[Any]] = {
             "given": room.given, "has": room.has, "now": store.now, "status": store.status, "shaft": room.shaft,
-            "seen": room.seen, "fresh": parts.fresh, **programs}
+            "seen": room.seen, "fresh": store.fresh, **programs}
         words = {name: array.ctypes.data for name, array in arrays.items()}
         words |= {"lanes": self.lanes, "renew": ctypes.cast(self._renew, ctypes.c_void_p).value or 0}
         self._handle[:] = [words[name] for name in HANDLE]
 
     def _renewed(self, _: int) -> int:
         """Lay the lanes out anew where one of them has to run in another way; C calls this, which is rare."""
-        parts = self._parts()
-        parts.store.refit(np.arange(self.lanes), True, parts.torque)
+        self._store.refit(np.arange(self.lanes), True)
         self.refresh()
         return 1
 

@@ -12,25 +12,35 @@ from numpy.typing import NDArray
 
 from servotwin.errors import CommandError, InputError, LoadError, ParameterError, UnknownNameError
 from servotwin.loads import Load, as_load
-from servotwin.models import AveragedServo, BoundedServo, DigitalServo, Model, PulseServo, PulseServoInductive
+from servotwin.models import (
+    AveragedServo,
+    AveragedServoInductive,
+    BoundedServo,
+    DCMotor,
+    DigitalServo,
+    GearedMotor,
+    Model,
+    PulseServo,
+    PulseServoInductive,
+)
 from servotwin.parameters import GROUPS, Servo
 from servotwin.parameters.groups import check_columns
 from servotwin.signals import Signal
 from servotwin.signals.signal import headers
-from servotwin.simulation.lane_loads import LOAD_NAMES, check_number, with_numbers
+from servotwin.simulation.lanes.load_columns import LOAD_NAMES, check_number, with_numbers
 from servotwin.units import is_finite, is_masked
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-LAWS: dict[type[Model], str] = {PulseServo: "pulse", PulseServoInductive: "pulse", BoundedServo: "bounded",
-                             DigitalServo: "digital"}
-TICK_LAWS: dict[type[Model], str] = {**LAWS, AveragedServo: "bounded"}
-"""Those that go on tick by tick; the paper's servo is a bounded one without bounds, under a smoothed friction."""
+LAWS: dict[type[Model], str] = {
+    DCMotor: "voltage", GearedMotor: "voltage", AveragedServo: "bounded", AveragedServoInductive: "bounded",
+    BoundedServo: "bounded", PulseServo: "pulse", PulseServoInductive: "pulse", DigitalServo: "digital"}
+"""How each model is told what to do; the averaged servos are bounded ones without bounds, under a smoothed friction."""
 
 
 @dataclass(frozen=True, eq=False)
-class Lanes:
+class LaneInputs:
     """What is simulated: what all lanes share once, what differs as arrays (B,).
 
     Parameters
@@ -82,16 +92,16 @@ class Lanes:
 
 
 def lanes_of(model: Model, command: object, load: object, parameters: object, initial: object,
-             seeds: object, laws: Mapping[type[Model], str] = LAWS) -> Lanes:
-    """Check the arguments of `simulate_many` that differ from lane to lane, and zip them; `laws` has what may run.
+             seeds: object) -> LaneInputs:
+    """Check the arguments of `simulate_many` that differ from lane to lane, and zip them.
 
     Raises
     ------
     InputError
         Or one of its kinds; names what is wrong, and the lane.
     """
-    if type(model) not in laws:
-        raise InputError("model of simulate_many", got=model, allowed=" or ".join(kind.__name__ for kind in laws))
+    if type(model) not in LAWS:
+        raise InputError("model of many lanes", got=model, allowed=" or ".join(kind.__name__ for kind in LAWS))
     given = _named("parameters", parameters)
     for name in given:
         check_name(model, name)
@@ -112,7 +122,7 @@ def lanes_of(model: Model, command: object, load: object, parameters: object, in
     servo = _servo_of_first(model.servo, {name: v for name, v in values.items() if name not in LOAD_NAMES})
     of_load = {name: value for name, value in values.items() if name in LOAD_NAMES}
     loads = _with_numbers(loads, load_of, of_load)
-    return Lanes(
+    return LaneInputs(
         model=model if servo is model.servo else type(model)(servo), count=count,
         numbers={name: column for name, column in columns.items() if column.dtype.kind == "f"},
         words={name: column for name, column in columns.items() if column.dtype.kind == "U"},
@@ -121,7 +131,7 @@ def lanes_of(model: Model, command: object, load: object, parameters: object, in
         seeds=np.arange(count) if seed is None else _spread(np.atleast_1d(seed), count))
 
 
-def framed(lanes: Lanes, until: float) -> Lanes:
+def framed(lanes: LaneInputs, until: float) -> LaneInputs:
     """Return lanes whose commands have their pulses one by one where they have silences, as far as `until` [s]."""
     if not any(signal.silences for signal in lanes.commands):
         return lanes

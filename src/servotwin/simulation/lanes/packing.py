@@ -1,4 +1,4 @@
-"""From checked lanes to the work of a chunk, and from its raw fields to output signals."""
+"""From checked lanes to what the kernels read, and from raw fields to output signals."""
 
 from __future__ import annotations
 
@@ -17,14 +17,16 @@ from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
 from servotwin.models.engine.modes import Vector
 from servotwin.models.engine.records import mapped
+from servotwin.models.engine.tiles import Lanes
 from servotwin.models.outputs import FIELDS as FIELDS_OF
+from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of
 from servotwin.physics.pieces import table_rows
 from servotwin.signals.signal import KIND_NAMES
-from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes
-from servotwin.simulation.lane_loads import LOAD_NAMES, column_load, recorded_torque, structure
-from servotwin.simulation.lanes import FIELDS, MORE_FIELDS, SMALL_FIELDS, Raw, Tables, Work, no_tables, regular_edges
+from servotwin.simulation.lanes.inputs import LAWS, LaneInputs
+from servotwin.simulation.lanes.load_columns import LOAD_NAMES, column_load, recorded_torque, structure
+from servotwin.simulation.lanes.packed import FIELDS, MORE_FIELDS, SMALL_FIELDS, Asked, Packed, Raw, Torques
 from servotwin.simulation.start import check_start, start_vector
 
 if TYPE_CHECKING:
@@ -38,21 +40,10 @@ Indices = NDArray[np.int64]
 _MOST_FRAMES = 1e8  # of a lane: they take half a minute, in which nothing stops a kernel
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What every chunk is asked for: see `Work`, and the names of the outputs."""
-
-    duration: float
-    times: Array
-    outputs: tuple[str, ...]
-    dtype: str
-    accuracy: float
-
-
 class Commands:
     """The commands of all lanes as one array of pieces."""
 
-    def __init__(self, lanes: Lanes) -> None:
+    def __init__(self, lanes: LaneInputs) -> None:
         signals, self.of = lanes.commands, lanes.command_of
         heads = lanes.headers
         self.kinds, self.initial, self.periods = heads["kind"], heads["initial"], heads["frame_period"]
@@ -95,15 +86,8 @@ class Commands:
         edges = None if self.edge_count[of[0]] < 0 else ()
         return LaneSignal(KIND_NAMES[self.kinds[of[0]]], pieces, period, edges, lanes)
 
-    def frame_edges(self, lanes: Indices) -> Tables:
-        """Return the edges of each lane's frames."""
-        of = self.of[lanes]
-        if (self.edge_count < 0).all():
-            return regular_edges(len(of))
-        return Tables(self.edge_first[of], self.edge_count[of], self.edges)
 
-
-def groups(lanes: Lanes, commands: Commands) -> Iterator[Indices]:
+def groups(lanes: LaneInputs, commands: Commands) -> Iterator[Indices]:
     """Return the lanes in groups of one structure: one kind of command and frame, same words, loads of same parts."""
     of_command = commands.shape.tolist() if np.ptp(commands.shape) else [0]
     of_load = [structure(load) for load in lanes.loads]
@@ -126,7 +110,7 @@ def groups(lanes: Lanes, commands: Commands) -> Iterator[Indices]:
 class Chunk:
     """Some lanes of one structure, with columns (n, 1) where they differ."""
 
-    lanes: Lanes
+    lanes: LaneInputs
     commands: Commands
     which: Indices
 
@@ -176,11 +160,14 @@ class Chunk:
     def start(self) -> Array:
         """The states at t = 0, shape (7, n)."""
         before = cast("LanePieces", self.model.command(cast("Any", self.commands.before(self.which))))
-        initial = {name: column[self.which if len(column) > 1 else [0], None]
-                   for name, column in self.lanes.initial.items()}
+        return self.started(before.initial, {name: column[self.which if len(column) > 1 else [0], None]
+                                             for name, column in self.lanes.initial.items()})
+
+    def started(self, drive: Any, initial: Mapping[str, Any]) -> Array:
+        """Return the states at rest under what the models follow, but for initial values by name; shape (7, n)."""
         angle: Any = initial.get("output_angle")
         if angle is None:
-            angle = self.model.start_angle(cast("Any", before.initial))
+            angle = self.model.start_angle(drive)
         y = np.empty((7, len(self.which), 1))
         for k, values in enumerate(start_vector(self.model.states, self.numbers, angle, initial)):
             y[k] = values
@@ -244,23 +231,23 @@ class Chunk:
         with np.errstate(over="ignore"):
             return np.where(own < 0, duration / np.asarray(flat(self.chip.frame_period), dtype=np.float64), own)
 
-    def work(self, asked: Asked, fields: tuple[str, ...]) -> Work:
-        """Return what the kernels need."""
+    def packed(self, accuracy: float) -> Packed:
+        """Return what the lanes are to the kernels, which integrate to so many radians."""
+        commands, of, none = self.commands, self.commands.of[self.which], np.zeros(len(self.which), np.int64)
         with np.errstate(all="ignore"):
             numbers, chip = self.numbers, self.chip
-            command = Tables(*self.drive.tables())
-        torque = no_tables(len(self.which))
+            first, count, rows = self.drive.tables()
+        torque = Torques(np.zeros((0, 7)), none, none)
         if any(load.recorded for load in self._of_loads[0]):
-            first, count, rows = recorded_torque(*self._of_loads).tables()
-            recorded = np.array([bool(load.recorded) for load in self._of_loads[0]])[self._of_loads[1]]
-            torque = Tables(first, np.where(recorded, count, 0), rows)
-        return Work(law=TICK_LAWS[type(self.model)], numbers=mapped(flat, numbers),
-                    chip=None if chip is None else mapped(flat, chip), command=command, torque=torque,
-                    constant_torque=flat(self.load.torque), edges=self.commands.frame_edges(self.which),
-                    start=self.start, seeds=self.lanes.seeds[self.which], duration=asked.duration,
-                    times=asked.times, fields=fields, dtype=asked.dtype, curve=table_of(self.model.curve()),
-                    accuracy=asked.accuracy,
-                    firmware=None if self.firmware is None else mapped(flat, self.firmware))
+            at, size, recorded = recorded_torque(*self._of_loads).tables()
+            has = np.array([bool(load.recorded) for load in self._of_loads[0]])[self._of_loads[1]]
+            torque = Torques(recorded, at, np.where(has, size, 0))
+        lanes = Lanes(
+            mapped(flat, numbers), mapped(flat, chip or NO_CHIP), self.start, flat(self.load.torque),
+            self.lanes.seeds[self.which], rows, first, count, commands.edges, commands.edge_first[of],
+            commands.edge_count[of], accuracy, self.firmware and mapped(flat, self.firmware))
+        curve = np.array(table_of(self.model.curve()), np.float64).reshape(-1, 2)
+        return Packed(LAWS[type(self.model)], lanes, curve, torque)
 
     def fields(self, asked: Asked) -> tuple[str, ...]:
         """Return the raw fields that the outputs read: those that they look at when they are computed for one lane."""

@@ -3,34 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, cast
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
-from servotwin.models.engine.memory import Memories, put_started
-from servotwin.models.engine.modes import INSIDE, NOWHERE, RIGID
-from servotwin.models.engine.records import columns_of, fields_of, put_columns, tiles_with
+from servotwin.models.engine.memory import Memories
+from servotwin.models.engine.records import columns_of, fields_of
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
-from servotwin.models.engine.tiles import Lanes as Columns
-from servotwin.models.terms.chip import NO_CHIP, Chip
+from servotwin.models.engine.tiles import Lanes
+from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.elastic import Elastic
-from servotwin.models.terms.firmware import NO_FIRMWARE
-from servotwin.models.terms.numbers import NEUTRAL, Numbers
-from servotwin.models.terms.play import Play
-from servotwin.models.terms.sensor import table_of
+from servotwin.models.terms.firmware import Firmware
+from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.stops import Stops
-from servotwin.simulation import lane_runs
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
-from servotwin.simulation.lane_inputs import TICK_LAWS, Lanes, lanes_of
-from servotwin.simulation.lane_memory import nothing_yet, taken
-from servotwin.simulation.lanes import Tables
-from servotwin.simulation.packing import Asked, Chunk, Commands, flat, groups
-from servotwin.simulation.start import start_vector
-from servotwin.simulation.vector_calls import TICKS, asked
+from servotwin.simulation.lanes.form_recipes import TICKS
+from servotwin.simulation.lanes.inputs import LaneInputs, lanes_of
+from servotwin.simulation.lanes.memories import nothing_yet
+from servotwin.simulation.lanes.packed import Packed, Torques
+from servotwin.simulation.lanes.packing import Chunk, Commands, flat, groups
+from servotwin.simulation.lanes.tick_room import asked
+from servotwin.simulation.lanes.translator import Translator
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -53,8 +51,7 @@ class LaneNumbers:
         Names of the signals, `time` apart.
     reduction : ndarray, shape (lanes,)
         N of each gear.
-    torque : Tables
-        Recorded torque over time; a lane without one has no row.
+    torque : Torques
     curve : ndarray, shape (n, 2)
         Rows of angle [rad] and error [V] of the potentiometers.
     given : ndarray
@@ -67,7 +64,7 @@ class LaneNumbers:
         Those that lanes share.
     """
 
-    def __init__(self, inputs: Lanes, accuracy: float, supplies: Supplies, imposed: Imposed | None = None) -> None:
+    def __init__(self, inputs: LaneInputs, accuracy: float, supplies: Supplies, imposed: Imposed | None = None) -> None:
         self.inputs, self.model, self.count = inputs, inputs.model, inputs.count
         self.accuracy, self.supplies = accuracy, supplies
         self.available = inputs.model.signals_with(*inputs.loads)
@@ -76,11 +73,12 @@ class LaneNumbers:
         commands = Commands(inputs)
         self.chunks = [Chunk(own, commands, part) for which in groups(inputs, commands)
                        for own, part in supplies.parts(inputs, which)]
-        law = TICK_LAWS[type(inputs.model)]
-        self.pulsed, self.digital = law != "bounded", law == "digital"  # whether there is a bridge, and a program
-        self.curve = np.array(table_of(inputs.model.curve()), np.float64).reshape(-1, 2)
         self.neutral = np.empty(self.count)
-        self.columns, self.torque = self._packed()
+        self._given = self._joined()
+        law, _, self.curve, self.torque = self._given
+        self.pulsed, self.digital = law != "bounded", law == "digital"  # whether there is a bridge, and a program
+        self.recorded = bool(self.torque.count.any())  # whether a record of torque may end
+        self.columns = self._given.columns()
         self.frame_period = self.columns.chips["frame_period"].ravel()[:self.count]
         self.load_total, self.reduction, self.V_oc = np.empty((3, self.count))
         for chunk in self.chunks:
@@ -97,30 +95,45 @@ class LaneNumbers:
             if len(fed):
                 self.impose(fed, None, imposed.bus_voltage[fed])
 
-    def _packed(self) -> tuple[Columns, Tables]:
-        B = self.count
-        numbers, chips, start = tiles_with(Numbers, NEUTRAL, B), tiles_with(Chip, NO_CHIP, B), np.empty((7, B))
-        torque, first, count = np.empty(B), np.zeros(B, np.int64), np.zeros(B, np.int64)
-        rows: list[Array] = []
-        programs = lane_runs.programs_of(NO_FIRMWARE if self.digital else None, B)
-        for chunk in self.chunks:
-            asked = Asked(1.0, np.zeros(1), (), "float64", self.accuracy)
-            work = chunk.work(asked, ())
-            packed, which = lane_runs.lanes_of(work), chunk.which
-            put_columns(numbers, which, columns_of(Numbers, packed.numbers, slice(len(which))))
-            put_columns(chips, which, columns_of(Chip, packed.chips, slice(len(which))))
-            start[:, which] = packed.start
-            if self.digital:
-                programs[which] = packed.firmware
-            torque[which] = packed.torque
-            first[which], count[which] = work.torque.first + sum(map(len, rows)), work.torque.count
-            rows.append(work.torque.rows)
-            self.neutral[which] = work.command.rows[work.command.first, 1]
-        pieces = np.zeros((B, 7))
+    def _joined(self) -> Packed:
+        """Return all lanes, which are told one thing for ever."""
+        parts = [(chunk.which, chunk.packed(self.accuracy)) for chunk in self.chunks]
+        lanes, B = [part.lanes for _, part in parts], self.count
+
+        def joined(*values: Any) -> Any:
+            if hasattr(values[0], "_fields"):
+                return type(values[0])(*map(joined, *values))
+            column = np.empty((*np.shape(values[0])[:-1], B))
+            for (which, _), x in zip(parts, values, strict=True):
+                column[..., which] = x
+            return column
+
+        at = np.cumsum([0, *(len(part.torque.rows) for _, part in parts)])
+        first, count = np.zeros((2, B), np.int64)
+        for (which, part), rows in zip(parts, at, strict=False):
+            first[which], count[which] = part.torque.first + rows, part.torque.count
+            self.neutral[which] = part.lanes.pieces[part.lanes.piece_first, 1]
         index, none = np.arange(B), np.zeros(B, np.int64)
-        columns = Columns(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), pieces, index, none + 1,
-                          np.zeros(0), none, none - 1, self.accuracy, programs)
-        return columns, Tables(first, count, np.concatenate(rows).reshape(-1, 7))
+        numbers, chips, start, torque = (joined(*(getattr(own, name) for own in lanes))
+                                         for name in ("numbers", "chips", "start", "torque"))
+        own = Lanes(numbers, chips, start, torque, self.inputs.seeds.astype(np.int64), np.zeros((B, 7)), index,
+                      none + 1, np.zeros(0), none, none - 1, self.accuracy,
+                      joined(*(own.firmware for own in lanes)) if parts[0][1].law == "digital" else None)
+        rows = np.concatenate([part.torque.rows for _, part in parts])
+        return Packed(parts[0][1].law, own, parts[0][1].curve, Torques(rows, first, count))
+
+    def packed(self) -> Packed:
+        """Return the lanes as they are now, as `forms.kinds_of` asks them."""
+        own, every = self.columns, slice(self.count)
+        firmware = Firmware(*(own.firmware[name] for name in Firmware._fields)) if self.digital else None
+        return self._given._replace(lanes=own._replace(
+            numbers=columns_of(Numbers, own.numbers, every), chips=columns_of(Chip, own.chips, every),
+            firmware=firmware))
+
+    @cached_property
+    def translate(self) -> Translator:
+        """What translates commands of these lanes."""
+        return Translator(self)
 
     def now(self, kind: Any, which: Indices | None = None) -> Any:
         """Return a term's record of numbers of some lanes, or of all, as they are now, each an array."""
@@ -152,7 +165,7 @@ class LaneNumbers:
         merged = {name: self._merged(name, value, which) for name, value in parameters.items()}
         known = {**inputs.numbers, **inputs.words}
         loads = [inputs.loads[k] for k in inputs.load_of.tolist()]
-        inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds, TICK_LAWS)
+        inputs = lanes_of(inputs.model, inputs.commands[0], loads, {**known, **merged}, None, inputs.seeds)
         return LaneNumbers(inputs, self.accuracy, self.supplies, self.imposed)
 
     def _merged(self, name: str, value: Any, which: Indices) -> Any:
@@ -196,26 +209,17 @@ class LaneNumbers:
         InputError
             If an angle is beyond a stop; names the lane.
         """
-        rest = nothing_yet(1)
-        put_started(rest, 0, NOWHERE, RIGID)
-        memories = taken(rest, np.zeros(len(which), np.int64))
-        place = np.full(self.count, -1)
+        place, y = np.full(self.count, -1), np.empty((7, self.count))
         place[which] = np.arange(len(which))
+        if angle is not None:
+            self.check_angles(angle, which)
         for chunk in self.chunks:
             own = chunk.which[place[chunk.which] >= 0]
-            if not len(own):
-                continue
-            part = Chunk(chunk.lanes, chunk.commands, own)
-            q = part.model.start_angle(cast("Any", command[own, None])) if angle is None else angle[place[own], None]
-            y = start_vector(part.model.states, part.numbers, q, {})
-            if angle is not None:
-                self.check_angles(angle[place[own]], own)
-            play = self.now(Play, own).half > 0.0
-            point = memories.rows["point"]
-            for name, values in y._asdict().items():
-                point["y"][name][place[own]] = point["anchor"][name][place[own]] = np.ravel(values)
-            point["wiper"][place[own]] = np.ravel(y.q)
-            point["mode"]["mesh"][place[own]] = np.where(play, INSIDE, RIGID)
+            if len(own):
+                initial = {} if angle is None else {"output_angle": angle[place[own], None]}
+                y[:, own] = Chunk(chunk.lanes, chunk.commands, own).started(command[own, None], initial)
+        memories = nothing_yet(len(which))
+        kernels(TICKS).start(self.columns._replace(start=y), which, memories)
         return memories
 
     def check_angles(self, angle: Array, which: Indices) -> None:
@@ -227,11 +231,8 @@ class LaneNumbers:
             raise InputError(f"output_angle of lane {which[k]}", got=float(angle[k]),
                              allowed=f"{lower[k]:.6g} to {upper[k]:.6g} rad, between the stops")
 
-    def check_recorded(self, time: Callable[[], Array], duration: float) -> None:
+    def check_recorded(self, now: Array, duration: float) -> None:
         """Raise LoadError if a recorded torque ends before lanes that go on for a duration [s] do; names the lane."""
-        if not self.torque.count.any():
-            return
-        now = time()
         for lane in np.flatnonzero(self.torque.count).tolist():
             load = self.inputs.loads[self.inputs.load_of[lane]]
             try:

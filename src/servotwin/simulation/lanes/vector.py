@@ -18,24 +18,24 @@ from servotwin.models.engine.memory import ACCURACY
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.ticks import LONGEST
 from servotwin.signals import Signal, constant
-from servotwin.simulation.batch import Failure
 from servotwin.simulation.bus_supply import supplies_of
-from servotwin.simulation.lane_inputs import TICK_LAWS, lanes_of, pick
-from servotwin.simulation.many import memory_limit, own_threads, real_type, workers_of
+from servotwin.simulation.lanes.batch import Failure
+from servotwin.simulation.lanes.inputs import LAWS, lanes_of, pick
+from servotwin.simulation.lanes.lane_numbers import LaneNumbers
+from servotwin.simulation.lanes.lane_sets import SHAFT
+from servotwin.simulation.lanes.many import real_type
+from servotwin.simulation.lanes.saved import VectorMemory
+from servotwin.simulation.lanes.store import Store
 from servotwin.simulation.start import accuracy_of
 from servotwin.simulation.status import Status
-from servotwin.simulation.vector_calls import Room
-from servotwin.simulation.vector_commands import Translator
-from servotwin.simulation.vector_memory import VectorMemory
-from servotwin.simulation.vector_numbers import LaneNumbers
-from servotwin.simulation.vector_store import SHAFT, Store
+from servotwin.simulation.workers import memory_limit, own_threads, workers_of
 from servotwin.units import is_finite, is_masked
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, DTypeLike
 
     from servotwin import loads
-    from servotwin.simulation.c_entry import CEntry, Parts
+    from servotwin.simulation.lanes.c_entry import CEntry
 
 Array = NDArray[np.float64]
 _BYTES = 4000  # of a lane, and of what is made of it now and then
@@ -55,7 +55,8 @@ class VectorSimulator:
 
     Parameters
     ----------
-    model : PulseServo, PulseServoInductive, DigitalServo, BoundedServo or AveragedServo
+    model : Model
+        Any servo.
     lanes : int
         Number of servos.
     load : Load or sequence of Load, optional
@@ -95,27 +96,28 @@ class VectorSimulator:
         parameters: Mapping[str, Any] | None = None, bus: Any = None, dtype: DTypeLike = "float64",
         threads: int | None = None, seed: int = 0, accuracy: float = ACCURACY,
     ) -> None:
+        if LAWS.get(type(model), "voltage") == "voltage":
+            raise InputError("model of a VectorSimulator", got=model,
+                             allowed=" or ".join(kind.__name__ for kind, law in LAWS.items() if law != "voltage"))
         count = _whole("lanes", lanes, 1)
         if count * _BYTES > 0.8 * memory_limit():
             raise InputError("lanes", got=count, allowed="what fits into memory: take fewer")
         supplies = supplies_of(bus, model, count)
         base = _whole("seed", seed, None)
         start = _first_command(model)
-        inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count), TICK_LAWS)
+        inputs = lanes_of(model, start, load, parameters, None, base + np.arange(count))
         if inputs.count != count:
             raise InputError("numbers of lanes", got=f"lanes: {count}, parameters or loads: {inputs.count}",
                              allowed="arrays of one number for each lane")
-        self._numbers = LaneNumbers(inputs, accuracy_of(accuracy), supplies)
-        self._threads = _whole("threads", threads, 1) if threads is not None else workers_of(None)
-        self._pool = own_threads(os.getpid())
-        self._store = Store(self._numbers, real_type(dtype), self._threads, self._pool)
-        self._translate = Translator(self._numbers)
-        self._command = self._numbers.neutral.copy()  # as the engine follows it: pulse width [s], control voltage [V]
-        self._torque = np.zeros(count)
-        self._room = Room.of(count)
-        self._fresh = np.zeros(1, np.int64)  # 1 while what was seen still shows; compiled code ends that too
+        self._store = Store(LaneNumbers(inputs, accuracy_of(accuracy), supplies), real_type(dtype),
+                            _whole("threads", threads, 1) if threads is not None else workers_of(None),
+                            own_threads(os.getpid()))
         self._entry: CEntry | None = None
         self.reset()
+
+    @property
+    def _numbers(self) -> LaneNumbers:
+        return self._store.numbers
 
     def __repr__(self) -> str:
         return f"VectorSimulator({self._numbers.model!r}, lanes={len(self)})"
@@ -164,15 +166,18 @@ class VectorSimulator:
         if not (type(duration) is float or is_finite(duration)) or not 0.0 <= duration <= LONGEST:
             raise InputError("advance(duration)", got=duration,
                              allowed=f"a number of seconds, from 0 to {LONGEST:.0e} in one call")
-        self._numbers.check_recorded(lambda: self.time, float(duration))
-        self._fresh[0] = 0
+        store = self._store
+        if store.numbers.recorded:
+            store.numbers.check_recorded(self.time, float(duration))
+        store.fresh[0] = 0
         torque = self._torque_of(external_torque) if external_torque is not None else None
-        self._take_command(pulse_width, command_angle, command_voltage)
-        if torque is not None and not np.array_equal(torque, self._torque):
-            self._torque[:] = torque
-            self._store.hang(self._torque)
+        command = store.numbers.translate.command(pulse_width, command_angle, command_voltage, None)
+        if command is not None:
+            store.command[:] = command
+        if torque is not None and not np.array_equal(torque, store.torque):
+            store.hang(torque)
         if duration > 0.0:
-            self._store.advance(float(duration), self._command)
+            store.advance(float(duration))
 
     def reset(self, *, pulse_width: ArrayLike | None = None, command_angle: ArrayLike | None = None,
               command_voltage: ArrayLike | None = None, output_angle: ArrayLike | None = None,
@@ -189,14 +194,14 @@ class VectorSimulator:
             Which; all unless given.
         """
         which = pick(lanes, len(self))
-        self._fresh[0] = 0
+        self._store.fresh[0] = 0
         angle = None if output_angle is None else numbers_of("output_angle", output_angle, which)
-        command = self._command.copy()
-        found = self._translate.command(pulse_width, command_angle, command_voltage, which)
+        command = self._store.command.copy()
+        found = self._numbers.translate.command(pulse_width, command_angle, command_voltage, which)
         if found is not None:
             command[which] = found
         self._store.start(which, self._numbers.start(which, command, angle))
-        self._command[:] = command
+        self._store.command[:] = command
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -215,11 +220,8 @@ class VectorSimulator:
         if name not in numbers.available:
             raise UnknownNameError(f"signal of {type(numbers.model).__name__}", name, ("time", *numbers.available))
         if name in KINDS:
-            return np.where(self._store.status != 0, math.nan, numbers.commanded(name, self._command))
-        if not self._fresh[0]:
-            self._store.look(self._command, self._room.seen)
-            self._fresh[0] = 1
-        values = self._room.seen[:, _COLUMNS[name]]
+            return np.where(self._store.status != 0, math.nan, numbers.commanded(name, self._store.command))
+        values = self._store.look()[:, _COLUMNS[name]]
         return np.asarray(AT_MOTOR[name](values, numbers.reduction)) if name in AT_MOTOR else values.copy()
 
     @property
@@ -255,7 +257,7 @@ class VectorSimulator:
             On bad input, before anything changes; names lane and argument.
         """
         which = pick(lanes, len(self))
-        self._fresh[0] = 0
+        self._store.fresh[0] = 0
         torque = None if torque_enable is None else self._torque_switch(torque_enable, which)
         angle, speed, inertia, bus = (
             None if value is None else numbers_of(name, value, which) for name, value in (
@@ -270,13 +272,11 @@ class VectorSimulator:
         if angle is not None:
             self._numbers.check_angles(angle, which)
         if parameters:
-            self._numbers = self._numbers.changed(which, parameters)
-            self._store.renew(self._numbers, which, self._torque)
-            self._translate = Translator(self._numbers)
+            self._store.renew(self._numbers.changed(which, parameters), which)
         otherwise = False
         if inertia is not None or bus is not None:
             otherwise = self._numbers.impose(which, inertia, bus)
-            self._store.refit(which, otherwise, self._torque)
+            self._store.refit(which, otherwise)
         if self._entry is not None and (parameters or otherwise):
             self._entry.refresh()
         if angle is not None or speed is not None:
@@ -288,10 +288,7 @@ class VectorSimulator:
 
     def save(self) -> VectorMemory:
         """Return all that the lanes remember, as it is now; picklable."""
-        store = self._store
-        return VectorMemory(type(self._numbers.model).__name__, *store.memories(), self._command.copy(),
-                            self._torque.copy(), store.status.copy(), store.ended.copy(), store.work.copy(),
-                            self._numbers.columns.numbers.copy(), store.common())
+        return self._store.save()
 
     def restore(self, memory: VectorMemory) -> None:
         """Go back to what was saved, here or in another simulator of this model with as many lanes.
@@ -309,9 +306,8 @@ class VectorSimulator:
         if memory.model != kind or len(memory.records) != len(self):
             raise InputError("restore(memory)", got=f"{len(memory.records)} lanes of {memory.model}",
                              allowed=f"{len(self)} lanes of {kind}")
-        self._fresh[0] = 0
-        self._command[:], self._torque[:] = memory.command, memory.torque
-        self._store.restore(memory, self._torque)
+        self._store.fresh[0] = 0
+        self._store.restore(memory)
 
     # --- from C -------------------------------------------------------------------------------------------------------
 
@@ -326,22 +322,12 @@ class VectorSimulator:
         All that its lanes may need is compiled now, once on a machine.
         """
         if self._entry is None:
-            from servotwin.simulation.c_entry import CEntry
+            from servotwin.simulation.lanes.c_entry import CEntry
 
-            self._entry = CEntry(self._parts)
+            self._entry = CEntry(self._store)
         return self._entry
 
-    def _parts(self) -> Parts:
-        from servotwin.simulation.c_entry import Parts
-
-        return Parts(self._numbers, self._store, self._translate, self._command, self._torque, self._room, self._fresh)
-
     # --- arguments ----------------------------------------------------------------------------------------------------
-
-    def _take_command(self, pulse_width: Any, command_angle: Any, command_voltage: Any) -> None:
-        found = self._translate.command(pulse_width, command_angle, command_voltage, None)
-        if found is not None:
-            self._command[:] = found
 
     def _torque_switch(self, torque_enable: Any, which: NDArray[np.int64]) -> Array:
         if not self._numbers.digital:
@@ -358,15 +344,13 @@ class VectorSimulator:
         return numbers_of("external_torque", torque, np.arange(len(self)))
 
 
-def _first_command(model: object) -> Signal:
+def _first_command(model: Model) -> Signal:
     """Return what a servo is told until the first command: a pulse in the middle of those that it takes, or a goal."""
     if isinstance(model, DigitalServo) and model.takes_goals:
         low, high = (model.value_or(f"firmware.{end}_goal", model.value_or(f"stops.{end}_angle", math.nan))
                      for end in ("lower", "upper"))
         middle = 0.5 * (low + high)
         return constant(0.0 if math.isnan(middle) else middle, unit="rad")
-    if not isinstance(model, Model):
-        return constant(1500.0, unit="us")  # what is no model is refused in a moment
     return constant(1e6 * _middle(model), unit="us")
 
 

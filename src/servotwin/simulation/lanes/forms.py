@@ -19,10 +19,11 @@ from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.rooms import NOTHING, ROOMS
 from servotwin.physics.pieces import Piece
-from servotwin.simulation import lane_recipes as recipes
 from servotwin.simulation.compile import Recipe, is_plain
 from servotwin.simulation.compile.unread import in_general, unread
-from servotwin.simulation.lane_groups import by_groups
+from servotwin.simulation.lanes import form_recipes as recipes
+from servotwin.simulation.lanes.divided import by_groups
+from servotwin.simulation.lanes.packed import Packed, swept
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -62,13 +63,12 @@ class Terms:
         """Tell which lanes have one of some numbers."""
         found: Any = False
         for path in paths:
-            found = _either(found, self.have(path))
+            found = found | self.have(path)
         return found
 
     def fit(self, recipe: Recipe) -> Any:
         """Tell for which lanes kernels are made: for those whose numbers they know, and all of whose terms."""
-        suited = self.suit(recipe.knows)
-        return _without(suited, self.have_any(_unknown(recipe))) if np.any(suited) else suited  # to look takes a second
+        return self.suit(recipe.knows) & np.logical_not(self.have_any(_unknown(recipe)))
 
     def suit(self, knows: int) -> Any:
         """Tell for which lanes kernels would be made that follow this, if they knew all numbers."""
@@ -124,66 +124,74 @@ class OneByOne(NamedTuple):
     calm: bool = False
 
 
-def kinds_of(numbers: Numbers, chip: Chip, lanes: int, dtype: str, swept: Mask, recorded: Mask,
-             curved: bool, firmware: Firmware = NO_FIRMWARE) -> list[SideBySide | OneByOne]:
+def kinds_of(packed: Packed, dtype: str) -> list[SideBySide | OneByOne]:
+    """Return how lanes run; `dtype` is that of those that may be of either."""
+    own, recorded = packed.lanes, packed.torque.count > 0
+    return kinds_with(own.numbers, own.chips, packed.size, dtype, swept(own), recorded, packed.curve.size > 0,
+                      own.firmware or NO_FIRMWARE)
+
+
+def kinds_with(numbers: Numbers, chip: Chip, lanes: int, dtype: str, sweeps: Mask, recorded: Mask,
+               curved: bool, firmware: Firmware = NO_FIRMWARE) -> list[SideBySide | OneByOne]:
     """Return how lanes run, whose numbers are numbers or arrays (lanes,).
 
-    `swept` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
+    `sweeps` is whose command has a chirp, `recorded` whose load is recorded over time, `curved` whether the
     potentiometers have a table.
     """
     inputs = recorded * RECORDED if recorded.any() else 0
-    terms = Terms(numbers, chip, firmware, swept.any() and swept, inputs | TABLE * curved)
-    if _any(terms.ask(SPRING | PWM)):
-        return _alone(terms, lanes)
-    found: list[SideBySide | OneByOne] = []
-    left: Any = not is_plain()
-    side = _stays(terms) if dtype == "float32" else True
-    for form, knows, made_for in recipes.SIDES:
-        own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
-        which = _and(terms.suit(knows), not made_for or terms.ask(made_for), side, left)
-        if _any(which):
-            which = _and(which, terms.fit(recipes.side_by_side(form, own_type, True, True)))
-            left = _without(left, which)
-            found.append(_together(terms, form, own_type, _indices(which, lanes)))
-    for wanted, calm in ((terms.suit(recipes.CALM), True), (True, False)):
-        which = _and(left, wanted)
-        if _any(which):
-            which = _and(which, terms.fit(recipes.PLAIN_RUNS))
-            left = _without(left, which)
-            found.append(OneByOne(_indices(which, lanes), recipes.PLAIN_RUNS, calm))
-    left = True if is_plain() else left
-    return [kind for kind in (*found, *_at_last(terms, left, recipes.ALL_RUNS, lanes)) if len(kind.which)]
-
-
-def _alone(terms: Terms, lanes: int) -> list[SideBySide | OneByOne]:
-    """Return how lanes run of which some have a spring between two bodies, or a program."""
-    digital, sprung = _any(terms.ask(PWM)), terms.ask(SPRING)
-    found, left = [*_at_last(terms, sprung, recipes.ALL_RUNS, lanes)], _not(sprung)
-    for recipe in (recipes.BY_TICKS, recipes.BY_LEGS, recipes.BY_SERIES) if digital and not is_plain() else ():
-        if _any(left):
-            which = _and(left, terms.fit(recipe))
-            left = _without(left, which)
-            found.append(OneByOne(_indices(which, lanes), recipe))
-    found += _at_last(terms, left, recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS, lanes)
+    terms = Terms(numbers, chip, firmware, sweeps.any() and sweeps, inputs | TABLE * curved)
+    left = np.ones(lanes, np.bool_)
+    found = list(_alone(terms, left) if np.any(terms.ask(SPRING | PWM)) else _of_analog(terms, left, dtype))
     return [kind for kind in found if len(kind.which)]
 
 
-def _at_last(terms: Terms, left: Any, recipe: Recipe, lanes: int) -> Iterator[OneByOne]:
+def _of_analog(terms: Terms, left: Mask, dtype: str) -> Iterator[SideBySide | OneByOne]:
+    """Return how lanes run that are pulsed or follow a mean, of one body or with play; they are taken from `left`."""
+    side = _stays(terms) if dtype == "float32" else True
+    for form, knows, made_for in () if is_plain() else recipes.SIDES:
+        own_type = dtype if form in (tiles.ONE_FORMULA, tiles.ARCS) else "float64"
+        asked: Any = terms.ask(made_for) if made_for else True
+        which = _take(terms, left, recipes.side_by_side(form, own_type, True, True),
+                      terms.suit(knows) & asked & side)
+        if len(which):
+            yield _together(terms, form, own_type, which)
+    for wanted, calm in () if is_plain() else ((terms.suit(recipes.CALM), True), (True, False)):
+        yield OneByOne(_take(terms, left, recipes.PLAIN_RUNS, wanted), recipes.PLAIN_RUNS, calm)
+    yield from _at_last(terms, left, recipes.ALL_RUNS)
+
+
+def _alone(terms: Terms, left: Mask) -> Iterator[OneByOne]:
+    """Return how lanes run of which some have a spring between two bodies, or a program."""
+    digital, sprung = np.any(terms.ask(PWM)), left & terms.ask(SPRING)
+    left &= ~sprung
+    yield from _at_last(terms, sprung, recipes.ALL_RUNS)
+    for recipe in (recipes.BY_TICKS, recipes.BY_LEGS, recipes.BY_SERIES) if digital and not is_plain() else ():
+        yield OneByOne(_take(terms, left, recipe), recipe)
+    yield from _at_last(terms, left, recipes.ALL_DIGITAL if digital else recipes.ALL_RUNS)
+
+
+def _at_last(terms: Terms, left: Mask, recipe: Recipe) -> Iterator[OneByOne]:
     """Return how those run that no faster form takes: none that its kernels do not know either, as terms are now."""
-    if is_plain():  # a fast form has no worth, nor to ask for it
-        yield OneByOne(_indices(left, lanes), recipe)
-    elif _any(left):
-        which = _and(left, terms.fit(recipe))
-        yield OneByOne(_indices(which, lanes), recipe)
-        yield OneByOne(_indices(_without(left, which), lanes), in_general(recipe))
+    if not is_plain():  # a fast form has no worth there, nor to ask for it
+        yield OneByOne(_take(terms, left, recipe), recipe)
+        recipe = in_general(recipe)
+    yield OneByOne(np.flatnonzero(left), recipe)
+
+
+def _take(terms: Terms, left: Mask, recipe: Recipe, wanted: Any = True) -> Indices:
+    """Return the lanes of those wanted for which kernels are made, which are not left then."""
+    which = left & wanted
+    if which.any():  # to look whether they fit takes a second
+        which &= terms.fit(recipe)
+        left &= ~which
+    return np.flatnonzero(which)
 
 
 def _stays(terms: Terms) -> Any:
     """Tell in which lanes what is not zero stays so in float32."""
     stays: Any = True
     for x in (*numbers_in(terms.numbers), *numbers_in(terms.chip)):
-        fits = (x == 0.0) | (abs(x) > _SMALLEST)
-        stays = stays if fits is True else stays & fits
+        stays = stays & ((x == 0.0) | (abs(x) > _SMALLEST))
     return stays
 
 
@@ -192,7 +200,7 @@ def _together(terms: Terms, form: int, dtype: str, which: Indices) -> SideBySide
     asked = terms.demands[which] if np.ndim(terms.demands) else terms.demands
 
     def some(flags: int) -> bool:
-        return _any((asked & flags) != 0)
+        return bool(np.any((asked & flags) != 0))
 
     return SideBySide(which, form, some(SLACK), dtype, form == tiles.BANDS and some(FADING),
                       form == tiles.STRIDES and some(recipes.BANDED))
@@ -201,38 +209,4 @@ def _together(terms: Terms, form: int, dtype: str, which: Indices) -> SideBySide
 def goes_together(numbers: Numbers, pulsed: bool) -> bool:
     """Tell whether all lanes take about as long, for none has a term that would let it run on its own."""
     asked = Terms(numbers, NO_CHIP, NO_FIRMWARE).ask(STEEP_W | PLAY | recipes.STRIDING)
-    return pulsed and not _any(asked)
-
-
-def _without(some: Any, *others: Any) -> Any:
-    """Return `some` but for those that one of the others holds for."""
-    for other in others:
-        some = some if other is False else _and(some, _not(other))
-    return some
-
-
-def _not(some: Any) -> Any:
-    return np.logical_not(some) if np.ndim(some) else not some
-
-
-def _and(*parts: Any) -> Any:
-    """Return those for which everything holds."""
-    found: Any = True
-    for part in parts:
-        found = part if found is True else found if part is True else found & part
-    return found
-
-
-def _either(a: Any, b: Any) -> Any:
-    """Return a | b, at once where one of them holds for none."""
-    return b if a is False else a if b is False else a | b
-
-
-def _any(some: Any) -> bool:
-    """Tell whether something holds for any lane."""
-    return bool(some.any() if np.ndim(some) else some)
-
-
-def _indices(some: Any, lanes: int) -> Indices:
-    """Return the lanes that something holds for."""
-    return np.flatnonzero(some) if np.ndim(some) else np.arange(lanes if some else 0)
+    return pulsed and not np.any(asked)

@@ -5,6 +5,7 @@ Nothing here names a term: what kernels leave out, and which numbers they know, 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -47,7 +48,7 @@ from servotwin.models.terms.dependence import (
 from servotwin.simulation.compile import Recipe
 
 _SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
-_ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "go_on"))
+_ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "ready", "go_on", "note_failures"))
 _DIGITAL = PROGRAM | BEYOND | AT_COMMANDS | PWM | ONE_WAY
 _MEAN = FOLLOWS | STEEP_W  # servos without pulses
 _NOT_DIGITAL = _MEAN | PULSES | ON_I
@@ -94,7 +95,8 @@ CALM = PLAIN_RUNS.knows & ~(_LEFT_TO_EVENTS | CURVED_Q | RECORDED | TABLE)
 """What lanes of those kernels may ask for that go on calmly, as far as that leads."""
 # Not compiled for its own sake: it says which numbers are known where lanes go on calmly
 _CALMLY = (Recipe("calm", (_CALM,), knows=CALM, leaves=_LEFT_TO_EVENTS), ())
-ALL_DIGITAL = Recipe("digital_runs", _ENTRIES, knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM)
+_FIRST_TICKS = "servotwin.models.engine.runs:to_first_ticks"
+ALL_DIGITAL = Recipe("digital_runs", (*_ENTRIES, _FIRST_TICKS), knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM)
 _TICKS = _PLAIN & ~ON_Q | _DIGITAL
 _LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
 BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.leg_runs:go_on",), vector=True, knows=_LEGS, always=PROGRAM | PWM)
@@ -118,10 +120,16 @@ _BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_L
                  "loop_tiles:enter", "loop_rounds:watch", "loop_rounds:decide", "loop_rounds:move",
                  "loop_rounds:move_on", "loop_rounds:follow")))
 
-# --- What shows of lanes ----------------------------------------------------------------------------------------------
+# --- Lanes between calls ----------------------------------------------------------------------------------------------
 
 LOOK = Recipe("look", tuple(f"servotwin.models.engine.sights:{name}" for name in ("side_by_side", "one_by_one")))
 """Lanes of all forms: to look leaves out little where terms are absent."""
+TICKS = Recipe("ticks", (
+    _ENTRIES[0], *(f"servotwin.models.engine.ticks:{name}" for name in ("accept", "change", "follow")),
+    *(f"servotwin.models.engine.lane_ticks:{name}" for name in (
+        "gather_lost", "to_records", "to_tiles", "forget_motions", "impose_on_tiles", "impose_on_records", "show_tiles",
+        "show_records", "read_clocks", "take_status", "note_lost_buses", "break_up"))))
+"""Lanes of all forms between two calls: what is imposed on them, and the way from tiles to records and back."""
 ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, knows=~_DIGITAL)
 _PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
           BY_SERIES: (_BY_SERIES,), ALL_DIGITAL: ((ALL_DIGITAL, ()), _BY_LEGS)}
@@ -129,9 +137,29 @@ _CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DI
            BY_SERIES: (BY_SERIES, ALL_DIGITAL)}
 
 
-def chain_of(recipe: Recipe) -> tuple[Recipe, ...]:
-    """Return the kernels by which lanes of a form go on one after the other: the last of them finish every call."""
-    return _CHAINS.get(recipe, (recipe,))
+def last_of(recipe: Recipe) -> Recipe:
+    """Return the kernels that finish every call of lanes of a form."""
+    return _CHAINS.get(recipe, (recipe,))[-1]
+
+
+def steps_of(recipe: Recipe, ended: Any) -> Iterator[tuple[Recipe, str, tuple[Any, ...]]]:
+    """Return the kernels by which lanes of a form go on one after the other, each with its entry.
+
+    All of them have the arguments of `runs.go_on`, with these in the place of the last one.
+    """
+    *ahead, last = _CHAINS.get(recipe, (recipe,))
+    if ahead:
+        yield last, "to_first_ticks", ()
+    for one in ahead:
+        yield one, "go_on", _room_of(one)
+    yield last, "go_on", (ended,)
+
+
+def _room_of(recipe: Recipe) -> tuple[Any, ...]:
+    """Return what kernels need beside the arguments of `runs.go_on`."""
+    if recipe == BY_SERIES:
+        return np.zeros(2, record_of(Unit)), np.zeros(2, record_of(Coupling))
+    return (loop_tiles.tile_room(),) if recipe == BY_TICKS else ()
 
 
 def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
@@ -140,13 +168,6 @@ def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
     Those that say by themselves whether they do follow all numbers.
     """
     return _PARTS.get(recipe, ((recipe, ()),))
-
-
-def room_of(recipe: Recipe) -> tuple[Any, ...]:
-    """Return what these need beside the arguments of `runs.go_on`: lanes side by side, room for a tile."""
-    if recipe == BY_SERIES:
-        return np.zeros(2, record_of(Unit)), np.zeros(2, record_of(Coupling))
-    return (loop_tiles.tile_room(),) if recipe == BY_TICKS else ()
 
 
 def side_by_side(form: int, dtype: str, creeps: bool, banded: bool) -> Recipe:
