@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from servotwin.models.engine import contacts, currents, twist
 from servotwin.models.engine.contacts import friction_torque
+from servotwin.models.engine.elementary import decay, exp, log1p
 from servotwin.models.engine.guards import SHARE, SPEED, ZONE_DOWN, ZONE_UP, creeping, geared, geared_speed, turns_alone
 from servotwin.models.engine.modes import BACKWARD, FORWARD, NOWHERE, Mode, Vector, moving, slides
 from servotwin.models.terms import shaft
@@ -45,8 +46,12 @@ _FEWER = (  # those of the rule of 10 points among them
     0.0747256745752903, 0.0, 0.03333567215434407, 0.0, 0.0, 0.0, 0.0,
 )
 IN_ANY_ORDER = ("_between",)  # functions whose sums a compiler may take side by side
-_HALVINGS = 12  # of a range of speeds; one that needs more is for the integrator
-_ROUNDS = 40
+_PANELS = 40  # on one way; one that needs more is for the integrator
+_GUESSES = 3
+_NEAR = 1e-7  # of a speed: within that a law is a straight line
+_LONG = 3.0  # times the time in which a straight law settles
+_SHORT = 4e-16  # of a time
+_LONGEST = 100.0  # s
 _INTO = 0.9  # of the speed at which friction begins to fade: up to there next to nothing of it has
 _PART, _ROUNDING = 0.01, 2e-15  # of a tolerance: where two runs halve otherwise, they should not differ by more
 
@@ -72,12 +77,36 @@ class _Course(NamedTuple):
     against: float  # external torque [N m]
 
 
+class _Panel(NamedTuple):
+    """A range of speeds, and how a shaft would go through it if its law were a straight line."""
+
+    span: float  # that time [s]; 0 where it stays as fast as it is
+    rate: float  # 1/s, at least 0: the law is told from the end at which it speeds up or slows down more
+    anchor: float  # this end [rad/s]
+    pull: float  # how the speed leaves it, as time goes on or back [rad/s²]
+    other: float  # the other end
+    there: float  # the one that is reached
+    way: float  # the angle that it would turn [rad]
+    arrives: bool
+    straight: bool  # the law is a straight line, to rounding
+
+
 class _Between(NamedTuple):
-    """Time [s] and angle [rad] between two speeds, and the relative error of the time; negative where none is."""
+    """Time [s] and angle [rad] through a panel, and the error of the time; negative where it cannot be told."""
 
     time: float
     way: float
     error: float
+
+
+class _Went(NamedTuple):
+    """Where the way on has led: time [s], angle [rad] and speed, whether to the bound; 1, or 0 where it cannot be told."""
+
+    time: float
+    way: float
+    speed: float
+    arrived: bool
+    done: float
 
 
 def creeps(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> bool:
@@ -94,7 +123,7 @@ def longest_step(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) 
         return math.inf
     slow = creeping_speed(numbers.friction)
     fast = slow if geared(numbers, mode) == FORWARD else -slow
-    most = max(_gain(numbers, mode, u, tau, y, 0.0), _gain(numbers, mode, u, tau, y, fast))
+    most = max(_most_gain(numbers, mode, u, tau, y, 0.0), _most_gain(numbers, mode, u, tau, y, fast))
     return 2.0 * slow / most if most > 0.0 else math.inf
 
 
@@ -111,7 +140,7 @@ def part_before(numbers: Numbers, mode: Mode, before: Vector, after: Vector) -> 
     return 1.0 if w_after >= _INTO * slow else (w - 0.5 * (1.0 + _INTO) * slow) / (w - w_after)
 
 
-def _gain(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: float) -> float:
+def _most_gain(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: float) -> float:
     """Return the magnitude of the acceleration [rad/s²] that a body sliding in the gear has at a speed."""
     inside = turns_alone(numbers, mode)
     at = moving(y, y.q, y.w if inside else w, y.w_m if behind(numbers.elastic) else w)
@@ -120,33 +149,99 @@ def _gain(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w: floa
 
 
 def creep(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, limit: float, tolerance: float) -> Crept:
-    """Return where a shaft creeps to: to where its law changes, or within `limit` [s]; with a relative error."""
+    """Return where a shaft creeps to: to where its law changes, or within `limit` [s], or a part of that way."""
     q, w = y.q, y.w
     course = _course(numbers, mode, u, tau, 1.0 if w > 0.0 or (w == 0.0 and mode.contact == FORWARD) else -1.0)
     dw = _acceleration(numbers, course, w)
     there, ends_by = _next_change(numbers, mode, u, course, w, w == 0.0 or dw * course.way > 0.0)
-    begin, end = math.sqrt(abs(w)), math.sqrt(abs(there))
     if there == w or (there < w) == (dw > 0.0):
         return Crept(0.0, q, w, ends_by, 1.0)
-    tolerance = max(_PART * tolerance, _ROUNDING)
-    for _ in range(_HALVINGS):
-        found = _between(numbers, course, begin, end)
-        size = 1.0 + abs(dw) * found.time + abs(found.way)
-        if found.error >= 0.0 and found.error * size <= tolerance:
-            if found.time <= limit:
-                return Crept(found.time, q + found.way, there, ends_by, 1.0)
-            return _within(numbers, course, q, begin, end, found.time, limit)
-        end, ends_by = 0.5 * (begin + end), -1
-        there = course.way * end * end
-    return Crept(0.0, q, w, -1, 0.0)
+    went = _onward(numbers, course, abs(w), abs(there), min(limit, _LONGEST), max(_PART * tolerance, _ROUNDING))
+    return Crept(went.time, q + course.way * went.way, there if went.arrived else course.way * went.speed,
+                 ends_by if went.arrived else -1, went.done)
 
 
-def at_time(numbers: Numbers, mode: Mode, u: float, tau: float, start: Vector, end: Vector, length: float,
+def at_time(numbers: Numbers, mode: Mode, u: float, tau: float, start: Vector, end: Vector, tolerance: float,
             s: float) -> tuple[float, float]:
-    """Return angle and speed at s within a creep of a length [s] from one state to another."""
+    """Return angle and speed at s within a creep from one state to another."""
     course = _course(numbers, mode, u, tau, 1.0 if start.w + end.w > 0.0 else -1.0)
-    there = _within(numbers, course, start.q, math.sqrt(abs(start.w)), math.sqrt(abs(end.w)), length, s)
-    return there.q, there.w
+    went = _onward(numbers, course, abs(start.w), abs(end.w), s, max(_PART * tolerance, _ROUNDING))
+    return start.q + course.way * went.way, course.way * went.speed
+
+
+def _onward(numbers: Numbers, course: _Course, begin: float, bound: float, limit: float, tolerance: float) -> _Went:
+    """Go on from a speed until another is reached, or for a time: panel by panel, back where one has led too far."""
+    x, left, way, longest = begin, limit, 0.0, limit
+    gain = _gain(numbers, course, x)
+    for _ in range(_PANELS):
+        sense = 1.0 if left > 0.0 else -1.0
+        panel = _panel(numbers, course, x, bound if left > 0.0 else begin, sense, gain, min(abs(left), longest))
+        if panel.span == 0.0:  # it stays as fast as it is
+            return _Went(limit, way + x * left, x, False, 1.0)
+        time, turned, error = panel.span, panel.way, 0.0
+        if not panel.straight:
+            time, turned, error = _between(numbers, course, panel, 1.0 if gain > 0.0 else -1.0)
+            error *= max(abs(gain), abs(panel.pull)) + abs(panel.there - x)
+        if error < 0.0 or error > tolerance:
+            longest = 0.5 * panel.span
+        else:
+            x, way, left = panel.there, way + sense * turned, left - sense * time
+            if panel.arrives and sense > 0.0 and left >= 0.0:
+                return _Went(limit - left, way, x, True, 1.0)
+            if abs(left) <= _SHORT * limit:
+                return _Went(limit, way, x, False, 1.0)
+            gain, longest = _gain(numbers, course, x), 4.0 * longest
+    return _Went(limit - left, way, x, False, 1.0 if 0.0 <= left < limit else 0.0)
+
+
+def _panel(numbers: Numbers, course: _Course, x: float, bound: float, sense: float, gain: float,
+           span: float) -> _Panel:
+    """Return the panel through which a shaft would go in a time if its law were a straight line by two points of it."""
+    most, on = abs(bound - x), 1.0 if bound > x else -1.0
+    way = on * sense
+    v, near = way * gain, _NEAR * min(x, numbers.friction.w_s)
+    if not v > 0.0 or most == 0.0:
+        return _Panel(0.0, 0.0, x, 0.0, x, x, 0.0, False, False)
+    reach = max(min(v * span, most), near)
+    growth = (way * _gain(numbers, course, x + on * reach) - v) / reach
+    for _ in range(_GUESSES):
+        if v + growth * reach > 0.0:
+            break
+        reach = max(-v / growth, near)
+        growth = (way * _gain(numbers, course, x + on * reach) - v) / reach
+    if growth > 0.0:
+        return _speeding(x, bound, on, v, growth, span, near)
+    rate = -growth
+    per_rate = 1.0 / rate if rate > 0.0 else 0.0
+    once, twice = decay(rate, per_rate, span)
+    straight = v * once <= near
+    if not straight and rate * span > _LONG:
+        span = _LONG * per_rate
+        once, twice = decay(rate, per_rate, span)
+    arrives = v * once >= most
+    if arrives:
+        span = _time_for(most / (v - rate * most), rate, per_rate)
+        twice = decay(rate, per_rate, span)[1]
+    there = bound if arrives else x + on * v * once
+    return _Panel(span, rate, x, on * v, there, there, x * span + on * v * twice, arrives, straight)
+
+
+def _speeding(x: float, bound: float, on: float, v: float, rate: float, span: float, near: float) -> _Panel:
+    """Return the same where the acceleration grows on the way: told from the end of the panel."""
+    most, per_rate = abs(bound - x), 1.0 / rate
+    gone = v * exp(rate * span) * decay(rate, per_rate, span)[0]
+    arrives = gone >= most
+    if arrives:
+        gone, span = most, _time_for(most / v, rate, per_rate)
+    there = bound if arrives else x + on * gone
+    v += rate * gone
+    way = there * span - on * v * decay(rate, per_rate, span)[1]
+    return _Panel(span, rate, there, -on * v, x, there, way, arrives, gone <= near)
+
+
+def _time_for(y: float, rate: float, per_rate: float) -> float:
+    """Return ln(1 + λ y)/λ [s]."""
+    return log1p(rate * y) * per_rate if rate > 0.0 else y
 
 
 def _course(numbers: Numbers, mode: Mode, u: float, tau: float, way: float) -> _Course:
@@ -170,7 +265,7 @@ def _next_change(numbers: Numbers, mode: Mode, u: float, course: _Course, w: flo
     if _nearer(at, w, end):
         end, ends_by = at, SHARE
     for at in (_root(static_share(own, m_0, e_0), static_share(own, m_1, e_1)), _root(e_0, e_1),
-               _root(m_0 + e_0, m_1 + e_1), way * own.w_s):
+               _root(m_0 + e_0, m_1 + e_1)):
         if _nearer(at, w, end):
             end, ends_by = at, -1
     return end, ends_by
@@ -194,46 +289,30 @@ def _acceleration(numbers: Numbers, course: _Course, w: float) -> float:
                               course.against)
 
 
-def _between(numbers: Numbers, course: _Course, begin: float, end: float) -> _Between:
-    """Integrate over σ from `begin` to `end`."""
-    span, way = end - begin, course.way
+def _gain(numbers: Numbers, course: _Course, x: float) -> float:
+    """Return by how much a shaft speeds up that is so fast [rad/s²]."""
+    return course.way * _acceleration(numbers, course, course.way * x)
+
+
+def _between(numbers: Numbers, course: _Course, panel: _Panel, sign: float) -> _Between:
+    """Integrate over a panel, in which the shaft speeds up (1) or slows down (−1)."""
+    span, rate, anchor, pull = panel.span, panel.rate, panel.anchor, panel.pull
+    begin, end = math.sqrt(anchor), math.sqrt(panel.other)
+    per_rate, size, law = 1.0 / rate if rate > 0.0 else 0.0, span / (begin + end), sign * abs(pull)
     time = fewer = turned = 0.0
     onward = 0
     for n in range(_COUNT):
-        sigma = begin + span * _NODES[n]
-        w = way * sigma * sigma
-        dw = way * _acceleration(numbers, course, w)
-        onward += 1 if dw * span > 0.0 else 0
-        f = 2.0 * sigma / dw if dw != 0.0 else 0.0
+        part = _NODES[n]
+        root = begin + (end - begin) * part
+        once, _ = decay(rate, per_rate, size * part * (begin + root))
+        x = anchor + pull * once
+        gain = _gain(numbers, course, x)
+        onward += 1 if sign * gain > 0.0 else 0
+        f = root * (law - law * (rate * once)) / gain if gain != 0.0 else 0.0
         time += _WEIGHTS[n] * f
         fewer += _FEWER[n] * f
-        turned += _WEIGHTS[n] * f * w
+        turned += _WEIGHTS[n] * f * x
+    size *= 2.0
     apart = abs(time - fewer) / abs(time) if time != 0.0 else math.inf
-    error = apart * math.sqrt(apart) if onward == _COUNT and apart < 1e-3 else -1.0
-    return _Between(time * span, turned * span, error)
-
-
-def _within(numbers: Numbers, course: _Course, q: float, begin: float, end: float, length: float,
-            time: float) -> Crept:
-    """Return where a creep from one σ to another, which would take a length [s], has led after a time [s]."""
-    low, high = begin, end
-    part = begin * begin + (end * end - begin * begin) * (time / length)
-    sigma = math.sqrt(max(part, 0.0))
-    found = _between(numbers, course, begin, sigma)
-    for _ in range(_ROUNDS):
-        miss = found.time - time
-        if abs(miss) <= 4e-16 * time:
-            break
-        if miss > 0.0:
-            high = sigma
-        else:
-            low = sigma
-        dw = course.way * _acceleration(numbers, course, course.way * sigma * sigma)
-        better = sigma - miss * dw / (2.0 * sigma) if sigma > 0.0 else 0.5 * (low + high)
-        if not min(low, high) < better < max(low, high):
-            better = 0.5 * (low + high)
-        if better == sigma or better == low or better == high:
-            break
-        sigma = better
-        found = _between(numbers, course, begin, sigma)
-    return Crept(time, q + found.way, course.way * sigma * sigma, -1, 1.0)
+    error = apart * math.sqrt(apart) * abs(time) * size if onward == _COUNT and apart < 1e-3 else -1.0
+    return _Between(time * size, turned * size, error)
