@@ -1,11 +1,14 @@
 """Creep: how a shaft moves at speeds at which static friction fades, under constant voltage and torque.
 
 There its acceleration depends on its speed alone, and in no straight line. So the time that it takes from one speed to
-another is an integral over the speed, t = ∫ dw/ẇ, and the angle q = ∫ w dw/ẇ. With w = ±σ² what is integrated is smooth
-down to rest, where the speed leaves as √t would. The integral is cut where a torque or a share changes its sign, and
-in halves until two Gauss-Kronrod rules agree.
+another is an integral over the speed, t = ∫ dw/ẇ, and the angle q = ∫ w dw/ẇ. It is taken panel by panel. A panel is
+told from the straight line through two points of the law: along it the speed is a known exponential v(ϑ) of a time ϑ,
+and t = ∫ (v̇/ẇ) dϑ, which is smooth from rest to the final speed, where both accelerations come to nothing together.
+With ϑ in steps of √w it is smooth at rest too, for every exponent. A panel is cut where a torque or a share changes its
+sign, and halved until two Gauss-Kronrod rules agree. Where a time is given, the panel that this straight line has told
+misses it by little: what is left is the next panel, forth or back, and so on until nothing is.
 
-Coefficients: R. Piessens et al., "QUADPACK", Springer 1983, rule of 21 points (qk21).
+Coefficients: R. Piessens et al., "QUADPACK", Springer 1983, rules of 21 points (qk21) and of 7.
 """
 
 from __future__ import annotations
@@ -45,15 +48,26 @@ _FEWER = (  # those of the rule of 10 points among them
     0.14776211235737644, 0.0, 0.14776211235737644, 0.0, 0.13463335965499817, 0.0, 0.10954318125799102, 0.0,
     0.0747256745752903, 0.0, 0.03333567215434407, 0.0, 0.0, 0.0, 0.0,
 )
-IN_ANY_ORDER = ("_between",)  # functions whose sums a compiler may take side by side
+_CLOSE_COUNT = 8  # of the rule of 7 points for short panels
+_CLOSE_NODES = (
+    0.01975436564598986, 0.11270166537925831, 0.2828781253265987, 0.5, 0.7171218746734013, 0.8872983346207417,
+    0.9802456343540101, 0.5,
+)
+_CLOSE_WEIGHTS = (
+    0.05232811301323363, 0.13424404493416672, 0.20069870738798111, 0.22545826932923707, 0.20069870738798111,
+    0.13424404493416672, 0.05232811301323363, 0.0,
+)
+_CLOSE_FEWER = (0.0, 0.2777777777777778, 0.0, 0.4444444444444444, 0.0, 0.2777777777777778, 0.0, 0.0)
+IN_ANY_ORDER = ("_between", "_close")  # functions whose sums a compiler may take side by side
 _PANELS = 40  # on one way; one that needs more is for the integrator
 _GUESSES = 3
 _NEAR = 1e-7  # of a speed: within that a law is a straight line
+_CLOSE = 0.1  # of a speed: within that few points are enough
 _LONG = 3.0  # times the time in which a straight law settles
 _SHORT = 4e-16  # of a time
 _LONGEST = 100.0  # s
 _INTO = 0.9  # of the speed at which friction begins to fade: up to there next to nothing of it has
-_PART, _ROUNDING = 0.01, 2e-15  # of a tolerance: where two runs halve otherwise, they should not differ by more
+_PART, _ROUNDING = 0.1, 2e-15  # of a tolerance: where two runs halve otherwise, they should not differ by more
 
 
 class Crept(NamedTuple):
@@ -91,8 +105,21 @@ class _Panel(NamedTuple):
     straight: bool  # the law is a straight line, to rounding
 
 
+class _Line(NamedTuple):
+    """What the nodes of a panel are told by."""
+
+    anchor: float
+    pull: float
+    rate: float
+    per_rate: float
+    law: float  # of the straight line at the anchor, signed as the shaft speeds up [rad/s²]
+    begin: float  # roots of the speeds at the ends
+    step: float
+    size: float
+
+
 class _Between(NamedTuple):
-    """Time [s] and angle [rad] through a panel, and the error of the time; negative where it cannot be told."""
+    """Time [s] and angle [rad] through a panel, and an error; inf where it cannot be told."""
 
     time: float
     way: float
@@ -100,7 +127,7 @@ class _Between(NamedTuple):
 
 
 class _Went(NamedTuple):
-    """Where the way on has led: time [s], angle [rad] and speed, whether to the bound; 1, or 0 where it cannot be told."""
+    """Where the way on has led: time [s], angle [rad], speed, whether to the bound; 1, or 0 where it cannot be told."""
 
     time: float
     way: float
@@ -149,14 +176,15 @@ def _most_gain(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, w:
 
 
 def creep(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector, limit: float, tolerance: float) -> Crept:
-    """Return where a shaft creeps to: to where its law changes, or within `limit` [s], or a part of that way."""
+    """Return where a shaft creeps to: to where its law changes, or within `limit` [s]; or a part of that way."""
     q, w = y.q, y.w
     course = _course(numbers, mode, u, tau, 1.0 if w > 0.0 or (w == 0.0 and mode.contact == FORWARD) else -1.0)
     dw = _acceleration(numbers, course, w)
     there, ends_by = _next_change(numbers, mode, u, course, w, w == 0.0 or dw * course.way > 0.0)
     if there == w or (there < w) == (dw > 0.0):
         return Crept(0.0, q, w, ends_by, 1.0)
-    went = _onward(numbers, course, abs(w), abs(there), min(limit, _LONGEST), max(_PART * tolerance, _ROUNDING))
+    went = _onward(numbers, course, abs(w), course.way * dw, abs(there), min(limit, _LONGEST),
+                   max(_PART * tolerance, _ROUNDING))
     return Crept(went.time, q + course.way * went.way, there if went.arrived else course.way * went.speed,
                  ends_by if went.arrived else -1, went.done)
 
@@ -165,33 +193,45 @@ def at_time(numbers: Numbers, mode: Mode, u: float, tau: float, start: Vector, e
             s: float) -> tuple[float, float]:
     """Return angle and speed at s within a creep from one state to another."""
     course = _course(numbers, mode, u, tau, 1.0 if start.w + end.w > 0.0 else -1.0)
-    went = _onward(numbers, course, abs(start.w), abs(end.w), s, max(_PART * tolerance, _ROUNDING))
+    gain = _gain(numbers, course, abs(start.w))
+    went = _onward(numbers, course, abs(start.w), gain, abs(end.w), s, max(_PART * tolerance, _ROUNDING))
     return start.q + course.way * went.way, course.way * went.speed
 
 
-def _onward(numbers: Numbers, course: _Course, begin: float, bound: float, limit: float, tolerance: float) -> _Went:
+def _onward(numbers: Numbers, course: _Course, begin: float, gain: float, bound: float, limit: float,
+            tolerance: float) -> _Went:
     """Go on from a speed until another is reached, or for a time: panel by panel, back where one has led too far."""
     x, left, way, longest = begin, limit, 0.0, limit
-    gain = _gain(numbers, course, x)
     for _ in range(_PANELS):
         sense = 1.0 if left > 0.0 else -1.0
         panel = _panel(numbers, course, x, bound if left > 0.0 else begin, sense, gain, min(abs(left), longest))
         if panel.span == 0.0:  # it stays as fast as it is
             return _Went(limit, way + x * left, x, False, 1.0)
-        time, turned, error = panel.span, panel.way, 0.0
-        if not panel.straight:
-            time, turned, error = _between(numbers, course, panel, 1.0 if gain > 0.0 else -1.0)
-            error *= max(abs(gain), abs(panel.pull)) + abs(panel.there - x)
-        if error < 0.0 or error > tolerance:
-            longest = 0.5 * panel.span
+        time, turned, error = _through(numbers, course, panel, x, gain)
+        after = left - sense * time
+        if error <= tolerance:
+            if panel.arrives and sense > 0.0 and after >= 0.0:
+                return _Went(limit - after, way + turned, panel.there, True, 1.0)
+            if abs(after) <= _SHORT * limit:
+                return _Went(limit, way + sense * turned, panel.there, False, 1.0)
+        gained = _gain(numbers, course, panel.there)
+        if error <= tolerance and (gained * gain > 0.0 or panel.straight):
+            x, gain, left, way, longest = panel.there, gained, after, way + sense * turned, 4.0 * longest
         else:
-            x, way, left = panel.there, way + sense * turned, left - sense * time
-            if panel.arrives and sense > 0.0 and left >= 0.0:
-                return _Went(limit - left, way, x, True, 1.0)
-            if abs(left) <= _SHORT * limit:
-                return _Went(limit, way, x, False, 1.0)
-            gain, longest = _gain(numbers, course, x), 4.0 * longest
+            longest = 0.5 * panel.span
     return _Went(limit - left, way, x, False, 1.0 if 0.0 <= left < limit else 0.0)
+
+
+def _through(numbers: Numbers, course: _Course, panel: _Panel, x: float, gain: float) -> _Between:
+    """Return time and angle through a panel that begins at a speed, and what may be wrong by then [rad, rad/s]."""
+    if panel.straight:
+        return _Between(panel.span, panel.way, 0.0)
+    sign, change = 1.0 if gain > 0.0 else -1.0, abs(panel.there - x)
+    if change <= _CLOSE * min(x, numbers.friction.w_s):
+        time, way, error = _close(numbers, course, panel, sign)
+    else:
+        time, way, error = _between(numbers, course, panel, sign)
+    return _Between(time, way, error * (max(abs(gain), abs(panel.pull)) + change))
 
 
 def _panel(numbers: Numbers, course: _Course, x: float, bound: float, sense: float, gain: float,
@@ -202,12 +242,12 @@ def _panel(numbers: Numbers, course: _Course, x: float, bound: float, sense: flo
     v, near = way * gain, _NEAR * min(x, numbers.friction.w_s)
     if not v > 0.0 or most == 0.0:
         return _Panel(0.0, 0.0, x, 0.0, x, x, 0.0, False, False)
-    reach = max(min(v * span, most), near)
+    reach = min(max(v * span, _NEAR * numbers.friction.w_s), most)
     growth = (way * _gain(numbers, course, x + on * reach) - v) / reach
     for _ in range(_GUESSES):
         if v + growth * reach > 0.0:
             break
-        reach = max(-v / growth, near)
+        reach = min(max(-v / growth, _NEAR * numbers.friction.w_s), most)
         growth = (way * _gain(numbers, course, x + on * reach) - v) / reach
     if growth > 0.0:
         return _speeding(x, bound, on, v, growth, span, near)
@@ -218,7 +258,7 @@ def _panel(numbers: Numbers, course: _Course, x: float, bound: float, sense: flo
     if not straight and rate * span > _LONG:
         span = _LONG * per_rate
         once, twice = decay(rate, per_rate, span)
-    arrives = v * once >= most
+    arrives = v * once >= most and v > rate * most
     if arrives:
         span = _time_for(most / (v - rate * most), rate, per_rate)
         twice = decay(rate, per_rate, span)[1]
@@ -296,23 +336,50 @@ def _gain(numbers: Numbers, course: _Course, x: float) -> float:
 
 def _between(numbers: Numbers, course: _Course, panel: _Panel, sign: float) -> _Between:
     """Integrate over a panel, in which the shaft speeds up (1) or slows down (−1)."""
-    span, rate, anchor, pull = panel.span, panel.rate, panel.anchor, panel.pull
-    begin, end = math.sqrt(anchor), math.sqrt(panel.other)
-    per_rate, size, law = 1.0 / rate if rate > 0.0 else 0.0, span / (begin + end), sign * abs(pull)
+    line = _line(panel, sign)
     time = fewer = turned = 0.0
     onward = 0
     for n in range(_COUNT):
-        part = _NODES[n]
-        root = begin + (end - begin) * part
-        once, _ = decay(rate, per_rate, size * part * (begin + root))
-        x = anchor + pull * once
-        gain = _gain(numbers, course, x)
-        onward += 1 if sign * gain > 0.0 else 0
-        f = root * (law - law * (rate * once)) / gain if gain != 0.0 else 0.0
+        f, x = _node(numbers, course, line, _NODES[n])
+        onward += 1 if f > 0.0 else 0
         time += _WEIGHTS[n] * f
         fewer += _FEWER[n] * f
         turned += _WEIGHTS[n] * f * x
-    size *= 2.0
-    apart = abs(time - fewer) / abs(time) if time != 0.0 else math.inf
-    error = apart * math.sqrt(apart) * abs(time) * size if onward == _COUNT and apart < 1e-3 else -1.0
+    return _summed(line, time, fewer, turned, onward == _COUNT)
+
+
+def _close(numbers: Numbers, course: _Course, panel: _Panel, sign: float) -> _Between:
+    """Integrate over a panel in which the speed changes little."""
+    line = _line(panel, sign)
+    time = fewer = turned = 0.0
+    onward = 0
+    for n in range(_CLOSE_COUNT):
+        f, x = _node(numbers, course, line, _CLOSE_NODES[n])
+        onward += 1 if f > 0.0 else 0
+        time += _CLOSE_WEIGHTS[n] * f
+        fewer += _CLOSE_FEWER[n] * f
+        turned += _CLOSE_WEIGHTS[n] * f * x
+    return _summed(line, time, fewer, turned, onward == _CLOSE_COUNT)
+
+
+def _line(panel: _Panel, sign: float) -> _Line:
+    """Return what nodes of a panel are told by."""
+    begin, end, rate = math.sqrt(panel.anchor), math.sqrt(panel.other), panel.rate
+    return _Line(panel.anchor, panel.pull, rate, 1.0 / rate if rate > 0.0 else 0.0, sign * abs(panel.pull), begin,
+                 end - begin, panel.span / (begin + end))
+
+
+def _node(numbers: Numbers, course: _Course, line: _Line, part: float) -> tuple[float, float]:
+    """Return how much longer than on a straight line a shaft takes at a part of a panel, and its speed there."""
+    root = line.begin + line.step * part
+    once, _ = decay(line.rate, line.per_rate, line.size * part * (line.begin + root))
+    x = line.anchor + line.pull * once
+    gain = _gain(numbers, course, x)
+    return (root * (line.law - line.law * (line.rate * once)) / gain if gain != 0.0 else 0.0), x
+
+
+def _summed(line: _Line, time: float, fewer: float, turned: float, onward: bool) -> _Between:
+    """Return time and angle from the sums over the nodes of a panel."""
+    apart, size = abs(time - fewer) / abs(time) if time != 0.0 else math.inf, 2.0 * line.size
+    error = apart * math.sqrt(apart) * abs(time) * size if onward and apart < 1e-3 else math.inf
     return _Between(time * size, turned * size, error)

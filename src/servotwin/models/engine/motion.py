@@ -238,7 +238,7 @@ def _creep(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vec
     """Return a creep, or a motion that is none where its end cannot be told."""
     time, q, w, ends_by, done = creep.creep(numbers, mode, u.value, tau.value, y, limit, FINE * accuracy)
     none = _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if done == 0.0 or t0 + time == t0:
+    if done == 0.0 or (t0 + time == t0 and ends_by < 0):
         return none
     tolerance = (FINE * accuracy, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     return Motion(CREEP, numbers, mode, u, tau, t0, y, time, tolerance, (0.0, 0.0),
