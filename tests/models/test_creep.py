@@ -166,6 +166,16 @@ def test_a_shaft_comes_as_close_to_its_final_speed_as_numbers_can_tell(alpha):
         assert two.q - one.q == pytest.approx(3.0 * final, rel=1e-12)
 
 
+def test_at_its_final_speed_a_creep_knows_where_it_stands_before_its_end():
+    numbers = numbers_of("M2, wide")
+    start = NOWHERE._replace(w=4.5, w_m=4.5)
+    went = creep.creep(numbers, driven(numbers), 6.0, 0.1, start, 0.4, FINE)
+    end = Vector(went.q, went.w, 0.0, 0.0, 0.0, went.q, went.w)
+    for before in (1e-3, 1e-9, 1e-12, 1e-15):
+        q, _ = creep.at_time(numbers, driven(numbers), 6.0, 0.1, start, end, FINE, went.time - before)
+        assert went.q - q == pytest.approx(before * went.w, rel=1e-9, abs=1e-15)
+
+
 def test_near_its_final_speed_the_law_is_a_straight_line():
     numbers = numbers_of("M2, wide")
     law = speed_law(numbers, 0.1)

@@ -19,7 +19,7 @@ FEW, MANY = 20, 100
 
 
 def case_of(seed):
-    """A servo whose Stribeck speed is 1/50 rad/s to 200 rad/s at the output, so that it reaches all of the law or less."""
+    """A servo with a Stribeck speed of 1/50 to 200 rad/s at the output, so that it reaches all of the law or part."""
     rng = np.random.default_rng([seed, 77])
     case = random_case(seed, frozenset(LAWS[seed % len(LAWS)]))
     speed = case.values["gear.gear_reduction"] * np.exp(rng.uniform(np.log(0.02), np.log(200.0)))

@@ -29,7 +29,8 @@ from servotwin.models.terms.numbers import Numbers, warm
 from servotwin.physics.load_friction import torque_on_gear
 from servotwin.physics.motor import back_emf
 
-_COUNT = 24  # a multiple of what a processor takes at once: the last three count nothing
+PLAIN = True  # the compiler takes it for False
+_POINTS, _COUNT = 21, 24  # a multiple of what a processor takes at once: the last three count nothing
 _NODES = (
     0.002171418487095955, 0.013046735741414128, 0.03492125432214588, 0.06746831665550773, 0.10959113670679155,
     0.16029521585048778, 0.21862143266569767, 0.2833023029353764, 0.35280356864926987, 0.4255628305091844, 0.5,
@@ -48,7 +49,7 @@ _FEWER = (  # those of the rule of 10 points among them
     0.14776211235737644, 0.0, 0.14776211235737644, 0.0, 0.13463335965499817, 0.0, 0.10954318125799102, 0.0,
     0.0747256745752903, 0.0, 0.03333567215434407, 0.0, 0.0, 0.0, 0.0,
 )
-_CLOSE_COUNT = 8  # of the rule of 7 points for short panels
+_CLOSE_POINTS, _CLOSE_COUNT = 7, 8  # of the rule for panels in which the speed changes little
 _CLOSE_NODES = (
     0.01975436564598986, 0.11270166537925831, 0.2828781253265987, 0.5, 0.7171218746734013, 0.8872983346207417,
     0.9802456343540101, 0.5,
@@ -60,12 +61,12 @@ _CLOSE_WEIGHTS = (
 _CLOSE_FEWER = (0.0, 0.2777777777777778, 0.0, 0.4444444444444444, 0.0, 0.2777777777777778, 0.0, 0.0)
 IN_ANY_ORDER = ("_between", "_close")  # functions whose sums a compiler may take side by side
 _PANELS = 40  # on one way; one that needs more is for the integrator
-_GUESSES = 3
+_GUESSES = 3  # of the speed at which a panel ends, where the final speed is before
 _NEAR = 1e-7  # of a speed: within that a law is a straight line
 _CLOSE = 0.1  # of a speed: within that few points are enough
-_LONG = 3.0  # times the time in which a straight law settles
+_LONG = 3.0  # of a panel, in times in which a straight law settles
 _SHORT = 4e-16  # of a time
-_LONGEST = 100.0  # s
+_LONGEST = 100.0  # s: of a creep
 _INTO = 0.9  # of the speed at which friction begins to fade: up to there next to nothing of it has
 _PART, _ROUNDING = 0.1, 2e-15  # of a tolerance: where two runs halve otherwise, they should not differ by more
 
@@ -195,7 +196,8 @@ def at_time(numbers: Numbers, mode: Mode, u: float, tau: float, start: Vector, e
     course = _course(numbers, mode, u, tau, 1.0 if start.w + end.w > 0.0 else -1.0)
     gain = _gain(numbers, course, abs(start.w))
     went = _onward(numbers, course, abs(start.w), gain, abs(end.w), s, max(_PART * tolerance, _ROUNDING))
-    return start.q + course.way * went.way, course.way * went.speed
+    left = s - went.time  # none but by rounding: it is nearly as fast at its end for long
+    return start.q + course.way * (went.way + went.speed * left), course.way * went.speed
 
 
 def _onward(numbers: Numbers, course: _Course, begin: float, gain: float, bound: float, limit: float,
@@ -258,8 +260,8 @@ def _panel(numbers: Numbers, course: _Course, x: float, bound: float, sense: flo
     if not straight and rate * span > _LONG:
         span = _LONG * per_rate
         once, twice = decay(rate, per_rate, span)
-    arrives = v * once >= most and v > rate * most
-    if arrives:
+    arrives = v * once >= most
+    if arrives and v > rate * most:
         span = _time_for(most / (v - rate * most), rate, per_rate)
         twice = decay(rate, per_rate, span)[1]
     there = bound if arrives else x + on * v * once
@@ -339,13 +341,13 @@ def _between(numbers: Numbers, course: _Course, panel: _Panel, sign: float) -> _
     line = _line(panel, sign)
     time = fewer = turned = 0.0
     onward = 0
-    for n in range(_COUNT):
+    for n in range(_POINTS if PLAIN else _COUNT):
         f, x = _node(numbers, course, line, _NODES[n])
         onward += 1 if f > 0.0 else 0
         time += _WEIGHTS[n] * f
         fewer += _FEWER[n] * f
         turned += _WEIGHTS[n] * f * x
-    return _summed(line, time, fewer, turned, onward == _COUNT)
+    return _summed(line, time, fewer, turned, onward == (_POINTS if PLAIN else _COUNT))
 
 
 def _close(numbers: Numbers, course: _Course, panel: _Panel, sign: float) -> _Between:
@@ -353,13 +355,13 @@ def _close(numbers: Numbers, course: _Course, panel: _Panel, sign: float) -> _Be
     line = _line(panel, sign)
     time = fewer = turned = 0.0
     onward = 0
-    for n in range(_CLOSE_COUNT):
+    for n in range(_CLOSE_POINTS if PLAIN else _CLOSE_COUNT):
         f, x = _node(numbers, course, line, _CLOSE_NODES[n])
         onward += 1 if f > 0.0 else 0
         time += _CLOSE_WEIGHTS[n] * f
         fewer += _CLOSE_FEWER[n] * f
         turned += _CLOSE_WEIGHTS[n] * f * x
-    return _summed(line, time, fewer, turned, onward == _CLOSE_COUNT)
+    return _summed(line, time, fewer, turned, onward == (_CLOSE_POINTS if PLAIN else _CLOSE_COUNT))
 
 
 def _line(panel: _Panel, sign: float) -> _Line:
