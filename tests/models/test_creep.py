@@ -5,10 +5,12 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import servotwin as st
-from servotwin.models.engine import bands, contacts, creep, currents
+from servotwin.models.engine import bands, contacts, creep, currents, dormand_prince
 from servotwin.models.engine.modes import NOWHERE, RIGID, Mode, Vector
+from servotwin.models.terms import friction
 from servotwin.models.terms.bridge import NO_BRIDGE, Off
 from servotwin.models.terms.friction import NO_FRICTION, creeping_speed
 from servotwin.models.terms.motor import Motor
@@ -20,7 +22,8 @@ FINE = 1e-12  # tolerance of a creep
 FRICTION = NO_FRICTION._replace(F_forward=0.2, F_backward=0.25, breakaway=1.5, varies=1.0)
 LAWS = {
     "M2": {"w_s": 0.05, "alpha": 1.0}, "M2, steep": {"w_s": 0.05, "alpha": 2.5},
-    "M2, flat": {"w_s": 0.02, "alpha": 0.6},
+    "M2, flat": {"w_s": 0.02, "alpha": 0.6}, "M2, wide": {"w_s": 2.0, "alpha": 1.0},
+    "M2, wide and steep": {"w_s": 1.5, "alpha": 4.0},
     "M3": {"K_m": 0.1, "K_e": 0.1, "breakaway": 1.0},
     "M4": {"K_m": 0.1, "K_e": 0.1, "K_ms": 0.05, "K_es": 0.05, "w_s": 0.05, "alpha": 1.5},
     "M5": {"K_m": 0.1, "K_e": 0.6},
@@ -93,8 +96,9 @@ def test_a_creep_in_parts_is_the_creep(law):
         assert q == pytest.approx(whole.q, rel=1e-9)
 
 
-def test_a_creep_is_as_accurate_as_asked():
-    numbers = numbers_of("M2")
+@pytest.mark.parametrize("law", ["M2", "M2, wide", "M2, wide and steep"])
+def test_a_creep_is_as_accurate_as_asked(law):
+    numbers = numbers_of(law)
     mode = Mode(currents.zone_of(numbers, 6.0, 0.0, 0.0, 0.0, 0.0), 1, RIGID, 0, 0)
     start = NOWHERE
 
@@ -134,3 +138,112 @@ def test_a_shaft_that_creeps_for_ever_comes_close_to_its_final_speed(servo):
                         accuracy=accuracy)["output_speed"] for accuracy in (1e-9, 1e-12)]
     np.testing.assert_allclose(*runs, rtol=0, atol=1e-7)
     assert 0.05 < np.max(np.abs(runs[0])) < 1.1  # rad/s, and creeping ends at 39 times 300/280
+
+
+def driven(numbers):
+    """Return the mode of a shaft that is driven forward."""
+    return Mode(currents.zone_of(numbers, 6.0, 0.0, 0.0, 0.0, 0.0), 1, RIGID, 0, 0)
+
+
+def speed_law(numbers, torque):
+    """Return the acceleration of that shaft, by its speed."""
+    return lambda w: contacts.acceleration(numbers, driven(numbers), 6.0, torque,
+                                           NOWHERE._replace(w=w, w_m=w))
+
+
+@pytest.mark.parametrize("alpha", [0.7, 1.0, 1.5, 4.0])
+def test_a_shaft_comes_as_close_to_its_final_speed_as_numbers_can_tell(alpha):
+    """From below and from above, in one creep of any length; from then on it turns evenly."""
+    numbers = numbers_of("M2, wide")
+    numbers = numbers._replace(friction=numbers.friction._replace(alpha=alpha, w_s=3.0))
+    final = brentq(speed_law(numbers, 0.1), 1.0, 6.0, xtol=1e-15, rtol=1e-15)
+    for w in (0.0, 0.5 * final, 1.001 * final):
+        start = NOWHERE._replace(w=w, w_m=w)
+        one, two = (creep.creep(numbers, driven(numbers), 6.0, 0.1, start, limit, FINE) for limit in (2.0, 5.0))
+        assert one.done == two.done == 1.0
+        assert (one.time, two.time) == (2.0, 5.0)
+        assert one.w == pytest.approx(final, rel=1e-13)
+        assert two.q - one.q == pytest.approx(3.0 * final, rel=1e-12)
+
+
+def test_at_its_final_speed_a_creep_knows_where_it_stands_before_its_end():
+    numbers = numbers_of("M2, wide")
+    start = NOWHERE._replace(w=4.5, w_m=4.5)
+    went = creep.creep(numbers, driven(numbers), 6.0, 0.1, start, 0.4, FINE)
+    end = Vector(went.q, went.w, 0.0, 0.0, 0.0, went.q, went.w)
+    for before in (1e-3, 1e-9, 1e-12, 1e-15):
+        q, _ = creep.at_time(numbers, driven(numbers), 6.0, 0.1, start, end, FINE, went.time - before)
+        assert went.q - q == pytest.approx(before * went.w, rel=1e-9, abs=1e-15)
+
+
+def test_near_its_final_speed_the_law_is_a_straight_line():
+    numbers = numbers_of("M2, wide")
+    law = speed_law(numbers, 0.1)
+    final = brentq(law, 1.0, 6.0, xtol=1e-15, rtol=1e-15)
+    rate = -(law(final + 1e-4) - law(final - 1e-4)) / 2e-4
+    start = NOWHERE._replace(w=final - 1e-6, w_m=final - 1e-6)
+    for time in (0.3 / rate, 3.0 / rate):
+        went = creep.creep(numbers, driven(numbers), 6.0, 0.1, start, time, FINE)
+        assert final - went.w == pytest.approx(1e-6 * math.exp(-rate * time), rel=1e-6)
+
+
+@pytest.mark.parametrize("law", ["M2", "M2, flat", "M4", "M6"])
+def test_where_nothing_is_left_of_static_friction_does_not_matter(law, monkeypatch):
+    """What is taken as rounding, exp(-39), could be any other that small."""
+    numbers, found = numbers_of(law), []
+    for faded in (38.9, 39.0, 39.1, 45.0):
+        monkeypatch.setattr(friction, "_FADED", faded)
+        assert creeping_speed(numbers.friction) == pytest.approx(
+            numbers.friction.w_s * faded ** (1.0 / numbers.friction.alpha))
+        begins = bands.starts(numbers, 0.1)
+        found.append([(*bands.slide(numbers, 0.1, begins, drive, 0.0, w, time, FINE)[:2],)
+                      for drive, w in ((1.0, 0.0), (0.0, 2.0), (-1.0, 1.0)) for time in (1e-3, 2e-2)])
+    np.testing.assert_allclose(found[1:], found[:1] * 3, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("alpha", [1.0, 1.5, 2.0])
+def test_nothing_jumps_where_the_shaft_just_reaches_the_end_of_the_fading(alpha):
+    numbers = numbers_of("M2")
+    final = brentq(speed_law(numbers_of("M2, wide")._replace(friction=NO_FRICTION._replace(F_forward=0.2)), 0.1),
+                   1.0, 6.0)
+    found = []
+    for part in (0.997, 1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.003):
+        own = numbers.friction._replace(alpha=alpha, w_s=part * final * 39.0 ** (-1.0 / alpha))
+        lane = numbers._replace(friction=own)
+        found.append(bands.slide(lane, 0.1, bands.starts(lane, 0.1), 1.0, 0.0, 0.0, 0.5, FINE)[:2])
+    steps = np.diff(found, axis=0)
+    np.testing.assert_allclose(steps[1:3], 0.0, atol=1e-11)
+    np.testing.assert_allclose(steps[0], steps[3], rtol=0.02, atol=1e-12)
+
+
+def test_static_friction_that_never_fades_and_one_that_fades_at_once(servo):
+    """The two ends of the range of Stribeck speeds are laws of their own."""
+    sliding = {name: servo.source(name).value for name in (
+        "friction.coulomb_torque_forward", "friction.coulomb_torque_backward")}
+    never = {name: 1.3 * value for name, value in sliding.items()} | {"friction.breakaway_ratio": 1.0}
+    for speed, limit in ((1e12, never), (1e-7, {"friction.breakaway_ratio": 1.3})):
+        fades = {"friction.breakaway_ratio": 1.3, "friction.stribeck_speed": speed}
+        runs = [st.simulate(st.PulseServo(servo.replace(one)), st.signals.step(0.0, 60.0, at=0.05, unit="deg"),
+                            duration=0.4, load=st.loads.Inertia(2e-3), output_step=0.02)["output_angle"]
+                for one in (fades, limit)]
+        np.testing.assert_allclose(*runs, rtol=0, atol=1e-9)
+        assert np.ptp(runs[0]) > 0.5
+
+
+def test_no_step_is_taken_under_a_constant_load(servo, monkeypatch):
+    """Any exponent, slow and fast fading, shares, a regulator: from rest to the final speed and back."""
+    monkeypatch.setattr(dormand_prince, "step", lambda *_: pytest.fail("a step by time"))
+    rng = np.random.default_rng(3)
+    for _ in range(25):
+        changes = {"gear.output_inertia": 10.0 ** rng.uniform(-5.0, -2.0),
+                   "friction.breakaway_ratio": 1.0 + 10.0 ** rng.uniform(-1.5, 0.7),
+                   "friction.stribeck_speed": 10.0 ** rng.uniform(-0.5, 3.5),
+                   "friction.stribeck_exponent": 10.0 ** rng.uniform(-0.5, 0.8)}
+        if rng.random() < 0.4:
+            changes |= {f"friction.load_friction_{name}": rng.uniform(0.0, 0.4) for name in (
+                "motor", "external", "motor_stribeck", "external_stribeck", "motor_quad", "external_quad")}
+        if rng.random() < 0.3:
+            changes["supply.current_limit"] = rng.uniform(0.3, 1.5)
+        told = st.signals.samples([0.0, 0.15], rng.uniform(0.8e-3, 2.3e-3, 2), unit="s")
+        st.simulate(st.PulseServo(servo.replace(changes)), told, duration=0.3, output_times=[0.3],
+                    load=st.loads.Constant(rng.uniform(-0.6, 0.6))).raise_if_failed()

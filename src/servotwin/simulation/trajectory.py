@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 _NODES = 12  # Gauss-Legendre nodes per interval
 _LATE = 1e-12  # of an instant
 _AT_ONCE = 1000  # segments
+_GRADES = 0.25 ** np.arange(1.0, 4.0)  # of an interval that ends at rest
+_SETTLING, _FADING = 4.0, 3.0  # times in which a creep settles, or friction fades, that an interval may last
 _SHORTEST = 1e-307  # s: what is over in less has no time of its own
 
 
@@ -96,13 +98,13 @@ class Trajectory:
         age, end = segment.start - segment.anchor, segment.end - segment.anchor
         width = motion.period(segment.motion.u, segment.motion.tau, segment.start - segment.origin,
                               segment.end - segment.origin) / 4.0
-        fine, settled = motion.scales(segment.motion)
+        fine, settled = _scales(segment.motion)
         fine = max(fine, _SHORTEST)
         edges = [age]
         while age < end:
             age = min(end, age + min(width, fine if age < settled else max(age, fine)))
             edges.append(age)
-        return np.array(edges)
+        return _graded(segment, np.array(edges))
 
     def integral(self, integrand: Callable[[Samples], Array]) -> Array:
         """Return the integral over the whole run of a vector of signals; `integrand` returns shape (m, n)."""
@@ -129,6 +131,31 @@ class Trajectory:
         fractions = np.linspace(0.0, 1.0, per_interval, endpoint=False)
         inner = segment.anchor + (edges[:-1, None] + np.diff(edges)[:, None] * fractions).ravel()
         return np.unique(np.clip(np.append(inner, segment.end), segment.start, segment.end))
+
+
+def _scales(m: motion.Motion) -> tuple[float, float]:
+    """Return `motion.scales`; of a creep, which may be long, the time in which its speed would change at most."""
+    fine, settled = motion.scales(m)
+    if m.kind != motion.CREEP:
+        return fine, settled
+    most = max(abs(motion.rates(m, 0.0, m.start).w), abs(motion.rates(m, m.length, m.end).w))
+    change = abs(m.end.w - m.start.w)
+    change = min(_SETTLING * change, _FADING * m.numbers.friction.w_s)
+    fine = min(fine, change / most) if change > 0.0 else fine
+    return fine, 10.0 * fine
+
+
+def _graded(segment: Segment, edges: Array) -> Array:
+    """Return intervals that are short beside a rest from which or to which a shaft creeps: there it is not smooth."""
+    m = segment.motion
+    if m.kind != motion.CREEP or edges.size < 2:
+        return edges
+    more = [edges]
+    if m.start.w == 0.0 and segment.start == segment.anchor:
+        more.append(edges[0] + (edges[1] - edges[0]) * _GRADES)
+    if m.end.w == 0.0 and edges[-1] >= m.length * (1.0 - _LATE):
+        more.append(edges[-1] + (edges[-2] - edges[-1]) * _GRADES)
+    return np.unique(np.concatenate(more))
 
 
 def _states(m: motion.Motion, s: Array) -> Array:

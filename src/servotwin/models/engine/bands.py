@@ -140,11 +140,12 @@ class Leg(NamedTuple):
 def leg(numbers: Numbers, torque: float, u: float, forward: bool, zone: int, share: int, q: float, w: float,
         time: float, tolerance: float) -> Leg:
     """Return where a shaft slides to within its band, or creeps to, in `time` [s] at most."""
-    arc, ends_at, creeps = band_at(numbers, torque, u, forward, zone, share, w)
-    if creeps and fades(numbers.friction):
-        y = Vector(q, w, 0.0, 0.0, 0.0, q, w)
-        crept = creep.creep(numbers, mode_of(numbers, forward, zone, share), u, torque, y, time, tolerance)
-        return Leg(crept.q, crept.w, max(time - crept.time, 0.0), crept.ends_by, crept.done)
+    if fades(numbers.friction):
+        mode, y = mode_of(numbers, forward, zone, share), Vector(q, w, 0.0, 0.0, 0.0, q, w)
+        if creep.creeps(numbers, mode, u, torque, y):
+            crept = creep.creep(numbers, mode, u, torque, y, time, tolerance)
+            return Leg(crept.q, crept.w, max(time - crept.time, 0.0), crept.ends_by, crept.done)
+    arc, ends_at, _ = band_at(numbers, torque, u, forward, zone, share, w)
     once, twice = decay(arc.rate, arc.per_rate, time)
     after = fma(arc.pull, once, w)
     if not arcs.reaches_edge(arc, after):

@@ -238,9 +238,10 @@ def _creep(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vec
     """Return a creep, or a motion that is none where its end cannot be told."""
     time, q, w, ends_by, done = creep.creep(numbers, mode, u.value, tau.value, y, limit, FINE * accuracy)
     none = _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
-    if done == 0.0 or t0 + time == t0:
+    if done == 0.0 or (t0 + time == t0 and ends_by < 0):
         return none
-    return Motion(CREEP, numbers, mode, u, tau, t0, y, time, _NO_COEFFICIENTS, (0.0, 0.0),
+    tolerance = (FINE * accuracy, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Motion(CREEP, numbers, mode, u, tau, t0, y, time, tolerance, (0.0, 0.0),
                   _moved(none, q, w, 0.0), step, ends_by, True, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
 
 
@@ -306,7 +307,7 @@ def state(motion: Motion, s: float) -> Vector:
         return pairs.propagate(motion.long_dense, start, s)
     if kind == CREEP:
         q, w = creep.at_time(motion.numbers, motion.mode, motion.u.value, motion.tau.value, start, motion.end,
-                             motion.length, s)
+                             motion.coefficients[0], s)
         return _moved(motion, q, w, start.i)
     x = s / motion.length
     if kind == STEP:
