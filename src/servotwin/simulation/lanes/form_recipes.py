@@ -125,7 +125,7 @@ _BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_L
 LOOK = Recipe("look", tuple(f"servotwin.models.engine.sights:{name}" for name in ("side_by_side", "one_by_one")))
 """Lanes of all forms: to look leaves out little where terms are absent."""
 TICKS = Recipe("ticks", (
-    _ENTRIES[0], *(f"servotwin.models.engine.ticks:{name}" for name in ("accept", "change", "follow")),
+    *(f"servotwin.models.engine.ticks:{name}" for name in ("accept", "change", "follow")),
     *(f"servotwin.models.engine.lane_ticks:{name}" for name in (
         "gather_lost", "to_records", "to_tiles", "forget_motions", "impose_on_tiles", "impose_on_records", "show_tiles",
         "show_records", "read_clocks", "take_status", "note_lost_buses", "break_up"))))

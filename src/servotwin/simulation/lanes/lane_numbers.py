@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
-from servotwin.models.engine.memory import Memories
+from servotwin.models.engine.memory import Memories, put_started
+from servotwin.models.engine.modes import INSIDE, NOWHERE, RIGID, Vector
 from servotwin.models.engine.records import columns_of, fields_of
 from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.tiles import Lanes
@@ -19,12 +20,13 @@ from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import Firmware
 from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.play import Play
 from servotwin.models.terms.stops import Stops
 from servotwin.simulation.bus_supply import Supplies, check_rigid
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lanes.form_recipes import TICKS
 from servotwin.simulation.lanes.inputs import LaneInputs, lanes_of
-from servotwin.simulation.lanes.memories import nothing_yet
+from servotwin.simulation.lanes.memories import nothing_yet, taken
 from servotwin.simulation.lanes.packed import Packed, Torques
 from servotwin.simulation.lanes.packing import Chunk, Commands, flat, groups
 from servotwin.simulation.lanes.tick_room import asked
@@ -218,8 +220,14 @@ class LaneNumbers:
             if len(own):
                 initial = {} if angle is None else {"output_angle": angle[place[own], None]}
                 y[:, own] = Chunk(chunk.lanes, chunk.commands, own).started(command[own, None], initial)
-        memories = nothing_yet(len(which))
-        kernels(TICKS).start(self.columns._replace(start=y), which, memories)
+        rest = nothing_yet(1)
+        put_started(rest, 0, NOWHERE, RIGID)
+        memories = taken(rest, np.zeros(len(which), np.int64))
+        point = memories.rows["point"]
+        for k, name in enumerate(Vector._fields):
+            point["y"][name] = point["anchor"][name] = y[k, which]
+        point["wiper"] = y[0, which]
+        point["mode"]["mesh"] = np.where(self.now(Play, which).half > 0.0, INSIDE, RIGID)
         return memories
 
     def check_angles(self, angle: Array, which: Indices) -> None:

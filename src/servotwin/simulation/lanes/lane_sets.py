@@ -67,7 +67,7 @@ class Chain:
 
 
 class Tiles:
-    """Lanes that run side by side."""
+    """Lanes that run side by side, as they start."""
 
     def __init__(self, kind: SideBySide, columns: tiles.Lanes, threads: int) -> None:
         self.which, self._kind = kind.which, kind
@@ -156,12 +156,13 @@ class Tiles:
 
 
 class Records:
-    """Lanes that run one by one."""
+    """Lanes that run one by one, as they start."""
 
-    def __init__(self, kind: OneByOne, threads: int) -> None:
+    def __init__(self, kind: OneByOne, columns: tiles.Lanes, threads: int) -> None:
         self.which, self._recipe, self._calms = kind.which, kind.recipe, kind.calm
         self.memories = nothing_yet(len(self.which))
         self.rows = self.memories.rows
+        kernels(form_recipes.last_of(kind.recipe)).start(columns, self.which, self.memories)
         self._workers = min(threads, len(self.which) // (_WORTH_QUICK if kind.recipe in _QUICK else _WORTH_SLOW))
         self._chains: list[Chain] = []
         self._look: Call | None = None

@@ -55,6 +55,8 @@ class Store:
         self.fresh = np.zeros(1, np.int64)  # 1 while what was seen still shows; compiled code ends that too
         self.now = np.zeros(2)  # what compiled code reads: the duration of a tick, and whether torques are others
         self._build(numbers)
+        for some in self._buses:
+            some.put(np.arange(len(some.which)), numbers.start(some.which, self.command, None), numbers)
 
     def _build(self, numbers: LaneNumbers) -> None:
         self.numbers = numbers
@@ -66,7 +68,7 @@ class Store:
         self._buses = [BusSet(numbers, self._threads, self._pool)] if numbers.supplies.lanes else []
         self.sets: list[Tiles | Records | BusSet] = [
             *(Tiles(kind, self.columns, self._threads) if isinstance(kind, SideBySide) else
-              Records(kind, self._threads) for kind in self._kinds), *self._buses]
+              Records(kind, self.columns, self._threads) for kind in self._kinds), *self._buses]
         self._reads_pieces = not all(isinstance(some, Tiles) for some in self.sets)
         self._set_of, self._place = np.empty((2, numbers.count), np.int64)
         for k, some in enumerate(self.sets):

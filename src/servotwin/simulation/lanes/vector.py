@@ -113,7 +113,6 @@ class VectorSimulator:
                             _whole("threads", threads, 1) if threads is not None else workers_of(None),
                             own_threads(os.getpid()))
         self._entry: CEntry | None = None
-        self.reset()
 
     @property
     def _numbers(self) -> LaneNumbers:
