@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from servotwin.models.engine.batch.tiles import Lanes
 from servotwin.models.engine.memory import ACCURACY
-from servotwin.models.engine.tiles import Lanes
 from servotwin.models.terms.bridge import Bridge, Off
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.friction import NO_FRICTION

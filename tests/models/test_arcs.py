@@ -9,8 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from lane_cases import case, replaced, with_lanes
-from servotwin.models.engine import arcs, contacts, side_by_side, tiles
-from servotwin.models.engine.records import room
+from servotwin.models.engine.batch import linear_segments, side_by_side, tiles
+from servotwin.models.engine.dynamics import contacts
+from servotwin.models.state.records import room
 from servotwin.models.terms.bridge import NO_BRIDGE, Off
 from servotwin.models.terms.friction import NO_FRICTION
 from servotwin.models.terms.motor import Motor
@@ -68,7 +69,7 @@ def fine(numbers, torque, drive, q, w, end):
 def test_arcs_against_a_fine_solution(zones, torque):
     numbers = replaced(NUMBERS, {"bridge.D_drive": zones[0], "bridge.off.D": zones[1]})
     for drive, w in product((-1.0, 0.0, 1.0), (0.0, 4.0, -9.0)):
-        q, speed, _, done = arcs.slide(arcs.arc_numbers(numbers, torque), drive, 0.3, w, 0.06)
+        q, speed, _, done = linear_segments.slide(linear_segments.arc_numbers(numbers, torque), drive, 0.3, w, 0.06)
         assert done == 1.0
         expected = fine(numbers, torque, drive, 0.3, w, 0.06)  # not much finer than this itself
         assert (q, speed) == pytest.approx(expected, abs=5e-8), (drive, w)
@@ -78,7 +79,7 @@ def test_arcs_against_a_fine_solution(zones, torque):
 def test_a_free_shaft_has_no_cancellation(time):
     numbers = replaced(NUMBERS, {"shaft.b": 0.0, "friction.F_forward": 0.0, "friction.F_backward": 0.0,
                                "bridge.off.R": 1e15})
-    q, w, _, _ = arcs.slide(arcs.arc_numbers(numbers, -0.006), 0.0, 0.0, 0.0, time)
+    q, w, _, _ = linear_segments.slide(linear_segments.arc_numbers(numbers, -0.006), 0.0, 0.0, 0.0, time)
     assert q == pytest.approx(0.5 * time * time, rel=1e-9)  # a winding of 1e15 ohm hardly brakes
     assert w == pytest.approx(time, rel=1e-9)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import servotwin as st
-from servotwin.models.engine import calm
+from servotwin.models.engine.batch import event_free
 
 WORN = {"electronics.voltage_deadband": 0.1, "stops.lower_angle": 0.2, "stops.upper_angle": 1.6,
         "stops.restitution": 0.4}
@@ -23,7 +23,7 @@ def test_it_is_the_general_way_where_nothing_happens(changes, load):
         goal = q + rng.choice([0.0, 0.02, 1.0]) * (goal - q)
         command, torque, time = st.signals.constant(goal, unit="rad"), rng.uniform(-0.4, 0.4), 1e-3
         u = model.command(command).rows[0][1]
-        angle, speed, lasts = calm.after(numbers, u, torque, q, w, time)
+        angle, speed, lasts = event_free.after(numbers, u, torque, q, w, time)
         if not lasts:
             continue
         found += 1

@@ -8,8 +8,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import servotwin as st
-from servotwin.models.engine import bands, contacts, creep, currents, dormand_prince
-from servotwin.models.engine.modes import NOWHERE, RIGID, Mode, Vector
+from servotwin.models.engine.batch import piecewise_segments
+from servotwin.models.engine.dynamics import contacts, currents
+from servotwin.models.engine.motions import dormand_prince, stribeck
+from servotwin.models.state.modes import NOWHERE, RIGID, Mode, Vector
 from servotwin.models.terms import friction
 from servotwin.models.terms.bridge import NO_BRIDGE, Off
 from servotwin.models.terms.friction import NO_FRICTION, creeping_speed
@@ -75,9 +77,9 @@ def fine(numbers, torque, drive, q, w, end):
 def test_a_slide_follows_the_law(law, source):
     numbers = numbers_of(law, source)
     for torque in LOADS:
-        begins = bands.starts(numbers, torque)
+        begins = piecewise_segments.starts(numbers, torque)
         for drive, w in ((1.0, 0.0), (1.0, -2.0), (-1.0, 0.3), (0.0, 1.5), (0.0, -0.04)):
-            q, speed, _, done = bands.slide(numbers, torque, begins, drive, 0.3, w, 0.03, FINE)
+            q, speed, _, done = piecewise_segments.slide(numbers, torque, begins, drive, 0.3, w, 0.03, FINE)
             assert done
             np.testing.assert_allclose((q, speed), fine(numbers, torque, drive, 0.3, w, 0.03), rtol=0, atol=3e-8)
 
@@ -86,12 +88,12 @@ def test_a_slide_follows_the_law(law, source):
 def test_a_creep_in_parts_is_the_creep(law):
     """From rest to a time, by one creep or by many: to rounding; and the same backward from its end."""
     numbers = numbers_of(law)
-    begins = bands.starts(numbers, 0.1)
+    begins = piecewise_segments.starts(numbers, 0.1)
     for end in (1e-5, 3e-4, 1.3e-3, 4e-3):
-        whole = bands.slide(numbers, 0.1, begins, 1.0, 0.0, 0.0, end, FINE)
+        whole = piecewise_segments.slide(numbers, 0.1, begins, 1.0, 0.0, 0.0, end, FINE)
         q = w = 0.0
         for _ in range(7):
-            q, w, _, _ = bands.slide(numbers, 0.1, begins, 1.0, q, w, end / 7, FINE)
+            q, w, _, _ = piecewise_segments.slide(numbers, 0.1, begins, 1.0, q, w, end / 7, FINE)
         assert w == pytest.approx(whole.w, rel=1e-9)
         assert q == pytest.approx(whole.q, rel=1e-9)
 
@@ -105,7 +107,7 @@ def test_a_creep_is_as_accurate_as_asked(law):
     def time_to_the_top(tolerance):
         y, time = start, 0.0
         while y.w < creeping_speed(numbers.friction) and time < 1.0:
-            went = creep.creep(numbers, mode, 6.0, 0.1, y, 1.0, tolerance)
+            went = stribeck.creep(numbers, mode, 6.0, 0.1, y, 1.0, tolerance)
             assert went.done
             time += went.time
             if went.ends_by >= 0 or went.time == 0.0:
@@ -123,10 +125,10 @@ def test_a_creep_knows_where_it_stands_in_between():
     numbers = numbers_of("M4")
     mode = Mode(currents.zone_of(numbers, 6.0, 0.0, 0.0, 0.0, 0.0), 1, RIGID, 0, 1)
     start = NOWHERE._replace(q=0.2)
-    went = creep.creep(numbers, mode, 6.0, 0.1, start, 1.0, FINE)
+    went = stribeck.creep(numbers, mode, 6.0, 0.1, start, 1.0, FINE)
     end = Vector(went.q, went.w, 0.0, 0.0, 0.0, went.q, went.w)
     for part in (0.01, 0.4, 0.99):
-        q, w = creep.at_time(numbers, mode, 6.0, 0.1, start, end, went.time, part * went.time)
+        q, w = stribeck.at_time(numbers, mode, 6.0, 0.1, start, end, went.time, part * went.time)
         np.testing.assert_allclose((q, w), fine(numbers, 0.1, 1.0, 0.2, 0.0, part * went.time), rtol=0, atol=1e-9)
 
 
@@ -159,7 +161,7 @@ def test_a_shaft_comes_as_close_to_its_final_speed_as_numbers_can_tell(alpha):
     final = brentq(speed_law(numbers, 0.1), 1.0, 6.0, xtol=1e-15, rtol=1e-15)
     for w in (0.0, 0.5 * final, 1.001 * final):
         start = NOWHERE._replace(w=w, w_m=w)
-        one, two = (creep.creep(numbers, driven(numbers), 6.0, 0.1, start, limit, FINE) for limit in (2.0, 5.0))
+        one, two = (stribeck.creep(numbers, driven(numbers), 6.0, 0.1, start, limit, FINE) for limit in (2.0, 5.0))
         assert one.done == two.done == 1.0
         assert (one.time, two.time) == (2.0, 5.0)
         assert one.w == pytest.approx(final, rel=1e-13)
@@ -169,10 +171,10 @@ def test_a_shaft_comes_as_close_to_its_final_speed_as_numbers_can_tell(alpha):
 def test_at_its_final_speed_a_creep_knows_where_it_stands_before_its_end():
     numbers = numbers_of("M2, wide")
     start = NOWHERE._replace(w=4.5, w_m=4.5)
-    went = creep.creep(numbers, driven(numbers), 6.0, 0.1, start, 0.4, FINE)
+    went = stribeck.creep(numbers, driven(numbers), 6.0, 0.1, start, 0.4, FINE)
     end = Vector(went.q, went.w, 0.0, 0.0, 0.0, went.q, went.w)
     for before in (1e-3, 1e-9, 1e-12, 1e-15):
-        q, _ = creep.at_time(numbers, driven(numbers), 6.0, 0.1, start, end, FINE, went.time - before)
+        q, _ = stribeck.at_time(numbers, driven(numbers), 6.0, 0.1, start, end, FINE, went.time - before)
         assert went.q - q == pytest.approx(before * went.w, rel=1e-9, abs=1e-15)
 
 
@@ -183,7 +185,7 @@ def test_near_its_final_speed_the_law_is_a_straight_line():
     rate = -(law(final + 1e-4) - law(final - 1e-4)) / 2e-4
     start = NOWHERE._replace(w=final - 1e-6, w_m=final - 1e-6)
     for time in (0.3 / rate, 3.0 / rate):
-        went = creep.creep(numbers, driven(numbers), 6.0, 0.1, start, time, FINE)
+        went = stribeck.creep(numbers, driven(numbers), 6.0, 0.1, start, time, FINE)
         assert final - went.w == pytest.approx(1e-6 * math.exp(-rate * time), rel=1e-6)
 
 
@@ -195,8 +197,8 @@ def test_where_nothing_is_left_of_static_friction_does_not_matter(law, monkeypat
         monkeypatch.setattr(friction, "_FADED", faded)
         assert creeping_speed(numbers.friction) == pytest.approx(
             numbers.friction.w_s * faded ** (1.0 / numbers.friction.alpha))
-        begins = bands.starts(numbers, 0.1)
-        found.append([(*bands.slide(numbers, 0.1, begins, drive, 0.0, w, time, FINE)[:2],)
+        begins = piecewise_segments.starts(numbers, 0.1)
+        found.append([(*piecewise_segments.slide(numbers, 0.1, begins, drive, 0.0, w, time, FINE)[:2],)
                       for drive, w in ((1.0, 0.0), (0.0, 2.0), (-1.0, 1.0)) for time in (1e-3, 2e-2)])
     np.testing.assert_allclose(found[1:], found[:1] * 3, rtol=0, atol=1e-13)
 
@@ -210,7 +212,8 @@ def test_nothing_jumps_where_the_shaft_just_reaches_the_end_of_the_fading(alpha)
     for part in (0.997, 1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.003):
         own = numbers.friction._replace(alpha=alpha, w_s=part * final * 39.0 ** (-1.0 / alpha))
         lane = numbers._replace(friction=own)
-        found.append(bands.slide(lane, 0.1, bands.starts(lane, 0.1), 1.0, 0.0, 0.0, 0.5, FINE)[:2])
+        found.append(piecewise_segments.slide(lane, 0.1, piecewise_segments.starts(lane, 0.1), 1.0, 0.0, 0.0, 0.5,
+                                              FINE)[:2])
     steps = np.diff(found, axis=0)
     np.testing.assert_allclose(steps[1:3], 0.0, atol=1e-11)
     np.testing.assert_allclose(steps[0], steps[3], rtol=0.02, atol=1e-12)

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from servotwin.models.engine import tiles
-from servotwin.models.engine.crossing import put_beside, remembered
+from servotwin.models.engine.batch import tiles
+from servotwin.models.engine.cosim.layout_convert import put_beside, remembered
 from servotwin.models.engine.memory import time_of
-from servotwin.models.engine.modes import ON_BACKWARD, RIGID
-from servotwin.models.engine.records import room
+from servotwin.models.state.modes import ON_BACKWARD, RIGID
+from servotwin.models.state.records import room
 from servotwin.models.terms.control import NOT_STARTED
 
 PERIOD, PLACE = 0.02, 5

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from servotwin.models.engine import elementary
+from servotwin.models.engine.motions import elementary
 
 EPS = 2.3e-16
 

@@ -6,8 +6,9 @@ import pytest
 
 import servotwin as st
 from servotwin.loads import Constant, Inertia, as_load
-from servotwin.models.engine import joint_motion, shared_source
-from servotwin.models.engine.modes import (
+from servotwin.models.engine.bus import coupled_step, shared_source
+from servotwin.models.engine.bus.bus_records import Mate
+from servotwin.models.state.modes import (
     BACKWARD,
     CURRENT_BACKWARD,
     CURRENT_FORWARD,
@@ -17,8 +18,7 @@ from servotwin.models.engine.modes import (
     Mode,
     Vector,
 )
-from servotwin.models.engine.records import object_of
-from servotwin.models.engine.seats import Mate
+from servotwin.models.state.records import object_of
 from servotwin.models.terms.source import Source
 from servotwin.physics.pieces import Piece
 
@@ -47,8 +47,8 @@ def value(coefficients, terms, s):
 @pytest.mark.parametrize("state", STATES)
 def test_the_short_way_for_plain_mates_is_the_general_one(state):
     short, general = mates(), mates(1e-300)  # a spring that nobody feels
-    length = 0.4 * joint_motion.longest_series(short, 2)
-    terms = [joint_motion.series(SOURCE, state, some, 2, 0.0, length) for some in (short, general)]
+    length = 0.4 * coupled_step.longest_series(short, 2)
+    terms = [coupled_step.series(SOURCE, state, some, 2, 0.0, length) for some in (short, general)]
     for one, other in zip(short, general, strict=True):
         for name in ("speed", "current"):
             at_end = [value(getattr(mate, name), n, length) for mate, n in zip((one, other), terms, strict=True)]
@@ -58,15 +58,15 @@ def test_the_short_way_for_plain_mates_is_the_general_one(state):
 @pytest.mark.parametrize("state", STATES)
 def test_a_series_is_what_the_step_finds(state):
     found = mates()
-    length = joint_motion.joint_step(SOURCE, state, found, 2, 0.0, 1e-3).length
-    terms = joint_motion.series(SOURCE, state, found, 2, 0.0, length)
+    length = coupled_step.joint_step(SOURCE, state, found, 2, 0.0, 1e-3).length
+    terms = coupled_step.series(SOURCE, state, found, 2, 0.0, length)
     for mate in found:
         assert value(mate.speed, terms, length) == pytest.approx(mate.end.w, abs=1e-11)
-        assert value(mate.speed, terms, 0.3 * length) == pytest.approx(joint_motion.between(mate, 0.3).w, abs=1e-10)
+        assert value(mate.speed, terms, 0.3 * length) == pytest.approx(coupled_step.between(mate, 0.3).w, abs=1e-10)
 
 
 def test_a_step_that_cannot_be_made_says_so():
     found = mates()
     for mate in found:
         mate.start = mate.start._replace(w=math.nan)
-    assert joint_motion.joint_step(SOURCE, shared_source.FOLLOWING, found, 2, 0.0, 1e-3).length < 0.0
+    assert coupled_step.joint_step(SOURCE, shared_source.FOLLOWING, found, 2, 0.0, 1e-3).length < 0.0

@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 
 from lane_cases import replaced
 from models.test_arcs import NUMBERS, OPEN
-from servotwin.models.engine import gap_rounds
-from servotwin.models.engine.modes import INSIDE, Vector
+from servotwin.models.engine.batch import backlash_batch
+from servotwin.models.state.modes import INSIDE, Vector
 from servotwin.models.terms.shaft import Shaft
 
 HALF = 6e-3
@@ -77,4 +77,4 @@ def test_two_bodies_against_a_fine_solution(name):
 
 def go(numbers, torque, drive, start, time):
     q, w, q_m, w_m = start
-    return gap_rounds.gone(numbers, torque, drive, Vector(q, w, 0.0, 0.0, 0.0, q_m, w_m), INSIDE, q, time)
+    return backlash_batch.gone(numbers, torque, drive, Vector(q, w, 0.0, 0.0, 0.0, q_m, w_m), INSIDE, q, time)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from servotwin.models.engine.noise import gaussian, scrambled
+from servotwin.models.state.noise import gaussian, scrambled
 
 
 @pytest.fixture(scope="module")

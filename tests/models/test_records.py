@@ -3,8 +3,8 @@
 import numpy as np
 
 from lane_cases import replaced
-from servotwin.models.engine.records import TILE, columns_of, put_columns, tiles_with
-from servotwin.models.engine.tiles import numbers_at
+from servotwin.models.engine.batch.tiles import numbers_at
+from servotwin.models.state.records import TILE, columns_of, put_columns, tiles_with
 from servotwin.models.terms.numbers import NEUTRAL, Numbers
 
 COUNT = 2 * TILE + 5

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as s
 
-from servotwin.models.engine import second_order
+from servotwin.models.engine.motions import second_order
 
 
 def exact(coefficients, time):

@@ -12,10 +12,10 @@ from scipy.linalg import expm
 
 import servotwin as st
 from lane_cases import replaced
-from servotwin.models.engine import slots, stride_rounds, strides, tiles
+from servotwin.models.engine.batch import rk_batch, rk_slots, rk_steps, tiles
+from servotwin.models.engine.batch.rk_steps import Aim, State
 from servotwin.models.engine.memory import FIRST_STEP
-from servotwin.models.engine.records import fill, room
-from servotwin.models.engine.strides import Aim, State
+from servotwin.models.state.records import fill, room
 from servotwin.models.terms.bridge import NO_BRIDGE, Off
 from servotwin.models.terms.friction import NO_FRICTION
 from servotwin.models.terms.heat import Heat
@@ -70,15 +70,15 @@ def fine(numbers, u, tau, way, state, time):
 def take(numbers, u, tau, state, aims):
     """Let a shaft take a stride to each of up to eight aims; return for each where it has led, and its time."""
     room_ = tiles.plan_room("float64", tiles.STRIDES)[0].of.slots
-    mode, stride, after = strides.entered(numbers, u, tau, state), room_.stride, room_.after
-    for k, aim in zip(range(slots.SLOTS), cycle(aims), strict=False):
-        slots.put_numbers_in(room_.own, k, numbers)
-        slots.put_before_in(room_.before, k, state)
+    mode, stride, after = rk_steps.entered(numbers, u, tau, state), room_.stride, room_.after
+    for k, aim in zip(range(rk_slots.SLOTS), cycle(aims), strict=False):
+        rk_slots.put_numbers_in(room_.own, k, numbers)
+        rk_slots.put_before_in(room_.before, k, state)
         stride.u[k], stride.tau[k], stride.tolerance[k], stride.left[k] = u, tau, 1.0, 1.0
         stride.reach[k], stride.origin[k], stride.rise[k] = aim
         stride.curved[k], room_.busy.tries[k] = numbers.friction.varies, 1
         room_.busy.zone[k], room_.busy.contact[k], room_.busy.share[k] = mode.zone, mode.contact, mode.share
-    slots.step(room_)
+    rk_slots.step(room_)
     return [(State(after.q[k], after.w[k], after.T_w[k], after.T_h[k]), after.t[k]) for k in range(len(aims))]
 
 
@@ -130,13 +130,13 @@ def go(numbers, power, torque, start, times, accuracy=1e-11):
     count, tile = len(times), rows[0]
     fill(rows["own"], numbers)
     tile.hung.torque[:count] = torque
-    tile.hung.tolerance[:count] = accuracy * (strides.STEEP if numbers.friction.varies else strides.SMOOTH)
+    tile.hung.tolerance[:count] = accuracy * (rk_steps.STEEP if numbers.friction.varies else rk_steps.SMOOTH)
     tile.servo.step[:count] = FIRST_STEP
     for name, value in zip(State._fields, start, strict=True):
         tile.servo[name][:count] = value
     plan.power[:count], plan.time[:count] = power, times
     with np.errstate(invalid="ignore"):  # in slots that stay empty
-        stride_rounds.phase(count, False, tile, plan)
+        rk_batch.phase(count, False, tile, plan)
     assert not plan.lost[:count].any()
     return np.array([tile.servo[name][:count].copy() for name in State._fields])
 

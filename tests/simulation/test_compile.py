@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
-from servotwin.models.engine import arcs
-from servotwin.models.engine.arcs import ArcNumbers
-from servotwin.models.engine.noise import gaussian
+from servotwin.models.engine.batch import linear_segments
+from servotwin.models.engine.batch.linear_segments import ArcNumbers
+from servotwin.models.state.noise import gaussian
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.building import printed
 from servotwin.simulation.compile.compilers import compilers
@@ -18,13 +18,13 @@ from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.translate import header
 from servotwin.simulation.lanes.form_recipes import _BY_ARCS, ALL_RUNS, BY_LEGS, PLAIN_RUNS, parts_of
 
-SLIDE = Recipe("slide", ("servotwin.models.engine.arcs:slide",), vector=True)
+SLIDE = Recipe("slide", ("servotwin.models.engine.batch.linear_segments:slide",), vector=True)
 NUMBERS = ArcNumbers(60.0, 60.0, 0.2, 1 / 60.0, 1 / 60.0, 5.0, 330.0, 20.0, 5.0, 6.0, 0.4, 0.1, 33.0, 40.0, 5.0, 1.0,
                      -1.0, 0.0, -math.inf, math.inf, 6e-3, 2.0, 0.2, 0.2)
 FLAGGED = ("_integrated", "_long_step")  # what a motion takes where no closed form holds
 SCRIPT = """
 from servotwin.simulation.compile import Recipe, kernels
-print(kernels(Recipe("noise", ("servotwin.models.engine.noise:gaussian",))).gaussian(3, 7))
+print(kernels(Recipe("noise", ("servotwin.models.state.noise:gaussian",))).gaussian(3, 7))
 """
 
 
@@ -36,7 +36,7 @@ def start(folder):
 def test_compiled_equals_plain():
     for drive, w, time in ((1.0, -2.0, 0.02), (0.0, 3.0, 0.1), (-1.0, 0.0, 1e-5)):
         compiled = kernels(SLIDE).slide(NUMBERS, drive, 0.3, w, time)
-        assert compiled == pytest.approx(arcs.slide(NUMBERS, drive, 0.3, w, time), rel=1e-13, abs=1e-15)
+        assert compiled == pytest.approx(linear_segments.slide(NUMBERS, drive, 0.3, w, time), rel=1e-13, abs=1e-15)
 
 
 def test_what_is_derived():
@@ -49,8 +49,8 @@ def test_what_is_derived():
 
 
 def test_the_vector_form_has_polynomials():
-    text = derive(Recipe("tiles", ("servotwin.models.engine.side_by_side:go_on",), vector=True)).text
-    assert "engine_elementary__log1p(" in text
+    text = derive(Recipe("tiles", ("servotwin.models.engine.batch.side_by_side:go_on",), vector=True)).text
+    assert "motions_elementary__log1p(" in text
     assert "math.log1p" not in text
 
 
@@ -101,10 +101,10 @@ def test_two_processes_at_once(tmp_path):
 def test_what_no_term_asks_for_is_left_out():
     plain, calm, loose, everything = (
         derive(one).text for one in (PLAIN_RUNS, parts_of(PLAIN_RUNS)[1][0], BY_LEGS, ALL_RUNS))
-    assert not any(f"engine_motion__{name}" in calm for name in FLAGGED)
-    assert "engine_motion___long_step" in plain
-    assert all(f"engine_motion__{name}" in everything for name in FLAGGED)
+    assert not any(f"motions_motion__{name}" in calm for name in FLAGGED)
+    assert "motions_motion___long_step" in plain
+    assert all(f"motions_motion__{name}" in everything for name in FLAGGED)
     assert "terms_heat__warming_rates" in everything
     assert "terms_heat__warming_rates" not in plain + calm + loose
-    assert "engine_contacts__apart(" in loose
-    assert "engine_contacts__apart(" not in plain + calm
+    assert "dynamics_contacts__apart(" in loose
+    assert "dynamics_contacts__apart(" not in plain + calm

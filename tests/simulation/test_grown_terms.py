@@ -98,7 +98,7 @@ NUMBERS = {
     "models/terms/shaft.py": [("    b_out: float\n", "    b_out: float\n    new: float = 0.0\n"),
                               ("J_out=load_inertia,", f"new={value('new_shaft')}, J_out=load_inertia,"),
                               ("dry, against, shaft.b, shaft.J)", "dry, against, shaft.b + shaft.new, shaft.J)")],
-    "models/engine/coefficients.py": [("damping = (own.b + of_load", "damping = (own.b + own.new + of_load"),
+    "models/engine/dynamics/coefficients.py": [("damping = (own.b + of_load", "damping = (own.b + own.new + of_load"),
                                       ("0.0, 0.0) - tau[0] -", "0.0, 0.0) - tau[0] - numbers.load.new -")],
     "models/terms/heat.py": [("    magnet: float  # [1/K]\n", "    magnet: float  # [1/K]\n    new: float = 0.0\n"),
                              ("                magnet=", f"                new={value('new_heat')}, magnet="),
@@ -120,7 +120,8 @@ NUMBERS = {
                         f"load_term.pack(load)._replace(new=self.{value('new_load').partition('.')[2]}),")],
     "models/terms/stops.py": [("    restitution: float\n", "    restitution: float\n    new: float = 0.0\n"),
                               ('"stops.restitution", 0.0))', f'"stops.restitution", 0.0), {value("new_stops")})')],
-    "models/engine/contacts.py": [("numbers.stops.restitution)", "numbers.stops.restitution + numbers.stops.new)")],
+    "models/engine/dynamics/contacts.py": [("numbers.stops.restitution)",
+                                            "numbers.stops.restitution + numbers.stops.new)")],
     "models/terms/sensor.py": [("from one step to the next; 0: none\n",
                                 "from one step to the next; 0: none\n    new: float = 0.0\n"),
                                ("_replace(half_slack=", f"_replace(new={value('new_sensor')}, half_slack="),
@@ -132,7 +133,7 @@ NUMBERS = {
     "models/terms/elastic.py": [("    hanging_angle: float\n", "    hanging_angle: float\n    new: float = 0.0\n"),
                                 ("        return NO_ELASTIC\n",
                                  f"        return NO_ELASTIC._replace(new={value('new_elastic')})\n")],
-    "models/engine/currents.py": [  # where there is no spring either
+    "models/engine/dynamics/currents.py": [  # where there is no spring either
         ("    return bridge.loop(numbers.bridge, numbers.source, zone, u)\n",
          "    v, R = bridge.loop(numbers.bridge, numbers.source, zone, u)\n    return v, R + numbers.elastic.new\n")],
 }

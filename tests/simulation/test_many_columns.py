@@ -6,7 +6,7 @@ import pytest
 import servotwin as st
 from servotwin import loads, signals
 from servotwin.models.columns import LanePieces
-from servotwin.models.engine.records import mapped
+from servotwin.models.state.records import mapped
 from servotwin.physics.pieces import Piece, Pieces
 from servotwin.simulation.lanes.load_columns import column_load, structure
 

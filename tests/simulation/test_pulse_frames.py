@@ -8,7 +8,7 @@ import pytest
 
 import servotwin as st
 from servotwin.errors import CommandError, InputError
-from servotwin.models.engine.noise import gaussian
+from servotwin.models.state.noise import gaussian
 from servotwin.models.terms import frame
 from servotwin.models.terms.frame import AT_START, Decision, Frame
 

@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 
 import servotwin as st
-from servotwin.models.engine import demands, modes, motion
-from servotwin.models.engine.modes import Mode, Vector
-from servotwin.models.engine.records import mapped
+from servotwin.models.engine import demands
+from servotwin.models.engine.motions import motion
+from servotwin.models.state import modes
+from servotwin.models.state.modes import Mode, Vector
+from servotwin.models.state.records import mapped
 from servotwin.models.terms import dependence
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.dependence import RECORDED
@@ -33,8 +35,8 @@ OTHERS = {
     ("simulation/remarks.py", "heat"): "what a servo trips by, as people read it",
     ("simulation/vector_buses.py", "source"): "a field of what servos on a bus share",
     ("simulation/lanes/store.py", "chip"): "a field of a memory",
-    ("models/engine/loop_tiles.py", "sensor"): "a field of a tile",
-    ("models/engine/tiles.py", "chip"): "a field of a tile",
+    ("models/engine/batch/digital_tiles.py", "sensor"): "a field of a tile",
+    ("models/engine/batch/tiles.py", "chip"): "a field of a tile",
 }
 
 

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from reference.drivetrain_cases import Command, random_case
 from reference.drivetrain_laws import make_plant
-from servotwin.models.engine.modes import INSIDE
+from servotwin.models.state.modes import INSIDE
 from validation.test_drivetrain_armature import CENTRE, SIMPLE, N, driven, undriven
 from validation.test_drivetrain_reference import simulate
 from validation.test_drivetrain_stops import around

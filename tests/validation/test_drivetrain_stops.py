@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from servotwin.models.engine.motion import prepared, state
+from servotwin.models.engine.motions.motion import prepared, state
 from validation.test_drivetrain_armature import LOCKED, N, driven, undriven
 from validation.test_drivetrain_reference import simulate
 

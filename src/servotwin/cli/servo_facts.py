@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from servotwin.errors import MissingParameterError, ServotwinError
 from servotwin.loads import as_load
 from servotwin.models import MODELS, DigitalServo, default_model
-from servotwin.models.engine.currents import stall_current
+from servotwin.models.engine.dynamics.currents import stall_current
 from servotwin.models.terms.duty import at_duty
 from servotwin.parameters import printed_flags, printed_points
 from servotwin.physics import stall_torque

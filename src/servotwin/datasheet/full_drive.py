@@ -16,9 +16,9 @@ import numpy as np
 from servotwin.errors import InputError
 from servotwin.loads import Load, as_load
 from servotwin.models.digital import DigitalServo
-from servotwin.models.engine import contacts, currents
+from servotwin.models.engine.dynamics import contacts, currents
 from servotwin.models.engine.memory import started
-from servotwin.models.engine.modes import FORWARD, FREE, RIGID, Mode, Vector
+from servotwin.models.state.modes import FORWARD, FREE, RIGID, Mode, Vector
 from servotwin.models.terms import bridge as bridge_term
 from servotwin.models.terms import duty, source
 from servotwin.models.terms.control import NOT_STARTED

@@ -13,7 +13,7 @@ from servotwin.datasheet.guesses import Span, spanned
 from servotwin.errors import InputError
 from servotwin.loads import as_load
 from servotwin.models import DigitalServo
-from servotwin.models.engine import contacts
+from servotwin.models.engine.dynamics import contacts
 from servotwin.models.standing import standing_current
 from servotwin.physics import motor
 from servotwin.physics.firmware import NEARLY, cut, duty_of, error_beyond_zone, started_duty

@@ -12,7 +12,7 @@ from servotwin import physics
 from servotwin.errors import CommandError, InputError, LoadError, MissingParameterError, UnknownNameError
 from servotwin.models import outputs
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
-from servotwin.models.engine.modes import Vector
+from servotwin.models.state.modes import Vector
 from servotwin.models.terms import load as load_term
 from servotwin.models.terms import motor, shaft
 from servotwin.models.terms.numbers import Numbers

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from servotwin import physics
 from servotwin.models.engine import observe
-from servotwin.models.engine.modes import FREE, RIGID, Mode, Vector
+from servotwin.models.state.modes import FREE, RIGID, Mode, Vector
 from servotwin.models.terms import duty
 from servotwin.models.terms.bridge import heeds_silence, off_now
 from servotwin.models.terms.numbers import at_temperature

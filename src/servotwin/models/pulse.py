@@ -12,7 +12,7 @@ from servotwin import physics
 from servotwin.errors import InputError
 from servotwin.loads import Inertia, as_load
 from servotwin.models.bounded import BoundedServo
-from servotwin.models.engine.currents import stall_current
+from servotwin.models.engine.dynamics.currents import stall_current
 from servotwin.models.switched import HIDDEN, MOTOR, SHAFT, SwitchedServo
 from servotwin.models.terms import bridge, chip, elastic, friction, heat, play, sensor, source, stops
 from servotwin.models.terms.bridge import Bridge

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from servotwin.models.engine import currents
+from servotwin.models.engine.dynamics import currents
 from servotwin.models.terms import duty
 from servotwin.physics.firmware import duty_for_bus_current, duty_for_motor_current
 

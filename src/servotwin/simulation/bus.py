@@ -12,9 +12,9 @@ import numpy as np
 
 from servotwin.errors import InputError, SimulationError, UnknownNameError
 from servotwin.models import Model
-from servotwin.models.engine.modes import Vector
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
+from servotwin.models.state.modes import Vector
 from servotwin.models.terms.source import Source
 from servotwin.parameters.groups import Supply
 from servotwin.signals import Signal

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import guards, motion, rodas, tape
-from servotwin.models.engine.modes import Mode, Vector
-from servotwin.models.engine.motion import Motion
-from servotwin.models.engine.rates import jacobian
-from servotwin.models.engine.shared_source import on_stiff_source
+from servotwin.models.engine.bus import event_log
+from servotwin.models.engine.bus.shared_source import on_stiff_source
+from servotwin.models.engine.dynamics.rates import jacobian
+from servotwin.models.engine.events import guards
+from servotwin.models.engine.motions import motion, rodas
+from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.step import at_pulses
+from servotwin.models.state.modes import Mode, Vector
 from servotwin.models.terms import duty
 from servotwin.physics.pieces import Piece, piece_rate, piece_value
 from servotwin.simulation.engine import TRIPS, Event, Plan, Segment, event_name
@@ -25,9 +27,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _STEPS = 7  # vectors of a dense output, of seven numbers each
-_WORDS = {tape.DRIVES + 1: "drive forward", tape.DRIVES - 1: "drive backward", tape.DRIVES: "drive ends",
-          tape.SILENCE + 1: "silence begins", tape.SILENCE: "silence ends", tape.REFUSED: "pulse refused",
-          **{tape.TRIPS + k: word for k, word in enumerate(TRIPS)}}
+_WORDS = {event_log.DRIVES + 1: "drive forward", event_log.DRIVES - 1: "drive backward", event_log.DRIVES: "drive ends",
+          event_log.SILENCE + 1: "silence begins", event_log.SILENCE: "silence ends",
+          event_log.REFUSED: "pulse refused",
+          **{event_log.TRIPS + k: word for k, word in enumerate(TRIPS)}}
 
 
 class Segments(Sequence[Segment]):
@@ -96,7 +99,7 @@ class _Maker:
         base = motion.nothing(numbers, Piece(value=u), tau)._replace(
             kind=int(kind), mode=mode, t0=anchor, length=length, next_step=next_step, end=Vector(*rest[14:21]),
             start=Vector(*rest[21:28]))
-        if how == tape.ALONE:
+        if how == event_log.ALONE:
             m = _alone(base, step, self._plan.accuracy)
         else:
             m = self._together(base._replace(numbers=on_stiff_source(numbers, returns > 0.0)), int(how), int(first))
@@ -105,7 +108,7 @@ class _Maker:
 
     def _together(self, m: Motion, how: int, first: int) -> Motion:
         numbers, mode, u, tau = m.numbers, m.mode, m.u, m.tau
-        if how == tape.SERIES:
+        if how == event_log.SERIES:
             both = self._given[first:first + 2 * m.kind].tolist()
             return motion.by_series(numbers, mode, u, tau, m.t0, m.start, m.length, tuple(both[:m.kind]),
                                     tuple(both[m.kind:]))

@@ -9,18 +9,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import bus, controller, crew, tape
-from servotwin.models.engine.buses import Buses
-from servotwin.models.engine.coupled_units import Coupling, Unit
+from servotwin.models.engine import controller
+from servotwin.models.engine.batch.tiles import Lanes
+from servotwin.models.engine.bus import bus_unit, event_log, event_queue
+from servotwin.models.engine.bus.bus_batch import Buses
+from servotwin.models.engine.bus.bus_inputs import Tables
+from servotwin.models.engine.bus.bus_records import ROOM, Mate, Seat, Shared, put_shared
+from servotwin.models.engine.bus.coupled_motion import at_start
+from servotwin.models.engine.bus.coupled_units import Coupling, Unit
+from servotwin.models.engine.bus.event_log import Tape
 from servotwin.models.engine.demands import demanded
 from servotwin.models.engine.memory import Memories, Memory, forgotten, resumed
-from servotwin.models.engine.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
-from servotwin.models.engine.seats import ROOM, Mate, Seat, Shared, put_shared
 from servotwin.models.engine.step import DIVERGED
-from servotwin.models.engine.tape import Tape
-from servotwin.models.engine.tiles import Lanes
-from servotwin.models.engine.together import at_start
-from servotwin.models.engine.told import Tables
+from servotwin.models.state.records import TILE, fields_of, numbers_in, object_of, record_of, room, rows_of
 from servotwin.models.terms import control
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.dependence import CURVED_Q, SPRING
@@ -36,7 +37,7 @@ from servotwin.simulation.lanes.packed import programs_of
 
 Array = NDArray[np.float64]
 
-_ENTRIES = tuple(f"servotwin.models.engine.buses:{name}" for name in ("go_on", "look"))
+_ENTRIES = tuple(f"servotwin.models.engine.bus.bus_batch:{name}" for name in ("go_on", "look"))
 BUSES = Recipe("buses", _ENTRIES, knows=~SPRING)
 """All servos but those with a spring between two bodies; they take hardly longer for what others lack."""
 _PLAINLY = PLAIN_RUNS.knows & ~CURVED_Q
@@ -76,15 +77,15 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
     Whenever it is, `tell` is told the time [s].
     """
     found: list[list[Array]] = []
-    count, status, when = 0, bus.PAUSED, 0.0
-    while status == bus.PAUSED:
+    count, status, when = 0, event_queue.PAUSED, 0.0
+    while status == event_queue.PAUSED:
         written.used[:] = 0
         try:
             status, when = way.go_on(until, written)
         except (ArithmeticError, ValueError):  # numbers beyond what a float holds
-            status, when = DIVERGED, float(written.motions[:written.used[0], tape.UNTIL].max(initial=when))
+            status, when = DIVERGED, float(written.motions[:written.used[0], event_log.UNTIL].max(initial=when))
         part = [rows[:used].copy() for rows, used in zip(written[:3], written.used.tolist(), strict=True)]
-        part[0][:, tape.FIRST] += count
+        part[0][:, event_log.FIRST] += count
         count += len(part[2])
         found.append(part)
         if tell is not None:
@@ -96,7 +97,7 @@ def taped(way: _Compiled | Plainly, until: float, written: Tape,
 def tape_of(servos: int) -> Tape:
     """Return a tape with room for what so many servos do."""
     rows = max(_ROWS, 64 * servos)
-    return Tape(np.empty((rows, tape.ROW)), np.empty((rows, tape.EVENT)),
+    return Tape(np.empty((rows, event_log.ROW)), np.empty((rows, event_log.EVENT)),
                 np.empty(max(_NUMBERS, 64 * servos * ROOM)), np.zeros(3, np.int64))
 
 
@@ -151,7 +152,7 @@ class Plainly:
         self._inputs = [plan.inputs for plan in plans]
         self.memories = [begun(plan, state) for plan, state in zip(plans, states, strict=True)]
         for seat, plan in zip(self._seats, plans, strict=True):
-            crew.sit(seat, plan.numbers, plan.chip, plan.inputs)
+            bus_unit.sit(seat, plan.numbers, plan.chip, plan.inputs)
 
     def break_up(self, source: Source) -> None:
         """Let nobody move together, and every motion begin anew: numbers of a servo, or the source, are others now."""
@@ -163,11 +164,12 @@ class Plainly:
     def go_on(self, until: float, written: Tape) -> tuple[int, float]:
         """Go on to a time [s]; return a status and when."""
         for seat, memory in zip(self._seats, self.memories, strict=True):
-            crew.remember(seat, memory)
+            bus_unit.remember(seat, memory)
             seat.until = until - seat.origin
         firms = [memory.firm[0] for memory in self.memories]
-        status, when = bus.through(self._inputs, firms, len(firms), self._shared, self._seats, self._mates, written)
-        self.memories = [crew.memory_in(seat, firms)._replace(firm=memory.firm)
+        status, when = event_queue.through(self._inputs, firms, len(firms), self._shared, self._seats, self._mates,
+                                           written)
+        self.memories = [bus_unit.memory_in(seat, firms)._replace(firm=memory.firm)
                          for seat, memory in zip(self._seats, self.memories, strict=True)]
         return status, when
 

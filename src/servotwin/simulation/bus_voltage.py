@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import shared_source
-from servotwin.models.engine.records import object_of
-from servotwin.models.engine.seats import Mate
+from servotwin.models.engine.bus import shared_source
+from servotwin.models.engine.bus.bus_records import Mate
 from servotwin.models.engine.step import at_pulses
+from servotwin.models.state.records import object_of
 from servotwin.models.terms import duty
 from servotwin.models.terms.bridge import coasts
 from servotwin.models.terms.source import Source
 
 if TYPE_CHECKING:
-    from servotwin.models.engine.modes import Vector
+    from servotwin.models.state.modes import Vector
     from servotwin.simulation.engine import Plan, Segment
 
 

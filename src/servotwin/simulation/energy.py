@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from servotwin import physics
-from servotwin.models.engine import motion
+from servotwin.models.engine.motions import motion
 from servotwin.models.engine.observe import stored_energy
 from servotwin.models.outputs import electrical_of, motor_speed_of, torques_of, warm_plant
 

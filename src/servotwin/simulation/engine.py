@@ -13,8 +13,9 @@ from typing import NamedTuple
 
 from servotwin.errors import SimulationError
 from servotwin.models.base import Place
-from servotwin.models.engine import controller, guards, motion
-from servotwin.models.engine.legs import MOST_SHORT
+from servotwin.models.engine import controller
+from servotwin.models.engine.events import guards
+from servotwin.models.engine.legs.legs import MOST_SHORT
 from servotwin.models.engine.memory import (
     ACCURACY,
     Inputs,
@@ -26,7 +27,11 @@ from servotwin.models.engine.memory import (
     resumed,
     time_of,
 )
-from servotwin.models.engine.modes import (
+from servotwin.models.engine.motions import motion
+from servotwin.models.engine.motions.motion import Motion
+from servotwin.models.engine.runs import calmed, is_short
+from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
+from servotwin.models.state.modes import (
     CONDUCTING,
     CORE,
     LIMITED_BACKWARD,
@@ -35,9 +40,6 @@ from servotwin.models.engine.modes import (
     Mode,
     at_rest,
 )
-from servotwin.models.engine.motion import Motion
-from servotwin.models.engine.runs import calmed, is_short
-from servotwin.models.engine.step import COMPLETED, MOST_IDLE, pulse_width, step
 from servotwin.models.terms import control, duty, firmware, frame
 from servotwin.models.terms.bridge import heeds_silence
 from servotwin.models.terms.chip import NO_CHIP, Chip

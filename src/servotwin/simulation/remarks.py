@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from servotwin.models import DigitalServo
-from servotwin.models.engine import ending
+from servotwin.models.engine.cosim import final_checks
 from servotwin.models.standing import standing_current
 from servotwin.models.terms import heat
 from servotwin.models.terms.chip import NO_CHIP
@@ -58,7 +58,7 @@ def drive_words(rate: float, duty: float, current: float) -> str:
 
 
 _NUMBERS: dict[str, Callable[..., str]] = {NOT_AT_REST: swing_words, BUZZES: drive_words}
-_MARKS = {ON_STOP: ending.ON_STOP, CANNOT_HOLD: ending.CANNOT_HOLD}
+_MARKS = {ON_STOP: final_checks.ON_STOP, CANNOT_HOLD: final_checks.CANNOT_HOLD}
 
 
 _AT_STOP = 1e-6  # rad, relative beyond 1 rad: as in `ending`
@@ -170,16 +170,16 @@ def remarks_of(result: Result) -> tuple[Remark, ...]:
     own = model.edges(result.command) if pulsed else None
     edges, period = own or (), period if own is None else 0.0
     rows = result.drive.rows
-    refused = ending.refused_from(accepts, rows, period, edges, end) if pulsed else math.nan
-    tau = piece_value(ending.piece_before(load.torque_pieces.rows, end, False), end)
+    refused = final_checks.refused_from(accepts, rows, period, edges, end) if pulsed else math.nan
+    tau = piece_value(final_checks.piece_before(load.torque_pieces.rows, end, False), end)
     final = [float(values[0]) for values in (last.angle, last.speed, last.winding, last.housing)]
     if model.endless:  # it is told no angle
         marks = 0
     elif firmware is not None:
         marks = _program_marks(numbers, firmware, last, tau, final)
     else:
-        marks = ending.marks(pulsed, numbers, accepts, rows, tau, period, edges, end, numbers.source.V,
-                             not math.isnan(refused), final)
+        marks = final_checks.marks(pulsed, numbers, accepts, rows, tau, period, edges, end, numbers.source.V,
+                                   not math.isnan(refused), final)
     said = tuple(Remark(remark.kind, remark.time) for remark in lane_remarks([refused], [marks], end))
     trips = () if firmware is None else _trips(result, last)
     return (*said, *trips, *_of_rest(result.rest, end, alone=not said))
@@ -214,7 +214,7 @@ def _program_marks(numbers: Numbers, firmware: Firmware, last: Samples, tau: flo
         return 0
     upper, lower = numbers.stops.upper, numbers.stops.lower
     at_stop = q >= upper - _AT_STOP * max(abs(upper), 1.0) or q <= lower + _AT_STOP * max(abs(lower), 1.0)
-    found = ending.ON_STOP if w == 0.0 and at_stop else 0
+    found = final_checks.ON_STOP if w == 0.0 and at_stop else 0
     if abs(float(last.duty[0])) > 1.0 or trip > 1:  # without torque, as it is told
         return found
     if heat.present(numbers.heat):
@@ -222,8 +222,8 @@ def _program_marks(numbers: Numbers, firmware: Firmware, last: Samples, tau: flo
     most = min(firmware.torque_limit, firmware.duty_limit, firmware.overload_output if trip == 1 else 1.0)
     torque = electromagnetic_torque(standing_current(numbers, firmware, most), numbers.motor.K)
     forward, sent = goal > q, min(max(goal, lower), upper)
-    able = all(ending.starts(numbers, forward, torque, tau, at) for at in (q, sent))
-    return found if able else found + ending.CANNOT_HOLD
+    able = all(final_checks.starts(numbers, forward, torque, tau, at) for at in (q, sent))
+    return found if able else found + final_checks.CANNOT_HOLD
 
 
 def _trips(result: Result, last: Samples) -> tuple[Remark, ...]:

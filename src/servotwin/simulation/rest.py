@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models import DigitalServo, PulseServo, PulseServoInductive
-from servotwin.models.engine.ending import piece_before, starts
+from servotwin.models.engine.cosim.final_checks import piece_before, starts
 from servotwin.models.switched import SwitchedServo
 from servotwin.models.terms.duty import drives
 from servotwin.physics.pieces import piece_value

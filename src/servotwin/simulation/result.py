@@ -11,7 +11,7 @@ import numpy as np
 
 from servotwin.errors import MissingExtraError, SimulationError
 from servotwin.look import escape, number, table
-from servotwin.models.engine.motion import is_step
+from servotwin.models.engine.motions.motion import is_step
 from servotwin.models.outputs import SIGNALS
 from servotwin.models.samples import Samples
 from servotwin.simulation import files

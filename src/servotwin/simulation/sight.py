@@ -16,7 +16,7 @@ import numpy as np
 
 from servotwin.loads import as_load
 from servotwin.models.base import KINDS
-from servotwin.models.engine import motion
+from servotwin.models.engine.motions import motion
 from servotwin.models.engine.observe import Observed, observed, on_bus, told_by
 from servotwin.models.engine.step import at_pulses
 from servotwin.models.terms import duty
@@ -27,8 +27,8 @@ from servotwin.physics.pieces import piece_value
 if TYPE_CHECKING:
     from servotwin.loads import Load, Part
     from servotwin.models import Model
-    from servotwin.models.engine.modes import Vector
-    from servotwin.models.engine.motion import Motion
+    from servotwin.models.engine.motions.motion import Motion
+    from servotwin.models.state.modes import Vector
     from servotwin.models.terms.numbers import Numbers
     from servotwin.simulation.engine import Plan, Segment
 

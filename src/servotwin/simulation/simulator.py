@@ -13,10 +13,10 @@ from servotwin.errors import CommandError, InputError, SimulationError, UnknownN
 from servotwin.loads import Constant, as_load
 from servotwin.models import DigitalServo, Model
 from servotwin.models.engine.memory import ACCURACY, Memory, started, with_bodies
-from servotwin.models.engine.modes import INSIDE, RIGID, Mode
 from servotwin.models.engine.runs import mode_of
 from servotwin.models.outputs import PLAIN
 from servotwin.models.samples import Samples
+from servotwin.models.state.modes import INSIDE, RIGID, Mode
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.control import NOT_STARTED
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware

@@ -9,7 +9,7 @@ import numpy as np
 
 from servotwin.errors import InputError
 from servotwin.models.base import Place
-from servotwin.models.engine.modes import Vector
+from servotwin.models.state.modes import Vector
 from servotwin.models.terms import elastic
 from servotwin.models.terms.numbers import Numbers
 from servotwin.physics.thermal import COPPER_COEFFICIENT, REFERENCE_TEMPERATURE

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import motion
+from servotwin.models.engine.motions import motion
 from servotwin.models.samples import Samples
 from servotwin.physics import play
 from servotwin.simulation.engine import Segment

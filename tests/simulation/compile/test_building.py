@@ -14,16 +14,16 @@ from pathlib import Path
 import pytest
 
 import servotwin
-from servotwin.models.engine.noise import gaussian
+from servotwin.models.state.noise import gaussian
 from servotwin.simulation.compile import Recipe, building, compilers, finding, kernels, library
 from servotwin.simulation.compile.compilers import compilers as at_hand
 
-RECIPE = Recipe("noise", ("servotwin.models.engine.noise:gaussian",))
+RECIPE = Recipe("noise", ("servotwin.models.state.noise:gaussian",))
 SCRIPT = """
 import sys
 from servotwin.simulation.compile import Recipe, backend, building, kernels
 building._LONGEST = float(sys.argv[1])
-kernel = kernels(Recipe("noise", ("servotwin.models.engine.noise:gaussian",)))
+kernel = kernels(Recipe("noise", ("servotwin.models.state.noise:gaussian",)))
 print(kernel.gaussian(3, 7), "plain" if backend.is_plain() else "compiled")
 """
 WANTED = gaussian(3, 7)

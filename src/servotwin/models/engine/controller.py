@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine import currents
+from servotwin.models.engine.dynamics import currents
 from servotwin.models.engine.memory import SAME, Inputs, Memory, in_force, next_frame, origin_of
-from servotwin.models.engine.modes import Vector
-from servotwin.models.engine.noise import gaussian
+from servotwin.models.state.modes import Vector
+from servotwin.models.state.noise import gaussian
 from servotwin.models.terms import bridge, control, duty
 from servotwin.models.terms.control import NOTHING_SENSED, NOWHERE, WAITING, Sensed
 from servotwin.models.terms.elastic import turning

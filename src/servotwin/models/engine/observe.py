@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from servotwin.models.engine import currents, twist
-from servotwin.models.engine.contacts import joint_friction
-from servotwin.models.engine.modes import INSIDE, Mode, Vector, at_rest
+from servotwin.models.engine.dynamics import currents, spring_contact
+from servotwin.models.engine.dynamics.contacts import joint_friction
+from servotwin.models.state.modes import INSIDE, Mode, Vector, at_rest
 from servotwin.models.terms import bridge, duty, elastic, shaft, source
 from servotwin.models.terms.bridge import Bridge, Off
 from servotwin.models.terms.control import NOWHERE
@@ -173,7 +173,7 @@ def stored_energy(numbers: Numbers, y: Vector) -> float:
         spring = numbers.elastic
         first, second = (own.J, spring.J) if elastic.behind(spring) else (own.J_out, own.J - own.J_out)
         return (kinetic_energy(w, first) + kinetic_energy(w_motor, second) + magnetic_energy(i, numbers.motor.L)
-                + spring_energy(stretch_beyond_play(twist.twist(numbers, y), spring.half), spring.k))
+                + spring_energy(stretch_beyond_play(spring_contact.twist(numbers, y), spring.half), spring.k))
     return (kinetic_energy(w, own.J_out) + kinetic_energy(w_motor, own.J - own.J_out)
             + magnetic_energy(i, numbers.motor.L))
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from servotwin.models.engine import controller, legs, motion, tick_legs
-from servotwin.models.engine.legs import MOST_SHORT, SHORT
+from servotwin.models.engine import controller
+from servotwin.models.engine.batch.tiles import chip_of, numbers_of
+from servotwin.models.engine.bus.bus_records import put_vector
+from servotwin.models.engine.legs import legs, tick_legs
+from servotwin.models.engine.legs.legs import MOST_SHORT, SHORT
+from servotwin.models.engine.legs.tick_legs import LEGS
 from servotwin.models.engine.memory import (
     SAME,
     Inputs,
@@ -25,11 +29,9 @@ from servotwin.models.engine.memory import (
     since,
     time_of,
 )
-from servotwin.models.engine.modes import INSIDE, LOST, RIGID, Mode, Vector
-from servotwin.models.engine.seats import put_vector
+from servotwin.models.engine.motions import motion
 from servotwin.models.engine.step import CHATTER, COMPLETED, MOST_IDLE, anchored, at_pulses, source, step
-from servotwin.models.engine.tick_legs import LEGS
-from servotwin.models.engine.tiles import chip_of, numbers_of
+from servotwin.models.state.modes import INSIDE, LOST, RIGID, Mode, Vector
 from servotwin.models.terms import duty, firmware, play
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as pulsed_chip
@@ -39,8 +41,8 @@ from servotwin.models.terms.sensor import wiper_at
 from servotwin.physics.pieces import Piece, piece_value
 
 if TYPE_CHECKING:
+    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
     from servotwin.models.engine.memory import Memories
-    from servotwin.models.engine.tiles import Floats, Indices, Lanes
 
 # Status of a lane that has gone on in this call already, side by side with others or by legs: for all of it, or not yet
 ARRIVED, UNDERWAY = -2, -1

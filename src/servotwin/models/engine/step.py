@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import math
 
-from servotwin.models.engine import controller, currents, events, guards, motion
+from servotwin.models.engine import controller
+from servotwin.models.engine.dynamics import currents
+from servotwin.models.engine.events import first_event, guards
 from servotwin.models.engine.memory import SAME, Inputs, Memory, Point, edge_of, in_force, origin_of, since
-from servotwin.models.engine.modes import CORE, Vector
-from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.motions import motion
+from servotwin.models.engine.motions.motion import Motion
+from servotwin.models.state.modes import CORE, Vector
 from servotwin.models.terms import bridge, duty, firmware, frame
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.chip import present as chip_present
@@ -139,11 +142,11 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
             kinds &= ~guards.IN_CLOSED_FORM
         elif guards.creeping(m.numbers, m.mode, m.start):
             kinds &= ~(1 << guards.CREEPS)
-        s, kind, y = events.first_event(m, kinds, 0.0, m.length)
+        s, kind, y = first_event.first_event(m, kinds, 0.0, m.length)
         if kind < 0 or s > end - t0:
             kind, y = -1, motion.state(m, m.length if end == step_end else end - t0)  # not a rounding before its end
     else:
-        s, kind, y = events.first_event(m, kinds, point.time - t0, end - t0)
+        s, kind, y = first_event.first_event(m, kinds, point.time - t0, end - t0)
     if kind < 0:
         wiper = wiper_at(m.numbers.sensor, point.wiper, y.q)
         if integrated and end == step_end and m.ends_by >= 0:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from servotwin.models.engine.modes import (
+from servotwin.models.state.modes import (
     CONDUCTING,
     CURRENT_BACKWARD,
     CURRENT_FORWARD,

@@ -13,7 +13,7 @@ import numpy as np
 
 from servotwin.errors import LoadError
 from servotwin.loads import Load
-from servotwin.models.engine.modes import PUSH_BACKWARD, PUSH_FORWARD, SPRUNG, Vector
+from servotwin.models.state.modes import PUSH_BACKWARD, PUSH_FORWARD, SPRUNG, Vector
 from servotwin.models.terms.dependence import ON_Q, SPRING, TWO_BODIES
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.shaft import Shaft

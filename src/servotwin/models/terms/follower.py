@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine.modes import (
+from servotwin.models.state.modes import (
     DEAD,
     LINEAR,
     LINEAR_BACKWARD,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
-from servotwin.models.engine.noise import gaussian
+from servotwin.models.state.noise import gaussian
 from servotwin.models.terms.chip import Chip
 from servotwin.physics import pulse
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from servotwin import physics
-from servotwin.models.engine.modes import CORE, at_rest
+from servotwin.models.state.modes import CORE, at_rest
 from servotwin.models.terms.dependence import BY_SHARE, CURVED_W, DRY, FADING, STEEP_W
 from servotwin.models.terms.given import Given
 from servotwin.physics.friction import breakaway_torque, coulomb_torque

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from servotwin.models.engine.modes import Vector
+from servotwin.models.state.modes import Vector
 from servotwin.models.terms.bridge import NO_BRIDGE, Bridge, Off
 from servotwin.models.terms.elastic import NO_ELASTIC, Elastic
 from servotwin.models.terms.follower import NO_FOLLOWER, Follower

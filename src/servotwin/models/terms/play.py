@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from servotwin import physics
-from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vector, moving
+from servotwin.models.state.modes import INSIDE, ON_BACKWARD, ON_FORWARD, Vector, moving
 from servotwin.models.terms.dependence import PLAY, TWO_BODIES
 from servotwin.models.terms.given import Given
 from servotwin.models.terms.shaft import Shaft

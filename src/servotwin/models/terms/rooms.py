@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from servotwin.models.engine.records import fields_of
+from servotwin.models.state.records import fields_of
 from servotwin.models.terms import follower
 from servotwin.models.terms.chip import NO_CHIP, Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from servotwin import loads, physics
-from servotwin.models.engine.modes import BACKWARD, FORWARD, FREE, ON_LOWER, ON_UPPER, STUCK
+from servotwin.models.state.modes import BACKWARD, FORWARD, FREE, ON_LOWER, ON_UPPER, STUCK
 from servotwin.models.terms.dependence import BY_SHARE, SHOWN, SPRING, STRAIGHT, TWO_BODIES
 from servotwin.models.terms.given import Given
 from servotwin.physics.friction import sticks

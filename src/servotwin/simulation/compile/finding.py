@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from servotwin import physics
-from servotwin.models import engine, terms
+from servotwin.models import engine, state, terms
 from servotwin.simulation.compile.compilers import Compiler, compilers, flags, level, levels, system
 from servotwin.simulation.compile.recipe import Recipe
 from servotwin.simulation.compile.storage import cache_folder, key_of
@@ -48,8 +48,8 @@ class Built:
 def sources() -> tuple[str, ...]:
     """Return the text of everything from which C is printed; to read it is quicker than to derive."""
     files = sorted(Path(__file__).parent.glob("*.[ph]*"))
-    for package in (physics, terms, engine):
-        files += sorted(Path(package.__path__[0]).glob("*.py"))
+    for package in (physics, state, terms, engine):
+        files += sorted(Path(package.__path__[0]).rglob("*.py"))
     return tuple(file.read_text(encoding="utf-8") for file in files)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.memory import Memory, time_of
-from servotwin.models.engine.motion import Motion
+from servotwin.models.engine.motions.motion import Motion
 from servotwin.models.engine.observe import Observed
 from servotwin.models.engine.step import DIVERGED
 from servotwin.simulation.compile.derive import derive
@@ -118,7 +118,7 @@ def _no_solution(square: Any, x: NDArray[np.float64]) -> None:
 
 
 _INSTEAD: dict[str, Callable[..., Any]] = {
-    "engine_step__step": _lost_step, "engine_runs__run": _lost_run, "engine_bus__through": _lost_bus,
-    "engine_calm__after": _not_calm, "engine_runs__mode_under": _mode_so_far,
-    "engine_observe__observed": _nothing_seen, "engine_ending__marks": _no_marks,
+    "engine_step__step": _lost_step, "engine_runs__run": _lost_run, "bus_event_queue__through": _lost_bus,
+    "batch_event_free__after": _not_calm, "engine_runs__mode_under": _mode_so_far,
+    "engine_observe__observed": _nothing_seen, "cosim_final_checks__marks": _no_marks,
     "compile_joint_torques___solve": _no_solution}

@@ -13,7 +13,7 @@ import ast
 from collections.abc import Iterator
 from dataclasses import replace
 
-from servotwin.models.engine import records
+from servotwin.models.state import records
 from servotwin.models.terms.rooms import ACTS, paths
 from servotwin.simulation.compile.derive import derive
 from servotwin.simulation.compile.inference import Module, Specialised

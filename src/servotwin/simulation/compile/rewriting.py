@@ -19,8 +19,8 @@ from servotwin.physics.pieces import Piece
 if TYPE_CHECKING:
     from servotwin.simulation.compile.derive import Derivation
 
-ELEMENTARY = "servotwin.models.engine.elementary"
-DOUBLE = ("servotwin.models.engine.noise", "servotwin.physics.pieces")  # in float64 throughout
+ELEMENTARY = "servotwin.models.engine.motions.elementary"
+DOUBLE = ("servotwin.models.state.noise", "servotwin.physics.pieces")  # in float64 throughout
 _REPLACED = ("exp", "log", "log1p", "sin", "floor")  # in the vector form, by those of `engine.elementary`
 _PACKAGE = "servotwin."
 _MODELS = "servotwin.models."

@@ -12,10 +12,10 @@ from typing import Any, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import tiles
+from servotwin.models.engine.batch import tiles
+from servotwin.models.engine.batch.tiles import Lanes, Outputs
 from servotwin.models.engine.memory import Memories, Memory
-from servotwin.models.engine.records import record_of, rows_of
-from servotwin.models.engine.tiles import Lanes, Outputs
+from servotwin.models.state.records import record_of, rows_of
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.control import Firm
 from servotwin.models.terms.firmware import Firmware
@@ -35,7 +35,6 @@ from servotwin.simulation.compile.kinds import (
 from servotwin.simulation.compile.recipe import Recipe
 
 Signature = tuple[str, tuple[Kind, ...]]
-_ENGINE = "servotwin.models.engine"
 _FLOATS, _TABLE, _CUBE = (Array(FLOAT64, dimensions) for dimensions in (1, 2, 3))
 _INDICES, _SMALLS, _SMALL_TABLE = Array(INT64, 1), Array(INT8, 1), Array(INT8, 2)
 FORMS = ("ONE_FORMULA", "ARCS", "BANDS", "STRIDES", "COILS", "GAPS")
@@ -67,52 +66,52 @@ _SIGNATURES: Mapping[str, tuple[Kind, ...]] = {
     "runs:start": (_LANES, _INDICES, _MEMORIES), "runs:go_on": (*_GOING, _FLOATS), "runs:to_first_ticks": _GOING,
     "runs:ready": (_INDICES, _SMALLS, _FLOATS, _INDICES, _FLOATS, _INDICES),
     "runs:note_failures": (_INDICES, _INDICES, _FLOATS, _ROWS, _SMALLS, _FLOATS),
-    "calm:go": (_LANES, _INDICES, _FLOATS, _SMALLS, _ROWS, _INDICES),
-    "ending:look_at_lanes": (BOOL, _LANES, *_RECORDED, FLOAT64, _TABLE, _FLOATS, _SMALLS),
-    "sights:one_by_one": (_LANES, _TABLE, *_RECORDED, _INDICES, _MEMORIES, _TABLE),
-    "ticks:accept": (_FLOATS, _INDICES, _TABLE, _CUBE, _NUMBERS, _FLOATS, _FLOATS, _INDICES, _FLOATS),
-    "ticks:change": (_INDICES, _TABLE, _INDICES, _NUMBERS, _FLOATS, _FLOATS, BOOL, _FLOATS, _FLOATS, _NUMBERS),
-    "ticks:follow": (_INDICES, _TABLE, *(_FLOATS,) * 5, _TABLE, _FLOATS),
-    "lane_ticks:forget_motions": (_ROWS,),
-    "lane_ticks:impose_on_records": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, _ROWS),
-    "lane_ticks:show_records": (_INDICES, _ROWS, _TABLE),
-    "lane_ticks:read_clocks": (_INDICES, _SMALLS, _FLOATS, _ROWS, _FLOATS),
-    "lane_ticks:take_status": (_INDICES, _SMALLS, _INDICES),
-    "lane_ticks:note_lost_buses": (_INDICES, _INDICES, _ROWS, _SMALLS, _FLOATS),
+    "event_free:go": (_LANES, _INDICES, _FLOATS, _SMALLS, _ROWS, _INDICES),
+    "final_checks:look_at_lanes": (BOOL, _LANES, *_RECORDED, FLOAT64, _TABLE, _FLOATS, _SMALLS),
+    "observe_batch:one_by_one": (_LANES, _TABLE, *_RECORDED, _INDICES, _MEMORIES, _TABLE),
+    "cosim_calls:accept": (_FLOATS, _INDICES, _TABLE, _CUBE, _NUMBERS, _FLOATS, _FLOATS, _INDICES, _FLOATS),
+    "cosim_calls:change": (_INDICES, _TABLE, _INDICES, _NUMBERS, _FLOATS, _FLOATS, BOOL, _FLOATS, _FLOATS, _NUMBERS),
+    "cosim_calls:follow": (_INDICES, _TABLE, *(_FLOATS,) * 5, _TABLE, _FLOATS),
+    "cosim_lanes:forget_motions": (_ROWS,),
+    "cosim_lanes:impose_on_records": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, _ROWS),
+    "cosim_lanes:show_records": (_INDICES, _ROWS, _TABLE),
+    "cosim_lanes:read_clocks": (_INDICES, _SMALLS, _FLOATS, _ROWS, _FLOATS),
+    "cosim_lanes:take_status": (_INDICES, _SMALLS, _INDICES),
+    "cosim_lanes:note_lost_buses": (_INDICES, _INDICES, _ROWS, _SMALLS, _FLOATS),
 }
 
 
 @cache
 def _of_ticks() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that let digital servos go from tick to tick together."""
-    from servotwin.models.engine import loop_tiles
-    from servotwin.models.engine.coupled_units import Coupling, Unit
+    from servotwin.models.engine.batch import digital_tiles
+    from servotwin.models.engine.bus.coupled_units import Coupling, Unit
 
-    return {"loops:go_on": (*_GOING, _records(loop_tiles.TILE_TYPE)), "leg_runs:go_on": _GOING,
+    return {"digital_batch:go_on": (*_GOING, _records(digital_tiles.TILE_TYPE)), "leg_runs:go_on": _GOING,
             "coupled_runs:go_on": (*_GOING, _records(record_of(Unit)), _records(record_of(Coupling)))}
 
 
 @cache
 def _of_buses() -> Mapping[str, tuple[Kind, ...]]:
     """Return what entries are called with that move servos on a bus."""
-    from servotwin.models.engine.buses import Buses
-    from servotwin.models.engine.coupled_units import Coupling, Unit
-    from servotwin.models.engine.seats import Mate, Seat, Shared
-    from servotwin.models.engine.tape import Tape
-    from servotwin.models.engine.told import Tables
+    from servotwin.models.engine.bus.bus_batch import Buses
+    from servotwin.models.engine.bus.bus_inputs import Tables
+    from servotwin.models.engine.bus.bus_records import Mate, Seat, Shared
+    from servotwin.models.engine.bus.coupled_units import Coupling, Unit
+    from servotwin.models.engine.bus.event_log import Tape
 
     tables = _tuple(Tables, _INDICES, torques=_TABLE, curves=_TABLE)
     shared, room = _records(record_of(Shared)), (_records(record_of(Seat)), _records(record_of(Mate)))
     units = (_records(record_of(Unit)), _records(record_of(Coupling)))
     own = (_LANES, tables, _tuple(Buses, _INDICES, memories=_MEMORIES, shared=shared, ended=_FLOATS))
     tape = _tuple(Tape, _TABLE, numbers=_FLOATS, used=_INDICES)
-    return {"buses:go_on": (*own, INT64, INT64, FLOAT64, FLOAT64, *room, *units, tape),
-            "buses:look": (*own, *room, _TABLE), "lane_ticks:break_up": (_INDICES, shared, _ROWS)}
+    return {"bus_batch:go_on": (*own, INT64, INT64, FLOAT64, FLOAT64, *room, *units, tape),
+            "bus_batch:look": (*own, *room, _TABLE), "cosim_lanes:break_up": (_INDICES, shared, _ROWS)}
 
 
 _ELSEWHERE: Mapping[str, Callable[[], Mapping[str, tuple[Kind, ...]]]] = {  # where kinds take more than lanes have
-    "loops:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "coupled_runs:go_on": _of_ticks,
-    "buses:go_on": _of_buses, "buses:look": _of_buses, "lane_ticks:break_up": _of_buses}
+    "digital_batch:go_on": _of_ticks, "leg_runs:go_on": _of_ticks, "coupled_runs:go_on": _of_ticks,
+    "bus_batch:go_on": _of_buses, "bus_batch:look": _of_buses, "cosim_lanes:break_up": _of_buses}
 
 
 def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ...]]:
@@ -122,12 +121,12 @@ def _on_tiles(rows: Array, plans: Array, real: Kind) -> dict[str, tuple[Kind, ..
         "side_by_side:go_on": (_TABLE, _FLOATS, INT64, BOOL, _INDICES, FLOAT64, _FLOATS, _outputs(real), rows, plans),
         "side_by_side:advance": (_INDICES, INT64, BOOL, INT64, INT64, FLOAT64, _FLOATS, _FLOATS, BOOL, rows, plans),
         "side_by_side:refit": (_LANES, INT64, _INDICES, _INDICES, rows),
-        "sights:side_by_side": (_LANES, _TABLE, _INDICES, rows, _TABLE),
-        "lane_ticks:gather_lost": (_INDICES, _SMALLS, _FLOATS, _TABLE, rows, *(_INDICES,) * 3, _FLOATS, _MEMORIES),
-        "lane_ticks:to_records": (_INDICES, rows, _MEMORIES),
-        "lane_ticks:to_tiles": (_INDICES, _INDICES, _MEMORIES, _FLOATS, rows),
-        "lane_ticks:impose_on_tiles": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, rows),
-        "lane_ticks:show_tiles": (_INDICES, rows, _TABLE),
+        "observe_batch:side_by_side": (_LANES, _TABLE, _INDICES, rows, _TABLE),
+        "cosim_lanes:gather_lost": (_INDICES, _SMALLS, _FLOATS, _TABLE, rows, *(_INDICES,) * 3, _FLOATS, _MEMORIES),
+        "cosim_lanes:to_records": (_INDICES, rows, _MEMORIES),
+        "cosim_lanes:to_tiles": (_INDICES, _INDICES, _MEMORIES, _FLOATS, rows),
+        "cosim_lanes:impose_on_tiles": (_INDICES, _TABLE, _NUMBERS, _INDICES, _INDICES, _FLOATS, rows),
+        "cosim_lanes:show_tiles": (_INDICES, rows, _TABLE),
     }
 
 
@@ -143,7 +142,7 @@ def signatures(recipe: Recipe) -> list[Signature]:
 
 
 def _kinds_of(entry: str, recipe: Recipe) -> Iterator[tuple[Kind, ...]]:
-    name = entry.removeprefix(f"{_ENGINE}.")
+    name = entry.rpartition(".")[2]
     if name in _SIGNATURES or name in _ELSEWHERE:
         yield (_SIGNATURES if name in _SIGNATURES else _ELSEWHERE[name]())[name]
         return

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.records import mapped
+from servotwin.models.state.records import mapped
 
 _Which = list[NDArray[np.int64]]
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from servotwin.models.engine import loop_tiles, tiles
-from servotwin.models.engine.coupled_units import Coupling, Unit
-from servotwin.models.engine.records import record_of
+from servotwin.models.engine.batch import digital_tiles, tiles
+from servotwin.models.engine.bus.coupled_units import Coupling, Unit
+from servotwin.models.state.records import record_of
 from servotwin.models.terms.dependence import (
     AT_COMMANDS,
     AT_STOPS,
@@ -47,7 +47,7 @@ from servotwin.models.terms.dependence import (
 )
 from servotwin.simulation.compile import Recipe
 
-_SIDE = tuple(f"servotwin.models.engine.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
+_SIDE = tuple(f"servotwin.models.engine.batch.side_by_side:{name}" for name in ("start", "go_on", "advance", "refit"))
 _ENTRIES = tuple(f"servotwin.models.engine.runs:{name}" for name in ("start", "ready", "go_on", "note_failures"))
 _DIGITAL = PROGRAM | BEYOND | AT_COMMANDS | PWM | ONE_WAY
 _MEAN = FOLLOWS | STEEP_W  # servos without pulses
@@ -88,7 +88,7 @@ _BY_GAPS = _side("by_gaps", ("GAPS",), _ANY_BRIDGE | _GAPS)
 
 ALL_RUNS = Recipe("runs", _ENTRIES)  # they take hardly longer for what others lack
 _PLAIN = _EVERYWHERE | DROPS | SILENCE | FREE_RUNNING | STEPS | TABLE | ON_Q
-_CALM = "servotwin.models.engine.calm:go"
+_CALM = "servotwin.models.engine.batch.event_free:go"
 PLAIN_RUNS = Recipe("plain_runs", (*_ENTRIES, _CALM), knows=_PLAIN | CURVED_Q | PULSES | FOLLOWS | RECORDED)
 _LEFT_TO_EVENTS = AT_STOPS | SHOWN | PULSES | STEPS
 CALM = PLAIN_RUNS.knows & ~(_LEFT_TO_EVENTS | CURVED_Q | RECORDED | TABLE)
@@ -99,38 +99,42 @@ _FIRST_TICKS = "servotwin.models.engine.runs:to_first_ticks"
 ALL_DIGITAL = Recipe("digital_runs", (*_ENTRIES, _FIRST_TICKS), knows=~(_NOT_DIGITAL | SPRING), always=PROGRAM | PWM)
 _TICKS = _PLAIN & ~ON_Q | _DIGITAL
 _LEGS = _TICKS | PLAY | TWO_BODIES | BY_SHARE
-BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.leg_runs:go_on",), vector=True, knows=_LEGS, always=PROGRAM | PWM)
+BY_LEGS = Recipe("by_legs", ("servotwin.models.engine.legs.leg_runs:go_on",), vector=True, knows=_LEGS,
+                 always=PROGRAM | PWM)
 """Digital servos from tick to tick, one after the other; what is left of a call is for `ALL_DIGITAL`."""
-BY_SERIES = Recipe("by_series", ("servotwin.models.engine.coupled_runs:go_on",),
+BY_SERIES = Recipe("by_series", ("servotwin.models.engine.bus.coupled_runs:go_on",),
                    knows=_LEGS & ~TABLE | ON_HEAT | REGULATED, always=PROGRAM | PWM)
 """The same whose windings get warm, or whose supply has a limit; what is left of a call is for `ALL_DIGITAL`."""
-BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.loops:go_on",), vector=True, knows=_TICKS & ~DROPS,
+BY_TICKS = Recipe("by_ticks", ("servotwin.models.engine.batch.digital_batch:go_on",), vector=True,
+                  knows=_TICKS & ~DROPS,
                   always=PROGRAM | PWM)
 """Digital servos from tick to tick, side by side; what is left of a call is for `BY_LEGS`."""
 # Not compiled for their own sake: what these call says which numbers are known where a program goes in one loop
 _LEFT_BY_LEGS = AT_STOPS | SHOWN | AT_COMMANDS
 _BY_LEGS = (replace(BY_LEGS, name="ticks_by_legs", knows=_LEGS & ~_LEFT_BY_LEGS, leaves=_LEFT_BY_LEGS),
-            ("servotwin.models.engine.tick_legs:go",))
+            ("servotwin.models.engine.legs.tick_legs:go",))
 _BY_SERIES = (replace(BY_SERIES, name="ticks_by_series", knows=BY_SERIES.knows & ~_LEFT_BY_LEGS,
                       leaves=_LEFT_BY_LEGS),
-              ("servotwin.models.engine.coupled_ticks:serve", "servotwin.models.engine.coupled_ticks:move"))
+              ("servotwin.models.engine.bus.coupled_ticks:serve", "servotwin.models.engine.bus.coupled_ticks:move"))
 _LEFT_BY_TICKS = _LEFT_BY_LEGS | BEYOND | ONE_WAY
 _BY_TICKS = (replace(BY_TICKS, name="ticks_by_loops", knows=BY_TICKS.knows & ~_LEFT_BY_TICKS, leaves=_LEFT_BY_TICKS),
              tuple(f"servotwin.models.engine.{name}" for name in (
-                 "loop_tiles:enter", "loop_rounds:watch", "loop_rounds:decide", "loop_rounds:move",
-                 "loop_rounds:move_on", "loop_rounds:follow")))
+                 "batch.digital_tiles:enter", "batch.digital_rounds:watch", "batch.digital_rounds:decide",
+                 "batch.digital_rounds:move",
+                 "batch.digital_rounds:move_on", "batch.digital_rounds:follow")))
 
 # --- Lanes between calls ----------------------------------------------------------------------------------------------
 
-LOOK = Recipe("look", tuple(f"servotwin.models.engine.sights:{name}" for name in ("side_by_side", "one_by_one")))
+LOOK = Recipe("look", tuple(f"servotwin.models.engine.cosim.observe_batch:{name}" for name in ("side_by_side",
+                                                                                               "one_by_one")))
 """Lanes of all forms: to look leaves out little where terms are absent."""
 TICKS = Recipe("ticks", (
-    *(f"servotwin.models.engine.ticks:{name}" for name in ("accept", "change", "follow")),
-    *(f"servotwin.models.engine.lane_ticks:{name}" for name in (
+    *(f"servotwin.models.engine.cosim.cosim_calls:{name}" for name in ("accept", "change", "follow")),
+    *(f"servotwin.models.engine.cosim.cosim_lanes:{name}" for name in (
         "gather_lost", "to_records", "to_tiles", "forget_motions", "impose_on_tiles", "impose_on_records", "show_tiles",
         "show_records", "read_clocks", "take_status", "note_lost_buses", "break_up"))))
 """Lanes of all forms between two calls: what is imposed on them, and the way from tiles to records and back."""
-ENDING = Recipe("ending", ("servotwin.models.engine.ending:look_at_lanes",), vector=True, knows=~_DIGITAL)
+ENDING = Recipe("ending", ("servotwin.models.engine.cosim.final_checks:look_at_lanes",), vector=True, knows=~_DIGITAL)
 _PARTS = {PLAIN_RUNS: ((PLAIN_RUNS, ()), _CALMLY), BY_TICKS: (_BY_TICKS, _BY_LEGS), BY_LEGS: (_BY_LEGS,),
           BY_SERIES: (_BY_SERIES,), ALL_DIGITAL: ((ALL_DIGITAL, ()), _BY_LEGS)}
 _CHAINS = {BY_TICKS: (BY_TICKS, BY_LEGS, ALL_DIGITAL), BY_LEGS: (BY_LEGS, ALL_DIGITAL),
@@ -159,7 +163,7 @@ def _room_of(recipe: Recipe) -> tuple[Any, ...]:
     """Return what kernels need beside the arguments of `runs.go_on`."""
     if recipe == BY_SERIES:
         return np.zeros(2, record_of(Unit)), np.zeros(2, record_of(Coupling))
-    return (loop_tiles.tile_room(),) if recipe == BY_TICKS else ()
+    return (digital_tiles.tile_room(),) if recipe == BY_TICKS else ()
 
 
 def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:

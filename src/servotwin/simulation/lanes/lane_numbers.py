@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
+from servotwin.models.engine.batch.tiles import Lanes
+from servotwin.models.engine.cosim.cosim_calls import INERTIA, SLACK, VOLTAGE
 from servotwin.models.engine.memory import Memories, put_started
-from servotwin.models.engine.modes import INSIDE, NOWHERE, RIGID, Vector
-from servotwin.models.engine.records import columns_of, fields_of
-from servotwin.models.engine.ticks import INERTIA, SLACK, VOLTAGE
-from servotwin.models.engine.tiles import Lanes
+from servotwin.models.state.modes import INSIDE, NOWHERE, RIGID, Vector
+from servotwin.models.state.records import columns_of, fields_of
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.firmware import Firmware

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import tiles
+from servotwin.models.engine.batch import tiles
 from servotwin.models.engine.memory import Memories
-from servotwin.models.engine.records import TILE
+from servotwin.models.state.records import TILE
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.compile.calls import Call, Now, Some, call_of
 from servotwin.simulation.lanes import form_recipes

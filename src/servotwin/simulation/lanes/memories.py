@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from servotwin.models.engine.memory import Memories, Memory
-from servotwin.models.engine.records import record_of
+from servotwin.models.state.records import record_of
 from servotwin.models.terms.control import Firm
 from servotwin.simulation.compile import kernels
 from servotwin.simulation.lanes.form_recipes import TICKS

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine.records import columns_of, mapped, record_of, tiles_with
-from servotwin.models.engine.tiles import Lanes
+from servotwin.models.engine.batch.tiles import Lanes
+from servotwin.models.state.records import columns_of, mapped, record_of, tiles_with
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.firmware import NO_FIRMWARE, Firmware
 from servotwin.models.terms.numbers import Numbers

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from servotwin.errors import InputError, LoadError
 from servotwin.models.columns import LanePieces, LaneServo, LaneSignal
-from servotwin.models.engine.modes import Vector
-from servotwin.models.engine.records import mapped
-from servotwin.models.engine.tiles import Lanes
+from servotwin.models.engine.batch.tiles import Lanes
 from servotwin.models.outputs import FIELDS as FIELDS_OF
+from servotwin.models.state.modes import Vector
+from servotwin.models.state.records import mapped
 from servotwin.models.terms.chip import NO_CHIP
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.sensor import table_of

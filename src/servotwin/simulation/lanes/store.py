@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from servotwin.models.engine.cosim.cosim_calls import ANGLE, SPEED
 from servotwin.models.engine.memory import Memories
-from servotwin.models.engine.modes import INSIDE, ON_BACKWARD, RIGID
-from servotwin.models.engine.records import TILE
-from servotwin.models.engine.ticks import ANGLE, SPEED
+from servotwin.models.state.modes import INSIDE, ON_BACKWARD, RIGID
+from servotwin.models.state.records import TILE
 from servotwin.models.terms.elastic import Elastic
 from servotwin.models.terms.play import Play
 from servotwin.simulation.compile.calls import Call, call_of

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from servotwin.models.engine import tiles
+from servotwin.models.engine.batch import tiles
+from servotwin.models.engine.batch.tiles import Lanes, Outputs
 from servotwin.models.engine.memory import Memories
-from servotwin.models.engine.records import room
-from servotwin.models.engine.tiles import Lanes, Outputs
+from servotwin.models.state.records import room
 from servotwin.simulation.compile import Recipe, kernels
 from servotwin.simulation.lanes.form_recipes import ALL_RUNS, ENDING, last_of, steps_of
 from servotwin.simulation.lanes.forms import OneByOne, SideBySide, kinds_of

@@ -14,7 +14,7 @@ from servotwin.web.live.told import Taken, Told
 if TYPE_CHECKING:
     from servotwin.loads import Load
     from servotwin.models import Model
-    from servotwin.models.engine.modes import Vector
+    from servotwin.models.state.modes import Vector
 
 Row = tuple[float, ...]
 _DULL = ("drive ", "current ", "zone", "pulse edge")  # how the names of events begin that come many times a second

@@ -1,0 +1,170 @@
+"""What servos on a bus work with while they go on: a record for each, and one for each that moves with others.
+
+For a compiler these are numpy's records, in plain Python objects of the same names (`records.object_of`).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from servotwin.models.engine.memory import Point
+from servotwin.models.engine.motions.dormand_prince import NUMBERS
+from servotwin.models.state.modes import Mode, Vector
+from servotwin.models.state.records import record_reader, record_writer
+from servotwin.models.terms import duty
+from servotwin.models.terms.chip import Chip
+from servotwin.models.terms.frame import Frame
+from servotwin.models.terms.numbers import Numbers
+from servotwin.models.terms.source import Source
+from servotwin.physics.pieces import Piece
+
+ROOM = 42  # coefficients of a series at most
+DENSE = 49  # numbers of the dense output of a step
+
+if TYPE_CHECKING:
+    Coefficients = list[float]
+    Numerals = list[float]
+    Stages = list[float]
+else:
+    Coefficients = tuple[(float,) * ROOM]
+    Numerals = tuple[(float,) * DENSE]
+    Stages = tuple[(float,) * NUMBERS]
+
+
+class Track(NamedTuple):
+    """The motion of a servo that moves on its own, as far as it has to be known to have it again."""
+
+    kind: int
+    length: float
+    end: Vector
+    next_step: float
+
+
+class Shown(NamedTuple):
+    """What shows of a program."""
+
+    duty: float  # of the bridge, or `OPEN`, `BRAKED`
+    goal: float
+    reference: float
+    trip: int
+
+
+class Seat(NamedTuple):
+    """A servo on a bus; times by its own clock [s] unless said."""
+
+    place: int  # where its memory stands among those of all
+    lane: int  # where its numbers do
+    numbers: Numbers
+    chip: Chip
+    point: Point
+    decided: Frame  # what its chip remembers
+    shown: Shown  # of a program, which remembers more elsewhere
+    u: Piece  # what it follows, as in `Memory`
+    u_end: float
+    tau: Piece
+    tau_end: float
+    frames: int  # where its clock counts from, as in `Memory`
+    beat: float
+    origin: float
+    period: float  # of its frames; 0: as listed
+    accuracy: float  # of what is integrated [rad]
+    clock: float  # its time now
+    late: float  # by how much its clock is ahead of that of the bus
+    until: float  # when it has gone far enough
+    end: float  # when the run is over: then, or before
+    switch: float  # when bridge or load change next
+    edge: float  # when its next frame begins
+    limit: float  # when anything is to be done next
+    due: float  # the same by the clock of the bus
+    arrival: float  # when it has its next point, left alone, by the clock of the bus; nan: not found out
+    ahead: Point
+    event: int  # that it has there; −1: none
+    track: Track
+    joined: int  # its place among those that move together; −1: none
+
+
+class Linear(NamedTuple):
+    """The law of a linear mate: L di/dt = s V − K_b w − drop − R i, J dw/dt = K i − b w − torques."""
+
+    sign: float  # or duty
+    K: float
+    K_b: float
+    R: float
+    L: float
+    J: float
+    b: float
+    stiffness: float
+    drop: float
+    conductance: float  # 0 where no current flows
+    conducts: float
+    moves: float
+    against: float
+    slope: float
+    start: float  # its angle
+
+
+class Mate(NamedTuple):
+    """A servo whose motor is connected to the bus; times by the clock of the bus [s]."""
+
+    unit: int
+    numbers: Numbers  # as on a stiff source
+    mode: Mode
+    sign: float  # of the bus voltage in its circuit
+    returns: int  # 1: through diodes, against the bus alone
+    tau: Piece
+    start: Vector  # where the common motion began
+    end: Vector  # where it ends when nothing happens
+    y: Vector  # where it is looked at
+    speed: Coefficients  # of power series
+    current: Coefficients
+    law: Linear  # of the series
+    stages: Stages  # of a step: the rates of all
+    dense: Numerals  # of a step
+
+
+class Shared(NamedTuple):
+    """What servos on one source remember besides what each does; times by the clock of the first of them [s]."""
+
+    phase: int
+    state: int  # what the source does
+    jumped: int  # 1: the common motion has ended with a jump, so that zones have to be found anew
+    whose: int  # event will end it, by number among those that move together; −1: the source's, or none
+    kind: int
+    members: int  # how many move together
+    how: int  # by series, or by a step: BY_SERIES or LONG_STEP
+    terms: int  # of the series
+    voltage: float  # of the bus when it was worked out last
+    step: float  # the next to try
+    begin: float  # of the common motion
+    length: float
+    end: float
+    source: Source
+
+
+numbers_of = record_reader("numbers_of", Numbers)
+put_numbers = record_writer("put_numbers", Numbers)
+chip_of = record_reader("chip_of", Chip)
+put_chip = record_writer("put_chip", Chip)
+point_of = record_reader("point_of", Point)
+put_point = record_writer("put_point", Point)
+decided_of = record_reader("decided_of", Frame)
+put_decided = record_writer("put_decided", Frame)
+piece_of = record_reader("piece_of", Piece)
+put_piece = record_writer("put_piece", Piece)
+vector_of = record_reader("vector_of", Vector)
+put_vector = record_writer("put_vector", Vector)
+mode_of = record_reader("mode_of", Mode)
+put_mode = record_writer("put_mode", Mode)
+put_law = record_writer("put_law", Linear)
+put_track = record_writer("put_track", Track)
+put_shared = record_writer("put_shared", Shared)
+source_of = record_reader("source_of", Source)
+
+
+def drive_of(seat: Any) -> float:
+    """Return how the bridge drives: −1, 0 or +1."""
+    if duty.present(seat.numbers.bridge):
+        return math.copysign(1.0, seat.shown.duty) if duty.drives(seat.shown.duty) else 0.0
+    drive: float = seat.decided.drive
+    return drive

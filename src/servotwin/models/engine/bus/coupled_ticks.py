@@ -1,0 +1,149 @@
+"""Digital servos on one supply, from tick to tick of all of them: programs decide, and legs lead to the next instant.
+
+A tick at which neither a duty nor a mode changes costs its program and, of a servo at rest, a comparison.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from servotwin.models.engine import controller
+from servotwin.models.engine.bus import coupled_legs
+from servotwin.models.engine.bus.bus_inputs import inputs_at
+from servotwin.models.engine.bus.coupled_legs import DONE, LEFT, current_of, is_plain, put_duty, settle
+from servotwin.models.engine.bus.coupled_units import unit_numbers, unit_state
+from servotwin.models.engine.memory import SAME, Inputs
+from servotwin.models.engine.motions.motion import may_depend
+from servotwin.models.terms import control, duty, elastic, firmware, sensor
+from servotwin.models.terms.control import NOTHING_SENSED, Sensed
+from servotwin.models.terms.dependence import BY_SHARE, ON_HEAT, TWO_BODIES
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.physics.pieces import Piece
+
+if TYPE_CHECKING:
+    from servotwin.models.terms.source import Source
+
+_FOLLOWED = TWO_BODIES | BY_SHARE | ON_HEAT
+_GIVEN = Piece()  # what a servo follows that a program drives
+
+
+def possible(numbers: Numbers, inputs: Inputs) -> bool:
+    """Tell whether a servo always moves by such legs."""
+    if not firmware.present(inputs.firmware[0]) or elastic.present(numbers.elastic):
+        return False
+    if sensor.slack(numbers.sensor) or len(inputs.torque) > 0:
+        return False
+    return may_depend(numbers, _GIVEN) & ~_FOLLOWED == 0
+
+
+def put_source(common: Any, source: Source) -> None:
+    """Let servos share a source, of which no current has been found out yet."""
+    common.V, common.R_b, common.I_max, common.now, common.then = (
+        source.V, source.R_b, source.I_max, source.V, source.V)
+    common.bend, common.jumped = 0.0, 0
+
+
+def sit(unit: Any, inputs: Inputs, until: float, last: float) -> None:
+    """Let a servo go on to `until`, by its own clock [s], and no further than `last`."""
+    program = inputs.firmware[0]
+    unit.tick, unit.slack, unit.torque, unit.accuracy = (
+        program.T_c, SAME * program.T_c, inputs.constant_torque, inputs.accuracy)
+    unit.last, unit.duty, unit.anew, unit.short, unit.active = min(until, last), math.nan, 1, 0, 0
+
+
+def go(told: Any, firms: Any, count: int, units: Any, common: Any) -> None:
+    """Let servos go on as far as this way leads; where they are, and when, is in their records."""
+    begin(told, firms, count, units)
+    while is_underway(units, count):
+        if serve(told, firms, count, units, common) == LEFT:
+            return
+        if move(units, count, common, to_next(units, count)) == LEFT:
+            return
+
+
+def begin(told: Any, firms: Any, count: int, units: Any) -> None:
+    """Let servos have the duties of their programs, and know when these do something next."""
+    for k in range(count):
+        unit = units[k]
+        unit.due = controller.next_due(inputs_at(told, unit).firmware[0], firms[unit.place], unit.frames)
+        put_duty(unit, firms[unit.place].duty)
+
+
+def move(units: Any, count: int, common: Any, time: float) -> int:
+    """Let servos move for a time [s] as far as legs lead; return `LEFT` where that is less."""
+    gone = coupled_legs.go(units, count, common, time)
+    for k in range(count):
+        unit = units[k]
+        end = min(unit.due, unit.last)
+        unit.time = end if gone == time and end <= unit.time + time + unit.slack else unit.time + gone
+    return DONE if gone == time else LEFT
+
+
+def is_underway(units: Any, count: int) -> bool:
+    """Tell whether all have to go on."""
+    for k in range(count):
+        if units[k].time >= units[k].last:
+            return False
+    return True
+
+
+def to_next(units: Any, count: int) -> float:
+    """Return how long it takes to the next instant of any servo [s]."""
+    time = math.inf
+    for k in range(count):
+        unit = units[k]
+        own = min(unit.due, unit.last) - unit.time
+        time = min(time, unit.tick if abs(own - unit.tick) <= unit.slack else own)
+    return max(time, 0.0)
+
+
+def serve(told: Any, firms: Any, count: int, units: Any, common: Any) -> int:
+    """Do what programs do now: put duties on bridges, measure, decide; return `LEFT` or not."""
+    due = False
+    for k in range(count):
+        unit = units[k]
+        if unit.due <= unit.time + unit.slack:
+            due = True
+            _apply(inputs_at(told, unit), firms[unit.place], unit)
+    if settle(units, count, common) == LEFT or not is_plain(units, count, common, common.now, False):
+        return LEFT  # before anything is measured
+    if not due:
+        return DONE
+    for k in range(count):
+        unit = units[k]
+        if unit.due <= unit.time + unit.slack:
+            _tick(inputs_at(told, unit), firms[unit.place], unit, common.now)
+    for k in range(count):
+        unit = units[k]
+        if unit.due <= unit.time + unit.slack:
+            inputs = inputs_at(told, unit)
+            _apply(inputs, firms[unit.place], unit)
+            unit.due = controller.next_due(inputs.firmware[0], firms[unit.place], unit.frames)
+    return settle(units, count, common)
+
+
+def _apply(inputs: Inputs, firm: Any, unit: Any) -> None:
+    """Put the duties of a program on its bridge whose time has come."""
+    controller.apply(inputs.firmware[0], firm, unit.frames, unit.time + unit.slack)
+    if firm.duty != unit.duty:
+        put_duty(unit, firm.duty)
+
+
+def _tick(inputs: Inputs, firm: Any, unit: Any, V: float) -> None:
+    """Let a servo's program decide where a tick is due, at a voltage of the bus [V]."""
+    program, y = inputs.firmware[0], unit_state(unit.y)
+    if not controller.is_due(program, firm, unit.frames, unit.time + unit.slack):
+        return
+    sensed = NOTHING_SENSED
+    if control.senses(program):
+        sensed = _sensed(unit, V)
+    controller.work(inputs, unit_numbers(unit.given).sensor, firm, y.q, y.q, sensed, unit.origin + unit.time)
+
+
+def _sensed(unit: Any, V: float) -> Sensed:
+    """Return what a program measures besides its angle."""
+    y = unit_state(unit.y)
+    numbers = warm(unit_numbers(unit.given), y)
+    i = current_of(unit, V, y)
+    return controller.sensed_of(numbers, i / duty.on_share_of(numbers.bridge, unit.duty), V, y)

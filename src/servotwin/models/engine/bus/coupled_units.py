@@ -1,0 +1,100 @@
+"""Working records of digital servos on one supply that go from tick to tick: one a servo, and one for the supply."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from servotwin.models.state.modes import Mode, Vector
+from servotwin.models.state.records import record_reader, record_writer
+from servotwin.models.terms.numbers import Numbers
+
+TERMS = 24  # of a power series at most
+
+if TYPE_CHECKING:
+    Coefficients = list[float]
+else:
+    Coefficients = tuple[(float,) * TERMS]
+
+
+class Law(NamedTuple):
+    """The law of a servo in a mode, at the temperatures at which a leg begins.
+
+    R i = s V − K_b w − drop; of what the motor turns ẇ = pull + per_torque K i − rate w; inside the play the output has
+    ẇ = output_pull − output_rate w.
+    """
+
+    R: float  # of the loop [Ω]
+    winding: float  # of that, of the winding
+    R_slope: float  # by how much both grow per kelvin of the winding; 0: temperatures stay
+    K: float
+    K_b: float
+    K_slope: float  # of K per kelvin of the housing
+    K_b_slope: float
+    drop: float
+    conducts: float  # 1/R; 0: no current flows
+    moves: float  # 1: what the motor turns moves
+    pull: float
+    per_torque: float
+    rate: float
+    apart: float  # 1: the output moves alone
+    output_pull: float
+    output_rate: float
+
+
+class Unit(NamedTuple):
+    """A servo; times by its own clock [s]."""
+
+    place: int  # where its memory stands among those of all
+    lane: int  # where its numbers do
+    given: Numbers
+    numbers: Numbers  # at its duty, as on a stiff source
+    duty: float  # nan: not found out yet
+    sign: float  # which part of the bus voltage is in its circuit, with its sign; 0: none
+    open: int  # 1: diodes lead back to the supply
+    anew: int  # 1: another duty than when its mode was found
+    torque: float  # of its load, the external one [N m]
+    accuracy: float
+    mode: Mode
+    y: Vector
+    time: float
+    due: float  # when its program does something next
+    last: float  # how far it may go
+    slack: float  # within which two instants are one
+    frames: int
+    origin: float
+    tick: float  # how long one lasts
+    law: Law
+    active: int  # 1: it moves, or gets warm
+    short: int  # legs in a row that took no time
+    speed: Coefficients
+    output: Coefficients
+    back: Coefficients  # voltage that the motor's speed and its warming take, but for s V
+    current: Coefficients
+    square: Coefficients  # of the current
+    winding: Coefficients  # temperature [K]
+    housing: Coefficients
+    bend: float  # h² max|ẅ| of what the motor turns
+    after: Vector  # the state at the end of a leg
+
+
+class Coupling(NamedTuple):
+    """What servos have in common along a leg."""
+
+    V: float  # of the supply without current
+    R_b: float
+    I_max: float
+    voltage: Coefficients  # of the bus
+    terms: int  # of all series
+    now: float  # the voltage of the bus where the servos are
+    then: float  # and at the end of the leg
+    bend: float  # h² max|V̈|
+    jumped: int  # 1: a speed has jumped, and with it the currents of all
+
+
+unit_numbers = record_reader("unit_numbers", Numbers)
+put_unit_numbers = record_writer("put_unit_numbers", Numbers)
+unit_mode = record_reader("unit_mode", Mode)
+put_unit_mode = record_writer("put_unit_mode", Mode)
+unit_state = record_reader("unit_state", Vector)
+put_unit_state = record_writer("put_unit_state", Vector)
+put_unit_law = record_writer("put_unit_law", Law)

@@ -1,0 +1,1 @@
+"""What another simulator does between ticks: it imposes states, reads signals, changes numbers."""

@@ -1,0 +1,1 @@
+"""Which forces and currents act in a mode: accelerations, rates and coefficients."""

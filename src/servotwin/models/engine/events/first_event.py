@@ -1,0 +1,162 @@
+"""When a mode ends: the first time at which one of its guards falls below zero.
+
+Within an interval in which the speed is monotone a guard has at most one turning point. So the ends of the
+interval and that point show every crossing, and a bracketed search finds its time to rounding. A motion of first
+order tells the times outright.
+"""
+
+from __future__ import annotations
+
+import math
+
+from servotwin.models.engine.dynamics.coefficients import Apart
+from servotwin.models.engine.events import guards
+from servotwin.models.engine.events.event_times import first_end
+from servotwin.models.engine.motions.motion import (
+    APART,
+    FIRST_ORDER,
+    REST,
+    Motion,
+    monotone_until,
+    prepared,
+    rates,
+    state,
+    state_and_rates,
+)
+from servotwin.models.engine.motions.rodas import not_constant
+from servotwin.models.state.modes import RIGID, Vector
+from servotwin.models.terms import source
+from servotwin.models.terms.friction import fades
+from servotwin.physics.pieces import piece_rate, piece_value
+
+
+def first_event(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int, Vector]:
+    """Return the time since the anchor and the kind of the first event in (s0, s1], inf and −1 where none is.
+
+    The third is the state at s1, where there is no event.
+    """
+    if kinds == 0 or (motion.kind == REST and not not_constant(motion.u) and not not_constant(motion.tau)):
+        return math.inf, -1, state(motion, s1)
+    straight = motion.kind == FIRST_ORDER and source.present(motion.numbers.source) and (
+        motion.mode.mesh == RIGID or not fades(motion.numbers.friction))
+    if straight or motion.kind == APART:
+        return _outright(motion, kinds, s0, s1)
+    left, at_left = s0, state(motion, s0)
+    while left < s1:
+        right = monotone_until(motion, left, s1)
+        if right <= left:
+            right = s1
+        at_right = state(motion, right)
+        first, found = _first_of(motion, kinds, left, at_left, right, at_right)
+        if found >= 0:
+            return first, found, at_right
+        left, at_left = right, at_right
+    return math.inf, -1, at_left
+
+
+def _outright(motion: Motion, kinds: int, s0: float, s1: float) -> tuple[float, int, Vector]:
+    """Return the same of a motion of first order behind a bridge."""
+    c, after = motion.coefficients, state(motion, s1)
+    laws = Apart(c[0], c[1], c[2], c[3]) if motion.kind == APART else Apart(2.0 * c[0], c[2], 2.0 * c[0], c[2])
+    s, kind = first_end(motion.numbers, motion.mode, kinds, motion.u.value, piece_value(motion.tau, motion.t0), laws,
+                        motion.start, after, s0, s1)
+    return s, kind, after
+
+
+def _first_of(motion: Motion, kinds: int, a: float, at_a: Vector, b: float, at_b: Vector) -> tuple[float, int]:
+    """Return when the first of several guards falls below zero in [a, b], and which; (inf, -1) where none does."""
+    first, found = math.inf, -1
+    rates_a, rates_b = rates(motion, a, at_a), rates(motion, b, at_b)
+    t = motion.t0 + b
+    u, du, tau, dtau = piece_value(motion.u, t), piece_rate(motion.u, t), piece_value(motion.tau, t), piece_rate(
+        motion.tau, t)
+    for kind in range(guards.KINDS):
+        if kinds >> kind == 0:
+            break
+        if not kinds >> kind & 1:
+            continue
+        end = guards.guard(motion.numbers, motion.mode, kind, u, du, tau, dtau, at_b, rates_b)
+        if end[0] >= guards.BELOW and not end[1] > 0.0:
+            continue  # it does not fall below zero, nor rises from there
+        begin = _guard(motion, kind, a, at_a, rates_a)
+        if end[0] >= guards.BELOW and not begin[1] < 0.0:
+            continue  # nor dips
+        motion = prepared(motion)
+        s = _crossing(motion, kind, a, begin, b, end)
+        if s < first:
+            first, found = s, kind
+    return first, found
+
+
+def _guard(motion: Motion, kind: int, s: float, y: Vector, dy: Vector) -> tuple[float, float]:
+    """Return a guard and its rate at s, where the state is y and its rates are dy."""
+    t = motion.t0 + s
+    u, tau = motion.u, motion.tau
+    return guards.guard(motion.numbers, motion.mode, kind, piece_value(u, t), piece_rate(u, t), piece_value(tau, t),
+                        piece_rate(tau, t), y, dy)
+
+
+def _at(motion: Motion, kind: int, s: float, rate: bool) -> tuple[float, float]:
+    """Return a guard and its rate at s; with `rate` the rate alone, and nan for its own."""
+    y, dy = state_and_rates(motion, s)
+    value, slope = _guard(motion, kind, s, y, dy)
+    return (slope, math.nan) if rate else (value, slope)
+
+
+def _crossing(motion: Motion, kind: int, a: float, at_a: tuple[float, float], b: float,
+              at_b: tuple[float, float]) -> float:
+    """Return where a guard with at most one turning point in [a, b] falls below zero; inf where it does not.
+
+    The motion is `prepared`; the guard ends below zero, or falls at a and rises at b.
+    """
+    if at_b[0] >= guards.BELOW:
+        # It may dip below zero and come back: look at the lowest point.
+        b = _root(motion, kind, a, b, at_a[1], at_b[1], True)
+        at_b = _at(motion, kind, b, False)
+        if at_b[0] >= guards.BELOW:
+            return math.inf
+    if at_a[0] <= 0.0:
+        # It starts at zero, to rounding, and so may its rate: look whether it rises before it falls.
+        for k in range(1, 50):
+            s = a + (b - a) * 0.5**k
+            value = _at(motion, kind, s, False)[0]
+            if value > 0.0:
+                return _root(motion, kind, s, b, value, at_b[0], False)
+        return a
+    return _root(motion, kind, a, b, at_a[0], at_b[0], False)
+
+
+def _root(motion: Motion, kind: int, a: float, b: float, f_a: float, f_b: float, rate: bool) -> float:
+    """Return a root of a guard, or of its rate, between a and b, where it has opposite signs, to rounding.
+
+    Newton steps where there is a derivative, else the secant through the bracket; a bisection whenever neither the
+    bracket nor the value went down by half.
+    """
+    if f_a == 0.0:
+        return a
+    if f_b == 0.0:
+        return b
+    rising = f_b > 0.0
+    x = 0.5 * (a + b)
+    last = math.inf
+    for _ in range(200):
+        f, slope = _at(motion, kind, x, rate)
+        if f == 0.0:
+            return x
+        width = b - a
+        if (f > 0.0) == rising:
+            b, f_b = x, f
+        else:
+            a, f_a = x, f
+        if b - a <= 2e-16 * max(abs(a), abs(b)) or b - a < 1e-18:
+            break
+        newton = slope == slope and slope != 0.0
+        guess = x - f / slope if newton else (a * f_b - b * f_a) / (f_b - f_a)
+        if abs(guess - x) <= 1e-16 * abs(x):
+            return guess if a <= guess <= b else x
+        better = b - a <= 0.6 * width or (slope == slope and abs(f) < 0.5 * last)
+        last = abs(f)
+        x = guess if a < guess < b and better else 0.5 * (a + b)
+        if not a < x < b:
+            break
+    return 0.5 * (a + b)

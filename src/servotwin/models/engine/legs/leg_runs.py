@@ -1,0 +1,61 @@
+"""Digital servos one after the other, from tick to tick by legs; what is left of a call is for `runs`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from servotwin.models.engine import controller
+from servotwin.models.engine.batch.tiles import numbers_of
+from servotwin.models.engine.legs import tick_legs
+from servotwin.models.engine.legs.tick_legs import LEGS
+from servotwin.models.engine.memory import (
+    counted_anew,
+    due,
+    instant,
+    memory_at,
+    origin_of,
+    put_memory,
+    resumed,
+)
+from servotwin.models.engine.runs import ARRIVED, UNDERWAY, inputs_of
+
+if TYPE_CHECKING:
+    from servotwin.models.engine.batch.tiles import Floats, Indices, Lanes
+    from servotwin.models.engine.memory import Memories
+
+
+def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, torque_count: Indices,
+          which: Indices, durations: Floats, times: Floats, first_output: Indices, outputs: Floats, memories: Memories,
+          status: Indices) -> None:
+    """Let the lanes named in `which` go on as far as legs lead; `runs.go_on` finishes those that do not arrive.
+
+    The arguments are those of `runs.go_on`. Durations [s] and outputs that are left to do, and the status of lanes that
+    have gone on, are noted for it.
+    """
+    for k in range(which.size):
+        if status[k] == ARRIVED:
+            continue
+        lane = which[k]
+        numbers = numbers_of(lanes, lane)
+        inputs = inputs_of(lanes, curve, torques[torque_first[lane]:torque_first[lane] + torque_count[lane]], lane)
+        if tick_legs.way_of(numbers, inputs, durations[k]) != LEGS:
+            continue
+        memory = memory_at(memories, k)
+        if status[k] != UNDERWAY:
+            memory = resumed(False, inputs, memory, False)
+            controller.resume(inputs, memory)
+        until, done, goes = instant(False, inputs, memory, memory.point.time + durations[k]), first_output[k], True
+        while goes:
+            if due(memory):
+                origin = origin_of(memory)
+                memory = counted_anew(memory)
+                until = instant(False, inputs, memory, until - (origin_of(memory) - origin))
+            gone = tick_legs.go(numbers, inputs, memory, until, times, done, outputs[k])
+            memory, done = tick_legs.as_gone(memory, gone), gone.done
+            goes = gone.anew and gone.time < until and due(memory)
+        arrives = memory.point.time >= until
+        if arrives:
+            controller.pause(inputs, memory)
+        put_memory(memories.rows[k], memory)
+        durations[k], first_output[k] = max(until - memory.point.time, 0.0), done
+        status[k] = ARRIVED if arrives else UNDERWAY
