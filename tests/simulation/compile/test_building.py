@@ -328,7 +328,7 @@ def test_an_edited_docstring_compiles_nothing_and_edited_code_does(tmp_path):
     with_own = {"PYTHONPATH": str(package.parent), "SERVOTWIN_CC": compiler}
     assert run(tmp_path / "cache", **with_own)[0] == "compiled"
     assert runs(notes) == 1
-    noise = package / "models" / "engine" / "noise.py"
+    noise = package / "models" / "state" / "noise.py"
     noise.write_text(noise.read_text() + '\n\ndef _of_no_use() -> None:\n    """Do nothing."""\n# a comment\n')
     law = package / "physics" / "motor.py"
     law.write_text(law.read_text().replace('"""', '"""Edited. ', 1))
