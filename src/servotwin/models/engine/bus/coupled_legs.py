@@ -8,10 +8,11 @@ way are followed, as the general engine has them.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from servotwin.models.engine.bus import coupled_series
-from servotwin.models.engine.bus.coupled_series import place_at, put_after, put_law_of, state_at, voltage_at
+from servotwin.models.engine.bus.coupled_events import first_end
+from servotwin.models.engine.bus.coupled_series import put_after, put_law_of, state_at, voltage_at
 from servotwin.models.engine.bus.coupled_units import (
     put_unit_mode,
     put_unit_numbers,
@@ -44,12 +45,9 @@ from servotwin.physics.motor import back_emf
 MOST_LEGS = 400  # to one instant; servos that need more are left to the general engine
 _LEAST = 0.05  # of the open-circuit voltage: below, buses are left to the general engine
 _SAME = 1e-14  # of that
-_HALVINGS = 200
-_INSTANT, _ROUNDING = 1e-16, 1e-16  # s and units of a guard, within which a root is found
 _CLOSE = 1e-13  # A
 
 _ZONES = 1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN
-_BY_PLACE = 1 << guards.SPEED | 1 << guards.MOTOR_SPEED | guards.MEETINGS | guards.STOPS  # without torques
 _AT_REST = ~(_ZONES | 1 << guards.SPEED | guards.MEETINGS | guards.STOPS)  # what ends rest of what the motor turns
 
 DONE, LEFT = 1, 0
@@ -321,102 +319,3 @@ def _parted(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, y: Vec
 def _above(first: float, end: float, least: float) -> bool:
     """Tell whether what bends so little stays above zero: at both ends it is, and it is monotone or far from zero."""
     return first >= 0.0 and end > 0.0 and (min(first, end) > least or abs(end - first) > 4.0 * least)
-
-
-# --- what ends a mode -------------------------------------------------------------------------------------------------
-
-
-def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) -> tuple[int, float]:
-    """Return which doubtful guard of a servo falls below zero first along a leg (−1: none), and when [s].
-
-    Where it is the `last` instant it counts as well. A guard turns once at most, about where a parabola does.
-    """
-    kinds = doubtful & guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
-    if kinds == 0:
-        return -1, length
-    at_start, at_end = _place(unit, common, kinds, 0.0), _place(unit, common, kinds, length)
-    middle = at_start
-    found, first = -1, length
-    for kind in range(guards.KINDS):
-        if not kinds >> kind & 1:
-            continue
-        s, f, f_end = math.inf, _guard(unit, kind, at_start), _guard(unit, kind, at_end)
-        if f < guards.BELOW:  # what another one did has ended this mode too
-            s = 0.0
-        elif f_end < guards.BELOW:
-            s = _crossing(unit, common, kind, 0.0, f, length, f_end)
-        else:
-            middle = middle if middle.s > 0.0 else _place(unit, common, kinds, 0.5 * length)
-            f_middle = _guard(unit, kind, middle)
-            bend = f - 2.0 * f_middle + f_end
-            turn = 0.25 * (3.0 * f - 4.0 * f_middle + f_end) / bend * length if bend > 0.0 else -1.0
-            lowest = middle
-            if f_middle >= guards.BELOW and 0.0 < turn < length:
-                lowest = _place(unit, common, kinds, turn)
-                f_middle = _guard(unit, kind, lowest)
-            if f_middle < guards.BELOW:
-                s = _crossing(unit, common, kind, 0.0, f, lowest.s, f_middle)
-        if s < first or (s == first and found < 0 and last):
-            found, first = kind, s
-    return found, first
-
-
-class Place(NamedTuple):
-    """Where a servo is along a leg: how long after its beginning [s], the voltage in its circuit [V], its state."""
-
-    s: float
-    u: float
-    y: Vector
-
-
-def _place(unit: Any, common: Any, kinds: int, s: float) -> Place:
-    """Return where a servo is at s [s] after the beginning of a leg, as far as guards of these kinds look at it."""
-    if kinds & ~_BY_PLACE == 0:
-        return Place(s, 1.0, place_at(unit, common.terms, s))
-    return Place(s, unit.sign * voltage_at(common, s), state_at(unit, common.terms, s))
-
-
-def _guard(unit: Any, kind: int, place: Place) -> float:
-    """Return a guard of a servo somewhere along a leg."""
-    return guards.guard(unit_numbers(unit.numbers), unit_mode(unit.mode), kind, place.u, 0.0, unit.torque, 0.0,
-                        place.y, place.y)[0]
-
-
-def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float, f_b: float) -> float:
-    """Return when a guard falls below zero, between two times [s] at which it is at least zero, to rounding, and below.
-
-    By inverse parabolas where they are sure to lead on, else by halves (Chandrupatla 1997).
-    """
-    if f_a <= -guards.BELOW:  # it starts at zero, to rounding: look whether it rises before it falls
-        start = a
-        for _ in range(50):
-            a = start + 0.5 * (b - start)
-            f_a = _guard(unit, kind, _place(unit, common, 1 << kind, a))
-            if f_a > -guards.BELOW:
-                break
-            b, f_b = a, f_a
-        if f_a <= -guards.BELOW or f_b > 0.0:
-            return start
-    new, f_new, old, f_old, part = b, f_b, a, f_a, f_a / (f_a - f_b)
-    part = 1.0 - part
-    for _ in range(_HALVINGS):
-        s = new + part * (old - new)
-        f = _guard(unit, kind, _place(unit, common, 1 << kind, s))
-        if (f > 0.0) == (f_new > 0.0):
-            third, f_third = new, f_new
-        else:
-            third, f_third = old, f_old
-            old, f_old = new, f_new
-        new, f_new = s, f
-        least = _INSTANT / abs(old - new)
-        if abs(f) <= _ROUNDING:
-            return s
-        if least > 0.5:
-            break
-        xi, phi = (new - old) / (third - old), (f_new - f_old) / (f_third - f_old)
-        part = 0.5
-        if phi * phi < xi and (1.0 - phi) * (1.0 - phi) < 1.0 - xi:
-            part = (f_new / (f_old - f_new) * f_third / (f_old - f_third)
-                    + (third - new) / (old - new) * f_new / (f_third - f_new) * f_old / (f_third - f_old))
-        part = min(max(part, least), 1.0 - least)
-    return new if f_new <= 0.0 else old
