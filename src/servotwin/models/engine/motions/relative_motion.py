@@ -12,7 +12,7 @@ from servotwin.models.engine.motions import first_order
 from servotwin.models.state.modes import Vector
 
 _BEYOND = 1e-13  # rad: so little is rounding
-_STEPS = 200
+_STEPS, _FEW = 200, 8  # after a few it is rounding that decides
 _ROUNDING = 2.5e-16  # of an angle
 _CLOSE = 1e-7  # of a time: from so near a step along a parabola ends at rounding
 
@@ -113,11 +113,11 @@ def _reaches(one: Course, other: Course, way: float, toward: float, a: float, at
         return a
     least = _ROUNDING * (abs(one.q) + abs(other.q))  # of a lead: less does not say on which side it is
     x = a + _step(toward * (way - at_a.way), toward * at_a.speed, toward * at_a.bend)
-    for _ in range(_STEPS):
+    for tried in range(_STEPS):
         x = x if a < x < b else 0.5 * (a + b)
         at = lead_at(one, other, x)
         left = toward * (way - at.way)
-        if abs(left) <= least:
+        if tried >= _FEW and abs(left) <= least:
             return x
         if left > 0.0:
             a = x
