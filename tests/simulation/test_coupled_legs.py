@@ -91,6 +91,27 @@ def test_the_order_of_servos_changes_rounding_alone(seed):
     np.testing.assert_allclose(bus.lanes(order=np.arange(SERVOS)[::-1]), bus.lanes(), rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize("periods", [(1e-3, 1e-3), (1e-3, 1.3e-3)], ids=["one clock", "two clocks"])
+@pytest.mark.parametrize("limit", [0.3, 1.2])
+def test_a_supply_at_its_limit_goes_on_under_the_duties_that_programs_have_put(limit, periods):
+    """One servo drives, the other is unplugged: its motion began before the call, and under another duty."""
+    model = st.DigitalServo(st.load_servo("feetech-sts3215-12v"))
+    supply = st.Supply(open_circuit_voltage=12.0, internal_resistance=0.3, current_limit=limit)
+    goals, found = np.random.default_rng(0).uniform(-1.0, 1.0, STEPS), {}
+    for cuts in (1, 7, 20):
+        sims = st.VectorSimulator(model, 2, load=st.loads.Inertia(4e-3) + st.loads.Constant(0.1), bus=supply, threads=1,
+                                  parameters={"firmware.control_period": np.array(periods)})
+        sims.reset(command_angle=0.0)
+        sims.set(torque_enable=[True, False])
+        found[cuts] = np.empty((STEPS, 2))
+        for k in range(STEPS):
+            for _ in range(cuts):
+                sims.advance(EVERY / cuts, command_angle=goals[k])
+            found[cuts][k] = sims["output_angle"]
+    for cuts in (7, 20):
+        np.testing.assert_allclose(found[cuts], found[1], rtol=0.0, atol=1e-12)
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_warm_lane_is_the_servo_alone(seed):
     model, load, _ = drawn(seed, without=ELSEWHERE)

@@ -12,7 +12,7 @@ from servotwin.models.engine.bus import bus_unit, coupled_ticks, event_queue
 from servotwin.models.engine.bus.bus_inputs import Tables, Told, inputs_at
 from servotwin.models.engine.bus.bus_records import drive_of, numbers_of, put_point, source_of
 from servotwin.models.engine.bus.coupled_motion import APART
-from servotwin.models.engine.bus.coupled_units import put_unit_numbers, put_unit_state, unit_state
+from servotwin.models.engine.bus.coupled_units import put_unit_numbers, unit_state
 from servotwin.models.engine.bus.event_log import Tape, runs
 from servotwin.models.engine.cosim.observe_batch import put
 from servotwin.models.engine.memory import (
@@ -129,20 +129,17 @@ def _sit(inputs: Any, memory: Memory, seat: Any, unit: Any) -> None:
         memory = counted_anew(memory)
         seat.until = instant(True, inputs, memory, seat.until)
         bus_unit.remember(seat, memory)
-    unit.frames, unit.origin, unit.time = memory.frames, origin_of(memory), memory.point.time
-    put_unit_state(unit.y, memory.point.y)
-    unit.mode.zone, unit.mode.contact, unit.mode.motor, unit.mode.share = 0, 0, 0, 0
-    unit.mode.mesh = memory.point.mode.mesh
-    coupled_ticks.sit(unit, inputs, seat.until, FRAMES * memory.beat)
+    coupled_ticks.sit(unit, inputs, memory, seat.until)
 
 
 def _got_up(seat: Any, unit: Any) -> bool:
-    """Put a servo's record where it has gone from tick to tick; return whether it only has to count anew to go on."""
+    """Put a servo's record where it has gone from tick to tick; return whether it only has to count anew to go on.
+
+    Its motion begins anew, also where no time has gone by: its program may have worked.
+    """
     y, went = unit_state(unit.y), unit.time > seat.point.time
-    if went or unit.short > 0:
-        point = Point(unit.time, y, Mode(0, 0, unit.mode.mesh, 0, 0), math.inf, y, seat.point.step, y.q)
-        put_point(seat.point, point)
-        seat.joined = -1
+    put_point(seat.point, Point(unit.time, y, Mode(0, 0, unit.mode.mesh, 0, 0), math.inf, y, seat.point.step, y.q))
+    seat.joined = -1
     return bool(went and FRAMES * seat.beat <= unit.time < seat.until)
 
 

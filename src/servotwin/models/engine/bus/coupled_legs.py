@@ -12,7 +12,7 @@ from typing import Any
 
 from servotwin.models.engine.bus import coupled_series
 from servotwin.models.engine.bus.coupled_events import first_end
-from servotwin.models.engine.bus.coupled_series import put_after, put_law_of, state_at, voltage_at
+from servotwin.models.engine.bus.coupled_series import put_law_of, state_at, voltage_at
 from servotwin.models.engine.bus.coupled_units import (
     put_unit_mode,
     put_unit_numbers,
@@ -133,11 +133,16 @@ def current_of(unit: Any, V: float, y: Vector) -> float:
 
 
 def is_plain(units: Any, count: int, common: Any, V: float, at_end: bool) -> bool:
-    """Tell whether the source follows its resistance, and diodes block, where servos are or at the end of a leg."""
+    """Tell whether the source follows its resistance, and diodes block, where servos are or at the end of a leg.
+
+    States that are no longer finite are left to the general engine as well, which says so.
+    """
     total = 0.0
     for k in range(count):
         unit = units[k]
         y = unit_state(unit.after) if at_end and unit.active != 0 else unit_state(unit.y)
+        if not math.isfinite(y.q + y.w + y.T_w + y.q_m + y.w_m):
+            return False
         if unit.open != 0 and abs(back_emf(y.w_m, unit.numbers.motor.K_b)) >= V:
             return False
         if common.I_max < math.inf and unit.sign != 0.0:
@@ -149,7 +154,7 @@ def is_plain(units: Any, count: int, common: Any, V: float, at_end: bool) -> boo
 
 def go(units: Any, count: int, common: Any, time: float) -> float:
     """Let all servos go on for a time [s], leg by leg; return how long they have: less where they are left."""
-    left, longest = time, 0.0
+    left = time
     for _ in range(MOST_LEGS):
         if settle(units, count, common) == LEFT or not is_plain(units, count, common, common.now, False):
             return time - left
@@ -160,8 +165,7 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
             moving = moving or units[k].active != 0
         if not moving or not left > 0.0:
             return time
-        longest = coupled_series.longest(units, count)
-        length = min(left, longest)
+        length = min(left, coupled_series.longest(units, count))
         coupled_series.work_out(units, count, common, length)
         whose, kind, end = -1, -1, length
         for k in range(count):
@@ -184,7 +188,7 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
             continue
         for k in range(count):
             if units[k].active != 0:
-                put_after(units[k], state_at(units[k], common.terms, end))
+                put_unit_state(units[k].after, state_at(units[k], common.terms, end))
         common.then = voltage_at(common, end)
         if not is_plain(units, count, common, common.then, True):
             return time - left

@@ -12,19 +12,16 @@ from servotwin.models.engine.batch.tiles import numbers_of
 from servotwin.models.engine.bus import coupled_legs, coupled_ticks
 from servotwin.models.engine.bus.bus_inputs import Tables, Told
 from servotwin.models.engine.bus.coupled_legs import LEFT
-from servotwin.models.engine.bus.coupled_units import put_unit_numbers, put_unit_state, unit_mode, unit_state
+from servotwin.models.engine.bus.coupled_units import put_unit_numbers, unit_mode, unit_state
+from servotwin.models.engine.legs.leg_runs import counted, laid_down
 from servotwin.models.engine.legs.tick_legs import Gone, as_gone, show_one
 from servotwin.models.engine.memory import (
-    FRAMES,
     SAME,
     Inputs,
     Memory,
-    counted_anew,
     due,
     instant,
     memory_at,
-    origin_of,
-    put_memory,
     resumed,
 )
 from servotwin.models.engine.runs import ARRIVED, UNDERWAY
@@ -60,32 +57,20 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
         put_unit_numbers(units[0].given, numbers)
         coupled_ticks.put_source(common[0], numbers.source)
         while goes:
-            if due(memory):
-                origin = origin_of(memory)
-                memory = counted_anew(memory)
-                until = instant(False, inputs, memory, until - (origin_of(memory) - origin))
+            memory, until = counted(inputs, memory, until)
             gone = _go(told, inputs, memory, memories.firms, until, times, done, outputs[k], units, common)
             memory, done = as_gone(memory, gone), gone.done
             goes = gone.anew and gone.time < until and due(memory)
-        arrives = memory.point.time >= until
-        if arrives:
-            controller.pause(inputs, memory)
-        put_memory(memories.rows[k], memory)
         durations[k], first_output[k] = max(until - memory.point.time, 0.0), done
-        status[k] = ARRIVED if arrives else UNDERWAY
+        status[k] = ARRIVED if laid_down(inputs, memory, until, memories, k) else UNDERWAY
 
 
 def _go(told: Told, inputs: Inputs, memory: Memory, firms: Any, until: float, times: Floats, done: int,
         outputs: Floats, units: Any, common: Any) -> Gone:
     """Go on from tick to tick as far as this way leads, and at most to `until` [s]."""
-    unit, start = units[0], memory.point.time
-    unit.frames, unit.origin, unit.time = memory.frames, origin_of(memory), start
-    put_unit_state(unit.y, memory.point.y)
-    unit.mode.zone, unit.mode.contact, unit.mode.motor, unit.mode.share = 0, 0, 0, 0
-    unit.mode.mesh = memory.point.mode.mesh
-    coupled_ticks.sit(unit, inputs, until, FRAMES * memory.beat)
+    unit, serves = units[0], False
+    coupled_ticks.sit(unit, inputs, memory, until)
     coupled_ticks.begin(told, firms, 1, units)
-    serves = False
     while coupled_ticks.is_underway(units, 1):
         serves = True
         if coupled_ticks.serve(told, firms, 1, units, common[0]) == LEFT:

@@ -13,7 +13,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.bus.coupled_units import TERMS, Law, put_unit_law, unit_mode, unit_numbers, unit_state
+from servotwin.models.engine.bus.coupled_units import (
+    TERMS,
+    Law,
+    put_unit_law,
+    put_unit_state,
+    unit_mode,
+    unit_numbers,
+    unit_state,
+)
 from servotwin.models.engine.dynamics import currents
 from servotwin.models.engine.legs import legs
 from servotwin.models.state.modes import FORWARD, INSIDE, NO_CURRENT, Mode, Vector, at_rest, sign_of
@@ -117,15 +125,8 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
     for k in range(count):
         unit = units[k]
         if unit.active != 0:
-            put_after(unit, state_at(unit, n, length))
+            put_unit_state(unit.after, state_at(unit, n, length))
     common.then = voltage_at(common, length)
-
-
-def put_after(unit: Any, y: Vector) -> None:
-    """Put a state where a servo is at the end of a leg."""
-    after = unit.after
-    after.q, after.w, after.i, after.T_w, after.T_h, after.q_m, after.w_m = (
-        y.q, y.w, y.i, y.T_w, y.T_h, y.q_m, y.w_m)
 
 
 def _back(unit: Any, n: int) -> float:

@@ -12,8 +12,8 @@ from servotwin.models.engine import controller
 from servotwin.models.engine.bus import coupled_legs
 from servotwin.models.engine.bus.bus_inputs import inputs_at
 from servotwin.models.engine.bus.coupled_legs import DONE, LEFT, current_of, is_plain, put_duty, settle
-from servotwin.models.engine.bus.coupled_units import unit_numbers, unit_state
-from servotwin.models.engine.memory import SAME, Inputs
+from servotwin.models.engine.bus.coupled_units import put_unit_state, unit_numbers, unit_state
+from servotwin.models.engine.memory import FRAMES, SAME, Inputs, Memory, origin_of
 from servotwin.models.engine.motions.motion import may_depend
 from servotwin.models.terms import control, duty, elastic, firmware, sensor
 from servotwin.models.terms.control import NOTHING_SENSED, Sensed
@@ -44,12 +44,15 @@ def put_source(common: Any, source: Source) -> None:
     common.bend, common.jumped = 0.0, 0
 
 
-def sit(unit: Any, inputs: Inputs, until: float, last: float) -> None:
-    """Let a servo go on to `until`, by its own clock [s], and no further than `last`."""
-    program = inputs.firmware[0]
-    unit.tick, unit.slack, unit.torque, unit.accuracy = (
-        program.T_c, SAME * program.T_c, inputs.constant_torque, inputs.accuracy)
-    unit.last, unit.duty, unit.anew, unit.short, unit.active = min(until, last), math.nan, 1, 0, 0
+def sit(unit: Any, inputs: Inputs, memory: Memory, until: float) -> None:
+    """Put a servo where its memory says, to go on to `until` by its own clock [s], or to where times count anew."""
+    program, mode = inputs.firmware[0], unit.mode
+    unit.frames, unit.origin, unit.time = memory.frames, origin_of(memory), memory.point.time
+    unit.last = min(until, FRAMES * memory.beat)
+    unit.tick, unit.slack, unit.torque = program.T_c, SAME * program.T_c, inputs.constant_torque
+    put_unit_state(unit.y, memory.point.y)
+    mode.zone, mode.contact, mode.mesh, mode.motor, mode.share = 0, 0, memory.point.mode.mesh, 0, 0
+    unit.short, unit.active = 0, 0
 
 
 def go(told: Any, firms: Any, count: int, units: Any, common: Any) -> None:

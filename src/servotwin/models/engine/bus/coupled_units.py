@@ -53,7 +53,6 @@ class Unit(NamedTuple):
     open: int  # 1: diodes lead back to the supply
     anew: int  # 1: another duty than when its mode was found
     torque: float  # of its load, the external one [N m]
-    accuracy: float
     mode: Mode
     y: Vector
     time: float

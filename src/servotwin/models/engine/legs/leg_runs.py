@@ -9,6 +9,8 @@ from servotwin.models.engine.batch.tiles import numbers_of
 from servotwin.models.engine.legs import tick_legs
 from servotwin.models.engine.legs.tick_legs import LEGS
 from servotwin.models.engine.memory import (
+    Inputs,
+    Memory,
     counted_anew,
     due,
     instant,
@@ -46,16 +48,26 @@ def go_on(lanes: Lanes, curve: Floats, torques: Floats, torque_first: Indices, t
             controller.resume(inputs, memory)
         until, done, goes = instant(False, inputs, memory, memory.point.time + durations[k]), first_output[k], True
         while goes:
-            if due(memory):
-                origin = origin_of(memory)
-                memory = counted_anew(memory)
-                until = instant(False, inputs, memory, until - (origin_of(memory) - origin))
+            memory, until = counted(inputs, memory, until)
             gone = tick_legs.go(numbers, inputs, memory, until, times, done, outputs[k])
             memory, done = tick_legs.as_gone(memory, gone), gone.done
             goes = gone.anew and gone.time < until and due(memory)
-        arrives = memory.point.time >= until
-        if arrives:
-            controller.pause(inputs, memory)
-        put_memory(memories.rows[k], memory)
         durations[k], first_output[k] = max(until - memory.point.time, 0.0), done
-        status[k] = ARRIVED if arrives else UNDERWAY
+        status[k] = ARRIVED if laid_down(inputs, memory, until, memories, k) else UNDERWAY
+
+
+def counted(inputs: Inputs, memory: Memory, until: float) -> tuple[Memory, float]:
+    """Return a memory and a time to which it shall go [s], which count from later on where that is due."""
+    if not due(memory):
+        return memory, until
+    later = counted_anew(memory)
+    return later, instant(False, inputs, later, until - (origin_of(later) - origin_of(memory)))
+
+
+def laid_down(inputs: Inputs, memory: Memory, until: float, memories: Memories, k: int) -> bool:
+    """Keep what a servo remembers that has gone on by legs; return whether it has come to a time [s]."""
+    arrives = memory.point.time >= until
+    if arrives:
+        controller.pause(inputs, memory)
+    put_memory(memories.rows[k], memory)
+    return bool(arrives)
