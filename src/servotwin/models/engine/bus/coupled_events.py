@@ -5,49 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from servotwin.models.engine.bus.coupled_series import place_at, state_at, voltage_at
+from servotwin.models.engine.bus.coupled_courses import BY_PLACE, first_below
+from servotwin.models.engine.bus.coupled_series import state_at, voltage_at
 from servotwin.models.engine.bus.coupled_units import unit_mode, unit_numbers
 from servotwin.models.engine.events import guards
 from servotwin.models.state.modes import Vector
 
-_BY_PLACE = 1 << guards.SPEED | 1 << guards.MOTOR_SPEED | guards.MEETINGS | guards.STOPS  # without torques
 _HALVINGS = 200
 _INSTANT, _ROUNDING = 1e-16, 1e-16  # s and units of a guard, within which a root is found
-
-
-def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) -> tuple[int, float]:
-    """Return which doubtful guard of a servo falls below zero first along a leg (−1: none), and when [s].
-
-    Where it is the `last` instant it counts as well. A guard turns once at most, about where a parabola does.
-    """
-    kinds = doubtful & guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
-    if kinds == 0:
-        return -1, length
-    at_start, at_end = _place(unit, common, kinds, 0.0), _place(unit, common, kinds, length)
-    middle = at_start
-    found, first = -1, length
-    for kind in range(guards.KINDS):
-        if not kinds >> kind & 1:
-            continue
-        s, f, f_end = math.inf, _guard(unit, kind, at_start), _guard(unit, kind, at_end)
-        if f < guards.BELOW:  # what another one did has ended this mode too
-            s = 0.0
-        elif f_end < guards.BELOW:
-            s = _crossing(unit, common, kind, 0.0, f, length, f_end)
-        else:
-            middle = middle if middle.s > 0.0 else _place(unit, common, kinds, 0.5 * length)
-            f_middle = _guard(unit, kind, middle)
-            bend = f - 2.0 * f_middle + f_end
-            turn = 0.25 * (3.0 * f - 4.0 * f_middle + f_end) / bend * length if bend > 0.0 else -1.0
-            lowest = middle
-            if f_middle >= guards.BELOW and 0.0 < turn < length:
-                lowest = _place(unit, common, kinds, turn)
-                f_middle = _guard(unit, kind, lowest)
-            if f_middle < guards.BELOW:
-                s = _crossing(unit, common, kind, 0.0, f, lowest.s, f_middle)
-        if s < first or (s == first and found < 0 and last):
-            found, first = kind, s
-    return found, first
 
 
 class Place(NamedTuple):
@@ -58,10 +23,50 @@ class Place(NamedTuple):
     y: Vector
 
 
-def _place(unit: Any, common: Any, kinds: int, s: float) -> Place:
-    """Return where a servo is at s [s] after the beginning of a leg, as far as guards of these kinds look at it."""
-    if kinds & ~_BY_PLACE == 0:
-        return Place(s, 1.0, place_at(unit, common.terms, s))
+def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) -> tuple[int, float]:
+    """Return which doubtful guard of a servo falls below zero first along a leg (−1: none), and when [s].
+
+    Where it is the `last` instant it counts as well. A guard turns once at most, about where a parabola does.
+    """
+    kinds = doubtful & guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
+    found, first = -1, length
+    for kind in range(guards.KINDS):
+        if (kinds & BY_PLACE) >> kind & 1:
+            s = first_below(unit, kind, common.terms, length)
+            if s < first or (s == first and found < 0 and last):
+                found, first = kind, s
+    kinds &= ~BY_PLACE
+    if kinds == 0:
+        return found, first
+    end = first
+    at_start, at_end = _place(unit, common, 0.0), _place(unit, common, end)
+    for kind in range(guards.KINDS):
+        if kinds >> kind & 1:
+            s = _below(unit, common, kind, at_start, at_end)
+            if s < first or (s == first and found < 0 and last):
+                found, first = kind, s
+    return found, first
+
+
+def _below(unit: Any, common: Any, kind: int, at_start: Place, at_end: Place) -> float:
+    """Return when a guard that looks at torques falls below zero between two places [s]; inf: it does not."""
+    f, f_end, length = _guard(unit, kind, at_start), _guard(unit, kind, at_end), at_end.s
+    if f < guards.BELOW:  # what another one did has ended this mode too
+        return 0.0
+    if f_end < guards.BELOW:
+        return _crossing(unit, common, kind, 0.0, f, length, f_end)
+    lowest = _place(unit, common, 0.5 * length)
+    least = _guard(unit, kind, lowest)
+    bend = f - 2.0 * least + f_end
+    turn = 0.25 * (3.0 * f - 4.0 * least + f_end) / bend * length if bend > 0.0 else -1.0
+    if least >= guards.BELOW and 0.0 < turn < length:
+        lowest = _place(unit, common, turn)
+        least = _guard(unit, kind, lowest)
+    return _crossing(unit, common, kind, 0.0, f, lowest.s, least) if least < guards.BELOW else math.inf
+
+
+def _place(unit: Any, common: Any, s: float) -> Place:
+    """Return where a servo is at s [s] after the beginning of a leg."""
     return Place(s, unit.sign * voltage_at(common, s), state_at(unit, common.terms, s))
 
 
@@ -80,7 +85,7 @@ def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float,
         start = a
         for _ in range(50):
             a = start + 0.5 * (b - start)
-            f_a = _guard(unit, kind, _place(unit, common, 1 << kind, a))
+            f_a = _guard(unit, kind, _place(unit, common, a))
             if f_a > -guards.BELOW:
                 break
             b, f_b = a, f_a
@@ -90,7 +95,7 @@ def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float,
     part = 1.0 - part
     for _ in range(_HALVINGS):
         s = new + part * (old - new)
-        f = _guard(unit, kind, _place(unit, common, 1 << kind, s))
+        f = _guard(unit, kind, _place(unit, common, s))
         if (f > 0.0) == (f_new > 0.0):
             third, f_third = new, f_new
         else:

@@ -12,8 +12,10 @@ TERMS = 24  # of a power series at most
 
 if TYPE_CHECKING:
     Coefficients = list[float]
+    Course = list[float]
 else:
     Coefficients = tuple[(float,) * TERMS]
+    Course = tuple[(float,) * (TERMS + 2)]
 
 
 class Law(NamedTuple):
@@ -73,6 +75,7 @@ class Unit(NamedTuple):
     winding: Coefficients  # temperature [K]
     housing: Coefficients
     bend: float  # h² max|ẅ| of what the motor turns
+    course: Course  # of a guard, in parts of a leg
     after: Vector  # the state at the end of a leg
 
 
