@@ -1,7 +1,7 @@
 """Guards that look at places and speeds alone, along a coupled leg: power series like these, and their roots.
 
-A guard is written in parts of the leg, Σ c_n xⁿ with x from 0 to 1, so that its value, its slope and a bound of how much
-it bends are sums of coefficients.
+A guard is written in parts of the leg, Σ c_n xⁿ with x from 0 to 1, so that its value, its slope and a bound of how
+much it bends are sums of coefficients.
 """
 
 from __future__ import annotations

@@ -28,8 +28,7 @@ def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) 
 
     Where it is the `last` instant it counts as well. A guard turns once at most, about where a parabola does.
     """
-    kinds = doubtful & guards.guards(unit_numbers(unit.numbers), unit_mode(unit.mode), unit.sign * common.now, False)
-    found, first = -1, length
+    found, first, kinds = -1, length, doubtful
     for kind in range(guards.KINDS):
         if (kinds & BY_PLACE) >> kind & 1:
             s = first_below(unit, kind, common.terms, length)

@@ -12,7 +12,8 @@ from typing import Any
 
 from servotwin.models.engine.bus import coupled_series
 from servotwin.models.engine.bus.coupled_events import first_end
-from servotwin.models.engine.bus.coupled_series import put_law_of, state_at, voltage_at
+from servotwin.models.engine.bus.coupled_laws import follow, put_law_of
+from servotwin.models.engine.bus.coupled_series import state_at, voltage_at
 from servotwin.models.engine.bus.coupled_units import (
     put_unit_mode,
     put_unit_numbers,
@@ -48,6 +49,7 @@ _SAME = 1e-14  # of that
 _CLOSE = 1e-13  # A
 
 _ZONES = 1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN
+_BY_TORQUE = ~(_ZONES | 1 << guards.SPEED | 1 << guards.MOTOR_SPEED | guards.MEETINGS | guards.STOPS)
 _AT_REST = ~(_ZONES | 1 << guards.SPEED | guards.MEETINGS | guards.STOPS)  # what ends rest of what the motor turns
 
 DONE, LEFT = 1, 0
@@ -110,20 +112,29 @@ def put_zones(units: Any, count: int, common: Any) -> int:
             unit = units[k]
             if unit.sign == 0.0 and unit.anew == 0:
                 continue
-            y = unit_state(unit.y)
-            numbers = warm(unit_numbers(unit.numbers), y)
-            zone = currents.zone_of(numbers, unit.sign * V, 0.0, y.q, y.w_m, 0.0)
-            if zone != unit.mode.zone:
-                unit.mode.zone, unit.anew = zone, max(unit.anew, ZONE)
-            if unit.sign != 0.0 and zone != NO_CURRENT:
-                per_volt = unit.sign / numbers.bridge.R_drive
+            law, w = unit.law, unit.y.w_m
+            conducts, K_b, drop = law.conducts, law.K_b, law.drop
+            if unit.anew != 0 or not law.low < unit.sign * V - back_emf(w, K_b) < law.high:
+                conducts, K_b, drop = _put_zone(unit, V)
+            if unit.sign != 0.0 and unit.mode.zone != NO_CURRENT:
+                per_volt = unit.sign * conducts
                 below += common.R_b * unit.sign * per_volt
-                back += per_volt * (back_emf(y.w_m, numbers.motor.K_b) + sign_of(zone) * numbers.bridge.D_drive)
+                back += per_volt * (back_emf(w, K_b) + drop)
         before, V = V, (common.V + common.R_b * back) / below
         if abs(V - before) <= _SAME * common.V:
             break
     common.now = V
     return DONE if V >= _LEAST * common.V else LEFT
+
+
+def _put_zone(unit: Any, V: float) -> tuple[float, float, float]:
+    """Put a servo into the zone of its current; return one by the resistance of its driven loop, K_b, and the drop."""
+    y = unit_state(unit.y)
+    numbers = warm(unit_numbers(unit.numbers), y)
+    zone = currents.zone_of(numbers, unit.sign * V, 0.0, y.q, y.w_m, 0.0)
+    if zone != unit.mode.zone:
+        unit.mode.zone, unit.anew = zone, max(unit.anew, ZONE)
+    return 1.0 / numbers.bridge.R_drive, numbers.motor.K_b, sign_of(zone) * numbers.bridge.D_drive
 
 
 def current_of(unit: Any, V: float, y: Vector) -> float:
@@ -140,13 +151,13 @@ def is_plain(units: Any, count: int, common: Any, V: float, at_end: bool) -> boo
     total = 0.0
     for k in range(count):
         unit = units[k]
-        y = unit_state(unit.after) if at_end and unit.active != 0 else unit_state(unit.y)
+        y = unit.after if at_end and unit.active != 0 else unit.y
         if not math.isfinite(y.q + y.w + y.T_w + y.q_m + y.w_m):
             return False
         if unit.open != 0 and abs(back_emf(y.w_m, unit.numbers.motor.K_b)) >= V:
             return False
         if common.I_max < math.inf and unit.sign != 0.0:
-            total += unit.sign * current_of(unit, V, y)
+            total += unit.sign * current_of(unit, V, unit_state(y))
     if common.I_max == math.inf:
         return True
     return bool(-_CLOSE <= total <= common.I_max)
@@ -160,8 +171,6 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
             return time - left
         moving = False
         for k in range(count):
-            if units[k].law.R_slope != 0.0:
-                put_law_of(units[k])  # at the temperatures that there are now
             moving = moving or units[k].active != 0
         if not moving or not left > 0.0:
             return time
@@ -178,10 +187,8 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
             if not is_plain(units, count, common, common.then, True):
                 return time - left
             for k in range(count):
-                if units[k].active != 0:
-                    units[k].short = 0
-                    put_unit_state(units[k].y, unit_state(units[k].after))
-            common.now = common.then
+                units[k].short = 0
+            _arrive(units, count, common)
             if length == left:
                 return time
             left -= length
@@ -192,14 +199,20 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
         common.then = voltage_at(common, end)
         if not is_plain(units, count, common, common.then, True):
             return time - left
-        for k in range(count):
-            if units[k].active != 0:
-                put_unit_state(units[k].y, unit_state(units[k].after))
-        common.now = common.then
+        _arrive(units, count, common)
         _cross(units[whose], kind, common.now, end, time)
         common.jumped = 1 if jumps(kind) and units[whose].sign != 0.0 else 0
         left -= end
     return time - left
+
+
+def _arrive(units: Any, count: int, common: Any) -> None:
+    """Let servos be at the end of a leg."""
+    for k in range(count):
+        if units[k].active != 0:
+            put_unit_state(units[k].y, unit_state(units[k].after))
+            follow(units[k])
+    common.now = common.then
 
 
 def _cross(unit: Any, kind: int, V: float, end: float, time: float) -> None:
@@ -224,34 +237,52 @@ def jumps(kind: int) -> bool:
 
 def doubtful(unit: Any, common: Any, length: float) -> int:
     """Return which guards of a servo do not surely stay above zero along a leg, as a sum of 1 << kind."""
-    constant = unit.sign == 0.0 or (
-        common.now == common.then and common.bend == 0.0 and unit.law.R_slope == 0.0)
-    if unit.active == 0 and constant:
+    law, mode, y, after, bend = unit.law, unit.mode, unit.y, unit.after, unit.bend
+    constant = unit.sign == 0.0 or (common.now == common.then and common.bend == 0.0 and law.R_slope == 0.0)
+    moves, apart, inside = law.moves > 0.0, law.apart > 0.0, mode.mesh == INSIDE
+    if not moves and not apart and constant:
         return 0
-    mode, y = unit_mode(unit.mode), unit_state(unit.y)
-    after = unit_state(unit.after) if unit.active != 0 else y
-    numbers, law = warm(unit_numbers(unit.numbers), after), unit.law
-    u0, u, moves, apart = unit.sign * common.now, unit.sign * common.then, law.moves > 0.0, law.apart > 0.0
-    bend = unit.bend
+    u0, u = unit.sign * common.now, unit.sign * common.then
     bend_x = abs(unit.sign) * common.bend + law.K_b * bend
-    kinds = 0 if _in_zone(numbers, mode.zone, u0, u, y, after, bend_x) else _ZONES
-    inside = mode.mesh == INSIDE
-    if (apart or (moves and not inside)) and not numbers.stops.lower < after.q < numbers.stops.upper:
+    x0, x = u0 - law.K_b * y.w_m, u - (law.K_b + law.K_b_slope * (after.T_h - y.T_h)) * after.w_m
+    kinds = 0 if _in_zone(law.low, law.high, x0, x, bend_x) else _ZONES
+    if (apart or (moves and not inside)) and not unit.numbers.stops.lower < after.q < unit.numbers.stops.upper:
         kinds |= guards.STOPS
     if inside:
         if apart and not _keeps_way(mode.contact, unit.output, y.w, after.w, 0.0, length):
             kinds |= 1 << guards.SPEED | guards.STOPS
         if moves and not _keeps_way(mode.motor, unit.speed, y.w_m, after.w_m, bend, length):
             kinds |= 1 << guards.MOTOR_SPEED
-        if not _within_play(numbers, y, after, bend, length):
+        if not _within_play(unit, bend, length):
             kinds |= guards.MEETINGS
     elif moves and not _keeps_way(mode.contact, unit.speed, y.w, after.w, bend, length):
         kinds |= 1 << guards.SPEED | guards.STOPS
-    if not moves and not constant:
-        kinds |= _released(unit, numbers, mode, u0, u, after, bend_x)
-    if not moves or (mode.share == 0 and not play.present(numbers.play)):
-        return kinds
-    return kinds | _parted(unit, numbers, mode, u0, u, y, after, bend_x)
+    if law.pressed > 0.0:
+        kinds |= 0 if _pressed(unit, x0, x, bend_x) else 1 << guards.PART
+    elif unit.kinds & _BY_TORQUE and not (constant and not moves):
+        kinds |= _by_torque(unit, u0, u, bend_x)
+    return kinds & unit.kinds
+
+
+def _by_torque(unit: Any, u0: float, u: float, bend: float) -> int:
+    """Return which guards that look at torques may fall."""
+    mode, y, after = unit_mode(unit.mode), unit_state(unit.y), unit_state(unit.after)
+    numbers = warm(unit_numbers(unit.numbers), after)
+    if unit.law.moves > 0.0:
+        return _parted(unit, numbers, mode, u0, u, y, after, bend)
+    return _released(unit, numbers, mode, u0, u, after, bend)
+
+
+def _pressed(unit: Any, x0: float, x: float, bend: float) -> bool:
+    """Tell whether motor and output surely press together, by what drives the current at both ends [V]."""
+    law = unit.law
+    per_volt = law.press_torque * law.K * law.conducts
+    least = 0.5 * abs(per_volt) * bend + abs(law.press_speed) * unit.bend
+    first = law.press + per_volt * (x0 - law.drop) + law.press_speed * unit.y.w_m
+    cooled = (1.0 + law.K_slope / law.K * (unit.after.T_h - unit.y.T_h)) / (
+        1.0 + law.R_slope * law.conducts * (unit.after.T_w - unit.y.T_w))
+    end = law.press + per_volt * cooled * (x - law.drop) + law.press_speed * unit.after.w_m
+    return _above(first, end, least)
 
 
 def _keeps_way(contact: int, speed: Any, w: float, after: float, bend: float, length: float) -> bool:
@@ -264,21 +295,20 @@ def _keeps_way(contact: int, speed: Any, w: float, after: float, bend: float, le
     return min(abs(w), abs(after)) > 0.25 * bend
 
 
-def _in_zone(numbers: Numbers, zone: int, u0: float, u: float, y: Vector, after: Vector, bend: float) -> bool:
-    """Tell whether the current surely stays in its zone."""
-    low, high = currents.zone_limits(numbers, zone, u)
+def _in_zone(low: float, high: float, x0: float, x: float, bend: float) -> bool:
+    """Tell whether what drives the current surely stays in its zone [V]."""
     if low == -math.inf and high == math.inf:
         return True
-    x0, x = u0 - back_emf(y.w_m, numbers.motor.K_b), u - back_emf(after.w_m, numbers.motor.K_b)
     if not low < x < high:
         return False
     first = low + 0.25 * bend < x0 < high - 0.25 * bend and low + 0.25 * bend < x < high - 0.25 * bend
     return first or (low + guards.BELOW <= x0 <= high - guards.BELOW and abs(x - x0) > 2.0 * bend)
 
 
-def _within_play(numbers: Numbers, y: Vector, after: Vector, bend: float, length: float) -> bool:
+def _within_play(unit: Any, bend: float, length: float) -> bool:
     """Tell whether motor and output surely stay apart."""
-    ahead, half = y.q_m - y.q, numbers.play.half
+    y, after, half = unit.y, unit.after, unit.numbers.play.half
+    ahead = y.q_m - y.q
     most = length * max(max(y.w_m, after.w_m) + 0.125 * bend - min(y.w, after.w), 0.0)
     least = length * min(min(y.w_m, after.w_m) - 0.125 * bend - max(y.w, after.w), 0.0)
     return ahead + most < half and ahead + least > -half
@@ -286,7 +316,7 @@ def _within_play(numbers: Numbers, y: Vector, after: Vector, bend: float, length
 
 def _released(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, after: Vector, bend: float) -> int:
     """Return which guards may fall that keep what the motor turns at rest."""
-    kinds, margin = guards.guards(numbers, mode, u, False) & _AT_REST, 2.0 * unit.law.K * unit.law.conducts * bend
+    kinds, margin = unit.kinds & _AT_REST, 2.0 * unit.law.K * unit.law.conducts * bend
     for kind in range(guards.KINDS):
         if kinds >> kind & 1:
             first = guards.guard(numbers, mode, kind, u0, 0.0, unit.torque, 0.0, after, NOWHERE)[0]

@@ -13,68 +13,15 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from servotwin.models.engine.bus.coupled_units import (
-    TERMS,
-    Law,
-    put_unit_law,
-    put_unit_state,
-    unit_mode,
-    unit_numbers,
-    unit_state,
-)
-from servotwin.models.engine.dynamics import currents
-from servotwin.models.engine.legs import legs
-from servotwin.models.state.modes import FORWARD, INSIDE, NO_CURRENT, Mode, Vector, at_rest, sign_of
-from servotwin.models.terms import bridge, heat, shaft
-from servotwin.models.terms.friction import share_slopes
-from servotwin.models.terms.numbers import Numbers, warm
-from servotwin.models.terms.play import ahead
-from servotwin.physics.thermal import heat_flow, magnet_factor, warming_rate, winding_resistance
+from servotwin.models.engine.bus.coupled_units import TERMS, put_unit_state, unit_state
+from servotwin.models.state.modes import INSIDE, Vector
+from servotwin.physics.thermal import heat_flow, warming_rate
 
 _LONGEST = 0.5  # of a series, in times of its fastest rate
 _ROUNDING = 1e-17  # of a term
 _INVERSES = (0.0, *(1.0 / n for n in range(1, TERMS + 1)))
 _PER_KELVIN = 1e-2  # what a kelvin counts beside a radian per second
-
-
-def put_law_of(unit: Any) -> None:
-    """Put into a servo's record its law in its mode, as it stands."""
-    cold, mode, y = unit_numbers(unit.numbers), unit_mode(unit.mode), unit_state(unit.y)
-    numbers, driven = warm(cold, y), unit.sign
-    R = winding = drop = conducts = R_slope = K_slope = K_b_slope = 0.0
-    winding = numbers.motor.R
-    if mode.zone != NO_CURRENT:
-        R = currents.resistance(numbers, mode.zone, driven)
-        drop = sign_of(mode.zone) * bridge.drop(numbers.bridge, driven)
-        conducts = 1.0 / R
-    if heat.present(cold.heat):
-        R_slope = winding_resistance(y.T_w + 1.0, cold.motor.R) - winding_resistance(y.T_w, cold.motor.R)
-        field = magnet_factor(y.T_h + 1.0, cold.heat.magnet) - magnet_factor(y.T_h, cold.heat.magnet)
-        K_slope, K_b_slope = cold.motor.K * field, cold.motor.K_b * field
-    inside = mode.mesh == INSIDE
-    moves = not at_rest(mode.motor if inside else mode.contact)
-    pull = rate = per_torque = output_pull = output_rate = 0.0
-    apart = inside and not at_rest(mode.contact)
-    if moves or apart:
-        still = legs.laws_of(numbers, Mode(NO_CURRENT, mode.contact, mode.mesh, mode.motor, mode.share), 0.0,
-                             unit.torque)
-        pull, rate, per_torque = still.motor_pull, still.motor_rate, per_torque_of(numbers, mode)
-        output_pull, output_rate = still.output_pull, still.output_rate
-    put_unit_law(unit.law, Law(
-        R, winding, R_slope, numbers.motor.K, numbers.motor.K_b, K_slope, K_b_slope, drop, conducts,
-        1.0 if moves else 0.0, pull, per_torque, rate, 1.0 if apart else 0.0, output_pull, output_rate))
-    unit.active = 1 if moves or apart or heat.present(cold.heat) else 0
-
-
-def per_torque_of(numbers: Numbers, mode: Mode) -> float:
-    """Return the acceleration [rad/s²] of what the motor turns per torque of it [N m], less what friction takes."""
-    inside, left = mode.mesh == INSIDE, 1.0
-    if mode.share != 0:
-        forward = (mode.motor if inside else mode.contact) == FORWARD
-        left -= share_slopes(numbers.friction, forward, float(mode.share))[0]
-    if inside:
-        return shaft.motor_acceleration(numbers.shaft, left, 0.0, 0.0)
-    return shaft.accelerated(numbers.shaft, left)
+_FEW = 3  # terms of temperatures at least
 
 
 def longest(units: Any, count: int) -> float:
@@ -93,10 +40,12 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
     for k in range(count):
         unit = units[k]
         below += common.R_b * unit.sign * unit.sign * unit.law.conducts
+        unit.back = unit.law.drop
         if unit.active != 0:
             unit.speed[0] = unit.y.w_m if unit.law.moves > 0.0 else 0.0
             unit.output[0], unit.winding[0], unit.housing[0] = unit.y.w, unit.y.T_w, unit.y.T_h
-            unit.bend = 0.0
+            unit.bend, unit.hot, unit.mild = 0.0, 0, 0
+            unit.back += unit.law.K_b * unit.speed[0]
     n, power, common.bend = 0, length, 0.0
     while n < TERMS - 1:
         V = common.V if n == 0 else 0.0
@@ -104,117 +53,109 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
         for k in range(count):
             unit = units[k]
             if unit.active != 0 or n == 0:
-                unit.back[n] = _back(unit, n)
-                back += unit.sign * unit.back[n] * unit.law.conducts
+                back += unit.sign * unit.back * unit.law.conducts
         V = (V + common.R_b * back) / below
         common.voltage[n] = V
         common.bend += n * (n - 1) * abs(V) * power / length
-        size = 0.0 if n == 0 else abs(V)
+        size = 0.0 if n == 0 else abs(V) / length
         for k in range(count):
             unit = units[k]
-            if unit.active != 0 or n == 0:
-                unit.current[n] = (unit.sign * V - unit.back[n]) * unit.law.conducts
             if unit.active != 0:
-                size = max(size, _next(unit, n))
-                unit.bend += (n + 1) * n * abs(unit.speed[n + 1]) * power
+                size = max(size, _next(unit, n, V, power))
         n += 1
         if size * power < _ROUNDING:
             break
         power *= length
     common.terms = n
     for k in range(count):
-        unit = units[k]
-        if unit.active != 0:
-            put_unit_state(unit.after, state_at(unit, n, length))
+        if units[k].active != 0:
+            put_unit_state(units[k].after, state_at(units[k], n, length))
     common.then = voltage_at(common, length)
 
 
-def _back(unit: Any, n: int) -> float:
-    """Return the n-th coefficient of K_b w + drop + (R − R(0)) i of a servo, whose current has one less."""
-    law = unit.law
-    back: float = law.K_b * unit.speed[n] if law.moves > 0.0 else 0.0
-    if n == 0:
-        back += law.drop
-        return back
-    if law.R_slope != 0.0:
-        warming = 0.0
-        for m in range(1, n + 1):
-            warming += law.R_slope * unit.winding[m] * unit.current[n - m]
-            back += law.K_b_slope * unit.housing[m] * unit.speed[n - m] * law.moves
-        back += warming
-    return back
+def _next(unit: Any, n: int, V: float, power: float) -> float:
+    """Work out what follows on the n-th coefficient of the bus voltage; return how large it is.
 
-
-def _next(unit: Any, n: int) -> float:
-    """Work out what follows on the n-th current of a servo; return how large it is."""
+    `power` is the (n + 1)-th of the duration.
+    """
     law, over = unit.law, _INVERSES[n + 1]
-    first = 1.0 if n == 0 else 0.0
-    torque: float = law.K * unit.current[n]
-    more = 0.0
+    i = (unit.sign * V - unit.back) * law.conducts
+    torque: float = law.K * i
+    more, hot = 0.0, law.R_slope != 0.0 and unit.hot == n
     if law.R_slope != 0.0:
-        for m in range(1, n + 1):
+        unit.current[n] = i
+    if hot:
+        for m in range(1, min(n, unit.mild) + 1):
             torque += law.K_slope * unit.housing[m] * unit.current[n - m]
-        more = _warm_up(unit, n)
-    dw = law.moves * (first * law.pull + law.per_torque * torque - law.rate * unit.speed[n]) * over
-    dv = law.apart * (first * law.output_pull - law.output_rate * unit.output[n]) * over
+        more = _warm_up(unit, n, power)
+    dw = -law.rate * unit.speed[n] + law.per_torque * torque
+    dv = -law.output_rate * unit.output[n]
+    if n == 0:
+        dw, dv = dw + law.pull, dv + law.output_pull
+    dw, dv = law.moves * dw * over, law.apart * dv * over
     unit.speed[n + 1], unit.output[n + 1] = dw, dv
-    size: float = max(abs(dw), abs(dv), more)
-    return size
+    unit.bend += (n + 1) * n * abs(dw) * power
+    unit.back = law.K_b * dw
+    if hot and unit.hot > n:
+        _put_warming(unit, n + 1)
+    return max(abs(dw), abs(dv), more)
 
 
-def _warm_up(unit: Any, n: int) -> float:
+def _put_warming(unit: Any, n: int) -> None:
+    """Add to the n-th coefficient of the voltage that a servo takes what its warming does."""
+    law = unit.law
+    warming = back = 0.0
+    for m in range(1, n + 1):
+        warming += unit.winding[m] * unit.current[n - m]
+    for m in range(1, min(n, unit.mild) + 1):
+        back += unit.housing[m] * unit.speed[n - m]
+    unit.warming = law.R_slope * warming
+    unit.back += unit.warming + law.K_b_slope * back
+
+
+def _warm_up(unit: Any, n: int, power: float) -> float:
     """Work out the next coefficients of a servo's temperatures; return how large they are."""
     law, own = unit.law, unit.numbers.heat
-    square, half = 0.0, (n + 1) // 2
-    for m in range(half):
-        square += unit.current[m] * unit.current[n - m]
-    square += square
-    if n == 2 * half:
-        square += unit.current[half] * unit.current[half]
-    unit.square[n] = square
-    loss = law.winding * square
-    for m in range(1, n + 1):
-        loss += law.R_slope * unit.winding[m] * unit.square[n - m]
+    unit.fall[n] = law.winding * unit.current[n] + (unit.warming if n > 0 else 0.0)
+    loss = 0.0
+    for m in range(n + 1):
+        loss += unit.current[m] * unit.fall[n - m]
     flow = heat_flow(unit.winding[n], unit.housing[n], own.G_wh)
     lost = heat_flow(unit.housing[n], own.T_amb if n == 0 else 0.0, own.G_ha)
     dT_w = warming_rate(loss, flow, own.C_w) * _INVERSES[n + 1]
     dT_h = warming_rate(flow, lost, own.C_h) * _INVERSES[n + 1]
     unit.winding[n + 1], unit.housing[n + 1] = dT_w, dT_h
-    return _PER_KELVIN * max(abs(dT_w), abs(dT_h))
+    size = _PER_KELVIN * max(abs(dT_w), abs(dT_h))
+    if n < _FEW or size * power > _ROUNDING:
+        unit.hot = n + 1
+    if _PER_KELVIN * abs(dT_h) * power > _ROUNDING:
+        unit.mild = n + 1
+    return size
 
 
 def state_at(unit: Any, terms: int, s: float) -> Vector:
     """Return the state of a servo at s [s] after the beginning of a leg."""
-    at = place_at(unit, terms, s)
-    if unit.law.R_slope == 0.0:
-        return at
-    T_w = T_h = 0.0
-    for n in range(terms, 0, -1):
-        T_w, T_h = (T_w + unit.winding[n]) * s, (T_h + unit.housing[n]) * s
-    return Vector(at.q, at.w, at.i, at.T_w + T_w, at.T_h + T_h, at.q_m, at.w_m)
-
-
-def place_at(unit: Any, terms: int, s: float) -> Vector:
-    """Return the same with the temperatures of the beginning."""
     y, law = unit.y, unit.law
     if unit.active == 0:
         return unit_state(y)
-    angle = w = 0.0
+    angle = w = T_w = T_h = 0.0
     if law.moves > 0.0:
         for n in range(terms, -1, -1):
             w = w * s + unit.speed[n]
             angle = angle * s + unit.speed[n] * _INVERSES[n + 1]
         angle *= s
+    if law.R_slope != 0.0:
+        for n in range(unit.hot, 0, -1):
+            T_w, T_h = (T_w + unit.winding[n]) * s, (T_h + unit.housing[n]) * s
     if unit.mode.mesh != INSIDE:
-        return Vector(y.q + angle, w, y.i, y.T_w, y.T_h,
-                      y.q + angle + ahead(unit_numbers(unit.numbers).play, unit.mode.mesh), w)
+        return Vector(y.q + angle, w, y.i, y.T_w + T_w, y.T_h + T_h, y.q + angle + law.ahead, w)
     way = v = 0.0
     if law.apart > 0.0:
         for n in range(terms, -1, -1):
             v = v * s + unit.output[n]
             way = way * s + unit.output[n] * _INVERSES[n + 1]
         way *= s
-    return Vector(y.q + way, v, y.i, y.T_w, y.T_h, y.q_m + angle, w)
+    return Vector(y.q + way, v, y.i, y.T_w + T_w, y.T_h + T_h, y.q_m + angle, w)
 
 
 def voltage_at(common: Any, s: float) -> float:

@@ -19,21 +19,21 @@ else:
 
 
 class Law(NamedTuple):
-    """The law of a servo in a mode, at the temperatures at which a leg begins.
+    """The law of a servo in a mode, at the temperatures at which a leg begins; all but four numbers stay with these.
 
     R i = s V − K_b w − drop; of what the motor turns ẇ = pull + per_torque K i − rate w; inside the play the output has
     ẇ = output_pull − output_rate w.
     """
 
-    R: float  # of the loop [Ω]
-    winding: float  # of that, of the winding
+    R: float  # of the loop of a cold winding [Ω]
+    winding: float  # of the winding [Ω]
     R_slope: float  # by how much both grow per kelvin of the winding; 0: temperatures stay
     K: float
     K_b: float
     K_slope: float  # of K per kelvin of the housing
     K_b_slope: float
     drop: float
-    conducts: float  # 1/R; 0: no current flows
+    conducts: float  # one by that of the loop; 0: no current flows
     moves: float  # 1: what the motor turns moves
     pull: float
     per_torque: float
@@ -41,6 +41,13 @@ class Law(NamedTuple):
     apart: float  # 1: the output moves alone
     output_pull: float
     output_rate: float
+    low: float  # between which what drives the current lies [V]
+    high: float
+    ahead: float  # by which angle the motor is ahead of the output where they touch [rad]
+    pressed: float  # 1: how they press together is known by what follows [rad/s²]
+    press: float
+    press_torque: float  # per torque of the motor [N m]
+    press_speed: float
 
 
 class Unit(NamedTuple):
@@ -66,14 +73,18 @@ class Unit(NamedTuple):
     tick: float  # how long one lasts
     law: Law
     active: int  # 1: it moves, or gets warm
+    kinds: int  # of guards that can end its mode
     short: int  # legs in a row that took no time
     speed: Coefficients
     output: Coefficients
-    back: Coefficients  # voltage that the motor's speed and its warming take, but for s V
     current: Coefficients
-    square: Coefficients  # of the current
+    fall: Coefficients  # of the voltage along the winding
     winding: Coefficients  # temperature [K]
     housing: Coefficients
+    hot: int  # coefficients of temperatures that count
+    mild: int  # of the housing's alone
+    back: float  # the last coefficient of the voltage that speed, drops and warming take, but for s V
+    warming: float  # what warming adds to that along the winding
     bend: float  # h² max|ẅ| of what the motor turns
     course: Course  # of a guard, in parts of a leg
     after: Vector  # the state at the end of a leg
