@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from servotwin.models.engine.bus.coupled_units import (
     Law,
@@ -25,12 +25,12 @@ from servotwin.models.state.modes import (
     Mode,
     at_rest,
     sign_of,
-    slides,
 )
 from servotwin.models.terms import bridge, heat, play, shaft
-from servotwin.models.terms.friction import share_slopes, varying
+from servotwin.models.terms.friction import share, share_slopes
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import ahead
+from servotwin.physics.load_friction import torque_on_gear
 from servotwin.physics.thermal import REFERENCE_TEMPERATURE, magnet_factor, winding_resistance
 
 _NEXT = REFERENCE_TEMPERATURE + 1.0  # K
@@ -58,11 +58,12 @@ def put_law_of(unit: Any) -> None:
         pull, rate, per_torque = still.motor_pull, still.motor_rate, per_torque_of(cold, mode)
         output_pull, output_rate = still.output_pull, still.output_rate
     low, high = currents.zone_limits(cold, mode.zone, driven)
-    press, press_torque, press_speed, pressed = pressing_of(cold, mode, unit.torque)
+    pressing, gear = pressing_of(cold, mode, unit.torque), share_of(cold, mode, unit.torque)
     put_unit_law(unit.law, Law(
         R, cold.motor.R, R_slope, cold.motor.K, cold.motor.K_b, K_slope, K_b_slope, drop, 1.0 / R if R > 0.0 else 0.0,
         1.0 if moves else 0.0, pull, per_torque, rate, 1.0 if apart else 0.0, output_pull, output_rate, low, high,
-        ahead(cold.play, mode.mesh), pressed, press, press_torque, press_speed))
+        ahead(cold.play, mode.mesh), pressing.still, pressing.forward, pressing.backward, pressing.speed, gear.still,
+        gear.forward, gear.speed))
     unit.kinds = guards.guards(cold, mode, driven, False)
     unit.active = 1 if moves or apart or heat.present(cold.heat) else 0
     if unit.active == 0:
@@ -93,18 +94,36 @@ def per_torque_of(numbers: Numbers, mode: Mode) -> float:
     return shaft.accelerated(numbers.shaft, left)
 
 
-def pressing_of(numbers: Numbers, mode: Mode, tau: float) -> tuple[float, float, float, float]:
-    """Return how motor and output press together that slide as one: by itself, per torque and per speed; and 1.
+class Line(NamedTuple):
+    """What depends on a motor's torque and on a speed by straight lines: without both, per torque and per speed."""
 
-    That is `contacts.pressing_along` where friction is constant; nothing, and 0, where it varies or cannot end so.
-    """
-    if mode.mesh == INSIDE or not play.present(numbers.play) or mode.motor == STUCK or not slides(mode.contact):
-        return 0.0, 0.0, 0.0, 0.0
-    if varying(numbers.friction):
-        return 0.0, 0.0, 0.0, 0.0
-    way = 1.0 if mode.mesh == ON_FORWARD else -1.0
+    still: float
+    forward: float  # per torque forward
+    backward: float
+    speed: float
+
+
+def pressing_of(numbers: Numbers, mode: Mode, tau: float) -> Line:
+    """Return `contacts.pressing_along` of a mode: how motor and output press together that slide as one [rad/s²]."""
+    if mode.mesh == INSIDE or not play.present(numbers.play) or mode.motor == STUCK or at_rest(mode.contact):
+        return Line(0.0, 0.0, 0.0, 0.0)
+    way, forward, own = 1.0 if mode.mesh == ON_FORWARD else -1.0, mode.contact == FORWARD, numbers.shaft
     idle = Mode(NO_CURRENT, mode.contact, mode.mesh, mode.motor, mode.share)
-    own = numbers.shaft
+    more = 1.0 - share_slopes(numbers.friction, forward, 1.0)[0]
+    less = 1.0 - share_slopes(numbers.friction, forward, -1.0)[0]
     per_speed = shaft.motor_acceleration(own, 0.0, 1.0, 0.0) - shaft.output_acceleration(own, 1.0, 0.0, 0.0)
-    return (contacts.pressing_along(numbers, idle, 0.0, tau, NOWHERE),
-            way * shaft.motor_acceleration(own, 1.0, 0.0, 0.0), way * per_speed, 1.0)
+    return Line(
+        contacts.pressing_along(numbers, idle, 0.0, tau, NOWHERE), way * shaft.motor_acceleration(own, more, 0.0, 0.0),
+        way * shaft.motor_acceleration(own, less, 0.0, 0.0), way * per_speed)
+
+
+def share_of(numbers: Numbers, mode: Mode, tau: float) -> Line:
+    """Return `contacts.through_gear` of a mode, with the sign that its share keeps [N m]."""
+    if mode.share == 0:
+        return Line(0.0, 0.0, 0.0, 0.0)
+    sign, per_speed = float(mode.share), 0.0
+    if mode.mesh != INSIDE:
+        per_speed = share(numbers.friction, 0.0, torque_on_gear(0.0, 1.0, numbers.shaft.b_out))
+    still = contacts.through_gear(numbers, mode.mesh, 0.0, tau, NOWHERE)
+    per_torque = sign * share(numbers.friction, 1.0, 0.0)
+    return Line(sign * still, per_torque, per_torque, sign * per_speed)

@@ -34,13 +34,11 @@ from servotwin.models.state.modes import (
     NO_CURRENT,
     NOWHERE,
     STUCK,
-    Mode,
     Vector,
     sign_of,
 )
 from servotwin.models.terms import bridge, duty, play
-from servotwin.models.terms.friction import share
-from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.models.terms.numbers import warm
 from servotwin.physics.motor import back_emf
 
 MOST_LEGS = 400  # to one instant; servos that need more are left to the general engine
@@ -49,7 +47,7 @@ _SAME = 1e-14  # of that
 _CLOSE = 1e-13  # A
 
 _ZONES = 1 << guards.ZONE_UP | 1 << guards.ZONE_DOWN
-_BY_TORQUE = ~(_ZONES | 1 << guards.SPEED | 1 << guards.MOTOR_SPEED | guards.MEETINGS | guards.STOPS)
+_BY_TORQUE = 1 << guards.SHARE | 1 << guards.PART
 _AT_REST = ~(_ZONES | 1 << guards.SPEED | guards.MEETINGS | guards.STOPS)  # what ends rest of what the motor turns
 
 DONE, LEFT = 1, 0
@@ -257,32 +255,36 @@ def doubtful(unit: Any, common: Any, length: float) -> int:
             kinds |= guards.MEETINGS
     elif moves and not _keeps_way(mode.contact, unit.speed, y.w, after.w, bend, length):
         kinds |= 1 << guards.SPEED | guards.STOPS
-    if law.pressed > 0.0:
-        kinds |= 0 if _pressed(unit, x0, x, bend_x) else 1 << guards.PART
-    elif unit.kinds & _BY_TORQUE and not (constant and not moves):
-        kinds |= _by_torque(unit, u0, u, bend_x)
+    if moves and unit.kinds & _BY_TORQUE:
+        kinds |= _by_torque(unit, x0, x, bend_x)
+    elif not moves and not constant:
+        kinds |= _released(unit, u0, u, bend_x)
     return kinds & unit.kinds
 
 
-def _by_torque(unit: Any, u0: float, u: float, bend: float) -> int:
-    """Return which guards that look at torques may fall."""
-    mode, y, after = unit_mode(unit.mode), unit_state(unit.y), unit_state(unit.after)
-    numbers = warm(unit_numbers(unit.numbers), after)
-    if unit.law.moves > 0.0:
-        return _parted(unit, numbers, mode, u0, u, y, after, bend)
-    return _released(unit, numbers, mode, u0, u, after, bend)
+def _by_torque(unit: Any, x0: float, x: float, bend: float) -> int:
+    """Return which may fall of the guards of a share, and of motor and output that press together.
 
-
-def _pressed(unit: Any, x0: float, x: float, bend: float) -> bool:
-    """Tell whether motor and output surely press together, by what drives the current at both ends [V]."""
-    law = unit.law
-    per_volt = law.press_torque * law.K * law.conducts
-    least = 0.5 * abs(per_volt) * bend + abs(law.press_speed) * unit.bend
-    first = law.press + per_volt * (x0 - law.drop) + law.press_speed * unit.y.w_m
-    cooled = (1.0 + law.K_slope / law.K * (unit.after.T_h - unit.y.T_h)) / (
-        1.0 + law.R_slope * law.conducts * (unit.after.T_w - unit.y.T_w))
-    end = law.press + per_volt * cooled * (x - law.drop) + law.press_speed * unit.after.w_m
-    return _above(first, end, least)
+    What drives the current is given, at both ends [V].
+    """
+    law, w, after, kinds = unit.law, unit.y.w_m, unit.after.w_m, 0
+    heated = (1.0 + law.R_slope * law.conducts * (unit.after.T_w - unit.y.T_w)) / (
+        1.0 + law.K_slope / law.K * (unit.after.T_h - unit.y.T_h))
+    before = law.K * law.conducts * (x0 - law.drop)
+    torque, off = law.K * law.conducts * (x - law.drop) / heated, 0.25 * law.K * law.conducts * bend
+    if unit.mode.share != 0:
+        least = abs(law.gear_torque) * off + 0.25 * abs(law.gear_speed) * unit.bend
+        if not _above(law.gear + law.gear_torque * before + law.gear_speed * w,
+                      law.gear + law.gear_torque * torque + law.gear_speed * after, least):
+            kinds = 1 << guards.SHARE
+    bends = law.conducts > 0.0 and law.press_forward != law.press_backward
+    if bends and (torque * before <= 0.0 or min(abs(torque), abs(before)) <= off):
+        return kinds | 1 << guards.PART  # there is a bend in how they press
+    per_torque = law.press_forward if torque + before > 0.0 else law.press_backward
+    least = 2.0 * abs(per_torque) * off + abs(law.press_speed) * unit.bend
+    pressed = _above(law.press + per_torque * before + law.press_speed * w,
+                     law.press + per_torque * torque + law.press_speed * after, least)
+    return kinds if pressed else kinds | 1 << guards.PART
 
 
 def _keeps_way(contact: int, speed: Any, w: float, after: float, bend: float, length: float) -> bool:
@@ -314,9 +316,13 @@ def _within_play(unit: Any, bend: float, length: float) -> bool:
     return ahead + most < half and ahead + least > -half
 
 
-def _released(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, after: Vector, bend: float) -> int:
+def _released(unit: Any, u0: float, u: float, bend: float) -> int:
     """Return which guards may fall that keep what the motor turns at rest."""
     kinds, margin = unit.kinds & _AT_REST, 2.0 * unit.law.K * unit.law.conducts * bend
+    if kinds == 0:
+        return 0
+    mode, after = unit_mode(unit.mode), unit_state(unit.after)
+    numbers = warm(unit_numbers(unit.numbers), after)
     for kind in range(guards.KINDS):
         if kinds >> kind & 1:
             first = guards.guard(numbers, mode, kind, u0, 0.0, unit.torque, 0.0, after, NOWHERE)[0]
@@ -324,30 +330,6 @@ def _released(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, afte
             if _above(first, end, margin):
                 kinds ^= 1 << kind
     return kinds
-
-
-def _parted(unit: Any, numbers: Numbers, mode: Mode, u0: float, u: float, y: Vector, after: Vector,
-            bend: float) -> int:
-    """Return which may fall of the guards of a share, and of motor and output that press together."""
-    body, tau, kinds = numbers.shaft, unit.torque, 0
-    torque, before = currents.drive_torque(numbers, mode.zone, u, after), currents.drive_torque(
-        numbers, mode.zone, u0, y)
-    off = 0.25 * unit.law.K * unit.law.conducts * bend
-    if mode.share != 0:
-        least = abs(share(numbers.friction, off, 0.0)) + abs(
-            share(numbers.friction, 0.0, 0.25 * body.b_out * unit.bend))
-        if not _above(mode.share * contacts.through_gear(numbers, mode.mesh, before, tau, y),
-                      mode.share * contacts.through_gear(numbers, mode.mesh, torque, tau, after), least):
-            kinds = 1 << guards.SHARE
-    if mode.mesh == INSIDE or not play.present(numbers.play) or mode.motor == STUCK:
-        return kinds
-    if torque * before <= 0.0 or min(abs(torque), abs(before)) <= off:
-        return kinds | 1 << guards.PART  # there is a bend in how they press
-    inertia = body.J - body.J_out
-    least = 2.0 * off / inertia + unit.bend * (abs(body.b - body.b_out) / inertia + body.b_out / body.J_out)
-    pressed = _above(contacts.pressing_along(numbers, mode, u0, tau, y),
-                     contacts.pressing_along(numbers, mode, u, tau, after), least)
-    return kinds if pressed else kinds | 1 << guards.PART
 
 
 def _above(first: float, end: float, least: float) -> bool:

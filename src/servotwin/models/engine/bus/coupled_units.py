@@ -44,10 +44,13 @@ class Law(NamedTuple):
     low: float  # between which what drives the current lies [V]
     high: float
     ahead: float  # by which angle the motor is ahead of the output where they touch [rad]
-    pressed: float  # 1: how they press together is known by what follows [rad/s²]
-    press: float
-    press_torque: float  # per torque of the motor [N m]
+    press: float  # how motor and output press together at rest, without torque [rad/s²]
+    press_forward: float  # more of it per torque of the motor [N m], forward or backward
+    press_backward: float
     press_speed: float
+    gear: float  # the same of what the torques through the gear add to its friction, with the sign that lasts [N m]
+    gear_torque: float
+    gear_speed: float
 
 
 class Unit(NamedTuple):
