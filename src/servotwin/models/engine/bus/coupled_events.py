@@ -38,7 +38,8 @@ def first_end(unit: Any, common: Any, doubtful: int, length: float, last: bool) 
     if kinds == 0:
         return found, first
     end = first
-    at_start, at_end = _place(unit, common, 0.0), _place(unit, common, end)
+    at_start = _place(unit, common, 0.0)
+    at_end = _place(unit, common, end)
     for kind in range(guards.KINDS):
         if kinds >> kind & 1:
             s = _below(unit, common, kind, at_start, at_end)
@@ -61,12 +62,15 @@ def _below(unit: Any, common: Any, kind: int, at_start: Place, at_end: Place) ->
     if least >= guards.BELOW and 0.0 < turn < length:
         lowest = _place(unit, common, turn)
         least = _guard(unit, kind, lowest)
-    return _crossing(unit, common, kind, 0.0, f, lowest.s, least) if least < guards.BELOW else math.inf
+    if least >= guards.BELOW:
+        return math.inf
+    return _crossing(unit, common, kind, 0.0, f, lowest.s, least)
 
 
 def _place(unit: Any, common: Any, s: float) -> Place:
     """Return where a servo is at s [s] after the beginning of a leg."""
-    return Place(s, unit.sign * voltage_at(common, s), state_at(unit, common.terms, s))
+    y = state_at(unit, common.terms, s)
+    return Place(s, unit.sign * voltage_at(common, s), y)
 
 
 def _guard(unit: Any, kind: int, place: Place) -> float:
@@ -84,7 +88,8 @@ def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float,
         start = a
         for _ in range(50):
             a = start + 0.5 * (b - start)
-            f_a = _guard(unit, kind, _place(unit, common, a))
+            place = _place(unit, common, a)
+            f_a = _guard(unit, kind, place)
             if f_a > -guards.BELOW:
                 break
             b, f_b = a, f_a
@@ -94,7 +99,8 @@ def _crossing(unit: Any, common: Any, kind: int, a: float, f_a: float, b: float,
     part = 1.0 - part
     for _ in range(_HALVINGS):
         s = new + part * (old - new)
-        f = _guard(unit, kind, _place(unit, common, s))
+        place = _place(unit, common, s)
+        f = _guard(unit, kind, place)
         if (f > 0.0) == (f_new > 0.0):
             third, f_third = new, f_new
         else:

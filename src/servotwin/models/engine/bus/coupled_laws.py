@@ -31,7 +31,7 @@ from servotwin.models.terms.friction import share, share_slopes
 from servotwin.models.terms.numbers import Numbers
 from servotwin.models.terms.play import ahead
 from servotwin.physics.load_friction import torque_on_gear
-from servotwin.physics.thermal import REFERENCE_TEMPERATURE, magnet_factor, winding_resistance
+from servotwin.physics.thermal import REFERENCE_TEMPERATURE, magnet_factor, warming_rate, winding_resistance
 
 _NEXT = REFERENCE_TEMPERATURE + 1.0  # K
 
@@ -40,7 +40,7 @@ def put_law_of(unit: Any) -> None:
     """Put into a servo's record its law in its mode, as it stands."""
     cold, mode, y = unit_numbers(unit.numbers), unit_mode(unit.mode), unit_state(unit.y)
     driven = unit.sign
-    R = drop = R_slope = K_slope = K_b_slope = 0.0
+    R = drop = R_slope = K_slope = K_b_slope = per_heat = per_flow = 0.0
     if mode.zone != NO_CURRENT:
         R = currents.resistance(cold, mode.zone, driven)
         drop = sign_of(mode.zone) * bridge.drop(cold.bridge, driven)
@@ -48,6 +48,7 @@ def put_law_of(unit: Any) -> None:
         R_slope = winding_resistance(_NEXT, cold.motor.R) - winding_resistance(REFERENCE_TEMPERATURE, cold.motor.R)
         field = magnet_factor(_NEXT, cold.heat.magnet) - magnet_factor(REFERENCE_TEMPERATURE, cold.heat.magnet)
         K_slope, K_b_slope = cold.motor.K * field, cold.motor.K_b * field
+        per_heat, per_flow = warming_rate(1.0, 0.0, cold.heat.C_w), warming_rate(1.0, 0.0, cold.heat.C_h)
     inside = mode.mesh == INSIDE
     moves = not at_rest(mode.motor if inside else mode.contact)
     pull = rate = per_torque = output_pull = output_rate = 0.0
@@ -60,7 +61,8 @@ def put_law_of(unit: Any) -> None:
     low, high = currents.zone_limits(cold, mode.zone, driven)
     pressing, gear = pressing_of(cold, mode, unit.torque), share_of(cold, mode, unit.torque)
     put_unit_law(unit.law, Law(
-        R, cold.motor.R, R_slope, cold.motor.K, cold.motor.K_b, K_slope, K_b_slope, drop, 1.0 / R if R > 0.0 else 0.0,
+        R, cold.motor.R, R_slope, cold.motor.K, cold.motor.K_b, K_slope, K_b_slope, per_heat,
+        per_flow, drop, 1.0 / R if R > 0.0 else 0.0,
         1.0 if moves else 0.0, pull, per_torque, rate, 1.0 if apart else 0.0, output_pull, output_rate, low, high,
         ahead(cold.play, mode.mesh), pressing.still, pressing.forward, pressing.backward, pressing.speed, gear.still,
         gear.forward, gear.speed))

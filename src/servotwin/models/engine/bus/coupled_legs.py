@@ -13,7 +13,7 @@ from typing import Any
 from servotwin.models.engine.bus import coupled_series
 from servotwin.models.engine.bus.coupled_events import first_end
 from servotwin.models.engine.bus.coupled_laws import follow, put_law_of
-from servotwin.models.engine.bus.coupled_series import state_at, voltage_at
+from servotwin.models.engine.bus.coupled_series import put_after, voltage_at
 from servotwin.models.engine.bus.coupled_units import (
     put_unit_mode,
     put_unit_numbers,
@@ -193,7 +193,7 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
             continue
         for k in range(count):
             if units[k].active != 0:
-                put_unit_state(units[k].after, state_at(units[k], common.terms, end))
+                put_after(units[k], common.terms, end)
         common.then = voltage_at(common, end)
         if not is_plain(units, count, common, common.then, True):
             return time - left

@@ -15,7 +15,7 @@ from typing import Any
 
 from servotwin.models.engine.bus.coupled_units import TERMS, put_unit_state, unit_state
 from servotwin.models.state.modes import INSIDE, Vector
-from servotwin.physics.thermal import heat_flow, warming_rate
+from servotwin.physics.thermal import heat_flow
 
 _LONGEST = 0.5  # of a series, in times of its fastest rate
 _ROUNDING = 1e-17  # of a term
@@ -44,7 +44,7 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
         if unit.active != 0:
             unit.speed[0] = unit.y.w_m if unit.law.moves > 0.0 else 0.0
             unit.output[0], unit.winding[0], unit.housing[0] = unit.y.w, unit.y.T_w, unit.y.T_h
-            unit.bend, unit.hot, unit.mild = 0.0, 0, 0
+            unit.bend, unit.hot, unit.mild, unit.warming, unit.field = 0.0, 0, 0, 0.0, 0.0
             unit.back += unit.law.K_b * unit.speed[0]
     n, power, common.bend = 0, length, 0.0
     while n < TERMS - 1:
@@ -69,7 +69,7 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
     common.terms = n
     for k in range(count):
         if units[k].active != 0:
-            put_unit_state(units[k].after, state_at(units[k], n, length))
+            put_after(units[k], n, length)
     common.then = voltage_at(common, length)
 
 
@@ -80,14 +80,10 @@ def _next(unit: Any, n: int, V: float, power: float) -> float:
     """
     law, over = unit.law, _INVERSES[n + 1]
     i = (unit.sign * V - unit.back) * law.conducts
-    torque: float = law.K * i
-    more, hot = 0.0, law.R_slope != 0.0 and unit.hot == n
-    if law.R_slope != 0.0:
-        unit.current[n] = i
+    torque, hot = law.K * i, law.R_slope != 0.0 and unit.hot == n
     if hot:
-        for m in range(1, min(n, unit.mild) + 1):
-            torque += law.K_slope * unit.housing[m] * unit.current[n - m]
-        more = _warm_up(unit, n, power)
+        unit.current[n] = i
+        torque += unit.field
     dw = -law.rate * unit.speed[n] + law.per_torque * torque
     dv = -law.output_rate * unit.output[n]
     if n == 0:
@@ -96,66 +92,76 @@ def _next(unit: Any, n: int, V: float, power: float) -> float:
     unit.speed[n + 1], unit.output[n + 1] = dw, dv
     unit.bend += (n + 1) * n * abs(dw) * power
     unit.back = law.K_b * dw
-    if hot and unit.hot > n:
-        _put_warming(unit, n + 1)
-    return max(abs(dw), abs(dv), more)
-
-
-def _put_warming(unit: Any, n: int) -> None:
-    """Add to the n-th coefficient of the voltage that a servo takes what its warming does."""
-    law = unit.law
-    warming = back = 0.0
-    for m in range(1, n + 1):
-        warming += unit.winding[m] * unit.current[n - m]
-    for m in range(1, min(n, unit.mild) + 1):
-        back += unit.housing[m] * unit.speed[n - m]
-    unit.warming = law.R_slope * warming
-    unit.back += unit.warming + law.K_b_slope * back
+    size: float = max(abs(dw), abs(dv))
+    return max(size, _warm_up(unit, n, power)) if hot else size
 
 
 def _warm_up(unit: Any, n: int, power: float) -> float:
-    """Work out the next coefficients of a servo's temperatures; return how large they are."""
+    """Work out the next coefficients of a servo's temperatures; return how large they are.
+
+    Also what warming adds to the next ones of its voltage and torque: products of series.
+    """
     law, own = unit.law, unit.numbers.heat
-    unit.fall[n] = law.winding * unit.current[n] + (unit.warming if n > 0 else 0.0)
-    loss = 0.0
-    for m in range(n + 1):
+    unit.fall[n] = law.winding * unit.current[n] + unit.warming
+    loss, warming, field, back = unit.current[0] * unit.fall[n], 0.0, 0.0, 0.0
+    for m in range(1, n + 1):
         loss += unit.current[m] * unit.fall[n - m]
+        warming += unit.winding[m] * unit.current[n + 1 - m]
     flow = heat_flow(unit.winding[n], unit.housing[n], own.G_wh)
     lost = heat_flow(unit.housing[n], own.T_amb if n == 0 else 0.0, own.G_ha)
-    dT_w = warming_rate(loss, flow, own.C_w) * _INVERSES[n + 1]
-    dT_h = warming_rate(flow, lost, own.C_h) * _INVERSES[n + 1]
+    dT_w, dT_h = (loss - flow) * law.per_heat * _INVERSES[n + 1], (flow - lost) * law.per_flow * _INVERSES[n + 1]
     unit.winding[n + 1], unit.housing[n + 1] = dT_w, dT_h
     size = _PER_KELVIN * max(abs(dT_w), abs(dT_h))
     if n < _FEW or size * power > _ROUNDING:
         unit.hot = n + 1
     if _PER_KELVIN * abs(dT_h) * power > _ROUNDING:
         unit.mild = n + 1
+    for m in range(1, min(n + 1, unit.mild) + 1):
+        field += unit.housing[m] * unit.current[n + 1 - m]
+        back += unit.housing[m] * unit.speed[n + 1 - m]
+    unit.warming = law.R_slope * (warming + dT_w * unit.current[0])
+    unit.field = law.K_slope * field
+    unit.back += unit.warming + law.K_b_slope * back
     return size
 
 
-def state_at(unit: Any, terms: int, s: float) -> Vector:
-    """Return the state of a servo at s [s] after the beginning of a leg."""
-    y, law = unit.y, unit.law
-    if unit.active == 0:
-        return unit_state(y)
-    angle = w = T_w = T_h = 0.0
+def put_after(unit: Any, terms: int, s: float) -> None:
+    """Put where a servo is s [s] after the beginning of a leg into its record."""
+    y, law, after = unit.y, unit.law, unit.after
+    angle = w = 0.0
     if law.moves > 0.0:
         for n in range(terms, -1, -1):
             w = w * s + unit.speed[n]
             angle = angle * s + unit.speed[n] * _INVERSES[n + 1]
         angle *= s
+    after.i, after.T_w, after.T_h = y.i, y.T_w, y.T_h
     if law.R_slope != 0.0:
+        T_w = T_h = 0.0
         for n in range(unit.hot, 0, -1):
             T_w, T_h = (T_w + unit.winding[n]) * s, (T_h + unit.housing[n]) * s
+        after.T_w, after.T_h = y.T_w + T_w, y.T_h + T_h
     if unit.mode.mesh != INSIDE:
-        return Vector(y.q + angle, w, y.i, y.T_w + T_w, y.T_h + T_h, y.q + angle + law.ahead, w)
+        after.q, after.w = y.q + angle, w
+        after.q_m, after.w_m = y.q + angle + law.ahead, w
+        return
     way = v = 0.0
     if law.apart > 0.0:
         for n in range(terms, -1, -1):
             v = v * s + unit.output[n]
             way = way * s + unit.output[n] * _INVERSES[n + 1]
         way *= s
-    return Vector(y.q + way, v, y.i, y.T_w + T_w, y.T_h + T_h, y.q_m + angle, w)
+    after.q, after.w, after.q_m, after.w_m = y.q + way, v, y.q_m + angle, w
+
+
+def state_at(unit: Any, terms: int, s: float) -> Vector:
+    """Return the state of a servo s [s] after the beginning of a leg; that at its end is put back."""
+    if unit.active == 0:
+        return unit_state(unit.y)
+    end = unit_state(unit.after)
+    put_after(unit, terms, s)
+    found = unit_state(unit.after)
+    put_unit_state(unit.after, end)
+    return found
 
 
 def voltage_at(common: Any, s: float) -> float:

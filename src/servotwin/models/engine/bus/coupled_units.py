@@ -32,6 +32,8 @@ class Law(NamedTuple):
     K_b: float
     K_slope: float  # of K per kelvin of the housing
     K_b_slope: float
+    per_heat: float  # by how much the winding warms per joule [K/J], and the housing
+    per_flow: float
     drop: float
     conducts: float  # one by that of the loop; 0: no current flows
     moves: float  # 1: what the motor turns moves
@@ -54,19 +56,35 @@ class Law(NamedTuple):
 
 
 class Unit(NamedTuple):
-    """A servo; times by its own clock [s]."""
+    """A servo; times by its own clock [s]. What legs look at stands first."""
 
-    place: int  # where its memory stands among those of all
-    lane: int  # where its numbers do
-    given: Numbers
-    numbers: Numbers  # at its duty, as on a stiff source
-    duty: float  # nan: not found out yet
+    active: int  # 1: it moves, or gets warm
+    kinds: int  # of guards that can end its mode
     sign: float  # which part of the bus voltage is in its circuit, with its sign; 0: none
+    back: float  # the last coefficient of the voltage that speed, drops and warming take, but for s V
+    bend: float  # h² max|ẅ| of what the motor turns
+    field: float  # what warming magnets add to the next current's torque
+    warming: float  # what warming adds to the voltage along the winding
+    hot: int  # coefficients of temperatures that count
+    mild: int  # of the housing's alone
     open: int  # 1: diodes lead back to the supply
     anew: int  # 1: another duty than when its mode was found
-    torque: float  # of its load, the external one [N m]
+    short: int  # legs in a row that took no time
+    law: Law
     mode: Mode
     y: Vector
+    after: Vector  # the state at the end of a leg
+    speed: Coefficients
+    output: Coefficients
+    current: Coefficients
+    fall: Coefficients  # of the voltage along the winding
+    winding: Coefficients  # temperature [K]
+    housing: Coefficients
+    course: Course  # of a guard, in parts of a leg
+    place: int  # where its memory stands among those of all
+    lane: int  # where its numbers do
+    duty: float  # nan: not found out yet
+    torque: float  # of its load, the external one [N m]
     time: float
     due: float  # when its program does something next
     last: float  # how far it may go
@@ -74,23 +92,8 @@ class Unit(NamedTuple):
     frames: int
     origin: float
     tick: float  # how long one lasts
-    law: Law
-    active: int  # 1: it moves, or gets warm
-    kinds: int  # of guards that can end its mode
-    short: int  # legs in a row that took no time
-    speed: Coefficients
-    output: Coefficients
-    current: Coefficients
-    fall: Coefficients  # of the voltage along the winding
-    winding: Coefficients  # temperature [K]
-    housing: Coefficients
-    hot: int  # coefficients of temperatures that count
-    mild: int  # of the housing's alone
-    back: float  # the last coefficient of the voltage that speed, drops and warming take, but for s V
-    warming: float  # what warming adds to that along the winding
-    bend: float  # h² max|ẅ| of what the motor turns
-    course: Course  # of a guard, in parts of a leg
-    after: Vector  # the state at the end of a leg
+    numbers: Numbers  # at its duty, as on a stiff source
+    given: Numbers
 
 
 class Coupling(NamedTuple):
