@@ -20,7 +20,7 @@ from servotwin.physics.thermal import heat_flow
 _LONGEST = 0.5  # of a series, in times of its fastest rate
 _ROUNDING = 1e-17  # of a term
 _INVERSES = (0.0, *(1.0 / n for n in range(1, TERMS + 1)))
-_PER_KELVIN = 1e-2  # what a kelvin counts beside a radian per second
+_PER_KELVIN = 1e-3  # what a kelvin counts beside a radian per second; of 300 K a float has 6e-14
 _FEW = 3  # terms of temperatures at least
 
 
@@ -36,32 +36,28 @@ def longest(units: Any, count: int) -> float:
 
 def work_out(units: Any, count: int, common: Any, length: float) -> None:
     """Work out the series of all servos for a time [s], and where they are at its end."""
-    below = 1.0
+    below, back = 1.0, 0.0
     for k in range(count):
         unit = units[k]
-        below += common.R_b * unit.sign * unit.sign * unit.law.conducts
+        unit.draws = unit.sign * unit.law.conducts
+        below += common.R_b * unit.sign * unit.draws
         unit.back = unit.law.drop
         if unit.active != 0:
-            unit.speed[0] = unit.y.w_m if unit.law.moves > 0.0 else 0.0
-            unit.output[0], unit.winding[0], unit.housing[0] = unit.y.w, unit.y.T_w, unit.y.T_h
-            unit.bend, unit.hot, unit.mild, unit.warming, unit.field = 0.0, 0, 0, 0.0, 0.0
-            unit.back += unit.law.K_b * unit.speed[0]
+            _begin(unit)
+        back += unit.draws * unit.back
+    per_volt = 1.0 / below
     n, power, common.bend = 0, length, 0.0
     while n < TERMS - 1:
-        V = common.V if n == 0 else 0.0
-        back = 0.0
-        for k in range(count):
-            unit = units[k]
-            if unit.active != 0 or n == 0:
-                back += unit.sign * unit.back * unit.law.conducts
-        V = (V + common.R_b * back) / below
+        V = ((common.V if n == 0 else 0.0) + common.R_b * back) * per_volt
         common.voltage[n] = V
         common.bend += n * (n - 1) * abs(V) * power / length
         size = 0.0 if n == 0 else abs(V) / length
+        back, bends = 0.0, (n + 1) * n * power
         for k in range(count):
             unit = units[k]
             if unit.active != 0:
-                size = max(size, _next(unit, n, V, power))
+                size = max(size, _next(unit, n, V, power, bends))
+                back += unit.draws * unit.back
         n += 1
         if size * power < _ROUNDING:
             break
@@ -73,10 +69,18 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
     common.then = voltage_at(common, length)
 
 
-def _next(unit: Any, n: int, V: float, power: float) -> float:
+def _begin(unit: Any) -> None:
+    law, y = unit.law, unit.y
+    unit.speed[0] = y.w_m if law.moves > 0.0 else 0.0
+    unit.output[0], unit.winding[0], unit.housing[0] = y.w, y.T_w, y.T_h
+    unit.bend, unit.hot, unit.mild, unit.warming, unit.field = 0.0, 0, 0, 0.0, 0.0
+    unit.back += law.K_b * unit.speed[0]
+
+
+def _next(unit: Any, n: int, V: float, power: float, bends: float) -> float:
     """Work out what follows on the n-th coefficient of the bus voltage; return how large it is.
 
-    `power` is the (n + 1)-th of the duration.
+    `power` is the (n + 1)-th of the duration, `bends` how often that counts of how much a speed bends.
     """
     law, over = unit.law, _INVERSES[n + 1]
     i = (unit.sign * V - unit.back) * law.conducts
@@ -90,7 +94,7 @@ def _next(unit: Any, n: int, V: float, power: float) -> float:
         dw, dv = dw + law.pull, dv + law.output_pull
     dw, dv = law.moves * dw * over, law.apart * dv * over
     unit.speed[n + 1], unit.output[n + 1] = dw, dv
-    unit.bend += (n + 1) * n * abs(dw) * power
+    unit.bend += bends * abs(dw)
     unit.back = law.K_b * dw
     size: float = max(abs(dw), abs(dv))
     return max(size, _warm_up(unit, n, power)) if hot else size

@@ -108,7 +108,8 @@ def serve(told: Any, firms: Any, count: int, units: Any, common: Any) -> int:
         unit = units[k]
         if unit.due <= unit.time + unit.slack:
             due = True
-            _apply(inputs_at(told, unit), firms[unit.place], unit)
+            if firms[unit.place].waiting > 0:
+                _apply(inputs_at(told, unit), firms[unit.place], unit)
     if settle(units, count, common) == LEFT or not is_plain(units, count, common, common.now, False):
         return LEFT  # before anything is measured
     if not due:
