@@ -23,8 +23,8 @@ _RISES = 50  # halvings of a leg, to see a guard that starts at zero rise
 
 def first_below(unit: Any, kind: int, terms: int, length: float) -> float:
     """Return when a guard of a servo falls below zero along a leg [s]; inf: it does not."""
-    bend = _put_course(unit, kind, terms, length)
-    first, last = unit.course[0], _value(unit.course, terms, 1.0)
+    bend, last = _put_course(unit, kind, terms, length)
+    first = unit.course[0]
     if first < guards.BELOW:  # what another one did has ended this mode too
         return 0.0
     if last < guards.BELOW:
@@ -38,8 +38,8 @@ def first_below(unit: Any, kind: int, terms: int, length: float) -> float:
     return length * _crossing(unit.course, terms, lowest, least, _INSTANT / length)
 
 
-def _put_course(unit: Any, kind: int, terms: int, length: float) -> float:
-    """Write a guard of a servo as a series in parts of a leg; return a bound of its second derivative."""
+def _put_course(unit: Any, kind: int, terms: int, length: float) -> tuple[float, float]:
+    """Write a guard of a servo as a series in parts of a leg; return a bound of its second derivative, and its end."""
     y, law, mode, start = unit.y, unit.law, unit.mode, 0.0
     motor = output = 0.0  # what counts of the speed of what the motor turns, and of the output's alone
     angle = True
@@ -66,24 +66,35 @@ def _put_course(unit: Any, kind: int, terms: int, length: float) -> float:
     return _in_parts(unit, angle, start, motor, output, terms, length)
 
 
-def _in_parts(unit: Any, angle: bool, start: float, motor: float, output: float, terms: int, length: float) -> float:
-    bend, power = 0.0, 1.0
+def _in_parts(unit: Any, angle: bool, start: float, motor: float, output: float, terms: int,
+              length: float) -> tuple[float, float]:
+    """Write what begins so and turns with these parts of both speeds, or is them."""
+    bend, power, lag = 0.0, 1.0, 1 if angle else 0
     unit.course[0] = start
     if not angle:
-        unit.course[0] = start + motor * unit.speed[0] + output * unit.output[0]
-        for n in range(1, terms + 1):
-            power *= length
-            c = (motor * unit.speed[n] + output * unit.output[n]) * power
-            unit.course[n] = c
-            bend += n * (n - 1) * abs(c)
-        unit.course[terms + 1] = 0.0
-        return bend
-    for n in range(1, terms + 2):
+        unit.course[0] += _of_both(unit, motor, output, 0)
+    end = unit.course[0]
+    for n in range(1, terms + 1 + lag):
         power *= length
-        c = (motor * unit.speed[n - 1] + output * unit.output[n - 1]) * power / n
+        c = _of_both(unit, motor, output, n - lag) * power
+        if angle:
+            c /= n
         unit.course[n] = c
+        end += c
         bend += n * (n - 1) * abs(c)
-    return bend
+    if not angle:
+        unit.course[terms + 1] = 0.0
+    return bend, end
+
+
+def _of_both(unit: Any, motor: float, output: float, n: int) -> float:
+    """Return a coefficient of so much of both speeds; of one that does not count it may be anything."""
+    c = 0.0
+    if motor != 0.0:
+        c = motor * unit.speed[n]
+    if output != 0.0:
+        c += output * unit.output[n]
+    return c
 
 
 def _value(course: Any, terms: int, x: float) -> float:

@@ -18,9 +18,9 @@ from servotwin.models.state.modes import INSIDE, Vector
 from servotwin.physics.thermal import heat_flow
 
 _LONGEST = 0.5  # of a series, in times of its fastest rate
-_ROUNDING = 1e-17  # of a term
+_ROUNDING = 1e-16  # of a term
 _INVERSES = (0.0, *(1.0 / n for n in range(1, TERMS + 1)))
-_PER_KELVIN = 1e-3  # what a kelvin counts beside a radian per second; of 300 K a float has 6e-14
+_PER_KELVIN = 1e-2  # what a kelvin counts beside a radian per second; a float has 6e-14 of 300 K
 _FEW = 3  # terms of temperatures at least
 
 
@@ -45,10 +45,10 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
         if unit.active != 0:
             _begin(unit)
         back += unit.draws * unit.back
-    per_volt = 1.0 / below
+    per_volt, sag = common.V / below, common.R_b / below
     n, power, common.bend = 0, length, 0.0
     while n < TERMS - 1:
-        V = ((common.V if n == 0 else 0.0) + common.R_b * back) * per_volt
+        V = sag * back + (per_volt if n == 0 else 0.0)
         common.voltage[n] = V
         common.bend += n * (n - 1) * abs(V) * power / length
         size = 0.0 if n == 0 else abs(V) / length
@@ -71,6 +71,7 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
 
 def _begin(unit: Any) -> None:
     law, y = unit.law, unit.y
+    unit.gain = law.per_torque * law.K
     unit.speed[0] = y.w_m if law.moves > 0.0 else 0.0
     unit.output[0], unit.winding[0], unit.housing[0] = y.w, y.T_w, y.T_h
     unit.bend, unit.hot, unit.mild, unit.warming, unit.field = 0.0, 0, 0, 0.0, 0.0
@@ -83,20 +84,22 @@ def _next(unit: Any, n: int, V: float, power: float, bends: float) -> float:
     `power` is the (n + 1)-th of the duration, `bends` how often that counts of how much a speed bends.
     """
     law, over = unit.law, _INVERSES[n + 1]
-    i = (unit.sign * V - unit.back) * law.conducts
-    torque, hot = law.K * i, law.R_slope != 0.0 and unit.hot == n
+    i, hot = unit.draws * V - unit.back * law.conducts, law.R_slope != 0.0 and unit.hot == n
+    slowed = law.rate * unit.speed[n]
     if hot:
         unit.current[n] = i
-        torque += unit.field
-    dw = -law.rate * unit.speed[n] + law.per_torque * torque
-    dv = -law.output_rate * unit.output[n]
+        slowed -= law.per_torque * unit.field
     if n == 0:
-        dw, dv = dw + law.pull, dv + law.output_pull
-    dw, dv = law.moves * dw * over, law.apart * dv * over
-    unit.speed[n + 1], unit.output[n + 1] = dw, dv
-    unit.bend += bends * abs(dw)
+        slowed -= law.pull
+    dw: float = (unit.gain * i - slowed) * (law.moves * over)
+    size = abs(dw)
+    unit.speed[n + 1] = dw
+    unit.bend += bends * size
     unit.back = law.K_b * dw
-    size: float = max(abs(dw), abs(dv))
+    if law.apart > 0.0:
+        dv: float = ((law.output_pull if n == 0 else 0.0) - law.output_rate * unit.output[n]) * over
+        unit.output[n + 1] = dv
+        size = max(size, abs(dv))
     return max(size, _warm_up(unit, n, power)) if hot else size
 
 
@@ -107,13 +110,14 @@ def _warm_up(unit: Any, n: int, power: float) -> float:
     """
     law, own = unit.law, unit.numbers.heat
     unit.fall[n] = law.winding * unit.current[n] + unit.warming
-    loss, warming, field, back = unit.current[0] * unit.fall[n], 0.0, 0.0, 0.0
+    loss = warming = field = back = 0.0
     for m in range(1, n + 1):
         loss += unit.current[m] * unit.fall[n - m]
-        warming += unit.winding[m] * unit.current[n + 1 - m]
+        warming += unit.winding[n + 1 - m] * unit.current[m]
+    loss += unit.current[0] * unit.fall[n]
     flow = heat_flow(unit.winding[n], unit.housing[n], own.G_wh)
     lost = heat_flow(unit.housing[n], own.T_amb if n == 0 else 0.0, own.G_ha)
-    dT_w, dT_h = (loss - flow) * law.per_heat * _INVERSES[n + 1], (flow - lost) * law.per_flow * _INVERSES[n + 1]
+    dT_w, dT_h = (loss - flow) * (law.per_heat * _INVERSES[n + 1]), (flow - lost) * (law.per_flow * _INVERSES[n + 1])
     unit.winding[n + 1], unit.housing[n + 1] = dT_w, dT_h
     size = _PER_KELVIN * max(abs(dT_w), abs(dT_h))
     if n < _FEW or size * power > _ROUNDING:

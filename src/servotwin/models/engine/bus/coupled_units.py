@@ -62,6 +62,7 @@ class Unit(NamedTuple):
     kinds: int  # of guards that can end its mode
     sign: float  # which part of the bus voltage is in its circuit, with its sign; 0: none
     draws: float  # from the bus, of a volt in its circuit [A]
+    gain: float  # acceleration per ampere [rad/s²/A]
     back: float  # the last coefficient of the voltage that speed, drops and warming take, but for s V
     bend: float  # h² max|ẅ| of what the motor turns
     field: float  # what warming magnets add to the next current's torque
