@@ -122,7 +122,7 @@ def _slope_and_bend(course: Any, terms: int, x: float) -> tuple[float, float]:
 
 def _lowest(course: Any, terms: int) -> float:
     """Return where a guard is least that turns once at most, 0 or 1 where that is at an end: where its slope rises."""
-    a, slope = 0.0, course[1]
+    a, slope = 0.0, float(course[1])
     b, end = 1.0, _slope_and_bend(course, terms, 1.0)[0]
     if slope >= 0.0 or end <= 0.0:
         return 0.5 if slope > 0.0 and end > 0.0 else 0.0
@@ -147,7 +147,7 @@ def _crossing(course: Any, terms: int, b: float, f_b: float, instant: float) -> 
 
     Both in parts of a leg. Where a step would lead out of what is known to hold the root, half of that is taken.
     """
-    a, f_a = 0.0, course[0]
+    a, f_a = 0.0, float(course[0])
     if f_a <= -guards.BELOW:  # it starts at zero, to rounding: look whether it rises before it falls
         for _ in range(_RISES):
             a = 0.5 * b

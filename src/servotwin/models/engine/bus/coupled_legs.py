@@ -259,7 +259,7 @@ def doubtful(unit: Any, common: Any, length: float) -> int:
         kinds |= _by_torque(unit, x0, x, bend_x)
     elif not moves and not constant:
         kinds |= _released(unit, u0, u, bend_x)
-    return kinds & unit.kinds
+    return kinds & int(unit.kinds)
 
 
 def _by_torque(unit: Any, x0: float, x: float, bend: float) -> int:
@@ -313,12 +313,12 @@ def _within_play(unit: Any, bend: float, length: float) -> bool:
     ahead = y.q_m - y.q
     most = length * max(max(y.w_m, after.w_m) + 0.125 * bend - min(y.w, after.w), 0.0)
     least = length * min(min(y.w_m, after.w_m) - 0.125 * bend - max(y.w, after.w), 0.0)
-    return ahead + most < half and ahead + least > -half
+    return bool(ahead + most < half and ahead + least > -half)
 
 
 def _released(unit: Any, u0: float, u: float, bend: float) -> int:
     """Return which guards may fall that keep what the motor turns at rest."""
-    kinds, margin = unit.kinds & _AT_REST, 2.0 * unit.law.K * unit.law.conducts * bend
+    kinds, margin = int(unit.kinds) & _AT_REST, 2.0 * unit.law.K * unit.law.conducts * bend
     if kinds == 0:
         return 0
     mode, after = unit_mode(unit.mode), unit_state(unit.after)

@@ -119,7 +119,7 @@ def _warm_up(unit: Any, n: int, power: float) -> float:
     lost = heat_flow(unit.housing[n], own.T_amb if n == 0 else 0.0, own.G_ha)
     dT_w, dT_h = (loss - flow) * (law.per_heat * _INVERSES[n + 1]), (flow - lost) * (law.per_flow * _INVERSES[n + 1])
     unit.winding[n + 1], unit.housing[n + 1] = dT_w, dT_h
-    size = _PER_KELVIN * max(abs(dT_w), abs(dT_h))
+    size: float = _PER_KELVIN * max(abs(dT_w), abs(dT_h))
     if n < _FEW or size * power > _ROUNDING:
         unit.hot = n + 1
     if _PER_KELVIN * abs(dT_h) * power > _ROUNDING:
