@@ -179,7 +179,7 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
                 return time - left
             for k in range(count):
                 if units[k].active != 0:
-                    units[k].short = 0
+                    units[k].short, units[k].mesh = 0, units[k].mode.mesh
                     put_unit_state(units[k].y, unit_state(units[k].after))
             common.now = common.then
             if length == left:
@@ -194,6 +194,7 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
             return time - left
         for k in range(count):
             if units[k].active != 0:
+                units[k].mesh = units[k].mode.mesh
                 put_unit_state(units[k].y, unit_state(units[k].after))
         common.now = common.then
         _cross(units[whose], kind, common.now, end, time)
@@ -209,6 +210,7 @@ def _cross(unit: Any, kind: int, V: float, end: float, time: float) -> None:
     unit.short = unit.short + 1 if end <= SHORT * time else 0
     if unit.short >= MOST_SHORT and play.present(numbers.play):
         _, mode, y = legs.together(warm(numbers, y), mode, u, unit.torque, y)
+    unit.mesh = mode.mesh
     put_unit_mode(unit.mode, mode)
     put_unit_state(unit.y, y)
     put_law_of(unit)

@@ -54,6 +54,7 @@ class Unit(NamedTuple):
     anew: int  # 1: another duty than when its mode was found
     torque: float  # of its load, the external one [N m]
     mode: Mode
+    mesh: int  # of the mode in which it came to its state: what is found there under another voltage may not hold
     y: Vector
     time: float
     due: float  # when its program does something next
