@@ -187,6 +187,13 @@ def test_a_fleet_goes_and_spends_as_the_reference(name):
     check_bus(QUICK[name][0])
 
 
+def test_teeth_that_press_at_the_limit_of_a_supply_keep_pressing():
+    """Under the voltage that the supply would have without its limit they part: 1e-10 rad in these 60 ms."""
+    one, call = case(3)
+    found = check_lanes(one._replace(duration=0.06), call)
+    assert deviations(found)[0].max() <= 1e-11
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LONG)
 def test_long_runs_are_those_of_the_reference(name):

@@ -14,7 +14,7 @@ from servotwin.models import BoundedServo, DigitalServo, PulseServo, PulseServoI
 from servotwin.physics.gear import output_torque
 from servotwin.simulation.arrival import resolution
 from servotwin.simulation.rest import rest_of
-from servotwin.simulation.simulator import simulate
+from servotwin.simulation.servo_run import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable

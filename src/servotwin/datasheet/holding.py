@@ -12,7 +12,7 @@ from servotwin.datasheet.conditions import changed
 from servotwin.datasheet.guesses import Span, spans
 from servotwin.models import DigitalServo, mid_travel
 from servotwin.models.outputs import warm_plant
-from servotwin.simulation.simulator import simulate
+from servotwin.simulation.servo_run import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -37,7 +37,7 @@ PULSE_RANGE = (3e-4, 2.7e-3)  # s, of what chips accept where the servo does not
 
 
 class Place(NamedTuple):
-    """A state: its signal name, its name in `engine.modes.Vector`, and the factor from there to the signal."""
+    """A state: its signal name, its name in `state.modes.Vector`, and the factor from there to the signal."""
 
     name: str
     at: str

@@ -8,7 +8,8 @@ from servotwin.simulation.engine import Event, State
 from servotwin.simulation.metrics import StepMetrics
 from servotwin.simulation.rest import Rest
 from servotwin.simulation.result import Result, Stats
-from servotwin.simulation.simulator import Simulator, simulate
+from servotwin.simulation.servo_run import simulate
+from servotwin.simulation.simulator import Simulator
 from servotwin.simulation.status import Status
 
 if TYPE_CHECKING:

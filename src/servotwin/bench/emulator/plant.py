@@ -15,7 +15,7 @@ from servotwin.models.switched import SwitchedServo
 from servotwin.physics.pieces import Piece, Pieces
 from servotwin.signals import Signal
 from servotwin.simulation import Simulator, State
-from servotwin.simulation.simulator import simulated
+from servotwin.simulation.servo_run import simulated
 from servotwin.simulation.times import times_asked
 from servotwin.units import is_finite
 

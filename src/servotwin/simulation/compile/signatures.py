@@ -38,7 +38,7 @@ Signature = tuple[str, tuple[Kind, ...]]
 _FLOATS, _TABLE, _CUBE = (Array(FLOAT64, dimensions) for dimensions in (1, 2, 3))
 _INDICES, _SMALLS, _SMALL_TABLE = Array(INT64, 1), Array(INT8, 1), Array(INT8, 2)
 FORMS = ("ONE_FORMULA", "ARCS", "BANDS", "STRIDES", "COILS", "GAPS")
-"""Names of the ways in which tiles go through phases, in `models.engine.tiles`."""
+"""Names of the ways in which tiles go through phases, in `models.engine.batch.tiles`."""
 
 
 def _records(dtype: np.dtype[Any]) -> Array:

@@ -323,9 +323,7 @@ class Values:
         self.writes = self.writes or function.writes
         if function.result is not None:
             return function.result
-        if name in c_functions.VOID:
-            return None
-        return self._widest(kinds)
+        return None if name in c_functions.VOID else self._widest(kinds)
 
     def _widest(self, kinds: Sequence[Kind | None]) -> Kind:
         return FLOAT32 if FLOAT32 in kinds and FLOAT64 not in kinds else FLOAT64

@@ -13,7 +13,8 @@ from servotwin.errors import SimulationError, UnknownNameError
 from servotwin.models.outputs import SIGNALS
 from servotwin.simulation import files, frames
 from servotwin.simulation.remarks import LaneRemark
-from servotwin.simulation.simulator import Simulator, simulated
+from servotwin.simulation.servo_run import simulated
+from servotwin.simulation.simulator import Simulator
 from servotwin.simulation.status import Status
 
 if TYPE_CHECKING:

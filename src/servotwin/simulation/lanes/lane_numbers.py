@@ -48,7 +48,7 @@ class LaneNumbers:
 
     Attributes
     ----------
-    columns : models.engine.tiles.Lanes
+    columns : models.engine.batch.tiles.Lanes
     available : tuple of str
         Names of the signals, `time` apart.
     reduction : ndarray, shape (lanes,)

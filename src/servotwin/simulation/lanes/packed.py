@@ -43,7 +43,7 @@ class Packed(NamedTuple):
     ----------
     law : str
         "voltage", "bounded", "pulse" or "digital".
-    lanes : models.engine.tiles.Lanes
+    lanes : models.engine.batch.tiles.Lanes
         Numbers, chips, torque and firmware as named tuples, each number one for all lanes or an array (B,); firmware
         is None where there is no program. Pieces are armature voltages or v_c [V] for "voltage" and "bounded", widths
         of pulses [s] for "pulse", either these or goals [rad] for "digital".
@@ -157,7 +157,7 @@ class Work:
     packed : Packed
     asked : Asked
     fields : tuple of str
-        Of "angle" [rad], "speed" [rad/s], "contact" (`engine.modes.FREE` … `ON_UPPER`), "drive" (−1, 0, +1),
+        Of "angle" [rad], "speed" [rad/s], "contact" (`state.modes.FREE` … `ON_UPPER`), "drive" (−1, 0, +1),
         "error" (of the latest decision [s]), "wiper" (of the potentiometer [rad]) and "current" (of an armature with
         inductance [A], else 0), or of `MORE_FIELDS`; only these are computed and kept.
     """
@@ -188,7 +188,7 @@ class Raw:
     refused : ndarray of float64, shape (B,)
         From when on all pulses are refused [s]; nan where the last one is not.
     marks : ndarray of int8, shape (B,)
-        Sums of `engine.ending.ON_STOP` and `CANNOT_HOLD`.
+        Sums of `engine.cosim.final_checks.ON_STOP` and `CANNOT_HOLD`.
     """
 
     fields: dict[str, NDArray[np.generic]]

@@ -16,7 +16,7 @@ class Common(NamedTuple):
     """What lanes on shared supplies remember together.
 
     Each lane's bus and its place among those that move together there (−1: none), shape (lanes,); and a record of
-    `models.engine.seats.Shared` for each bus.
+    `models.engine.bus.bus_records.Shared` for each bus.
     """
 
     bus_of: NDArray[np.int64]

@@ -138,7 +138,7 @@ def _got_up(seat: Any, unit: Any) -> bool:
     Its motion begins anew, also where no time has gone by: its program may have worked.
     """
     y, went = unit_state(unit.y), unit.time > seat.point.time
-    put_point(seat.point, Point(unit.time, y, Mode(0, 0, unit.mode.mesh, 0, 0), math.inf, y, seat.point.step, y.q))
+    put_point(seat.point, Point(unit.time, y, Mode(0, 0, unit.mesh, 0, 0), math.inf, y, seat.point.step, y.q))
     seat.joined = -1
     return bool(went and FRAMES * seat.beat <= unit.time < seat.until)
 

@@ -2,7 +2,7 @@
 
 Each has a clock of its own, by which its frames come; the bus has that of the first. The end of a run, or of a
 servo's present inputs, is the same instant by both clocks, however their difference is rounded. The functions take
-records of `seats.Seat`.
+records of `bus_records.Seat`.
 """
 
 from __future__ import annotations

@@ -174,18 +174,12 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
             return time
         length = min(left, coupled_series.longest(units, count))
         coupled_series.work_out(units, count, common, length)
-        whose, kind, end = -1, -1, length
-        for k in range(count):
-            kinds = doubtful(units[k], common, length)
-            if kinds != 0:
-                found, s = first_end(units[k], common, kinds, end, whose < 0)
-                if found >= 0:
-                    whose, kind, end = k, found, s
+        whose, kind, end = _ending(units, count, common, length)
         if whose < 0:
             if not is_plain(units, count, common, common.then, True):
                 return time - left
             for k in range(count):
-                units[k].short = 0
+                units[k].short = 0 if units[k].active != 0 else units[k].short
             _arrive(units, count, common)
             if length == left:
                 return time
@@ -204,10 +198,23 @@ def go(units: Any, count: int, common: Any, time: float) -> float:
     return time - left
 
 
+def _ending(units: Any, count: int, common: Any, length: float) -> tuple[int, int, float]:
+    """Return whose event ends a leg first (−1: nobody's), of which kind, and when [s]."""
+    whose, kind, end = -1, -1, length
+    for k in range(count):
+        kinds = doubtful(units[k], common, length)
+        if kinds != 0:
+            found, s = first_end(units[k], common, kinds, end, whose < 0)
+            if found >= 0:
+                whose, kind, end = k, found, s
+    return whose, kind, end
+
+
 def _arrive(units: Any, count: int, common: Any) -> None:
     """Let servos be at the end of a leg."""
     for k in range(count):
         if units[k].active != 0:
+            units[k].mesh = units[k].mode.mesh
             put_unit_state(units[k].y, unit_state(units[k].after))
             follow(units[k])
     common.now = common.then
@@ -220,6 +227,7 @@ def _cross(unit: Any, kind: int, V: float, end: float, time: float) -> None:
     unit.short = unit.short + 1 if end <= SHORT * time else 0
     if unit.short >= MOST_SHORT and play.present(numbers.play):
         _, mode, y = legs.together(warm(numbers, y), mode, u, unit.torque, y)
+    unit.mesh = mode.mesh
     put_unit_mode(unit.mode, mode)
     put_unit_state(unit.y, y)
     put_law_of(unit)

@@ -1,6 +1,6 @@
 """Servos whose motors are connected to one source at the same time: their common motion, and what ends it.
 
-The functions take records of `seats.Mate`, of which the first `shared.members` move together.
+The functions take records of `bus_records.Mate`, of which the first `shared.members` move together.
 """
 
 from __future__ import annotations

@@ -80,7 +80,7 @@ def _go(told: Told, inputs: Inputs, memory: Memory, firms: Any, until: float, ti
             done = _show(units, common, unit.time + time, until, times, done, outputs, firms)
         if coupled_ticks.move(units, 1, common[0], time) == LEFT:
             break
-    return Gone(unit.time, unit_state(unit.y), unit.mode.mesh, done, serves)
+    return Gone(unit.time, unit_state(unit.y), unit.mesh, done, serves)
 
 
 def _show(units: Any, common: Any, end: float, until: float, times: Floats, done: int, outputs: Floats,

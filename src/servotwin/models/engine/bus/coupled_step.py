@@ -1,6 +1,6 @@
 """How servos on one source move together: all linear, as power series exact to rounding; else by one explicit step.
 
-The functions take the first `count` records of `seats.Mate`, whose motions begin at their `start`.
+The functions take the first `count` records of `bus_records.Mate`, whose motions begin at their `start`.
 """
 
 from __future__ import annotations

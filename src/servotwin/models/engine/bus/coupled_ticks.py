@@ -52,7 +52,7 @@ def sit(unit: Any, inputs: Inputs, memory: Memory, until: float) -> None:
     unit.tick, unit.slack, unit.torque = program.T_c, SAME * program.T_c, inputs.constant_torque
     put_unit_state(unit.y, memory.point.y)
     mode.zone, mode.contact, mode.mesh, mode.motor, mode.share = 0, 0, memory.point.mode.mesh, 0, 0
-    unit.short, unit.active = 0, 0
+    unit.mesh, unit.short, unit.active = mode.mesh, 0, 0
 
 
 def go(told: Any, firms: Any, count: int, units: Any, common: Any) -> None:

@@ -74,6 +74,7 @@ class Unit(NamedTuple):
     short: int  # legs in a row that took no time
     law: Law
     mode: Mode
+    mesh: int  # of the mode in which it came to its state: what is found there under another voltage may not hold
     y: Vector
     after: Vector  # the state at the end of a leg
     speed: Coefficients

@@ -3,7 +3,7 @@
 A servo takes part, as a mate of the others, while its bridge connects the motor to the bus: with the sign of the drive,
 or through the diodes of a coasting bridge against the sign of its current. Its numbers are then those of a stiff
 source, and u = s V_bus, where s is the sign, or the duty of a bridge under PWM: an ideal transformer, which takes s i.
-The functions take the first `count` records of `seats.Mate`, each as it stands at its `y`.
+The functions take the first `count` records of `bus_records.Mate`, each as it stands at its `y`.
 """
 
 from __future__ import annotations

@@ -28,6 +28,8 @@ export class Bench extends EventTarget {
     this.scene = "";
     /** @type {Map<number, {done: (found: any) => void, failed: (error: Error) => void}>} */
     this.waiting = new Map();
+    /** @type {Set<() => void>} what is said with the next frame */
+    this.soon = new Set();
     this.number = 0;
     this.attempt = 0;
     /** @type {Record<string, string|number|boolean>} how it is looked at: part of its text, and so of a link */
@@ -69,6 +71,7 @@ export class Bench extends EventTarget {
    * @returns {Promise<any>}
    */
   ask(message) {
+    this.sayNow();
     this.number += 1;
     const id = this.number;
     const answer = new Promise((done, failed) => this.waiting.set(id, { done, failed }));
@@ -89,6 +92,25 @@ export class Bench extends EventTarget {
       this.notice(error instanceof Error ? error.message : String(error));
       return null;
     }
+  }
+
+  /**
+   * Say something at most once a frame, and before all that is said later, so that the order is that of the hand.
+   * @param {() => void} say
+   * @returns {() => void}
+   */
+  onceAFrame(say) {
+    return () => {
+      if (this.soon.has(say)) return;
+      this.soon.add(say);
+      requestAnimationFrame(() => { if (this.soon.has(say)) this.sayNow(); });
+    };
+  }
+
+  sayNow() {
+    const all = [...this.soon];
+    this.soon.clear();
+    all.forEach((say) => say());
   }
 
   /** @param {string} line */

@@ -1,6 +1,6 @@
 // The paper's control circuit: what it feels of the servo's supply, and when its program reads the command.
 
-import { onceAFrame, panel } from "./dom.js";
+import { panel } from "./dom.js";
 import { slider } from "./slider.js";
 
 const FIELDS = /** @type {[string, string, string, number, number, number][]} */ ([ // name, label, unit, factor, highest, usual
@@ -16,7 +16,7 @@ export function mount(root, bench) {
     if (!state.control) { body.replaceChildren(); return; }
     body.replaceChildren(...FIELDS.map(([name, label, unit, factor, high, usual]) => {
       let next = 0;
-      const send = onceAFrame(() => bench.tell({ do: "control", value: { [name]: next / factor } }));
+      const send = bench.onceAFrame(() => bench.tell({ do: "control", value: { [name]: next / factor } }));
       return slider({ label, unit, low: 0, high, value: factor * (state.control[name] ?? usual), title: name,
         changed: (value) => { next = value; send(); } }).row;
     }));

@@ -1,6 +1,6 @@
 // What the servos are told: a slider, a gamepad, and commands with a shape.
 
-import { READABLE, choice, el, onceAFrame, paced, panel, unique } from "./dom.js";
+import { READABLE, choice, el, paced, panel, unique } from "./dom.js";
 import { slider } from "./slider.js";
 
 /** Fields of each shape: [name, label, unit or "command", usual value]. */
@@ -35,7 +35,7 @@ export function mount(root, bench) {
   let value = 1500;
   let touched = -Infinity;
   let shape = "step";
-  const told = onceAFrame(() => bench.tell({ do: "command", value: { shape: "hold", value, unit } }));
+  const told = bench.onceAFrame(() => bench.tell({ do: "command", value: { shape: "hold", value, unit } }));
   const send = () => { touched = performance.now(); told(); }; // from now on nothing but a hand moves the slider
   const units = choice("Told in", [], (chosen) => { unit = /** @type {Unit} */ (chosen); bench.look({ "command.unit": unit }); begin(); });
   const shapes = choice("Shape", [...Object.keys(SHAPES), RECORD].map((name) => [name, name]), (chosen) => { shape = chosen; form(); });

@@ -1,6 +1,6 @@
 // What the servo hangs on and what hangs on it, and the numbers of its chip that matter most.
 
-import { choice, el, onceAFrame, panel } from "./dom.js";
+import { choice, el, panel } from "./dom.js";
 import { slider } from "./slider.js";
 
 const MOST = [ // parameters that stand here; all others are found in the search
@@ -29,7 +29,7 @@ export function mount(root, bench) {
     const unit = small ? "mN m" : of.shown.unit;
     const factor = small ? 1e-3 : of.shown.factor;
     let next = 0;
-    const send = onceAFrame(() => set(of.name, next));
+    const send = bench.onceAFrame(() => set(of.name, next));
     const made = slider({ label, unit, low: low / factor, high: high / factor,
       value: of.value === null ? 0 : of.value / factor,
       title: [of.name, of.symbol, of.source].filter(Boolean).join(" · "),
@@ -41,7 +41,7 @@ export function mount(root, bench) {
   const frames = () => {
     let rate = bench.state.frame_rate ?? 50;
     let lost = Number([...bench.scene.matchAll(/^ *\[[^,]+, "frames", \{[^}]*lost = ([\d.e+-]+)/gm)].at(-1)?.[1] ?? 0);
-    const send = onceAFrame(() => bench.tell({ do: "frames", value: { rate, lost } }));
+    const send = bench.onceAFrame(() => bench.tell({ do: "frames", value: { rate, lost } }));
     return [
       slider({ label: "frame rate", unit: "Hz", low: 10, high: 400, value: rate, step: 1,
         changed: (value) => { rate = value; send(); } }).row,

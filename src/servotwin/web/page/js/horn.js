@@ -1,6 +1,6 @@
 // The horn that turns, drawn from the servo's size, with what hangs on it; it can be pushed by hand.
 
-import { READABLE, el, onceAFrame, paced } from "./dom.js";
+import { READABLE, el, paced } from "./dom.js";
 import { RING, belowOf, centre, drawServo, frame, hang, push, reachOf } from "./horn_draw.js";
 import { fullName } from "./names.js";
 import { engineering } from "./units.js";
@@ -84,7 +84,7 @@ export function mount(root, bench) {
   // --- the hand -----------------------------------------------------------------------------------------------------
 
   bench.on("push", () => holds.forEach((one) => one())); // a horn goes on under a hand that rests
-  const send = onceAFrame(() => {
+  const send = bench.onceAFrame(() => {
     if (torque === sent) return;
     sent = torque;
     force.textContent = torque ? `Your hand pushes with ${engineering(Math.abs(torque), "N m", 3)} towards ${
