@@ -116,12 +116,9 @@ def serve(told: Any, firms: Any, count: int, units: Any, common: Any) -> int:
         return DONE
     for k in range(count):
         unit = units[k]
-        if unit.due <= unit.time + unit.slack:
-            _tick(inputs_at(told, unit), firms[unit.place], unit, common.now)
-    for k in range(count):
-        unit = units[k]
-        if unit.due <= unit.time + unit.slack:
+        if unit.due <= unit.time + unit.slack:  # what it measures is of before, whatever others put on their bridges
             inputs = inputs_at(told, unit)
+            _tick(inputs, firms[unit.place], unit, common.now)
             _apply(inputs, firms[unit.place], unit)
             unit.due = controller.next_due(inputs.firmware[0], firms[unit.place], unit.frames)
     return settle(units, count, common)
