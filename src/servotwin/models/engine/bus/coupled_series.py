@@ -46,12 +46,12 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
             _begin(unit)
         back += unit.draws * unit.back
     per_volt, sag = common.V / below, common.R_b / below
-    n, power, common.bend = 0, length, 0.0
+    n, power, before, per_time, common.bend = 0, length, 1.0, 1.0 / length, 0.0
     while n < TERMS - 1:
         V = sag * back + (per_volt if n == 0 else 0.0)
         common.voltage[n] = V
-        common.bend += n * (n - 1) * abs(V) * power / length
-        size = 0.0 if n == 0 else abs(V) / length
+        common.bend += n * (n - 1) * abs(V) * before
+        size = 0.0 if n == 0 else abs(V) * per_time
         back, bends = 0.0, (n + 1) * n * power
         for k in range(count):
             unit = units[k]
@@ -61,7 +61,7 @@ def work_out(units: Any, count: int, common: Any, length: float) -> None:
         n += 1
         if size * power < _ROUNDING:
             break
-        power *= length
+        before, power = power, power * length
     common.terms = n
     for k in range(count):
         if units[k].active != 0:
