@@ -192,7 +192,8 @@ def _by_torque(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau
         if elastic.present(numbers.elastic):
             return mode.share * spring_contact.through_gear(numbers, mode.mesh, tau_m, tau, y), _share_rate(
                 numbers, mode, u, du, dtau, y, dy)
-        return mode.share * contacts.through_gear(numbers, mode.mesh, tau_m, tau, y), math.nan
+        return (mode.share * contacts.through_gear(numbers, mode.mesh, tau_m, tau, y),
+                _share_slope(numbers, mode, dtau, y, dy))
     if elastic.present(numbers.elastic):
         return _spring_guard(numbers, mode, kind, u, du, tau, dtau, y, dy)
     if play.present(numbers.play) and kind >= MEET_FORWARD:
@@ -212,6 +213,18 @@ def _share_rate(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, 
         against = dtau + slope + stiffness_at(numbers.load, y.q) * y.w
         tau_e = torque_on_gear(against, dy.w, numbers.shaft.b_out)
     return mode.share * friction.share(numbers.friction, motor.electromagnetic_torque(di, numbers.motor.K), tau_e)
+
+
+def _share_slope(numbers: Numbers, mode: Mode, dtau: float, y: Vector, dy: Vector) -> float:
+    """Return the rate of the guard of a share where the current has inertia; nan where it has none.
+
+    There the share goes with the speed, and one way where that does.
+    """
+    if not inductive(numbers.motor):
+        return math.nan
+    against = dtau + stiffness_at(numbers.load, y.q) * y.w
+    on_gear = torque_on_gear(against, dy.w, numbers.shaft.b_out) if mode.mesh != INSIDE else 0.0
+    return mode.share * friction.share(numbers.friction, motor.electromagnetic_torque(dy.i, numbers.motor.K), on_gear)
 
 
 def share_along(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:

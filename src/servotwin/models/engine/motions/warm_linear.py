@@ -1,0 +1,347 @@
+"""How a servo that warms up moves where its law is a straight line otherwise, with or without inductance.
+
+At the temperatures of its start shaft and current are exponentials, which are known however fast one of them fades.
+How far warming leads off them is small. It is followed at the five points of Radau's rule: the fast part by the rule,
+which is stable however fast it is, the slow one by its exponential. A polynomial through the points says what is
+between.
+
+Coefficients: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II", 2nd edition, Springer 1996, section
+IV.5 (Radau IIA).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from servotwin.models.engine.dynamics import coefficients, currents
+from servotwin.models.engine.dynamics.rates import rates_of
+from servotwin.models.engine.motions import first_order
+from servotwin.models.engine.motions.elementary import decay
+from servotwin.models.state.modes import INSIDE, RIGID, Mode, Vector, at_rest, constant_current
+from servotwin.models.terms import play
+from servotwin.models.terms.heat import Heat, warming_rates
+from servotwin.models.terms.motor import inductive
+from servotwin.models.terms.numbers import Numbers, warm
+from servotwin.physics.motor import steady_armature_current
+from servotwin.physics.thermal import REFERENCE_TEMPERATURE, magnet_factor, winding_resistance
+
+POINTS = 5
+_TWO, _ALL = 2 * POINTS, 5 * POINTS
+NODES = (0.05710419611451768, 0.2768430136381238, 0.5835904323689168, 0.8602401356562195, 1.0)
+_PLACES = (199.88739542347736, -127.022853068795, 92.10283313613321, -64.16737549081559, 25.2)
+_UP_TO = (
+    0.07299886431790333, -0.02673533110794557, 0.018676929763984353, -0.01287910609330644, 0.005042839233882015,
+    0.15377523147918246, 0.14621486784749352, -0.03644456890512809, 0.02123306311930472, -0.007935579902728777,
+    0.14006304568480987, 0.29896712949128346, 0.16758507013524895, -0.03396910168661774, 0.010944288744192253,
+    0.14489430810953477, 0.2765000687601592, 0.32579792291042103, 0.12875675325490976, -0.015708917378805327,
+    0.14371356079122594, 0.28135601514946207, 0.31182652297574126, 0.22310390108357075, 0.04,
+)
+_APART = 4.0  # times: the fast rate is more than the slow one
+_LONGEST = 0.8  # of a step, times 1/slow
+_RULE, _NINTH = 2e-11, 1.0 / 9.0  # error of the rule for e^x over 1, by x^9
+_LAG = 2500.0  # times 1/fast and a fifth root of the tolerance: of a step, for the current lags behind warming
+_USUAL = 1e-4  # by which warming changes a law within a step
+_PART = 0.1  # of the time in which temperatures change: of a step
+_PER_KELVIN = 0.1  # of an error of the temperature, to tell it as one of an angle
+_MARGIN = 3.0
+_NONE = 1e-200
+
+
+class Law(NamedTuple):
+    """What motor and current go by at the temperatures of the start; rates are 0 of what does not move."""
+
+    slow: float  # [1/s]
+    fast: float
+    apart: float  # 1/(fast − slow) [s]
+    dw: float  # rates at the start, and what ẍ + damping ẋ of either is
+    rw: float
+    di: float
+    ri: float
+    c_s: float  # by which what drives the slow part grows with the warming of the start, and the fast one
+    c_f: float
+    of_i: float  # the slow part is w + of_i i
+    of_w: float  # the fast one i + of_w w
+    per_ampere: float  # [rad/s²/A]
+    v: float  # of the loop [V]
+    R: float  # of the loop [Ω]; inf: the current stays
+    i: float  # the current that stays [A]
+    L: float  # [H]; 0: the current has no inertia, or stays
+    K_b: float
+    copper: float  # of the winding [Ω]
+    per_kelvin: float  # [Ω/K]
+    field: float  # [1/K]
+
+
+class Step(NamedTuple):
+    """The error of a step relative to 1 + |state|, and what says how it goes."""
+
+    error: float
+    dense: tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector]
+
+
+def law_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> Law:
+    """Return the law of a mode from a state on, under a voltage behind the bridge [V] and an external torque [N m]."""
+    now, zone = warm(numbers, y), mode.zone
+    dy = rates_of(numbers, mode, u, tau, y)
+    stays = constant_current(zone)
+    v, R = (0.0, math.inf) if stays else currents.loop(now, zone, u)
+    lags, turns = inductive(now.motor) and not stays, not at_rest(mode.motor if mode.mesh == INSIDE else mode.contact)
+    L, K_b = now.motor.L, now.motor.K_b
+    gain = coefficients.per_ampere(now, mode) if turns else 0.0
+    drag = coefficients.drag(now, mode) if turns else 0.0
+    own, magnet = numbers.motor.R, numbers.heat.magnet
+    grows = winding_resistance(REFERENCE_TEMPERATURE + 1.0, own) - own
+    field = magnet_factor(y.T_h, magnet)
+    rises = (magnet_factor(y.T_h + 1.0, magnet) - field) / field
+    slow, fast, apart, rw, ri, of_i, of_w = drag, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    dw, di = dy.w_m if turns else 0.0, dy.i
+    if lags and not turns:
+        fast = R / L
+    elif lags:
+        fade, brake = R / L, K_b / L
+        half = 0.5 * (fade - drag)
+        square = half * half - brake * gain
+        root = math.sqrt(square) if square > 0.0 else 0.0
+        of_i = gain / (half + root)
+        of_w = brake / (half + root)
+        slow, fast = drag + brake * of_i, fade - gain * of_w
+        apart = 1.0 / (fast - slow) if fast > _APART * slow else 0.0
+        rw = gain * di - drag * dw + (fade + drag) * dw
+        ri = -fade * di - brake * dw + (fade + drag) * di
+    elif not stays:
+        slow = drag + gain * K_b / R
+    c_w = gain * rises * dy.T_h * y.i if lags else 0.0
+    c_i = -(grows * dy.T_w * y.i + K_b * rises * dy.T_h * y.w_m) / L if lags else 0.0
+    return Law(slow, fast, apart, dw, rw, di, ri, c_w + of_i * c_i, c_i + of_w * c_w, of_i, of_w, gain, v, R,
+               currents.flowing(now, zone, u, y.q, y.w_m, y.i), L if lags else 0.0, K_b, now.motor.R, grows, rises)
+
+
+def suits(law: Law) -> bool:
+    """Tell whether a law can be followed: where both move, their rates have to be apart."""
+    return law.L == 0.0 or law.per_ampere == 0.0 or law.apart > 0.0
+
+
+def length(law: Law, heat: Heat, y: Vector, limit: float, tolerance: float) -> float:
+    """Return how long a step may be [s], so that the rule follows what is slow and what is left of the fast part."""
+    rate = _rate(law, heat, y)
+    most: float = min(limit, _PART / rate) if rate > 0.0 else limit
+    if law.slow > 0.0:
+        most = min(most, min(_LONGEST, 0.5 * (tolerance / (_RULE * _USUAL)) ** _NINTH) / law.slow)
+    if law.fast == 0.0:
+        return most
+    most = min(most, _LAG * tolerance**0.2 / law.fast)
+    fades = abs(fading(law))
+    warms = law.copper * fades * (fades + 2.0 * abs(y.i)) / (heat.C_w * law.fast)
+    part = warms * abs(law.per_kelvin / law.copper) * (law.per_ampere * fades / law.fast + warms)
+    reach: float = 0.5 * (tolerance / (_RULE * part)) ** _NINTH / law.fast if part > _NONE else most
+    return min(most, reach)
+
+
+def _rate(law: Law, heat: Heat, y: Vector) -> float:
+    """Return about how fast temperatures tend to where they do [1/s]."""
+    i = law.i if law.R == math.inf else y.i if law.L > 0.0 else law.v / law.R
+    return (heat.G_wh + law.per_kelvin * i * i) / heat.C_w + (heat.G_wh + heat.G_ha) / heat.C_h
+
+
+def fading(law: Law) -> float:
+    """Return the part of the current at the start that will fade fast [A]."""
+    if law.fast == 0.0:
+        return 0.0
+    lags = law.c_f / (law.fast * law.fast * (1.0 - law.of_i * law.of_w))  # behind steady warming
+    return lags + ((law.ri / law.fast - law.di) * law.apart if law.apart != 0.0 else -law.di / law.fast)
+
+
+def fast_heat(slow: float, fast: float, F: float, P: float, i: float, s: float) -> tuple[float, float]:
+    """Return what a fast part F [A] adds to the square of the current after s [s], and its integral [A², A² s].
+
+    The rest begins with the rate P [A/s].
+    """
+    if fast == 0.0:
+        return 0.0, 0.0
+    once, _ = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
+    soon, _ = decay(fast, 1.0 / fast, s)
+    E_s, E_f, start = 1.0 - slow * once, 1.0 - fast * soon, i - F
+    together = (slow * once + E_s * (fast * soon)) / (slow + fast)
+    return (F * E_f * (2.0 * (start + P * once) + F * E_f),
+            2.0 * F * (start * soon + P * (together - E_f * once) / fast) + 0.5 * F * F * soon * (1.0 + E_f))
+
+
+def straight(slow: float, fast: float, apart: float, dw: float, rw: float, di: float, ri: float, w: float, i: float,
+             s: float) -> tuple[float, float, float]:
+    """Return way, speed and current after s [s] at the temperatures of the start, by the numbers of a `Law`."""
+    once, twice = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
+    if fast == 0.0:
+        return w * s + dw * twice, w + dw * once, i
+    soon, soon_twice = decay(fast, 1.0 / fast, s)
+    if apart == 0.0:
+        return 0.0, 0.0, i + di * soon
+    g, both, both_twice = (fast * soon - slow * once) * apart, (once - soon) * apart, (twice - soon_twice) * apart
+    return w * s + dw * both + rw * both_twice, w + dw * g + rw * both, i + di * g + ri * both
+
+
+def ramp(slow: float, fast: float, c_s: float, c_f: float, of_i: float, of_w: float, s: float) -> tuple[float, float]:
+    """Return what steady warming adds to speed and current in s [s], by the numbers of a `Law`."""
+    if fast == 0.0:
+        return 0.0, 0.0
+    _, z = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
+    _, f = decay(fast, 1.0 / fast, s)
+    z, f, per = c_s * z, c_f * f, 1.0 / (1.0 - of_i * of_w)
+    return (z - of_i * f) * per, (f - of_w * z) * per
+
+
+def step(law: Law, own: Heat, y: Vector, h: float) -> Step:
+    """Follow motor, current and temperatures for a time h [s]."""
+    at = [0.0] * _ALL  # speed and current so far known, and the part of the speed that warming has made
+    more = [0.0] * _ALL  # of speed, current, winding, housing, way
+    soon = [0.0] * _TWO  # rate of the winding by the fast part of the current, and its integral
+    fall = [0.0] * POINTS
+    solver = [0.0] * _ALL
+    F, P = fading(law), (law.ri - law.di * law.slow) * law.apart
+    for k in range(POINTS):
+        _, w, i = straight(law.slow, law.fast, law.apart, law.dw, law.rw, law.di, law.ri, y.w_m, y.i,
+                           NODES[k] * h)
+        more_w, more_i = ramp(law.slow, law.fast, law.c_s, law.c_f, law.of_i, law.of_w, NODES[k] * h)
+        at[k], at[POINTS + k], at[_TWO + k] = w + more_w, i + more_i, more_w
+        fall[k] = math.exp(-law.slow * NODES[k] * h)
+        now, so_far = fast_heat(law.slow, law.fast, F, P, y.i, NODES[k] * h)
+        soon[k], soon[POINTS + k] = law.copper / own.C_w * now, law.copper / own.C_w * so_far
+    if law.fast > 0.0:
+        _factor(solver, law.fast * h)
+    _heat(law, own, y, h, at, soon, more)
+    _deviate(law, h, at, fall, solver, more)
+    w, i, T = more[POINTS - 1], more[2 * POINTS - 1], more[3 * POINTS - 1]
+    _heat(law, own, y, h, at, soon, more)
+    _deviate(law, h, at, fall, solver, more)
+    _heat(law, own, y, h, at, soon, more)
+    warmer, housing = more[3 * POINTS - 1], more[4 * POINTS - 1]
+    part = abs(law.per_kelvin * warmer / law.copper) + abs(law.field * housing)
+    changed = max(abs(more[POINTS - 1] - w), abs(more[2 * POINTS - 1] - i))
+    heats = _PER_KELVIN * abs(warmer - T) * (part + h * _rate(law, own, y))
+    for k in range(POINTS):
+        more[2 * POINTS + k] -= soon[POINTS + k]
+    return Step(_MARGIN * max(part * changed, heats), _dense(law, law.copper / own.C_w, F, P, more))
+
+
+def _heat(law: Law, own: Heat, y: Vector, h: float, at: Any, soon: Any, more: Any) -> None:
+    """Set by how much winding and housing are warmer at the points, by what is known of speed and current."""
+    rates = [0.0] * _TWO
+    for k in range(POINTS):
+        w, i = at[k] + more[k], at[POINTS + k] + more[POINTS + k]
+        d, g = more[2 * POINTS + k], more[3 * POINTS + k]
+        copper = law.per_kelvin * d
+        if law.L == 0.0:
+            i = law.i
+            if law.R < math.inf:
+                i = steady_armature_current(law.v, w, law.R + copper, law.K_b * (1.0 + law.field * g))
+        dT_w, dT_h = warming_rates(own, law.copper + copper, i, y.T_w + d, y.T_h + g)
+        rates[k], rates[POINTS + k] = dT_w - soon[k], dT_h
+    for k in range(POINTS):
+        d = g = 0.0
+        for n in range(POINTS):
+            d += _UP_TO[POINTS * k + n] * rates[n]
+            g += _UP_TO[POINTS * k + n] * rates[POINTS + n]
+        more[2 * POINTS + k], more[3 * POINTS + k] = soon[POINTS + k] + h * d, h * g
+
+
+def _deviate(law: Law, h: float, at: Any, fall: Any, solver: Any, more: Any) -> None:
+    """Set by how much speed and current deviate at the points, by what is known of the temperatures."""
+    slow = [0.0] * POINTS
+    fast = [0.0] * POINTS
+    for k in range(POINTS):
+        w, i = at[k] + more[k], at[POINTS + k] + more[POINTS + k]
+        copper, field = law.per_kelvin * more[2 * POINTS + k], law.field * more[3 * POINTS + k]
+        n_i = 0.0
+        if law.L > 0.0:
+            n_i = -(copper * i + law.K_b * field * w) / law.L
+            n_w = law.per_ampere * field * i
+        elif law.R < math.inf:
+            now = steady_armature_current(law.v, w, law.R + copper, law.K_b * (1.0 + field))
+            n_w = law.per_ampere * ((1.0 + field) * now - steady_armature_current(law.v, w, law.R, law.K_b))
+        else:
+            n_w = law.per_ampere * field * law.i
+        t = NODES[k] * h
+        slow[k] = (n_w + law.of_i * n_i - law.c_s * t) / fall[k]
+        fast[k] = n_i + law.of_w * n_w - law.c_f * t
+    turns, per = law.per_ampere > 0.0, 1.0 / (1.0 - law.of_i * law.of_w)
+    for k in range(POINTS):
+        z = f = 0.0
+        for n in range(POINTS):
+            z += _UP_TO[POINTS * k + n] * slow[n]
+            f += _UP_TO[POINTS * k + n] * fast[n]
+        more[k], more[POINTS + k] = h * fall[k] * z, h * f
+    if law.fast > 0.0:
+        _solve(solver, more)
+    for k in range(POINTS):
+        z, f = more[k] if turns else 0.0, more[POINTS + k] if law.fast > 0.0 else 0.0
+        more[k], more[POINTS + k] = (z - law.of_i * f) * per, (f - law.of_w * z) * per
+    for k in range(POINTS):
+        way = 0.0
+        for n in range(POINTS):
+            way += _UP_TO[POINTS * k + n] * (more[n] + at[_TWO + n])
+        more[4 * POINTS + k] = h * way
+
+
+def _factor(solver: Any, x: float) -> None:
+    """Set the triangular factors of 1 + x A."""
+    for k in range(POINTS):
+        for n in range(POINTS):
+            solver[POINTS * k + n] = x * _UP_TO[POINTS * k + n] + (1.0 if k == n else 0.0)
+    for m in range(POINTS):
+        for k in range(m + 1, POINTS):
+            part = solver[POINTS * k + m] / solver[POINTS * m + m]
+            solver[POINTS * k + m] = part
+            for n in range(m + 1, POINTS):
+                solver[POINTS * k + n] -= part * solver[POINTS * m + n]
+
+
+def _solve(solver: Any, more: Any) -> None:
+    """Solve (1 + x A) z = f, for what stands where the current's deviations do."""
+    for k in range(POINTS):
+        for n in range(k):
+            more[POINTS + k] -= solver[POINTS * k + n] * more[POINTS + n]
+    for k in range(POINTS - 1, -1, -1):
+        for n in range(k + 1, POINTS):
+            more[POINTS + k] -= solver[POINTS * k + n] * more[POINTS + n]
+        more[POINTS + k] /= solver[POINTS * k + k]
+
+
+def _dense(law: Law, per_square: float, F: float, P: float,
+           more: Any) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector]:
+    """Return the deviations, each times its part of the polynomial through them and the start, and the law."""
+    return (_row(0, more), _row(1, more), _row(2, more), _row(3, more), _row(4, more),
+            Vector(law.slow, law.fast, law.apart, law.dw, law.rw, law.di, law.ri),
+            Vector(per_square, law.c_s, law.c_f, law.of_i, law.of_w, F, P))
+
+
+def _row(k: int, more: Any) -> Vector:
+    part = _PLACES[k]
+    return Vector(part * more[4 * POINTS + k], part * more[k], part * more[POINTS + k], part * more[2 * POINTS + k],
+                  part * more[3 * POINTS + k], 0.0, 0.0)
+
+
+def state(numbers: Numbers, mode: Mode, y: Vector, output: tuple[float, float], dense: tuple[Vector, ...], h: float,
+          s: float) -> Vector:
+    """Return the state after s [s] of a step of a length h [s]; `output` is the law of one that moves apart."""
+    of, by = dense[5], dense[6]
+    way, w, i = straight(of.q, of.w, of.i, of.T_w, of.T_h, of.q_m, of.w_m, y.w_m, y.i, s)
+    more_w, more_i = ramp(of.q, of.w, by.w, by.i, by.T_w, by.T_h, s)
+    w, i = w + more_w, i + more_i
+    x = s / h
+    b0, b1, b2, b3, b4 = x - NODES[0], x - NODES[1], x - NODES[2], x - NODES[3], x - NODES[4]
+    low, high = x * b0 * b1, b3 * b4
+    p0, p1, p2 = x * b1 * b2 * high, x * b0 * b2 * high, low * high
+    p3, p4 = low * b2 * b4, low * b2 * b3
+    d0, d1, d2, d3, d4 = dense[0], dense[1], dense[2], dense[3], dense[4]
+    way += p0 * d0.q + p1 * d1.q + p2 * d2.q + p3 * d3.q + p4 * d4.q
+    w += p0 * d0.w + p1 * d1.w + p2 * d2.w + p3 * d3.w + p4 * d4.w
+    i += p0 * d0.i + p1 * d1.i + p2 * d2.i + p3 * d3.i + p4 * d4.i
+    _, heat = fast_heat(of.q, of.w, by.q_m, by.w_m, y.i, s)
+    T_w = y.T_w + by.q * heat + (p0 * d0.T_w + p1 * d1.T_w + p2 * d2.T_w + p3 * d3.T_w + p4 * d4.T_w)
+    T_h = y.T_h + (p0 * d0.T_h + p1 * d1.T_h + p2 * d2.T_h + p3 * d3.T_h + p4 * d4.T_h)
+    if mode.mesh == INSIDE:
+        q, w_out = first_order.propagate(output[0], output[1], y.q, y.w, s)
+        return Vector(q, w_out, i, T_w, T_h, y.q_m + way, w)
+    if mode.mesh == RIGID:
+        return Vector(y.q + way, w, i, T_w, T_h, y.q + way, w)
+    return play.with_motor(numbers.play, mode.mesh, Vector(y.q + way, w, i, T_w, T_h, y.q_m, w))
