@@ -103,9 +103,9 @@ def test_a_step_of_shaft_and_current_follows_the_law(servo, name, tolerance, off
     left = 0.012
     for _ in range(60):
         law = warm_linear.law_of(numbers, mode, u, TORQUE, y)
-        h = warm_linear.length(law, numbers.heat, y, left, tolerance)
-        found = warm_linear.step(law, numbers.heat, y, h)
-        assert found.error < tolerance
+        h, found = warm_linear.follow(law, numbers.heat, y, left, tolerance)
+        assert 0.0 < h <= left
+        assert found.error <= tolerance * (1.0 + abs(y.w_m))
         y, left = warm_linear.state(numbers, mode, y, (0.0, 0.0), found.dense, h, h), left - h
         if left <= 0.0:
             break

@@ -72,7 +72,6 @@ _WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what a servo tha
 _TURN = 2.0 * math.pi
 # Error of one implicit step, relative to 1 + |state|, and of an explicit one: parts of the accuracy asked for
 _TOLERANCE, FINE = 0.3, 1e-3
-_WARM = 0.01  # of one that follows warming alone
 _ORIGIN = (0.0, 0.0, 0.0)
 _NO_STAGES = (_ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN, _ORIGIN)
 _NO_DENSE = (_ORIGIN, _ORIGIN, _ORIGIN)
@@ -270,23 +269,28 @@ def _warming(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: V
     none = _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
     if not warm_linear.suits(law):
         return none
-    tolerance = _WARM * accuracy
-    h = warm_linear.length(law, numbers.heat, y, limit, tolerance)
-    output = (0.0, 0.0)
-    if mode.mesh == INSIDE:
-        apart = apart_coefficients(numbers, mode, u.value, tau.value)
-        output = (apart.output_rate, apart.output_pull)
-    for _ in range(60):
-        found = warm_linear.step(law, numbers.heat, y, h)
-        if found.error <= tolerance * (1.0 + abs(y.w_m)):
-            end = warm_linear.state(numbers, mode, y, output, found.dense, h, h)
-            following = min(step, 0.2 / law.fast) if law.fast > 0.0 else step
-            return Motion(WARMING, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, output, end, following, -1, True,
-                          _NO_STAGES, _NO_DENSE, found.dense)
-        h *= 0.5
-        if t0 + h == t0:
-            break
-    return none
+    h, found = warm_linear.follow(law, numbers.heat, y, limit, FINE * accuracy)
+    if t0 + h == t0:
+        return none
+    output = _output_apart(numbers, mode, u, tau)
+    end = warm_linear.state(numbers, mode, y, output, found.dense, h, h)
+    following = min(step, 0.2 / law.fast) if law.fast > 0.0 else step
+    return Motion(WARMING, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, output, end, following, -1, True,
+                  _NO_STAGES, _NO_DENSE, found.dense)
+
+
+def _output_apart(numbers: Numbers, mode: Mode, u: Piece, tau: Piece) -> tuple[float, float]:
+    """Return the law of an output that moves apart from the motor, (λ, f)."""
+    if mode.mesh != INSIDE:
+        return 0.0, 0.0
+    apart = apart_coefficients(numbers, mode, u.value, tau.value)
+    return apart.output_rate, apart.output_pull
+
+
+def _warm_step(motion: Motion, s: float) -> warm_linear.Step:
+    """Return the step of a servo that warms up, of a length s [s]."""
+    law = warm_linear.law_of(motion.numbers, motion.mode, motion.u.value, motion.tau.value, motion.start)
+    return warm_linear.step(law, motion.numbers.heat, motion.start, s)
 
 
 def _pair(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
@@ -305,14 +309,17 @@ def prepared(motion: Motion) -> Motion:
     """Return the motion ready to be evaluated between the ends of a step."""
     if motion.has_dense or not is_step(motion):
         return motion
-    dense, long_dense = motion.dense, motion.long_dense
-    if motion.kind == STEP:
+    dense, long_dense, against = motion.dense, motion.long_dense, motion.against
+    if motion.kind == WARMING:
+        long_dense = _warm_step(motion, motion.length).dense
+        against = _output_apart(motion.numbers, motion.mode, motion.u, motion.tau)
+    elif motion.kind == STEP:
         dense = rodas.dense_coefficients(motion.stages)
     elif motion.kind == LONG_STEP:
         long_dense = dormand_prince.dense(motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
                                           motion.length)
     return Motion(motion.kind, motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
-                  motion.length, motion.coefficients, motion.against, motion.end, motion.next_step, motion.ends_by,
+                  motion.length, motion.coefficients, against, motion.end, motion.next_step, motion.ends_by,
                   True, motion.stages, dense, long_dense)
 
 
@@ -371,10 +378,8 @@ def ended(motion: Motion, s: float) -> Vector:
     """Return the state at s after the anchor where a motion ends: what is only interpolated there is followed anew."""
     if motion.kind != WARMING or not s > 0.0:
         return state(motion, s)
-    law = warm_linear.law_of(motion.numbers, motion.mode, motion.u.value, motion.tau.value, motion.start)
-    found = warm_linear.step(law, motion.numbers.heat, motion.start, s)
     return warm_linear.state(motion.numbers, motion.mode, motion.start, (motion.against[0], motion.against[1]),
-                             found.dense, s, s)
+                             _warm_step(motion, s).dense, s, s)
 
 
 def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:

@@ -40,12 +40,31 @@ _UP_TO = (
 _APART = 4.0  # times: the fast rate is more than the slow one
 _LONGEST = 0.8  # of a step, times 1/slow
 _RULE, _NINTH = 2e-11, 1.0 / 9.0  # error of the rule for e^x over 1, by x^9
-_LAG = 2500.0  # times 1/fast and a fifth root of the tolerance: of a step, for the current lags behind warming
+_SEVENTH = 1.0 / 7.0
+# Times the tolerance, by the 4th and 7th power of fast · time: what the rule may miss of a current within a step, and
+# of what it leads to at the end
+_SEEN, _STAYS = 30.0 / 3e-5, 3.0 / 2e-8
 _USUAL = 1e-4  # by which warming changes a law within a step
 _PART = 0.1  # of the time in which temperatures change: of a step
 _PER_KELVIN = 0.1  # of an error of the temperature, to tell it as one of an angle
 _MARGIN = 3.0
 _NONE = 1e-200
+_STRAIGHT = 1e-4  # times 1/slow: a time in which the slow part is a straight line
+_MOST, _LEAST, _LESS, _SIXTH = 60, 0.1, 0.85, 1.0 / 6.0  # tries of a step, and how much shorter the next one is
+_BETWEEN = 6e-5  # of the change of a polynomial's highest power within a step: of its error between the points
+
+
+class Rough(NamedTuple):
+    """What a fading current does to itself by its heat [A/s]: that much of the powers of e = e^(−fast t)."""
+
+    by_t: float  # of t e [A/s²]
+    by_0: float  # of 1
+    by_1: float  # of e
+    by_2: float
+    by_3: float
+
+
+_SMOOTH = Rough(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Law(NamedTuple):
@@ -58,8 +77,9 @@ class Law(NamedTuple):
     rw: float
     di: float
     ri: float
-    c_s: float  # by which what drives the slow part grows with the warming of the start, and the fast one
+    c_s: float  # by which what drives the slow part grows with the warming of the start, and the fast one [1/s]
     c_f: float
+    c_ff: float  # by the square of time, of the fast one
     of_i: float  # the slow part is w + of_i i
     of_w: float  # the fast one i + of_w w
     per_ampere: float  # [rad/s²/A]
@@ -71,6 +91,9 @@ class Law(NamedTuple):
     copper: float  # of the winding [Ω]
     per_kelvin: float  # [Ω/K]
     field: float  # [1/K]
+    F: float  # part of the current at the start that will fade fast [A]
+    P: float  # rate of the rest [A/s]
+    rough: Rough
 
 
 class Step(NamedTuple):
@@ -111,10 +134,28 @@ def law_of(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> Law
         ri = -fade * di - brake * dw + (fade + drag) * di
     elif not stays:
         slow = drag + gain * K_b / R
-    c_w = gain * rises * dy.T_h * y.i if lags else 0.0
-    c_i = -(grows * dy.T_w * y.i + K_b * rises * dy.T_h * y.w_m) / L if lags else 0.0
-    return Law(slow, fast, apart, dw, rw, di, ri, c_w + of_i * c_i, c_i + of_w * c_w, of_i, of_w, gain, v, R,
-               currents.flowing(now, zone, u, y.q, y.w_m, y.i), L if lags else 0.0, K_b, now.motor.R, grows, rises)
+    F = c_w = c_i = c_ff = 0.0
+    P = -K_b * dw / R
+    rough = _SMOOTH
+    if lags:
+        F = (ri / fast - di) * apart if apart != 0.0 else -di / fast
+        P, steady = (ri - di * slow) * apart, y.i - F
+        warms, _ = warming_rates(numbers.heat, now.motor.R, steady, y.T_w, y.T_h)
+        c_w = gain * rises * dy.T_h * steady
+        c_i = -(grows * warms * steady + K_b * rises * dy.T_h * y.w_m) / L
+        heats, fades = now.motor.R / numbers.heat.C_w, (numbers.heat.G_wh - grows * steady * steady) / numbers.heat.C_w
+        c_ff = -grows / L * ((heats * steady * P - 0.5 * fades * warms) * steady + warms * P)
+        rough = _rough(-grows / L * F, heats / fast, warms, steady, F)
+    return Law(slow, fast, apart, dw, rw, di, ri, c_w + of_i * c_i, c_i + of_w * c_w, c_ff, of_i, of_w, gain, v, R,
+               currents.flowing(now, zone, u, y.q, y.w_m, y.i), L if lags else 0.0, K_b, now.motor.R, grows, rises,
+               F, P, rough)
+
+
+def _rough(c: float, heats: float, warms: float, i: float, F: float) -> Rough:
+    """Return what a fading current F [A] beside a steady one i does; a kelvin drives c F e, and i² warms by heats."""
+    by, more = c * heats * i, c * heats * F
+    return Rough(c * warms, by * (2.0 * i + 0.5 * F), 2.0 * by * (F - i) + 0.5 * more * F, -2.5 * by * F,
+                 -0.5 * more * F)
 
 
 def suits(law: Law) -> bool:
@@ -124,18 +165,22 @@ def suits(law: Law) -> bool:
 
 def length(law: Law, heat: Heat, y: Vector, limit: float, tolerance: float) -> float:
     """Return how long a step may be [s], so that the rule follows what is slow and what is left of the fast part."""
-    rate = _rate(law, heat, y)
+    rate = abs(_rate(law, heat, y))
     most: float = min(limit, _PART / rate) if rate > 0.0 else limit
     if law.slow > 0.0:
         most = min(most, min(_LONGEST, 0.5 * (tolerance / (_RULE * _USUAL)) ** _NINTH) / law.slow)
     if law.fast == 0.0:
         return most
-    most = min(most, _LAG * tolerance**0.2 / law.fast)
-    fades = abs(fading(law))
-    warms = law.copper * fades * (fades + 2.0 * abs(y.i)) / (heat.C_w * law.fast)
-    part = warms * abs(law.per_kelvin / law.copper) * (law.per_ampere * fades / law.fast + warms)
-    reach: float = 0.5 * (tolerance / (_RULE * part)) ** _NINTH / law.fast if part > _NONE else most
-    return min(most, reach)
+    F = abs(law.F)
+    warms = law.copper * F * (F + 2.0 * abs(y.i - law.F)) / (heat.C_w * law.fast)
+    part = abs(law.per_kelvin / law.copper) * warms
+    left = part * (abs(law.P) / law.fast + part * F) + 6.0 * abs(law.c_ff) * (law.slow + rate) / law.fast**4  # [A]
+    ends = left * law.per_ampere / law.fast + part * warms
+    if left > _NONE:
+        most = min(most, (_SEEN * tolerance / left) ** 0.25 / law.fast)
+    if ends > _NONE:
+        most = min(most, (_STAYS * tolerance / ends) ** _SEVENTH / law.fast)
+    return most
 
 
 def _rate(law: Law, heat: Heat, y: Vector) -> float:
@@ -145,26 +190,32 @@ def _rate(law: Law, heat: Heat, y: Vector) -> float:
 
 
 def fading(law: Law) -> float:
-    """Return the part of the current at the start that will fade fast [A]."""
+    """Return the part of the current at the start that will fade fast, with what lags behind steady warming [A]."""
     if law.fast == 0.0:
         return 0.0
-    lags = law.c_f / (law.fast * law.fast * (1.0 - law.of_i * law.of_w))  # behind steady warming
-    return lags + ((law.ri / law.fast - law.di) * law.apart if law.apart != 0.0 else -law.di / law.fast)
+    return law.F + law.c_f / (law.fast * law.fast * (1.0 - law.of_i * law.of_w))
 
 
-def fast_heat(slow: float, fast: float, F: float, P: float, i: float, s: float) -> tuple[float, float]:
-    """Return what a fast part F [A] adds to the square of the current after s [s], and its integral [A², A² s].
+def own_heat(slow: float, fast: float, F: float, P: float, i: float, s: float) -> tuple[float, float]:
+    """Return by how much the square of the current changes in s [s] as it goes by itself, and its integral [A², A² s].
 
-    The rest begins with the rate P [A/s].
+    Of the current i a part F fades fast, the rest begins with the rate P [A/s].
     """
+    once, twice = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
+    start = i - F
+    now, so_far = P * once * (2.0 * start + P * once), 2.0 * start * P * twice
+    if slow * s < _STRAIGHT:
+        so_far += P * P * s * s * s * (1.0 / 3.0 - 0.25 * slow * s)
+    else:
+        _, soon_twice = decay(2.0 * slow, 0.5 / slow, s)
+        so_far += 2.0 * P * P * (twice - soon_twice) / slow
     if fast == 0.0:
-        return 0.0, 0.0
-    once, _ = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
+        return now, so_far
     soon, _ = decay(fast, 1.0 / fast, s)
-    E_s, E_f, start = 1.0 - slow * once, 1.0 - fast * soon, i - F
+    E_s, E_f = 1.0 - slow * once, 1.0 - fast * soon
     together = (slow * once + E_s * (fast * soon)) / (slow + fast)
-    return (F * E_f * (2.0 * (start + P * once) + F * E_f),
-            2.0 * F * (start * soon + P * (together - E_f * once) / fast) + 0.5 * F * F * soon * (1.0 + E_f))
+    return (now + F * E_f * (2.0 * (start + P * once) + F * E_f),
+            so_far + 2.0 * F * (start * soon + P * (together - E_f * once) / fast) + 0.5 * F * F * soon * (1.0 + E_f))
 
 
 def straight(slow: float, fast: float, apart: float, dw: float, rw: float, di: float, ri: float, w: float, i: float,
@@ -180,38 +231,61 @@ def straight(slow: float, fast: float, apart: float, dw: float, rw: float, di: f
     return w * s + dw * both + rw * both_twice, w + dw * g + rw * both, i + di * g + ri * both
 
 
-def ramp(slow: float, fast: float, c_s: float, c_f: float, of_i: float, of_w: float, s: float) -> tuple[float, float]:
-    """Return what steady warming adds to speed and current in s [s], by the numbers of a `Law`."""
+def ramp(slow: float, fast: float, c_s: float, c_f: float, c_ff: float, of_i: float, of_w: float, rough: Rough,
+         s: float) -> tuple[float, float]:
+    """Return what steady warming and a current that fades add to speed and current in s [s], by a `Law`'s numbers."""
     if fast == 0.0:
         return 0.0, 0.0
-    _, z = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
-    _, f = decay(fast, 1.0 / fast, s)
-    z, f, per = c_s * z, c_f * f, 1.0 / (1.0 - of_i * of_w)
+    once, z = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
+    soon, f = decay(fast, 1.0 / fast, s)
+    E_s, e, gap, per = 1.0 - slow * once, 1.0 - fast * soon, fast - slow, 1.0 / (1.0 - of_i * of_w)
+    f = c_f * f + c_ff * (s * s - 2.0 * f) / fast + s * e * (rough.by_1 + 0.5 * s * rough.by_t) + soon * (
+        rough.by_0 + e * (rough.by_2 + 0.5 * (1.0 + e) * rough.by_3))
+    z = c_s * z + of_i * (
+        rough.by_0 * once + rough.by_1 * (E_s - e) / gap + rough.by_2 * (E_s - e * e) / (gap + fast)
+        + rough.by_3 * (E_s - e * e * e) / (gap + 2.0 * fast) + rough.by_t * (E_s - e * (1.0 + gap * s)) / (gap * gap))
     return (z - of_i * f) * per, (f - of_w * z) * per
+
+
+def follow(law: Law, own: Heat, y: Vector, limit: float, tolerance: float) -> tuple[float, Step]:
+    """Return a step that is accurate enough, at most `limit` [s] long, and how long it is; 0 where none is."""
+    h = length(law, own, y, limit, tolerance)
+    found = step(law, own, y, h)
+    for _ in range(_MOST):
+        size = found.error / (tolerance * (1.0 + abs(y.w_m)))
+        if size <= 1.0:
+            return h, found
+        h *= max(_LEAST, _LESS * size**-_SIXTH) if size < math.inf else _LEAST
+        found = step(law, own, y, h)
+    return 0.0, found
 
 
 def step(law: Law, own: Heat, y: Vector, h: float) -> Step:
     """Follow motor, current and temperatures for a time h [s]."""
-    at = [0.0] * _ALL  # speed and current so far known, and the part of the speed that warming has made
+    at = [0.0] * _ALL  # speed and current so far known, the part of the speed that warming has made, `Rough`
     more = [0.0] * _ALL  # of speed, current, winding, housing, way
-    soon = [0.0] * _TWO  # rate of the winding by the fast part of the current, and its integral
+    soon = [0.0] * _TWO  # rate of the winding by what the current does by itself, and its integral
     fall = [0.0] * POINTS
     solver = [0.0] * _ALL
-    F, P = fading(law), (law.ri - law.di * law.slow) * law.apart
+    F, rough = fading(law), law.rough
     for k in range(POINTS):
         _, w, i = straight(law.slow, law.fast, law.apart, law.dw, law.rw, law.di, law.ri, y.w_m, y.i,
                            NODES[k] * h)
-        more_w, more_i = ramp(law.slow, law.fast, law.c_s, law.c_f, law.of_i, law.of_w, NODES[k] * h)
+        more_w, more_i = ramp(law.slow, law.fast, law.c_s, law.c_f, law.c_ff, law.of_i, law.of_w, rough, NODES[k] * h)
         at[k], at[POINTS + k], at[_TWO + k] = w + more_w, i + more_i, more_w
+        e = math.exp(-law.fast * NODES[k] * h)
+        at[_TWO + POINTS + k] = rough.by_0 + e * (
+            rough.by_1 + rough.by_t * NODES[k] * h + e * (rough.by_2 + e * rough.by_3))
         fall[k] = math.exp(-law.slow * NODES[k] * h)
-        now, so_far = fast_heat(law.slow, law.fast, F, P, y.i, NODES[k] * h)
+        now, so_far = own_heat(law.slow, law.fast, F, law.P, law.i, NODES[k] * h)
         soon[k], soon[POINTS + k] = law.copper / own.C_w * now, law.copper / own.C_w * so_far
     if law.fast > 0.0:
         _factor(solver, law.fast * h)
     _heat(law, own, y, h, at, soon, more)
     _deviate(law, h, at, fall, solver, more)
-    w, i, T = more[POINTS - 1], more[2 * POINTS - 1], more[3 * POINTS - 1]
+    w, i = more[POINTS - 1], more[2 * POINTS - 1]
     _heat(law, own, y, h, at, soon, more)
+    T = more[3 * POINTS - 1]
     _deviate(law, h, at, fall, solver, more)
     _heat(law, own, y, h, at, soon, more)
     warmer, housing = more[3 * POINTS - 1], more[4 * POINTS - 1]
@@ -220,7 +294,15 @@ def step(law: Law, own: Heat, y: Vector, h: float) -> Step:
     heats = _PER_KELVIN * abs(warmer - T) * (part + h * _rate(law, own, y))
     for k in range(POINTS):
         more[2 * POINTS + k] -= soon[POINTS + k]
-    return Step(_MARGIN * max(part * changed, heats), _dense(law, law.copper / own.C_w, F, P, more))
+    dense = _dense(law, law.copper / own.C_w, F, more)
+    return Step(max(_MARGIN * max(part * changed, heats), _BETWEEN * _bend(dense)), dense)
+
+
+def _bend(dense: tuple[Vector, ...]) -> float:
+    """Return the largest coefficient of the highest power of time over the length of the step."""
+    d0, d1, d2, d3, d4 = dense[0], dense[1], dense[2], dense[3], dense[4]
+    return max(abs(d0.q + d1.q + d2.q + d3.q + d4.q), abs(d0.w + d1.w + d2.w + d3.w + d4.w),
+               abs(d0.i + d1.i + d2.i + d3.i + d4.i), _PER_KELVIN * abs(d0.T_w + d1.T_w + d2.T_w + d3.T_w + d4.T_w))
 
 
 def _heat(law: Law, own: Heat, y: Vector, h: float, at: Any, soon: Any, more: Any) -> None:
@@ -253,7 +335,7 @@ def _deviate(law: Law, h: float, at: Any, fall: Any, solver: Any, more: Any) -> 
         copper, field = law.per_kelvin * more[2 * POINTS + k], law.field * more[3 * POINTS + k]
         n_i = 0.0
         if law.L > 0.0:
-            n_i = -(copper * i + law.K_b * field * w) / law.L
+            n_i = -(copper * i + law.K_b * field * w) / law.L - at[_TWO + POINTS + k]
             n_w = law.per_ampere * field * i
         elif law.R < math.inf:
             now = steady_armature_current(law.v, w, law.R + copper, law.K_b * (1.0 + field))
@@ -262,7 +344,7 @@ def _deviate(law: Law, h: float, at: Any, fall: Any, solver: Any, more: Any) -> 
             n_w = law.per_ampere * field * law.i
         t = NODES[k] * h
         slow[k] = (n_w + law.of_i * n_i - law.c_s * t) / fall[k]
-        fast[k] = n_i + law.of_w * n_w - law.c_f * t
+        fast[k] = n_i + law.of_w * n_w - (law.c_f + law.c_ff * t) * t
     turns, per = law.per_ampere > 0.0, 1.0 / (1.0 - law.of_i * law.of_w)
     for k in range(POINTS):
         z = f = 0.0
@@ -306,37 +388,39 @@ def _solve(solver: Any, more: Any) -> None:
         more[POINTS + k] /= solver[POINTS * k + k]
 
 
-def _dense(law: Law, per_square: float, F: float, P: float,
+def _dense(law: Law, per_square: float, F: float,
            more: Any) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector]:
     """Return the deviations, each times its part of the polynomial through them and the start, and the law."""
-    return (_row(0, more), _row(1, more), _row(2, more), _row(3, more), _row(4, more),
+    rough = law.rough
+    return (_row(0, more, law.c_ff, rough.by_t), _row(1, more, rough.by_0, rough.by_1),
+            _row(2, more, rough.by_2, rough.by_3), _row(3, more, law.i, 0.0), _row(4, more, 0.0, 0.0),
             Vector(law.slow, law.fast, law.apart, law.dw, law.rw, law.di, law.ri),
-            Vector(per_square, law.c_s, law.c_f, law.of_i, law.of_w, F, P))
+            Vector(per_square, law.c_s, law.c_f, law.of_i, law.of_w, F, law.P))
 
 
-def _row(k: int, more: Any) -> Vector:
+def _row(k: int, more: Any, one: float, other: float) -> Vector:
     part = _PLACES[k]
     return Vector(part * more[4 * POINTS + k], part * more[k], part * more[POINTS + k], part * more[2 * POINTS + k],
-                  part * more[3 * POINTS + k], 0.0, 0.0)
+                  part * more[3 * POINTS + k], one, other)
 
 
 def state(numbers: Numbers, mode: Mode, y: Vector, output: tuple[float, float], dense: tuple[Vector, ...], h: float,
           s: float) -> Vector:
     """Return the state after s [s] of a step of a length h [s]; `output` is the law of one that moves apart."""
-    of, by = dense[5], dense[6]
+    d0, d1, d2, d3, d4 = dense[0], dense[1], dense[2], dense[3], dense[4]
+    of, by, rough = dense[5], dense[6], Rough(d0.w_m, d1.q_m, d1.w_m, d2.q_m, d2.w_m)
     way, w, i = straight(of.q, of.w, of.i, of.T_w, of.T_h, of.q_m, of.w_m, y.w_m, y.i, s)
-    more_w, more_i = ramp(of.q, of.w, by.w, by.i, by.T_w, by.T_h, s)
+    more_w, more_i = ramp(of.q, of.w, by.w, by.i, d0.q_m, by.T_w, by.T_h, rough, s)
     w, i = w + more_w, i + more_i
     x = s / h
     b0, b1, b2, b3, b4 = x - NODES[0], x - NODES[1], x - NODES[2], x - NODES[3], x - NODES[4]
     low, high = x * b0 * b1, b3 * b4
     p0, p1, p2 = x * b1 * b2 * high, x * b0 * b2 * high, low * high
     p3, p4 = low * b2 * b4, low * b2 * b3
-    d0, d1, d2, d3, d4 = dense[0], dense[1], dense[2], dense[3], dense[4]
     way += p0 * d0.q + p1 * d1.q + p2 * d2.q + p3 * d3.q + p4 * d4.q
     w += p0 * d0.w + p1 * d1.w + p2 * d2.w + p3 * d3.w + p4 * d4.w
     i += p0 * d0.i + p1 * d1.i + p2 * d2.i + p3 * d3.i + p4 * d4.i
-    _, heat = fast_heat(of.q, of.w, by.q_m, by.w_m, y.i, s)
+    _, heat = own_heat(of.q, of.w, by.q_m, by.w_m, d3.q_m, s)
     T_w = y.T_w + by.q * heat + (p0 * d0.T_w + p1 * d1.T_w + p2 * d2.T_w + p3 * d3.T_w + p4 * d4.T_w)
     T_h = y.T_h + (p0 * d0.T_h + p1 * d1.T_h + p2 * d2.T_h + p3 * d3.T_h + p4 * d4.T_h)
     if mode.mesh == INSIDE:
