@@ -378,8 +378,9 @@ def ended(motion: Motion, s: float) -> Vector:
     """Return the state at s after the anchor where a motion ends: what is only interpolated there is followed anew."""
     if motion.kind != WARMING or not s > 0.0:
         return state(motion, s)
+    found = _warm_step(motion, s)
     return warm_linear.state(motion.numbers, motion.mode, motion.start, (motion.against[0], motion.against[1]),
-                             _warm_step(motion, s).dense, s, s)
+                             found.dense, s, s)
 
 
 def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:
