@@ -311,7 +311,8 @@ def prepared(motion: Motion) -> Motion:
         return motion
     dense, long_dense, against = motion.dense, motion.long_dense, motion.against
     if motion.kind == WARMING:
-        long_dense = _warm_step(motion, motion.length).dense
+        found = _warm_step(motion, motion.length)
+        long_dense = found.dense
         against = _output_apart(motion.numbers, motion.mode, motion.u, motion.tau)
     elif motion.kind == STEP:
         dense = rodas.dense_coefficients(motion.stages)
