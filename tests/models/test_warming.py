@@ -11,15 +11,19 @@ from servotwin.models.engine.batch import warm_backlash, warm_segments
 from servotwin.models.engine.batch.rk_steps import State
 from servotwin.models.engine.dynamics import coefficients
 from servotwin.models.engine.dynamics.rates import rates_of
+from servotwin.models.engine.events import guards
 from servotwin.models.engine.legs import legs
 from servotwin.models.engine.motions import warm_exponential, warm_linear
 from servotwin.models.state.modes import (
+    BACKWARD,
     CONDUCTING,
     CURRENT_FORWARD,
     FORWARD,
     FREE,
     INSIDE,
     NO_CURRENT,
+    ON_BACKWARD,
+    ON_FORWARD,
     RIGID,
     STUCK,
     Mode,
@@ -150,3 +154,26 @@ def test_legs_with_play_end_where_those_of_a_cold_servo_do(servo, u):
     assert hot.done == want.done == 1.0
     assert hot.mode == want.mode
     np.testing.assert_allclose(hot.y, want.y, rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize("mesh", [ON_FORWARD, ON_BACKWARD])
+@pytest.mark.parametrize("w", [-0.4, 0.6])
+@pytest.mark.parametrize("i", [-0.3, 0.2])
+def test_how_fast_teeth_in_contact_cease_to_press(servo, mesh, w, i):
+    """They may part and meet again within a step: seen by the rates at its ends."""
+    shares = {"friction.load_friction_motor": 0.08, "friction.load_friction_external": 0.1}
+    numbers = numbers_of(servo, st.PulseServoInductive, **GAP, **shares, **{"motor.armature_inductance": 6e-4})
+    large = numbers._replace(heat=numbers.heat._replace(C_w=1e12, C_h=1e12))
+    contact = FORWARD if w > 0.0 else BACKWARD
+    y = Vector(0.5, w, i, 310.0, 300.0, 0.5, w)
+    share = guards.contacts.share_sign(warm(large, y), CONDUCTING, contact, mesh, 0.0, TORQUE, y)
+    mode = Mode(CONDUCTING, contact, mesh, FREE, share)
+
+    def pressing(t):
+        dy = rates_of(large, mode, 0.0, TORQUE, y)
+        at = Vector(*(x + t * dx for x, dx in zip(y, dy, strict=True)))
+        return guards.guard(large, mode, guards.PART, 0.0, 0.0, TORQUE, 0.0, at, rates_of(large, mode, 0.0, TORQUE, at))
+
+    value, rate = pressing(0.0)
+    assert abs(value) > 1e-3
+    assert rate == pytest.approx((pressing(1e-6)[0] - pressing(-1e-6)[0]) / 2e-6, rel=1e-6)

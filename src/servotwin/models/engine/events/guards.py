@@ -30,7 +30,7 @@ from servotwin.models.state.modes import (
     moving,
     slides,
 )
-from servotwin.models.terms import elastic, friction, heat, play, source
+from servotwin.models.terms import elastic, friction, heat, play, shaft, source
 from servotwin.models.terms.friction import core_speed, creeping_speed, fades, smoothed, varying
 from servotwin.models.terms.load import external_torque, stiffness_at
 from servotwin.models.terms.motor import inductive
@@ -299,7 +299,7 @@ def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, d
     if kind == MEET_BACKWARD:
         return numbers.play.half + (y.q_m - y.q), y.w_m - y.w
     if kind == PART:
-        return contacts.pressing(numbers, mode, u, tau, y), math.nan
+        return contacts.pressing(numbers, mode, u, tau, y), _pressing_rate(numbers, mode, u, dtau, y, dy)
     if kind == MOTOR_SPEED:
         sign = 1.0 if mode.motor == FORWARD else -1.0
         return sign * y.w_m, sign * dy.w_m
@@ -314,6 +314,20 @@ def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, d
     if kind == MOTOR_RELEASE_FORWARD or (kind == PART_MOTOR and not pushes):
         return contacts.motor_hold(numbers, True, torque) - torque, -rate
     return contacts.motor_hold(numbers, False, torque) + torque, rate
+
+
+def _pressing_rate(numbers: Numbers, mode: Mode, u: float, dtau: float, y: Vector, dy: Vector) -> float:
+    """Return the rate of `contacts.pressing` where the current has inertia; nan where it has none.
+
+    There it goes with the speed, and one way where that does. What friction that fades adds is left out.
+    """
+    if not inductive(numbers.motor) or y.w == 0.0:
+        return math.nan
+    torque, more = currents.drive_torque(numbers, mode.zone, u, y), motor.electromagnetic_torque(dy.i, numbers.motor.K)
+    taken, _ = friction.share_slopes(numbers.friction, y.w > 0.0, 1.0 if torque > 0.0 else -1.0)
+    gain = (shaft.motor_acceleration(numbers.shaft, (1.0 - taken) * more, dy.w, 0.0)
+            - shaft.output_acceleration(numbers.shaft, dy.w, 0.0, dtau + stiffness_at(numbers.load, y.q) * y.w))
+    return gain if mode.mesh == ON_FORWARD else -gain
 
 
 def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:

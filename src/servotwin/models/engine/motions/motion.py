@@ -127,7 +127,7 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
         return _closed(APART, numbers, mode, u, tau, t0, y, laws, (0.0, 0.0), step)
     if two_mass_series.linear(numbers, on, u, tau):
         return _pair(numbers, mode, u, tau, t0, y, step, limit)
-    if on & ON_HEAT and behind and not on & ~_WITH_HEAT and not not_constant(tau) and not elastic.present(
+    if heat.present(numbers.heat) and behind and not on & ~_WITH_HEAT and not not_constant(tau) and not elastic.present(
             numbers.elastic) and not (on & FADING and creeping(numbers, mode, y)):
         m = _warming(numbers, mode, u, tau, t0, y, step, limit, accuracy)
         if m.kind == WARMING:
@@ -311,7 +311,8 @@ def prepared(motion: Motion) -> Motion:
         return motion
     dense, long_dense, against = motion.dense, motion.long_dense, motion.against
     if motion.kind == WARMING:
-        long_dense = _warm_step(motion, motion.length).dense
+        found = _warm_step(motion, motion.length)
+        long_dense = found.dense
         against = _output_apart(motion.numbers, motion.mode, motion.u, motion.tau)
     elif motion.kind == STEP:
         dense = rodas.dense_coefficients(motion.stages)
