@@ -33,7 +33,6 @@ from servotwin.physics.backlash import play
 from servotwin.physics.load_friction import torque_on_gear
 
 _NEAR = 4e-16  # relative, of a current that releases the shaft
-CALLED = ("onward",)  # lanes go alone here
 
 
 class Leg(NamedTuple):
