@@ -49,7 +49,8 @@ def heat(rng: np.random.Generator) -> dict[str, float]:
              "thermal.housing_capacity": size * rng.uniform(3.0, 60.0), "thermal.winding_to_housing": ways[0],
              "thermal.housing_to_ambient": ways[1]}
     if rng.integers(2):
-        found["thermal.magnet_coefficient"] = rng.choice([-1e-3, -2e-3, 1e-3, 0.0, 2e-2 / size if size > 1.0 else -4e-3])
+        large = 2e-2 / size if size > 1.0 else -4e-3
+        found["thermal.magnet_coefficient"] = rng.choice([-1e-3, -2e-3, 1e-3, 0.0, large])
     if rng.integers(3) == 0:
         found["thermal.ambient"] = rng.uniform(220.0, 360.0)
     return found
@@ -76,7 +77,8 @@ def others(rng: np.random.Generator) -> dict[str, Any]:
     for one in may:
         found |= one if rng.integers(share) == 0 else {}
     if rng.integers(3) == 0:
-        found |= {"friction.load_friction_motor": rng.uniform(0.0, 0.3), "friction.load_friction_external": rng.uniform(0.0, 0.3)}
+        found |= {"friction.load_friction_motor": rng.uniform(0.0, 0.3),
+                  "friction.load_friction_external": rng.uniform(0.0, 0.3)}
     if rng.integers(6) == 0:
         found |= {"friction.breakaway_ratio": 1.3, "friction.stribeck_speed": 10.0 ** rng.uniform(0.0, 2.0)}
     return found
@@ -102,7 +104,8 @@ def told(rng: np.random.Generator) -> tuple[st.signals.Signal, dict[str, float]]
         return st.signals.pulse_train(list(edges), list(rng.uniform(900.0, 2000.0, len(edges)))), {}
     if kind == 1:
         at = np.arange(0.0, DURATION, frame)
-        return st.signals.samples(at, rng.uniform(0.9e-3, 2.0e-3, len(at)), unit="s"), {"electronics.frame_period": frame}
+        widths = rng.uniform(0.9e-3, 2.0e-3, len(at))
+        return st.signals.samples(at, widths, unit="s"), {"electronics.frame_period": frame}
     at = np.concatenate(([0.0], np.sort(rng.uniform(0.0, DURATION, 3))))
     widths = rng.uniform(0.9e-3, 2.0e-3, 4)
     if kind == 2 and frame > 0.003:
