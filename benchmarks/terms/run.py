@@ -11,7 +11,7 @@ from importlib import import_module
 
 import picture
 
-PARTS = ("batch", "single", "bus", "off", "digital", "shared", "stribeck")
+PARTS = ("batch", "kernels", "single", "bus", "off", "digital", "shared", "stribeck")
 
 
 def main() -> None:

@@ -23,6 +23,7 @@ _BACKLASH = {"gear.backlash": 0.01}
 _HEAT = {"thermal.winding_capacity": 2.0, "thermal.housing_capacity": 60.0, "thermal.winding_to_housing": 8.0,
          "thermal.housing_to_ambient": 10.0, "thermal.magnet_coefficient": -1.5e-3}
 _PLAY = {"potentiometer.backlash": 0.005}
+_M5 = {"friction.load_friction_motor": 0.08, "friction.load_friction_external": 0.1}
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,16 @@ TERMS = (
     Term("inductance", {}, inductive=True),
     Term("regulator", _REGULATOR),
     Term("M3", {"friction.load_friction": 0.08}),
-    Term("M5", {"friction.load_friction_motor": 0.08, "friction.load_friction_external": 0.1}),
+    Term("M5", _M5),
     Term("Stribeck", _STRIBECK),
     Term("M4", {**_STRIBECK, "friction.load_friction": 0.08, "friction.load_friction_stribeck": 0.04}),
     Term("M6", _M6),
     Term("backlash", _BACKLASH),
     Term("heat", _HEAT),
     Term("potentiometer play", _PLAY),
+    Term("inductance, M5", _M5, inductive=True),
+    Term("inductance, heat", _HEAT, inductive=True),
+    Term("backlash, heat", {**_BACKLASH, **_HEAT}),
     Term("all together", {**_REGULATOR, **_M6, **_BACKLASH, **_HEAT, **_PLAY}, inductive=True))
 
 

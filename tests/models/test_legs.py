@@ -77,4 +77,5 @@ def test_two_bodies_against_a_fine_solution(name):
 
 def go(numbers, torque, drive, start, time):
     q, w, q_m, w_m = start
-    return backlash_batch.gone(numbers, torque, drive, Vector(q, w, 0.0, 0.0, 0.0, q_m, w_m), INSIDE, q, time)
+    return backlash_batch.gone(numbers, torque, drive, Vector(q, w, 0.0, 0.0, 0.0, q_m, w_m), INSIDE, q, time,
+                               1e-12)

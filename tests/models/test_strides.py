@@ -293,7 +293,7 @@ def test_fleets_go_by_strides(name):
     model, _, loads, _, _ = fleet(name)
     numbers, nobody = model.pack(loads[0]), np.zeros(3, np.bool_)
     (kind,) = forms.kinds_with(numbers, model.chip(), 3, "float32", nobody, nobody, False)
-    assert (kind.form, kind.dtype, kind.banded) == (tiles.STRIDES, "float64", FLEETS[name][2])
+    assert (kind.form, kind.dtype, kind.wider) == (tiles.STRIDES, "float64", FLEETS[name][2])
 
 
 @pytest.mark.parametrize("accuracy", [1e-7, 1e-9])

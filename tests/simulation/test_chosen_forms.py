@@ -48,7 +48,9 @@ OF_PULSES = ("coil", "silent", "coast")
 OF_ANALOG = {
     "side_by_side_float64": "plain slack coast coast+silent",
     "by_gaps": "play play+limit play+share play+slack play+coast",
+    "by_gaps_and_heat": "play+heat",
     "by_coils": "coil coil+slack coil+coast",
+    "by_coils_and_shares": "coil+share",
     "by_strides": (
         "heat hangs held heat+slack heat+coast heat+hangs heat+held slack+hangs slack+held coast+hangs coast+held "
         "hangs+held"),

@@ -8,7 +8,6 @@ from servotwin.models.engine.motions.motion import may_depend
 from servotwin.models.terms import bridge, chip, elastic, firmware, motor, play, sensor, source
 from servotwin.models.terms.chip import Chip
 from servotwin.models.terms.dependence import (
-    BY_SHARE,
     CURVED_Q,
     CURVED_T,
     CURVED_W,
@@ -35,9 +34,10 @@ _COMES_UP: dict[str, tuple[int, ...]] = {
     "LIMITED_FORWARD": (REGULATED,), "LIMITED_BACKWARD": (REGULATED,), "SHORT_FORWARD": (REGULATED,),
     "SHORT_BACKWARD": (REGULATED,),
     "WITH_CURRENT": (ON_I,), "HELD": (ON_I,), "CREEP": (FADING,), "APART": (PLAY,), "PAIR": (SPRING,),
+    "WARMING": (ON_HEAT,),
     "SERIES": (),  # of servos on a bus, where they are looked at afterwards
     "STEP": (STEEP_W, CURVED_Q, CURVED_T, ON_I),
-    "LONG_STEP": (ON_HEAT, CURVED_W, CURVED_Q, FADING, SPRING, ON_I | ON_Q, ON_I | BY_SHARE, *(
+    "LONG_STEP": (ON_HEAT, CURVED_W, CURVED_Q, FADING, SPRING, ON_I | ON_Q, *(
         TWO_BODIES | other for other in (ON_Q, ON_I, STEEP_W, RECORDED, FOLLOWS))),
 }
 """Modes and kinds of motion that not all servos have: each comes up where something of this has to be followed."""

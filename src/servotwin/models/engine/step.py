@@ -158,7 +158,7 @@ def follow(m: Motion, point: Point, horizon: float) -> tuple[Point, int, int]:
     t = min(max(t0 + s, point.time), end)
     if integrated:
         m = motion.prepared(m)
-    y = motion.state(m, s)
+    y = motion.ended(m, s)
     wiper = wiper_at(m.numbers.sensor, point.wiper, y.q)
     after, y = guards.cross(m.numbers, m.mode, kind, piece_value(m.u, t), piece_value(m.tau, t), y)
     return Point(t, y, after, t, y, point.step, wiper), kind, status_of(y)

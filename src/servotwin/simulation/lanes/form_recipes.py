@@ -64,8 +64,11 @@ _GAPS = REGULATED | BY_SHARE | PLAY | TWO_BODIES
 SIDES = (
     (tiles.ONE_FORMULA, _BRAKED, 0), (tiles.ARCS, _ARCS, 0), (tiles.BANDS, _ANY_BRIDGE | BANDED, BANDED | SLACK),
     (tiles.STRIDES, _ANY_BRIDGE | STRIDING, STRIDING), (tiles.STRIDES, _ANY_BRIDGE | STRIDING | BANDED, STRIDING),
-    (tiles.COILS, _ANY_BRIDGE | ON_I, ON_I), (tiles.GAPS, _ANY_BRIDGE | _GAPS, PLAY))
+    (tiles.COILS, _ANY_BRIDGE | ON_I, ON_I), (tiles.COILS, _ANY_BRIDGE | ON_I | BY_SHARE, ON_I),
+    (tiles.GAPS, _ANY_BRIDGE | _GAPS, PLAY), (tiles.GAPS, _ANY_BRIDGE | _GAPS | ON_HEAT, PLAY))
 """Forms of going side by side, the fastest first: what each follows, and what of this its lanes have to ask for."""
+WIDER = {tiles.STRIDES: BANDED, tiles.COILS: BY_SHARE, tiles.GAPS: ON_HEAT}
+"""What a form follows by other kernels, where some lanes ask for it."""
 _FORMS = ("ONE_FORMULA", "ARCS", "BANDS", "STRIDES", "COILS", "GAPS")
 
 
@@ -81,8 +84,10 @@ _BY_BANDS = {creeps: _side("by_bands" + "_and_creep" * creeps, ("BANDS",),
                            _ANY_BRIDGE | (BANDED if creeps else BANDED & ~FADING)) for creeps in (False, True)}
 _BY_STRIDES = {banded: _side("by_strides" + "_in_bands" * banded, ("STRIDES",),
                              _ANY_BRIDGE | STRIDING | BANDED * banded) for banded in (False, True)}
-_BY_COILS = _side("by_coils", ("COILS",), _ANY_BRIDGE | ON_I)
-_BY_GAPS = _side("by_gaps", ("GAPS",), _ANY_BRIDGE | _GAPS)
+_BY_COILS = {shared: _side("by_coils" + "_and_shares" * shared, ("COILS",), _ANY_BRIDGE | ON_I | BY_SHARE * shared)
+             for shared in (False, True)}
+_BY_GAPS = {warms: _side("by_gaps" + "_and_heat" * warms, ("GAPS",), _ANY_BRIDGE | _GAPS | ON_HEAT * warms)
+            for warms in (False, True)}
 
 # --- Lanes one by one -------------------------------------------------------------------------------------------------
 
@@ -174,10 +179,10 @@ def parts_of(recipe: Recipe) -> tuple[tuple[Recipe, tuple[str, ...]], ...]:
     return _PARTS.get(recipe, ((recipe, ()),))
 
 
-def side_by_side(form: int, dtype: str, creeps: bool, banded: bool) -> Recipe:
-    """Return the kernels of lanes that go side by side in a form; whether some creep, or stride in bands."""
+def side_by_side(form: int, dtype: str, creeps: bool, wider: bool) -> Recipe:
+    """Return the kernels of lanes that go side by side in a form; whether some creep, or ask for what is `WIDER`."""
     if form == tiles.BANDS:
         return _BY_BANDS[creeps]
     if form == tiles.STRIDES:
-        return _BY_STRIDES[banded]
-    return _BY_COILS if form == tiles.COILS else _BY_GAPS if form == tiles.GAPS else _BY_ARCS[dtype]
+        return _BY_STRIDES[wider]
+    return _BY_COILS[wider] if form == tiles.COILS else _BY_GAPS[wider] if form == tiles.GAPS else _BY_ARCS[dtype]

@@ -93,8 +93,8 @@ def _unknown(recipe: Recipe) -> tuple[str, ...]:
 class SideBySide(NamedTuple):
     """Lanes that run side by side in one form.
 
-    Whether some have a potentiometer with play, whether some creep, and, where they go by strides, whether they have
-    what makes bands.
+    Whether some have a potentiometer with play, whether some creep, and whether some ask for what the form follows by
+    wider kernels alone.
     """
 
     which: Indices
@@ -102,12 +102,12 @@ class SideBySide(NamedTuple):
     slack: bool
     dtype: str
     creeps: bool = False
-    banded: bool = False
+    wider: bool = False
 
     @property
     def recipe(self) -> Recipe:
         """Their kernels."""
-        return recipes.side_by_side(self.form, self.dtype, self.creeps, self.banded)
+        return recipes.side_by_side(self.form, self.dtype, self.creeps, self.wider)
 
     @property
     def general(self) -> Recipe:
@@ -203,7 +203,7 @@ def _together(terms: Terms, form: int, dtype: str, which: Indices) -> SideBySide
         return bool(np.any((asked & flags) != 0))
 
     return SideBySide(which, form, some(SLACK), dtype, form == tiles.BANDS and some(FADING),
-                      form == tiles.STRIDES and some(recipes.BANDED))
+                      some(recipes.WIDER.get(form, 0)))
 
 
 def goes_together(numbers: Numbers, pulsed: bool) -> bool:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine.batch import inductive_segments, linear_segments, tiles
-from servotwin.models.engine.batch.inductive_segments import Circuit, Course
+from servotwin.models.engine.batch import inductive_segments, inductive_shares, linear_segments, tiles
+from servotwin.models.engine.batch.inductive_segments import Circuit, Course, Went
 from servotwin.models.state.modes import NO_CURRENT, sign_of
+from servotwin.models.terms.friction import shared
 from servotwin.models.terms.numbers import Numbers
 
 
@@ -14,6 +15,10 @@ def phase(size: int, slack: bool, tile: Any, plan: Any) -> None:
     """Move all lanes through a time with or without drive; `slack` where potentiometers have play."""
     for j in range(size):
         _enter(tiles.numbers_at(tile.own, j), tile, plan, j)
+    for j in range(size):
+        if plan.time[j] > 0.0 and shared(tiles.numbers_at(tile.own, j).friction):
+            _go_on_by_share(tile, plan, j)
+            plan.time[j] = 0.0
     going = 0
     for j in range(size):
         going += 1 if plan.time[j] > 0.0 else 0
@@ -43,7 +48,19 @@ def alone(tile: Any, plan: Any, j: int) -> None:
     """Move one lane through a time with or without drive."""
     _enter(tiles.numbers_at(tile.own, j), tile, plan, j)
     if plan.time[j] > 0.0:
-        _go_on(tile, plan, j)
+        if shared(tiles.numbers_at(tile.own, j).friction):
+            _go_on_by_share(tile, plan, j)
+        else:
+            _go_on(tile, plan, j)
+
+
+def seen(torque: float, drive: float, q: float, w: float, i: float, wiper: float, time: float, tile: Any,
+         j: int) -> Went:
+    """Return where a lane is so much time [s] after it has been there and so."""
+    numbers = tiles.numbers_at(tile.own, j)
+    if shared(numbers.friction):
+        return inductive_shares.through(numbers, torque, drive, q, w, i, wiper, time)
+    return inductive_segments.through(numbers, tiles.winding_at(tile.winding, j), torque, drive, q, w, i, wiper, time)
 
 
 def _enter(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
@@ -97,12 +114,24 @@ def _glide(numbers: Numbers, circuit: Circuit, tile: Any, plan: Any, j: int) -> 
 
 def _go_on(tile: Any, plan: Any, j: int) -> None:
     """Move one lane to the end of its time, leg by leg."""
-    q, w, i, wiper, done = inductive_segments.onward(
+    _put(inductive_segments.onward(
         tiles.numbers_at(tile.own, j), tiles.winding_at(tile.winding, j), tile.hung.torque[j], plan.power[j],
         tile.count.zone[j], plan.way[j], tile.servo.q[j], tile.servo.w[j], tile.servo.i[j], tile.servo.wiper[j],
-        plan.time[j])
-    tile.servo.q[j] = q
-    tile.servo.w[j] = w
-    tile.servo.i[j] = i
-    tile.servo.wiper[j] = wiper
-    plan.lost[j] = plan.lost[j] if done > 0.0 else 1.0
+        plan.time[j]), tile, plan, j)
+
+
+def _go_on_by_share(tile: Any, plan: Any, j: int) -> None:
+    """Move one lane whose friction follows the torques to the end of its time, leg by leg."""
+    servo = tile.servo
+    _put(inductive_shares.onward(
+        tiles.numbers_at(tile.own, j), tile.hung.torque[j], plan.power[j], tile.count.zone[j], plan.way[j], servo.q[j],
+        servo.w[j], servo.i[j], servo.wiper[j], plan.time[j]), tile, plan, j)
+
+
+def _put(to: Went, tile: Any, plan: Any, j: int) -> None:
+    """Put a lane where it has gone; one that gave up is for the general way."""
+    tile.servo.q[j] = to.q
+    tile.servo.w[j] = to.w
+    tile.servo.i[j] = to.i
+    tile.servo.wiper[j] = to.wiper
+    plan.lost[j] = plan.lost[j] if to.done > 0.0 else 1.0

@@ -23,7 +23,7 @@ from servotwin.models.terms.shaft import acceleration
 from servotwin.physics import motor
 from servotwin.physics.backlash import play
 
-_BELOW = -1e-13  # A, rad/s: less below zero is rounding
+BELOW = -1e-13  # A, rad/s: less below zero is rounding
 _SETTLED = 40.0  # e^-40 of a current is less than rounding
 _NEAR = 1e-7  # a step of Halley's that is so short beside the time is the last
 
@@ -110,11 +110,12 @@ class Went(NamedTuple):
 
 def winding(numbers: Numbers) -> Winding:
     """Return the circuits of a servo behind a bridge."""
-    return Winding(_circuit(numbers, numbers.source.V), _circuit(numbers, 0.0))
-
-
-def _circuit(numbers: Numbers, u: float) -> Circuit:
     mode = Mode(CONDUCTING, FORWARD, RIGID, FREE, 0)
+    return Winding(circuit_of(numbers, numbers.source.V, mode), circuit_of(numbers, 0.0, mode))
+
+
+def circuit_of(numbers: Numbers, u: float, mode: Mode) -> Circuit:
+    """Return the circuit of a mode in which the shaft slides, under a voltage behind the bridge [V]."""
     a, c, _, _, _, _, _, _, _ = speed_coefficients(numbers, mode, (u, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0), 0.0, 0.0)
     _, R = currents.loop(numbers, CONDUCTING, u)
     rate = -motor.armature_current_rate(0.0, 1.0, 0.0, R, numbers.motor.L, numbers.motor.K_b)
@@ -137,8 +138,9 @@ def entered(numbers: Numbers, torque: float, u: float, w: float, i: float) -> tu
 
 def way_from_rest(numbers: Numbers, torque: float, i: float) -> float:
     """Return which way a shaft at rest starts under a current [A] and an external torque [N m]: −1, 0, +1."""
-    backward, forward = contacts.holding_bounds(numbers, 0.0, 0.0)
-    return linear_segments.starting(forward, backward, motor.electromagnetic_torque(i, numbers.motor.K) - torque)
+    tau_m = motor.electromagnetic_torque(i, numbers.motor.K)
+    backward, forward = contacts.holding_bounds(numbers, tau_m, -torque)
+    return linear_segments.starting(forward, backward, tau_m - torque)
 
 
 def contact_of(numbers: Numbers, torque: float, w: float, i: float) -> int:
@@ -167,6 +169,11 @@ def held_current(x: Held, i: float, time: float) -> float:
     """Return the current [A] of a shaft at rest after a time; in the end it is what it tends to."""
     once, _ = fading(x.arc.rate, x.arc.per_rate, time)
     return x.final if x.arc.rate * time > _SETTLED else fma(x.arc.pull, once, i)
+
+
+def to_final(di: float, final: float, rate: float, i: float, time: float) -> float:
+    """Return the same of one that begins with the rate di [A/s]."""
+    return held_current(Held(Arc(rate, 1.0 / rate, di, 0.0, 0.0), final), i, time)
 
 
 def flow(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int, way: float, w: float,
@@ -202,7 +209,7 @@ def slid(circuit: Circuit, x: Flow, after: Course, way: float, side: float, q: f
 
 def _falls(circuit: Circuit, after: Course, dx: float, r: float, end: float) -> bool:
     """Tell whether x ≥ 0 with the rate dx may fall below zero before its `end`, where its rate has one zero at most."""
-    return end < _BELOW or (dx < 0.0 and _rate(circuit, after, dx, r) > 0.0)
+    return end < BELOW or (dx < 0.0 and _rate(circuit, after, dx, r) > 0.0)
 
 
 def _rate(circuit: Circuit, after: Course, dx: float, r: float) -> float:
@@ -263,18 +270,18 @@ def _rest(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int
 
 def _slide(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: int, way: float, q: float, w: float,
            i: float, time: float) -> Leg:
-    x, side, after = flow(numbers, circuit, torque, u, zone, way, w, i), sign_of(zone), _response(circuit, time)
+    x, side, after = flow(numbers, circuit, torque, u, zone, way, w, i), sign_of(zone), response(circuit, time)
     to = slid(circuit, x, after, way, side, q, time)
     if not to.ends and circuit.apart > 0.0:
         return Leg(to.q, to.w, to.i, 0.0, zone, way)
-    stop = _zero(circuit, after, way * x.w, way * x.dw, way * x.rw, time)
+    stop = zero(circuit, after, way * x.w, way * x.dw, way * x.rw, time)
     if stop < math.inf:
-        time, after, left = stop, _response(circuit, stop), time - stop
+        time, after, left = stop, response(circuit, stop), time - stop
     else:
         left = 0.0
-    fade = _zero(circuit, after, side * x.i, side * x.di, side * x.ri, time) if side != 0.0 else math.inf
+    fade = zero(circuit, after, side * x.i, side * x.di, side * x.ri, time) if side != 0.0 else math.inf
     if fade < math.inf:
-        to = slid(circuit, x, _response(circuit, fade), way, side, q, fade)
+        to = slid(circuit, x, response(circuit, fade), way, side, q, fade)
         zone = currents.zone_of(numbers, u, 0.0, q, to.w, 0.0)
         return Leg(to.q, to.w, 0.0, left + (time - fade), zone, way)
     if stop < math.inf:
@@ -283,7 +290,7 @@ def _slide(numbers: Numbers, circuit: Circuit, torque: float, u: float, zone: in
     return Leg(to.q, to.w, to.i, 0.0, zone, way)
 
 
-def _response(circuit: Circuit, s: float) -> Course:
+def response(circuit: Circuit, s: float) -> Course:
     """Return the responses after a time s [s] in any circuit."""
     if circuit.apart > 0.0:
         return course(circuit, s)
@@ -292,7 +299,7 @@ def _response(circuit: Circuit, s: float) -> Course:
     return Course(g, once, twice)
 
 
-def _zero(circuit: Circuit, after: Course, x: float, dx: float, r: float, until: float) -> float:
+def zero(circuit: Circuit, after: Course, x: float, dx: float, r: float, until: float) -> float:
     """Return when x ≥ 0 with the rate dx first falls below zero; inf where it does not by `until` [s].
 
     `after` is the response then. Between the zeros of its rate x is monotone; rates far apart leave one at most.
@@ -301,14 +308,14 @@ def _zero(circuit: Circuit, after: Course, x: float, dx: float, r: float, until:
         end = fma(r, after.once, fma(dx, after.g, x))
         if not _falls(circuit, after, dx, r, end):
             return math.inf
-        if x > 0.0 and end < _BELOW:
+        if x > 0.0 and end < BELOW:
             return _root(circuit, x, dx, r, 0.0, until)
     zero, spacing = second_order.first_zero_of(
         0.5 * circuit.damping, circuit.square, circuit.root, dx, r - circuit.damping * dx)
     left, right = 0.0, min(zero, until)
     for _ in range(MOST_ARCS):
         value, _ = _value(circuit, x, dx, r, right)
-        if value < _BELOW:
+        if value < BELOW:
             return _root(circuit, x, dx, r, left, right)
         if right >= until:
             return math.inf
@@ -317,7 +324,7 @@ def _zero(circuit: Circuit, after: Course, x: float, dx: float, r: float, until:
 
 
 def _value(circuit: Circuit, x: float, dx: float, r: float, s: float) -> tuple[float, float]:
-    after = _response(circuit, s)
+    after = response(circuit, s)
     return fma(r, after.once, fma(dx, after.g, x)), _rate(circuit, after, dx, r)
 
 

@@ -90,6 +90,18 @@ def band_at(numbers: Numbers, torque: float, u: float, forward: bool, zone: int,
     return Band(arc, ends_at, abs(w) < slow or (abs(w) == slow and slow > 0.0 and slows))
 
 
+def edge_speed(numbers: Numbers, torque: float, u: float, zone: int, share: int, ends_at: int) -> float:
+    """Return the speed at which a band ends so, for which the numbers of a servo may have changed since it began."""
+    if ends_at == SPEED:
+        return 0.0
+    if ends_at == SHARE:
+        still = contacts.through_gear(numbers, RIGID, _torque(numbers, zone, u, 0.0), torque, _turning(0.0))
+        return still / (still - contacts.through_gear(
+            numbers, RIGID, _torque(numbers, zone, u, 1.0), torque, _turning(1.0)))
+    low, high = currents.zone_limits(numbers, zone, u)
+    return (u - low if ends_at == ZONE_DOWN else u - high) / back_emf(1.0, numbers.motor.K_b)
+
+
 def mode_of(numbers: Numbers, forward: bool, zone: int, share: int) -> Mode:
     """Return the mode of a shaft that slides."""
     return Mode(zone, FREE if not contacts.has_friction(numbers) else FORWARD if forward else BACKWARD, RIGID, FREE,

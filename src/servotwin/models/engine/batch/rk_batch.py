@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from servotwin.models.engine.batch import rk_steps, tiles
+from servotwin.models.engine.batch import rk_steps, tiles, warm_batch, warm_segments
 from servotwin.models.engine.batch.rk_slots import (
     NOBODY,
     SLOTS,
@@ -35,6 +35,7 @@ def phase(size: int, slack: bool, tile: Any, plan: Any) -> None:
         _look(tiles.numbers_at(tile.own, j), tile, plan, j)
     for j in range(size):
         _cool(tiles.numbers_at(tile.own, j), tile, plan, j)
+    _by_legs(size, slack, tile, plan)
     waiting = 0
     for j in range(size):
         tile.count.which[waiting] = j
@@ -48,6 +49,8 @@ def alone(slack: bool, tile: Any, plan: Any, j: int) -> None:
     numbers = tiles.numbers_at(tile.own, j)
     _look(numbers, tile, plan, j)
     _cool(numbers, tile, plan, j)
+    if plan.time[j] > 0.0:
+        _alone_by_legs(numbers, warm_segments.UNKNOWN, tile, plan, j)
     if plan.time[j] > 0.0:
         tile.count.which[0] = j
         _run(1, slack, tile, plan)
@@ -87,6 +90,40 @@ def _cool(numbers: Numbers, tile: Any, plan: Any, j: int) -> None:
     tile.servo.T_w[j] = cool_w if rests else T_w
     tile.servo.T_h[j] = cool_h if rests else T_h
     plan.time[j] = 0.0 if rests else time
+
+
+def _by_legs(size: int, slack: bool, tile: Any, plan: Any) -> None:
+    """Let all lanes go through their time by legs whose legs tell it."""
+    going = 0
+    for j in range(size):
+        going += 1 if plan.time[j] > 0.0 and warm_segments.suits(tiles.numbers_at(tile.own, j)) else 0
+    if going == 0:
+        return
+    warm_batch.first_leg(size, tile, plan)
+    if slack:
+        for j in range(size):
+            tiles.drag(tile, tile.servo.q[j], j)
+    for j in range(size):
+        _look(tiles.numbers_at(tile.own, j), tile, plan, j)
+    for j in range(size):
+        _cool(tiles.numbers_at(tile.own, j), tile, plan, j)
+    for j in range(size):
+        if plan.time[j] > 0.0:
+            _alone_by_legs(tiles.numbers_at(tile.own, j), tile.count.zone[j], tile, plan, j)
+
+
+def _alone_by_legs(numbers: Numbers, zone: int, tile: Any, plan: Any, j: int) -> None:
+    """Let a lane go through its time by legs, where these tell it."""
+    if not warm_segments.suits(numbers):
+        return
+    servo = tile.servo
+    to = warm_segments.go(numbers, tile.hung.torque[j], plan.power[j] * numbers.source.V, zone, tile.count.share[j],
+                          _state(tile, j), servo.wiper[j], plan.time[j],
+                          warm_segments.tolerance_of(numbers, tile.hung.tolerance[j]))
+    if to.done > 0.0:
+        servo.q[j], servo.w[j], servo.T_w[j], servo.T_h[j] = to.state.q, to.state.w, to.state.T_w, to.state.T_h
+        servo.wiper[j] = to.wiper
+        plan.time[j] = 0.0
 
 
 def _run(waiting: int, slack: bool, tile: Any, plan: Any) -> None:

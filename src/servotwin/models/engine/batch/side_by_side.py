@@ -13,6 +13,7 @@ from servotwin.models.engine.batch import (
     backlash_batch,
     frame_phases,
     frame_windows,
+    inductive_batch,
     inductive_segments,
     linear_segments,
     piecewise_segments,
@@ -194,11 +195,12 @@ def _write_one(lane: int, o: int, j: int, form: int, slack: bool, outputs: Outpu
         i, T_w, T_h, q_m, w_m, mesh, _ = more
         done = 1.0
         if form == tiles.COILS:
-            q, w, i, wiper, done = inductive_segments.through(
-                own, tiles.winding_at(tile.winding, j), torque, drive, q, w, i, wiper, x)
+            q, w, i, wiper, done = inductive_batch.seen(torque, drive, q, w, i, wiper, x, tile, j)
             contact = inductive_segments.contact_of(own, torque, w, i)
         elif form == tiles.GAPS:
-            gone = backlash_batch.gone(own, torque, drive, Vector(q, w, 0.0, T_w, T_h, q_m, w_m), int(mesh), wiper, x)
+            gone = backlash_batch.gone(own, torque, drive, Vector(q, w, 0.0, T_w, T_h, q_m, w_m), int(mesh), wiper, x,
+                                       tile.hung.tolerance[j])
+            T_w, T_h = gone.y.T_w, gone.y.T_h
             q, w, wiper, contact = gone.y.q, gone.y.w, gone.wiper, gone.mode.contact
             q_m, w_m, mesh, done = gone.y.q_m, gone.y.w_m, float(gone.mode.mesh), gone.done
         elif form == tiles.STRIDES:

@@ -19,6 +19,7 @@ from servotwin.models.engine.batch.rk_steps import SMOOTH, STEEP
 from servotwin.models.engine.dynamics import contacts
 from servotwin.models.engine.memory import FIRST_STEP
 from servotwin.models.engine.motions.motion import FINE
+from servotwin.models.engine.motions.warm_exponential import Gone, Law
 from servotwin.models.state.modes import INSIDE, RIGID
 from servotwin.models.state.records import TILE, fill, reader, room, rows_of, tile_of, writer
 from servotwin.models.terms.chip import Chip
@@ -223,7 +224,7 @@ def tile_type(real: str, form: int) -> np.dtype[Any]:
 @cache
 def plan_type(real: str, form: int) -> np.dtype[Any]:
     """Return the type of the room that a window is worked out in, by lanes that go through phases in this form."""
-    slots = {"slots": slots_type()} if form == STRIDES else {}
+    slots = {"slots": slots_type(), "law": rows_of(Law, real), "gone": rows_of(Gone, real)} if form == STRIDES else {}
     return tile_of({"of": tile_of({**dict.fromkeys(Plan._fields, real), **slots}), "clock": rows_of(Times, np.float64)})
 
 
@@ -317,7 +318,8 @@ def set_numbers(lanes: Lanes, form: int, first: int, size: int, tile: Any, place
     for j in range(size):
         numbers = numbers_of(lanes, first + j)
         tile.hung.half_slack[place + j] = numbers.sensor.half_slack
-        part = FINE if form != STRIDES else STEEP if numbers.friction.varies > 0.0 else SMOOTH
+        rough = SMOOTH if form == GAPS or numbers.friction.varies == 0.0 else STEEP
+        part = rough if form == STRIDES or form == GAPS else FINE
         tile.hung.tolerance[place + j] = part * lanes.accuracy
         tile.hung.dry[place + j] = 1.0 if contacts.has_friction(numbers) else 0.0
     if form == BANDS:

@@ -197,7 +197,7 @@ def point_now(seat: Any, shared: Any, mates: Any, time: float) -> Point:
         u = source(seat, numbers)
         m = motion.prepared(motion.begin(numbers, p.mode, u, tau_by(seat, seat.origin), p.anchor_time, p.anchor,
                                          p.step, seat.limit - p.anchor_time, seat.accuracy))
-        y = motion.state(m, t - m.t0)
+        y = motion.ended(m, t - m.t0)
     return Point(t, y, p.mode, p.anchor_time, p.anchor, p.step, wiper_of(seat, y.q))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from servotwin.models.engine.dynamics import contacts, currents
-from servotwin.models.state.modes import CONDUCTING, FORWARD, Mode, at_rest, constant_current, in_linear_zone
+from servotwin.models.state.modes import CONDUCTING, FORWARD, INSIDE, Mode, at_rest, constant_current, in_linear_zone
 from servotwin.models.terms import follower, shaft
 from servotwin.models.terms.friction import share_slopes
 from servotwin.models.terms.load import external_torque, springy
@@ -27,9 +27,7 @@ def linear_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], tau:
     if springy(numbers.load):
         stiffness = spring_torque(1.0, numbers.load.stiffness)
         pull = spring_torque(0.0, numbers.load.stiffness, numbers.load.rest_angle)
-    of_motor = of_load = 0.0  # what friction takes of the torques through the gear
-    if mode.share != 0:
-        of_motor, of_load = share_slopes(numbers.friction, mode.contact == FORWARD, float(mode.share))
+    of_motor, of_load = _taken(numbers, mode)
     on_gear = torque_on_gear(pull + tau[0], 0.0, numbers.shaft.b_out)
     torque = -pull - contacts.friction_torque(numbers, mode.contact, w, 0.0, 0.0) - tau[0] - of_load * on_gear
     rate = -tau[1] - of_load * torque_on_gear(tau[1], 0.0, numbers.shaft.b_out)
@@ -78,9 +76,7 @@ def apart_coefficients(numbers: Numbers, mode: Mode, u: float, tau: float) -> Ap
         output_rate = -shaft.output_acceleration(own, 1.0, 0.0, 0.0)
         output_pull = contacts.output_acceleration(numbers, mode.contact, external_torque(numbers.load, tau, 0.0), 0.0)
     if not at_rest(mode.motor):
-        left = 1.0  # of the motor's torque, after what friction takes of it
-        if mode.share != 0:
-            left -= share_slopes(numbers.friction, mode.motor == FORWARD, float(mode.share))[0]
+        left = 1.0 - _taken(numbers, mode)[0]  # of the motor's torque, after what friction takes of it
         torque = motor.electromagnetic_torque(currents.current(numbers, zone, u, 0.0, 0.0), numbers.motor.K)
         drag = motor.back_emf(1.0, numbers.motor.K_b) * currents.torque_per_volt(
             numbers, currents.resistance(numbers, zone, u))
@@ -95,9 +91,10 @@ def speed_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], again
     """Return the coefficients of the speed of a motor with inductance, without feedback or spring.
 
     From L di/dt = v − R i − K_b w and J ẇ = K i − b w − τ, where `against` is (value, slope) of all constant and
-    external torque τ, and `u` as in `linear_coefficients`.
+    external torque τ, and `u` as in `linear_coefficients`. What friction takes of the torques is a part of K, b and τ.
     """
     R, L, K_b = numbers.motor.R, numbers.motor.L, numbers.motor.K_b
+    of_motor, of_load = _taken(numbers, mode)
     follows = in_linear_zone(mode.zone)
     if mode.zone >= CONDUCTING:
         v, R = currents.loop(numbers, mode.zone, u[0])
@@ -108,22 +105,62 @@ def speed_coefficients(numbers: Numbers, mode: Mode, u: tuple[float, ...], again
     rise = motor.armature_current_rate(1.0, 0.0, 0.0, R, L, K_b)
     fade = -motor.armature_current_rate(0.0, 1.0, 0.0, R, L, K_b)
     brake = -motor.armature_current_rate(0.0, 0.0, 1.0, R, L, K_b)
-    per_ampere = accelerated(numbers.shaft, motor.electromagnetic_torque(1.0, numbers.motor.K))
-    drag = accelerated(numbers.shaft, numbers.shaft.b)
-    held, held_more = accelerated(numbers.shaft, against[0]), accelerated(numbers.shaft, against[1])
-    per_volt = per_ampere * rise
-    return (0.5 * (fade + drag), fade * drag + per_ampere * brake, per_volt * v - fade * held - held_more,
+    own = numbers.shaft
+    by_ampere = per_ampere(numbers, mode)
+    drag = accelerated(own, own.b + of_load * torque_on_gear(0.0, 1.0, own.b_out))
+    held, held_more = accelerated(own, against[0]), accelerated(own, against[1])
+    per_volt = by_ampere * rise
+    return (0.5 * (fade + drag), fade * drag + by_ampere * brake, per_volt * v - fade * held - held_more,
             per_volt * gain * u[1] - fade * held_more, per_volt * gain * u[2], u[3], u[4], w,
-            acceleration(numbers.shaft, motor.electromagnetic_torque(i, numbers.motor.K), w, 0.0, against[0]))
+            acceleration(own, (1.0 - of_motor) * motor.electromagnetic_torque(i, numbers.motor.K), w,
+                         of_load * torque_on_gear(0.0, w, own.b_out), against[0]))
 
 
-def current_of(numbers: Numbers, dw: float, w: float, against: float) -> float:
+def against_of(numbers: Numbers, mode: Mode, w: float, tau: tuple[float, float]) -> tuple[float, float]:
+    """Return value and slope of all torque against a shaft that slides [N m], but for what its speed adds.
+
+    `tau` is (value, slope) of the external torque.
+    """
+    _, of_load = _taken(numbers, mode)
+    dry = contacts.friction_torque(numbers, mode.contact, w, 0.0, 0.0)
+    return (tau[0] + dry + of_load * torque_on_gear(tau[0], 0.0, numbers.shaft.b_out),
+            tau[1] + of_load * torque_on_gear(tau[1], 0.0, numbers.shaft.b_out))
+
+
+def current_of(numbers: Numbers, mode: Mode, dw: float, w: float, against: float) -> float:
     """Return the armature current [A] by which a shaft speeds up so, at a speed and against a torque [N m].
 
     The law is linear, so that the same holds of their rates of change.
     """
-    per_ampere = accelerated(numbers.shaft, motor.electromagnetic_torque(1.0, numbers.motor.K))
-    return (dw - acceleration(numbers.shaft, 0.0, w, 0.0, against)) / per_ampere
+    own = numbers.shaft
+    _, of_load = _taken(numbers, mode)
+    drag = of_load * torque_on_gear(0.0, w, own.b_out)
+    return (dw - acceleration(own, 0.0, w, drag, against)) / per_ampere(numbers, mode)
+
+
+def per_ampere(numbers: Numbers, mode: Mode) -> float:
+    """Return the acceleration of what the motor turns by an ampere [rad/s²/A], after what friction takes of it."""
+    of_motor, _ = _taken(numbers, mode)
+    torque = (1.0 - of_motor) * motor.electromagnetic_torque(1.0, numbers.motor.K)
+    if mode.mesh != INSIDE:
+        return accelerated(numbers.shaft, torque)
+    return shaft.motor_acceleration(numbers.shaft, torque, 0.0, 0.0)
+
+
+def drag(numbers: Numbers, mode: Mode) -> float:
+    """Return by how much a speed slows down what the motor turns, the motor's own torque apart [1/s]."""
+    own = numbers.shaft
+    if mode.mesh == INSIDE:
+        return -shaft.motor_acceleration(own, 0.0, 1.0, 0.0)
+    return accelerated(own, own.b + _taken(numbers, mode)[1] * torque_on_gear(0.0, 1.0, own.b_out))
+
+
+def _taken(numbers: Numbers, mode: Mode) -> tuple[float, float]:
+    """Return what friction takes of the torques of motor and load while the share keeps its sign [1]."""
+    if mode.share == 0:
+        return 0.0, 0.0
+    slides = mode.motor if mode.mesh == INSIDE else mode.contact
+    return share_slopes(numbers.friction, slides == FORWARD, float(mode.share))
 
 
 def fading_coefficients(numbers: Numbers, mode: Mode, u: float) -> tuple[float, float]:

@@ -30,7 +30,7 @@ from servotwin.models.state.modes import (
     moving,
     slides,
 )
-from servotwin.models.terms import elastic, friction, heat, play, source
+from servotwin.models.terms import elastic, friction, heat, play, shaft, source
 from servotwin.models.terms.friction import core_speed, creeping_speed, fades, smoothed, varying
 from servotwin.models.terms.load import external_torque, stiffness_at
 from servotwin.models.terms.motor import inductive
@@ -192,7 +192,8 @@ def _by_torque(numbers: Numbers, mode: Mode, kind: int, u: float, du: float, tau
         if elastic.present(numbers.elastic):
             return mode.share * spring_contact.through_gear(numbers, mode.mesh, tau_m, tau, y), _share_rate(
                 numbers, mode, u, du, dtau, y, dy)
-        return mode.share * contacts.through_gear(numbers, mode.mesh, tau_m, tau, y), math.nan
+        return (mode.share * contacts.through_gear(numbers, mode.mesh, tau_m, tau, y),
+                _share_slope(numbers, mode, dtau, y, dy))
     if elastic.present(numbers.elastic):
         return _spring_guard(numbers, mode, kind, u, du, tau, dtau, y, dy)
     if play.present(numbers.play) and kind >= MEET_FORWARD:
@@ -212,6 +213,18 @@ def _share_rate(numbers: Numbers, mode: Mode, u: float, du: float, dtau: float, 
         against = dtau + slope + stiffness_at(numbers.load, y.q) * y.w
         tau_e = torque_on_gear(against, dy.w, numbers.shaft.b_out)
     return mode.share * friction.share(numbers.friction, motor.electromagnetic_torque(di, numbers.motor.K), tau_e)
+
+
+def _share_slope(numbers: Numbers, mode: Mode, dtau: float, y: Vector, dy: Vector) -> float:
+    """Return the rate of the guard of a share where the current has inertia; nan where it has none.
+
+    There the share goes with the speed, and one way where that does.
+    """
+    if not inductive(numbers.motor):
+        return math.nan
+    against = dtau + stiffness_at(numbers.load, y.q) * y.w
+    on_gear = torque_on_gear(against, dy.w, numbers.shaft.b_out) if mode.mesh != INSIDE else 0.0
+    return mode.share * friction.share(numbers.friction, motor.electromagnetic_torque(dy.i, numbers.motor.K), on_gear)
 
 
 def share_along(numbers: Numbers, mode: Mode, u: float, tau: float, y: Vector) -> tuple[float, float]:
@@ -286,7 +299,7 @@ def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, d
     if kind == MEET_BACKWARD:
         return numbers.play.half + (y.q_m - y.q), y.w_m - y.w
     if kind == PART:
-        return contacts.pressing(numbers, mode, u, tau, y), math.nan
+        return contacts.pressing(numbers, mode, u, tau, y), _pressing_rate(numbers, mode, u, dtau, y, dy)
     if kind == MOTOR_SPEED:
         sign = 1.0 if mode.motor == FORWARD else -1.0
         return sign * y.w_m, sign * dy.w_m
@@ -301,6 +314,20 @@ def _play_guard(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, d
     if kind == MOTOR_RELEASE_FORWARD or (kind == PART_MOTOR and not pushes):
         return contacts.motor_hold(numbers, True, torque) - torque, -rate
     return contacts.motor_hold(numbers, False, torque) + torque, rate
+
+
+def _pressing_rate(numbers: Numbers, mode: Mode, u: float, dtau: float, y: Vector, dy: Vector) -> float:
+    """Return the rate of `contacts.pressing` where the current has inertia; nan where it has none.
+
+    There it goes with the speed, and one way where that does. What friction that fades adds is left out.
+    """
+    if not inductive(numbers.motor) or y.w == 0.0:
+        return math.nan
+    torque, more = currents.drive_torque(numbers, mode.zone, u, y), motor.electromagnetic_torque(dy.i, numbers.motor.K)
+    taken, _ = friction.share_slopes(numbers.friction, y.w > 0.0, 1.0 if torque > 0.0 else -1.0)
+    gain = (shaft.motor_acceleration(numbers.shaft, (1.0 - taken) * more, dy.w, 0.0)
+            - shaft.output_acceleration(numbers.shaft, dy.w, 0.0, dtau + stiffness_at(numbers.load, y.q) * y.w))
+    return gain if mode.mesh == ON_FORWARD else -gain
 
 
 def cross(numbers: Numbers, mode: Mode, kind: int, u: float, tau: float, y: Vector) -> tuple[Mode, Vector]:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from servotwin.models.engine.dynamics import contacts
 from servotwin.models.engine.dynamics.coefficients import (
+    against_of,
     apart_coefficients,
     current_of,
     fading_coefficients,
@@ -17,7 +17,16 @@ from servotwin.models.engine.dynamics.coefficients import (
     speed_coefficients,
 )
 from servotwin.models.engine.dynamics.rates import jacobian, rates_of
-from servotwin.models.engine.motions import dormand_prince, first_order, rodas, second_order, stribeck, two_mass_series
+from servotwin.models.engine.events.guards import creeping
+from servotwin.models.engine.motions import (
+    dormand_prince,
+    first_order,
+    rodas,
+    second_order,
+    stribeck,
+    two_mass_series,
+    warm_linear,
+)
 from servotwin.models.engine.motions.relative_motion import Course, both
 from servotwin.models.engine.motions.rodas import Triple, not_constant
 from servotwin.models.state.modes import (
@@ -57,9 +66,11 @@ from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 # Kinds of motion. IMPOSSIBLE: no step is short enough for the tolerance.
 (REST, FIRST_ORDER, SECOND_ORDER, WITH_CURRENT, HELD, SERIES, STEP, LONG_STEP, CREEP, APART, PAIR,
- IMPOSSIBLE) = range(12)
+ WARMING, IMPOSSIBLE) = range(13)
 
+_WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what a servo that is followed as it warms may ask for
 _TURN = 2.0 * math.pi
+_GONE = 2.0  # times that of what fades fast: most of it is over
 # Error of one implicit step, relative to 1 + |state|, and of an explicit one: parts of the accuracy asked for
 _TOLERANCE, FINE = 0.3, 1e-3
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -99,7 +110,8 @@ def nothing(numbers: Numbers, u: Piece, tau: Piece) -> Motion:
 
 def is_step(motion: Motion) -> bool:
     """Tell whether a motion is one step of an integrator, or a creep or a series, which end as one does."""
-    return motion.kind == STEP or motion.kind == LONG_STEP or motion.kind == CREEP or motion.kind == PAIR
+    return motion.kind == STEP or motion.kind == LONG_STEP or motion.kind == CREEP or motion.kind == PAIR or (
+        motion.kind == WARMING)
 
 
 def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
@@ -116,7 +128,12 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
         return _closed(APART, numbers, mode, u, tau, t0, y, laws, (0.0, 0.0), step)
     if two_mass_series.linear(numbers, on, u, tau):
         return _pair(numbers, mode, u, tau, t0, y, step, limit)
-    if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & (ON_Q | BY_SHARE)))):
+    if heat.present(numbers.heat) and behind and not on & ~_WITH_HEAT and not not_constant(tau) and not elastic.present(
+            numbers.elastic) and not (on & FADING and creeping(numbers, mode, y)):
+        m = _warming(numbers, mode, u, tau, t0, y, step, limit, accuracy)
+        if m.kind == WARMING:
+            return m
+    if on & (ON_HEAT | CURVED_W | TWO_BODIES) or (behind and (on & CURVED_Q or (on & ON_I and on & ON_Q))):
         return _long_step(numbers, mode, u, tau, t0, y, step, limit, accuracy)
     if on & FADING:
         steady = not (on & (ON_Q | ON_I | CURVED_T) or not_constant(tau))
@@ -138,7 +155,7 @@ def begin(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vect
         wave = (wave[0], u.slope, u.amplitude, u.frequency, u.phase + u.frequency * (t0 - u.start))
     torque = (tau.value + tau.slope * (t0 - tau.start), tau.slope)
     if on & ON_I and not constant_current(mode.zone):
-        against = (torque[0] + contacts.friction_torque(numbers, mode.contact, y.w, 0.0, 0.0), torque[1])
+        against = against_of(numbers, mode, y.w, torque)
         coefficients = speed_coefficients(numbers, mode, wave, against, y.w, y.i)
         return _closed(WITH_CURRENT, numbers, mode, u, tau, t0, y, coefficients, against, step)
     coefficients = linear_coefficients(numbers, mode, wave, torque, y.q, y.w)
@@ -246,6 +263,37 @@ def _creep(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vec
                   _moved(none, q, w, 0.0), step, ends_by, True, _NO_STAGES, _NO_DENSE, _NO_LONG_DENSE)
 
 
+def _warming(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float, limit: float,
+             accuracy: float) -> Motion:
+    """Return a step of a servo that warms up, or a motion that is none where its rates are not apart."""
+    law = warm_linear.law_of(numbers, mode, u.value, tau.value, y)
+    none = _closed(IMPOSSIBLE, numbers, mode, u, tau, t0, y, _NO_COEFFICIENTS, (0.0, 0.0), step)
+    if not warm_linear.suits(law):
+        return none
+    h, found = warm_linear.follow(law, numbers.heat, y, limit, FINE * accuracy)
+    if t0 + h == t0:
+        return none
+    output = _output_apart(numbers, mode, u, tau)
+    end = warm_linear.state(numbers, mode, y, output, found.dense, h, h)
+    following = min(step, 0.2 / law.fast) if law.fast > 0.0 else step
+    return Motion(WARMING, numbers, mode, u, tau, t0, y, h, _NO_COEFFICIENTS, output, end, following, -1, True,
+                  _NO_STAGES, _NO_DENSE, found.dense)
+
+
+def _output_apart(numbers: Numbers, mode: Mode, u: Piece, tau: Piece) -> tuple[float, float]:
+    """Return the law of an output that moves apart from the motor, (λ, f)."""
+    if mode.mesh != INSIDE:
+        return 0.0, 0.0
+    apart = apart_coefficients(numbers, mode, u.value, tau.value)
+    return apart.output_rate, apart.output_pull
+
+
+def _warm_step(motion: Motion, s: float) -> warm_linear.Step:
+    """Return the step of a servo that warms up, of a length s [s]."""
+    law = warm_linear.law_of(motion.numbers, motion.mode, motion.u.value, motion.tau.value, motion.start)
+    return warm_linear.step(law, motion.numbers.heat, motion.start, s)
+
+
 def _pair(numbers: Numbers, mode: Mode, u: Piece, tau: Piece, t0: float, y: Vector, step: float,
           limit: float) -> Motion:
     """Return the series of two bodies, as long as it holds."""
@@ -262,14 +310,18 @@ def prepared(motion: Motion) -> Motion:
     """Return the motion ready to be evaluated between the ends of a step."""
     if motion.has_dense or not is_step(motion):
         return motion
-    dense, long_dense = motion.dense, motion.long_dense
-    if motion.kind == STEP:
+    dense, long_dense, against = motion.dense, motion.long_dense, motion.against
+    if motion.kind == WARMING:
+        found = _warm_step(motion, motion.length)
+        long_dense = found.dense
+        against = _output_apart(motion.numbers, motion.mode, motion.u, motion.tau)
+    elif motion.kind == STEP:
         dense = rodas.dense_coefficients(motion.stages)
     elif motion.kind == LONG_STEP:
         long_dense = dormand_prince.dense(motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
                                           motion.length)
     return Motion(motion.kind, motion.numbers, motion.mode, motion.u, motion.tau, motion.t0, motion.start,
-                  motion.length, motion.coefficients, motion.against, motion.end, motion.next_step, motion.ends_by,
+                  motion.length, motion.coefficients, against, motion.end, motion.next_step, motion.ends_by,
                   True, motion.stages, dense, long_dense)
 
 
@@ -291,7 +343,7 @@ def state(motion: Motion, s: float) -> Vector:
     if kind == WITH_CURRENT:
         w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
         against = motion.against[0] + motion.against[1] * s
-        return _moved(motion, start.q + way, w, current_of(motion.numbers, dw, w, against))
+        return _moved(motion, start.q + way, w, current_of(motion.numbers, motion.mode, dw, w, against))
     if kind == HELD:
         rate, final = motion.coefficients[0], motion.coefficients[1]
         return _moved(motion, start.q, start.w, start.i + (start.i - final) * math.expm1(-rate * s))
@@ -309,6 +361,9 @@ def state(motion: Motion, s: float) -> Vector:
         return start
     if elastic.present(motion.numbers.elastic) and kind == PAIR:
         return two_mass_series.propagate(motion.long_dense, start, s)
+    if kind == WARMING:
+        return warm_linear.state(motion.numbers, motion.mode, start, (motion.against[0], motion.against[1]),
+                                 motion.long_dense, motion.length, s)
     if kind == CREEP:
         q, w = stribeck.at_time(motion.numbers, motion.mode, motion.u.value, motion.tau.value, start, motion.end,
                                 motion.coefficients[0], s)
@@ -319,6 +374,15 @@ def state(motion: Motion, s: float) -> Vector:
     if kind == LONG_STEP:
         return dormand_prince.interpolate(start, motion.long_dense, x)
     return start
+
+
+def ended(motion: Motion, s: float) -> Vector:
+    """Return the state at s after the anchor where a motion ends: what is only interpolated there is followed anew."""
+    if motion.kind != WARMING or not s > 0.0:
+        return state(motion, s)
+    found = _warm_step(motion, s)
+    return warm_linear.state(motion.numbers, motion.mode, motion.start, (motion.against[0], motion.against[1]),
+                             found.dense, s, s)
 
 
 def _moved(motion: Motion, q: float, w: float, i: float) -> Vector:
@@ -346,7 +410,7 @@ def rates(motion: Motion, s: float, y: Vector) -> Vector:
     if kind == WITH_CURRENT:
         w, dw = second_order.propagate(motion.coefficients, s)
         ddw = second_order.acceleration(motion.coefficients, s, w, dw)
-        return Vector(w, dw, current_of(numbers, ddw, dw, motion.against[1]), 0.0, 0.0, w_m, dw)
+        return Vector(w, dw, current_of(numbers, motion.mode, ddw, dw, motion.against[1]), 0.0, 0.0, w_m, dw)
     if kind == HELD:
         return Vector(0.0, 0.0, motion.coefficients[0] * (motion.coefficients[1] - y.i), 0.0, 0.0, 0.0, 0.0)
     if is_step(motion):
@@ -361,8 +425,9 @@ def state_and_rates(motion: Motion, s: float) -> tuple[Vector, Vector]:
         numbers, against = motion.numbers, motion.against
         w, dw, way = second_order.propagate_with_integral(motion.coefficients, s)
         ddw = second_order.acceleration(motion.coefficients, s, w, dw)
-        y = _moved(motion, motion.start.q + way, w, current_of(numbers, dw, w, against[0] + against[1] * s))
-        return y, Vector(w, dw, current_of(numbers, ddw, dw, against[1]), 0.0, 0.0, y.w_m, dw)
+        i = current_of(numbers, motion.mode, dw, w, against[0] + against[1] * s)
+        y = _moved(motion, motion.start.q + way, w, i)
+        return y, Vector(w, dw, current_of(numbers, motion.mode, ddw, dw, against[1]), 0.0, 0.0, y.w_m, dw)
     y = state(motion, s)
     return y, rates(motion, s, y)
 
@@ -409,6 +474,9 @@ def _frequency(piece: Piece, t0: float, t1: float) -> float:
 def monotone_until(motion: Motion, s: float, s1: float) -> float:
     """Return the end of an interval from s on, at most s1, in which the speed is monotone and inputs are simple."""
     kind = motion.kind
+    if kind == WARMING and motion.mode.mesh == INSIDE:  # the distance of two bodies turns more often
+        fast = motion.long_dense[5].w
+        return _GONE / fast if fast * s < _GONE < fast * s1 else s1
     if kind == HELD or is_step(motion) or s1 - s <= 0.0:
         return s1
     if kind == REST or periodic(motion.u, motion.tau):
