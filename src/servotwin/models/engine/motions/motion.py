@@ -70,6 +70,7 @@ from servotwin.physics.pieces import Piece, piece_rate, piece_value
 
 _WITH_HEAT = ON_HEAT | ON_I | BY_SHARE | TWO_BODIES | FADING  # what a servo that is followed as it warms may ask for
 _TURN = 2.0 * math.pi
+_GONE = 2.0  # times that of what fades fast: most of it is over
 # Error of one implicit step, relative to 1 + |state|, and of an explicit one: parts of the accuracy asked for
 _TOLERANCE, FINE = 0.3, 1e-3
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -473,6 +474,9 @@ def _frequency(piece: Piece, t0: float, t1: float) -> float:
 def monotone_until(motion: Motion, s: float, s1: float) -> float:
     """Return the end of an interval from s on, at most s1, in which the speed is monotone and inputs are simple."""
     kind = motion.kind
+    if kind == WARMING and motion.mode.mesh == INSIDE:  # the distance of two bodies turns more often
+        fast = motion.long_dense[5].w
+        return _GONE / fast if fast * s < _GONE < fast * s1 else s1
     if kind == HELD or is_step(motion) or s1 - s <= 0.0:
         return s1
     if kind == REST or periodic(motion.u, motion.tau):

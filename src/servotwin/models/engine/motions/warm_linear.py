@@ -96,6 +96,16 @@ class Law(NamedTuple):
     rough: Rough
 
 
+class Faded(NamedTuple):
+    """How far both parts have faded after a time: ∫ e^(−rate t) dt and its integral, slow, twice as fast, and fast."""
+
+    once: float
+    twice: float
+    double_twice: float
+    soon: float  # 0 of what does not move
+    soon_twice: float
+
+
 class Step(NamedTuple):
     """The error of a step relative to 1 + |state|, and what says how it goes."""
 
@@ -196,54 +206,65 @@ def fading(law: Law) -> float:
     return law.F + law.c_f / (law.fast * law.fast * (1.0 - law.of_i * law.of_w))
 
 
-def own_heat(slow: float, fast: float, F: float, P: float, i: float, s: float) -> tuple[float, float]:
+def faded(slow: float, fast: float, s: float) -> Faded:
+    """Return how far both parts have faded after s [s]."""
+    per = 1.0 / slow if slow > 0.0 else 0.0
+    once, twice = decay(slow, per, s)
+    _, double_twice = decay(2.0 * slow, 0.5 * per, s)
+    soon = soon_twice = 0.0
+    if fast > 0.0:
+        soon, soon_twice = decay(fast, 1.0 / fast, s)
+    return Faded(once, twice, double_twice, soon, soon_twice)
+
+
+def own_heat(slow: float, fast: float, F: float, P: float, i: float, x: Faded, s: float) -> tuple[float, float]:
     """Return by how much the square of the current changes in s [s] as it goes by itself, and its integral [A², A² s].
 
     Of the current i a part F fades fast, the rest begins with the rate P [A/s].
     """
-    once, twice = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
     start = i - F
-    now, so_far = P * once * (2.0 * start + P * once), 2.0 * start * P * twice
+    now, so_far = P * x.once * (2.0 * start + P * x.once), 2.0 * start * P * x.twice
     if slow * s < _STRAIGHT:
         so_far += P * P * s * s * s * (1.0 / 3.0 - 0.25 * slow * s)
     else:
-        _, soon_twice = decay(2.0 * slow, 0.5 / slow, s)
-        so_far += 2.0 * P * P * (twice - soon_twice) / slow
+        so_far += 2.0 * P * P * (x.twice - x.double_twice) / slow
     if fast == 0.0:
         return now, so_far
-    soon, _ = decay(fast, 1.0 / fast, s)
-    E_s, E_f = 1.0 - slow * once, 1.0 - fast * soon
-    together = (slow * once + E_s * (fast * soon)) / (slow + fast)
-    return (now + F * E_f * (2.0 * (start + P * once) + F * E_f),
-            so_far + 2.0 * F * (start * soon + P * (together - E_f * once) / fast) + 0.5 * F * F * soon * (1.0 + E_f))
+    E_s, E_f = 1.0 - slow * x.once, 1.0 - fast * x.soon
+    together = (slow * x.once + E_s * (fast * x.soon)) / (slow + fast)
+    return (now + F * E_f * (2.0 * (start + P * x.once) + F * E_f),
+            so_far + 2.0 * F * (start * x.soon + P * (together - E_f * x.once) / fast) + 0.5 * F * F * x.soon * (
+                1.0 + E_f))
 
 
 def straight(slow: float, fast: float, apart: float, dw: float, rw: float, di: float, ri: float, w: float, i: float,
-             s: float) -> tuple[float, float, float]:
+             x: Faded, s: float) -> tuple[float, float, float]:
     """Return way, speed and current after s [s] at the temperatures of the start, by the numbers of a `Law`."""
-    once, twice = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
     if fast == 0.0:
-        return w * s + dw * twice, w + dw * once, i
-    soon, soon_twice = decay(fast, 1.0 / fast, s)
+        return w * s + dw * x.twice, w + dw * x.once, i
     if apart == 0.0:
-        return 0.0, 0.0, i + di * soon
-    g, both, both_twice = (fast * soon - slow * once) * apart, (once - soon) * apart, (twice - soon_twice) * apart
+        return 0.0, 0.0, i + di * x.soon
+    g, both, both_twice = ((fast * x.soon - slow * x.once) * apart, (x.once - x.soon) * apart,
+                           (x.twice - x.soon_twice) * apart)
     return w * s + dw * both + rw * both_twice, w + dw * g + rw * both, i + di * g + ri * both
 
 
 def ramp(slow: float, fast: float, c_s: float, c_f: float, c_ff: float, of_i: float, of_w: float, rough: Rough,
-         s: float) -> tuple[float, float]:
+         x: Faded, s: float) -> tuple[float, float]:
     """Return what steady warming and a current that fades add to speed and current in s [s], by a `Law`'s numbers."""
     if fast == 0.0:
         return 0.0, 0.0
-    once, z = decay(slow, 1.0 / slow if slow > 0.0 else 0.0, s)
-    soon, f = decay(fast, 1.0 / fast, s)
-    E_s, e, gap, per = 1.0 - slow * once, 1.0 - fast * soon, fast - slow, 1.0 / (1.0 - of_i * of_w)
-    f = c_f * f + c_ff * (s * s - 2.0 * f) / fast + s * e * (rough.by_1 + 0.5 * s * rough.by_t) + soon * (
+    e, per = 1.0 - fast * x.soon, 1.0 / (1.0 - of_i * of_w)
+    f = c_f * x.soon_twice + c_ff * (s * s - 2.0 * x.soon_twice) / fast + s * e * (
+        rough.by_1 + 0.5 * s * rough.by_t) + x.soon * (
         rough.by_0 + e * (rough.by_2 + 0.5 * (1.0 + e) * rough.by_3))
-    z = c_s * z + of_i * (
-        rough.by_0 * once + rough.by_1 * (E_s - e) / gap + rough.by_2 * (E_s - e * e) / (gap + fast)
-        + rough.by_3 * (E_s - e * e * e) / (gap + 2.0 * fast) + rough.by_t * (E_s - e * (1.0 + gap * s)) / (gap * gap))
+    z = c_s * x.twice
+    if of_i != 0.0:
+        E_s, gap = 1.0 - slow * x.once, fast - slow
+        z += of_i * (
+            rough.by_0 * x.once + rough.by_1 * (E_s - e) / gap + rough.by_2 * (E_s - e * e) / (gap + fast)
+            + rough.by_3 * (E_s - e * e * e) / (gap + 2.0 * fast)
+            + rough.by_t * (E_s - e * (1.0 + gap * s)) / (gap * gap))
     return (z - of_i * f) * per, (f - of_w * z) * per
 
 
@@ -269,15 +290,15 @@ def step(law: Law, own: Heat, y: Vector, h: float) -> Step:
     solver = [0.0] * _ALL
     F, rough = fading(law), law.rough
     for k in range(POINTS):
-        _, w, i = straight(law.slow, law.fast, law.apart, law.dw, law.rw, law.di, law.ri, y.w_m, y.i,
-                           NODES[k] * h)
-        more_w, more_i = ramp(law.slow, law.fast, law.c_s, law.c_f, law.c_ff, law.of_i, law.of_w, rough, NODES[k] * h)
+        t = NODES[k] * h
+        x = faded(law.slow, law.fast, t)
+        _, w, i = straight(law.slow, law.fast, law.apart, law.dw, law.rw, law.di, law.ri, y.w_m, y.i, x, t)
+        more_w, more_i = ramp(law.slow, law.fast, law.c_s, law.c_f, law.c_ff, law.of_i, law.of_w, rough, x, t)
         at[k], at[POINTS + k], at[_TWO + k] = w + more_w, i + more_i, more_w
-        e = math.exp(-law.fast * NODES[k] * h)
-        at[_TWO + POINTS + k] = rough.by_0 + e * (
-            rough.by_1 + rough.by_t * NODES[k] * h + e * (rough.by_2 + e * rough.by_3))
-        fall[k] = math.exp(-law.slow * NODES[k] * h)
-        now, so_far = own_heat(law.slow, law.fast, F, law.P, law.i, NODES[k] * h)
+        e = 1.0 - law.fast * x.soon
+        at[_TWO + POINTS + k] = rough.by_0 + e * (rough.by_1 + rough.by_t * t + e * (rough.by_2 + e * rough.by_3))
+        fall[k] = 1.0 - law.slow * x.once
+        now, so_far = own_heat(law.slow, law.fast, F, law.P, law.i, x, t)
         soon[k], soon[POINTS + k] = law.copper / own.C_w * now, law.copper / own.C_w * so_far
     if law.fast > 0.0:
         _factor(solver, law.fast * h)
@@ -409,8 +430,9 @@ def state(numbers: Numbers, mode: Mode, y: Vector, output: tuple[float, float], 
     """Return the state after s [s] of a step of a length h [s]; `output` is the law of one that moves apart."""
     d0, d1, d2, d3, d4 = dense[0], dense[1], dense[2], dense[3], dense[4]
     of, by, rough = dense[5], dense[6], Rough(d0.w_m, d1.q_m, d1.w_m, d2.q_m, d2.w_m)
-    way, w, i = straight(of.q, of.w, of.i, of.T_w, of.T_h, of.q_m, of.w_m, y.w_m, y.i, s)
-    more_w, more_i = ramp(of.q, of.w, by.w, by.i, d0.q_m, by.T_w, by.T_h, rough, s)
+    fades = faded(of.q, of.w, s)
+    way, w, i = straight(of.q, of.w, of.i, of.T_w, of.T_h, of.q_m, of.w_m, y.w_m, y.i, fades, s)
+    more_w, more_i = ramp(of.q, of.w, by.w, by.i, d0.q_m, by.T_w, by.T_h, rough, fades, s)
     w, i = w + more_w, i + more_i
     x = s / h
     b0, b1, b2, b3, b4 = x - NODES[0], x - NODES[1], x - NODES[2], x - NODES[3], x - NODES[4]
@@ -420,7 +442,7 @@ def state(numbers: Numbers, mode: Mode, y: Vector, output: tuple[float, float], 
     way += p0 * d0.q + p1 * d1.q + p2 * d2.q + p3 * d3.q + p4 * d4.q
     w += p0 * d0.w + p1 * d1.w + p2 * d2.w + p3 * d3.w + p4 * d4.w
     i += p0 * d0.i + p1 * d1.i + p2 * d2.i + p3 * d3.i + p4 * d4.i
-    _, heat = own_heat(of.q, of.w, by.q_m, by.w_m, d3.q_m, s)
+    _, heat = own_heat(of.q, of.w, by.q_m, by.w_m, d3.q_m, fades, s)
     T_w = y.T_w + by.q * heat + (p0 * d0.T_w + p1 * d1.T_w + p2 * d2.T_w + p3 * d3.T_w + p4 * d4.T_w)
     T_h = y.T_h + (p0 * d0.T_h + p1 * d1.T_h + p2 * d2.T_h + p3 * d3.T_h + p4 * d4.T_h)
     if mode.mesh == INSIDE:
