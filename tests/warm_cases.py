@@ -124,6 +124,7 @@ def case(seed: int, lanes: int = 4) -> Case:
             changes["motor.armature_inductance"] = 10.0 ** rng.uniform(-4.5, -2.5)
         if warms and not coiled and rng.integers(2):
             changes = {name: x for name, x in changes.items() if not name.startswith("friction.stri")}
+        changes = {name: x if isinstance(x, str) else float(x) for name, x in changes.items()}
         load = hung(rng)
         try:
             servo = st.servo_from_values("drawn", GIVEN).replace(changes)
@@ -136,5 +137,5 @@ def case(seed: int, lanes: int = 4) -> Case:
         "friction.coulomb_torque_forward": 9e-4 * rng.uniform(0.3, 1.5, lanes),
         "electronics.stretcher_gain": 80.0 * rng.uniform(0.5, 1.5, lanes),
         "load.inertia": rng.uniform(0.0, 5e-3, lanes), "load.torque": rng.uniform(-0.25, 0.25, lanes)}
-    initial = {"output_angle": rng.uniform(0.5, 0.7), "output_speed": rng.choice([0.0, 0.0, -3.0, 4.0])}
+    initial = {"output_angle": rng.uniform(0.5, 0.7), "output_speed": float(rng.choice([0.0, 0.0, -3.0, 4.0]))}
     return Case(model, command, load, initial, parameters, str(changes | {"load": load}))
